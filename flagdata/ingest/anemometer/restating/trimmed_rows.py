@@ -54,10 +54,18 @@ def _sign(lines: Sequence[str]) -> str | None:
         shorter = [row for row in rows if len(row) < len(names)]
         ends = sum(bool(row[-1]) for row in shorter)
         lengths = {len(row) for row in rows} | {len(names)}
-        several = len(lengths) >= _LENGTHS and min(lengths) > 1
+        several = len(lengths) >= _LENGTHS and min(lengths) > 1 and not _wrapped([len(row) for row in rows], len(names))
         if several and len(shorter) > (1 - _WHOLE) * len(rows) and ends >= _SHARE * len(shorter):
             return sign
     return None
+
+
+def _wrapped(lengths: Sequence[int], whole: int) -> bool:
+    """Whether rows of a certain length were cut into lines, as many for each."""
+    for lines in range(2, len(lengths) // 2 + 1):
+        if sum(lengths[:lines]) == whole and all(a == b for a, b in zip(lengths, lengths[lines:], strict=False)):
+            return True
+    return False
 
 
 def _names(cell: str) -> bool:

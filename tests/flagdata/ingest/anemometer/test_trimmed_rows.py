@@ -38,6 +38,7 @@ def test_shorter_rows_are_read_by_the_names_above(read: Read) -> None:
         [NAMES, *(f"{row},," for row in rows())],  # rows do not end in a value
         ["43337.5,5.1,1,2,3,4,5,6,7,8", *rows()],  # no names
         [NAMES, *(f"{row},1,2,3,4,5,6,7,8,9" for row in rows())],  # beyond the names
+        [NAMES, *(["0,43337.5,5.1,111.5,14.4,1", "2,3,4,5"] * 8)],  # each row cut into two lines
     ],
 )
 def test_other_tables_are_left_as_they_are(lines: list[str]) -> None:
