@@ -218,9 +218,12 @@ def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]
     from flagdata.ingest.store import IngestResult, ingest_wind, ingest_winds
 
     found = anemometers(source, options.wind.wind)
-    if not found:
-        return (ingest_wind(lake, source, options.wind, labels=options.labels, branch=options.branch),)
     stem = options.labels.name or source.name.removesuffix(".gz").rpartition(".")[0] or source.name
+    if not found:
+        one, labels = options.wind.wind.wind, options.labels
+        if one is not None and len(anemometers(source, replace(options.wind.wind, wind=None))) > 1:
+            labels = replace(labels, name=f"{stem}:{one}")
+        return (ingest_wind(lake, source, options.wind, labels=labels, branch=options.branch),)
     each = [
         (
             replace(options.wind, wind=replace(options.wind.wind, wind=label)),

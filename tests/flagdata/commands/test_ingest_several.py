@@ -44,6 +44,14 @@ def test_each_anemometer_of_a_table_becomes_an_artifact(run: Run, lake: Lake, tm
     assert out.count("already in the lake") == 2
 
 
+def test_one_anemometer_of_several_keeps_its_label(run: Run, lake: Lake, tmp_path: Path) -> None:
+    path = tmp_path / "mast.csv"
+    path.write_text("\n".join(["time,Spd80m (m/s),Spd40m (m/s)", *ROWS]) + "\n")
+    for wind in ("Spd80m (m/s)", "Spd40m (m/s)"):
+        assert run(path, "--wind", wind)[0] == 0
+    assert sorted(row["name"] for row in lake.rows().to_pylist()) == ["mast:Spd40m (m/s)", "mast:Spd80m (m/s)"]
+
+
 def test_a_unit_that_is_missing_is_asked_for_and_taken(run: Run, lake: Lake, tmp_path: Path) -> None:
     path = tmp_path / "wind.csv"
     path.write_text("\n".join(["time,wind,temp", *ROWS]) + "\n")
@@ -99,3 +107,16 @@ def test_of_many_stations_in_one_table_a_few_are_described_and_all_are_named(run
     code, out, _ = run("--sniff", path, "--json")
     reasons = json.loads(out)["sources"][0]["guesses"][0]["reasons"]
     assert sum(reason.startswith("anemometer 'S") for reason in reasons) == 12
+
+
+def test_ls_shows_the_mean_wind_of_a_log(
+    run: Run, lake: Lake, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mast.csv"
+    rows = [f"2026-05-13T12:00:{k:02d}Z,{4 + k % 3}" for k in range(30)]
+    path.write_text("\n".join(["time,wind speed (m/s)", *rows]) + "\n")
+    assert run(path)[0] == 0
+    with pytest.raises(SystemExit):
+        main(["ls", "--lake", str(lake.path)])
+    (row,) = capsys.readouterr().out.splitlines()[1:]
+    assert row.split()[2:5] == ["mast", "2026-05-13T12:00:00Z", "5.00"]
