@@ -131,7 +131,9 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
     why = ", ".join(f"{count} {flag.name.lower().replace('_', ' ')}" for flag, count in counts if count and flag.name)
     what = f"not one value of the wind in {len(reading.time)} rows can be used{f' ({why})' if why else ''}"
     if not others:
-        fix = "check the sensor and the recipe's columns; if calm air reads below zero, give --zero-offset"
+        fix = "check the sensor, and which columns are read"
+        below = any((values < 0).any() for name, values in reading.channels.items() if name in quality.SPEEDS)
+        fix += "; if calm air reads below zero, give --zero-offset" if below else ""
         doubt = next((finding for finding in reading.findings if finding.kind == "unit-doubtful"), None)
         if doubt is not None:
             what, fix = f"{what}; {doubt.what}", doubt.fix or fix

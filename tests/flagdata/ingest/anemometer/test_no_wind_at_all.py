@@ -187,3 +187,11 @@ def test_the_only_column_of_numbers_is_offered_by_its_name(
     assert f"--wind {name} --unit m/s" in (caught.value.fix or "")
     series = read_log(path, WindOptions(wind=name, unit="m/s")).series
     assert series.channels["wind_speed"].tolist() == [3.5 + at % 5 for at in range(20)]
+
+
+@pytest.mark.parametrize(("cell", "offered"), [("", False), ("-0.4", True)])
+def test_an_offset_is_offered_only_where_speeds_are_below_zero(log_file: Write, cell: str, offered: bool) -> None:
+    rows = "".join(f"2026-05-01T12:{at:02d}:00Z,{cell}\n" for at in range(20))
+    with pytest.raises(FlagdataError) as caught:
+        read_log(log_file(f"time,wind_speed (m/s)\n{rows}"), WindOptions(recipe=None, columns="time,wind_speed[m/s]"))
+    assert ("--zero-offset" in (caught.value.fix or "")) is offered
