@@ -351,7 +351,7 @@ def _unit_doubt(
         what = f"column {layout.names[column]!r} is what an anemometer counts or gives, not yet a speed"
         fix = "say what one of it is in m/s, from the anemometer's data sheet: "
         return Doubt(what=what, fix=fix + offered_columns.calibrated(layout, time, column))
-    value = numbers(layout.column(column), decimal=layout.decimal).value
+    value = numbers(layout.column(column), decimal=layout.decimal, missing=missing_codes.of(layout, wind)).value
     if missing[0] == "wind_speed" and (unlike := cumulated.unlike_speed(value)):
         what = f"column {layout.names[column]!r} may be no speed, and its unit is not stated: {unlike}"
         fix = "name the column of the speed: --wind COLUMN; if it is a speed all the same, give its unit: --unit m/s"

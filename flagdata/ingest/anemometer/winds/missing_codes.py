@@ -59,7 +59,7 @@ def _numbers(layout: Layout, wind: Wind | None) -> list[float]:
             codes = [code for code in codes if code < -180]
         if channel.endswith("direction") and not _near_a_thousand(layout, wind):
             codes.extend(code for code in NO_ANGLE if code in known)
-        for code in (99.0, 99.9, 99.99, 999.0, 999.9, 999.99, 9999.0, 99999.0):
+        for code in (99.0, 99.9, 99.99, 999.0, 999.9, 999.99, 9999.0, 9999.9, 99999.0, 999999.0):
             others = known[known != code]
             if channel == "wind_speed" and code in known and len(others) and 2 * others.max() < code:
                 codes.append(code)

@@ -41,6 +41,9 @@ _ABOVE = re.compile(
 )
 _PERIOD = re.compile(r"(avg|average|mean)([\W_]*\(\s*\d+\s*)m(?=\s*\))", re.IGNORECASE)
 """Minutes behind a mean, as "WS_Avg(5m)", which are no height."""
+_WIND_VECTOR = re.compile(r"(?:WS|WD|Wind|Anem\w*)(?P<name>.*?)_WVc\((?P<n>[123])\)", re.IGNORECASE)
+_VECTOR = {"1": "wind speed", "2": "wind direction", "3": "wind direction Std"}
+"""What Campbell's instruction WindVector writes under one name: mean speed, mean direction, its standard deviation."""
 _INTERVAL = re.compile(r"\b\d+ ?-?(?:min|mins|minutes|minute|sec|hr|hour|h)\b", re.IGNORECASE)
 _ZONE = re.compile(r"\b(?:UTC|GMT)\s*([+-]\s?\d{1,2}(?::?\d{2})?)?|(?<![A-Za-z])Z(?![A-Za-z])")
 
@@ -160,6 +163,9 @@ def understand(name: str, stated: str = "") -> Heading:
     tenfold = _TENFOLD.search(text)
     text = text if tenfold is None else f"{text[: tenfold.start()]} {text[tenfold.end() :]}"
     text = re.sub(r"_(S|U|D1|SD1|D1U|DU)_WVT$", lambda found: "_Std" if found[1] == "SD1" else "_Avg", text)
+    vector = _WIND_VECTOR.fullmatch(text)
+    if vector is not None:
+        text, stated = f"{_VECTOR[vector['n']]} {vector['name']}", stated if vector["n"] == "1" else "deg"
     north = _NORTH_BEHIND.search(text) if re.search(r"dir|bearing|wd", text, re.IGNORECASE) else None
     text = text if north is None else text[: north.start()]
     rest, unit = _unit(text, stated)

@@ -234,3 +234,23 @@ def test_a_speed_is_no_difference_with_a_column_that_was_never_filled(log_file: 
     path = log_file(_table("time,craft wind speed [m/s],wind speed [m/s],radial wind speed [m/s]", rows))
     notes = " ".join(finding.what for finding in read_log(path, WindOptions(wind="wind speed [m/s]")).findings)
     assert " less " not in notes
+
+
+def test_the_three_results_of_a_wind_vector_are_a_speed_a_direction_and_its_spread(log_file: Write) -> None:
+    """Campbell's WindVector writes them under one name, and the unit of the speed below all three."""
+    head = (
+        '"TOA5","x"\n"TIMESTAMP","WS_CUP_1_WVc(1)","WS_CUP_1_WVc(2)","WS_CUP_1_WVc(3)"\n"TS","m s-1","m s-1","m s-1"\n'
+    )
+    rows = "".join(f'"2026-05-01 12:{at:02d}:00",{3 + at % 4}.5,{200 + at}.1,{6 + at % 3}.35\n' for at in range(12))
+    path = log_file(f'{head}"","WVc","WVc","WVc"\n{rows}')
+    assert anemometers(path, WindOptions(format="delimited")) == ()  # one
+    channels = read_log(path, WindOptions(format="delimited", zone="UTC")).series.channels
+    np.testing.assert_allclose(channels["wind_speed"], 3.5 + np.arange(12) % 4)
+    np.testing.assert_allclose(np.degrees(channels["wind_direction"]), 200.1 + np.arange(12))
+
+
+def test_codes_of_no_value_do_not_tell_a_unit(log_file: Write) -> None:
+    rows = [f"2026-05-01T{at:02d}:00:00Z,{'999999' if at % 2 else f'{8 + at % 7}.5'}" for at in range(24)]
+    with pytest.raises(InputError) as raised:
+        read_log(log_file(_table("time,wind speed", rows)), WindOptions())
+    assert "extreme wind" not in raised.value.what
