@@ -21,7 +21,7 @@ from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recognition import recognise
 from flagdata.ingest.anemometer.restating import bulletins, spelled_stamps, untimed
 from flagdata.ingest.anemometer.restating.restate import restate
-from flagdata.ingest.anemometer.samples import future, platform, possible, quality, zero
+from flagdata.ingest.anemometer.samples import calm_zeros, future, platform, possible, quality, zero
 from flagdata.ingest.anemometer.samples.order import in_order
 from flagdata.ingest.anemometer.sniff import unknown
 from flagdata.ingest.anemometer.sniffing import SURE
@@ -91,7 +91,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     zero.check(reading, options.zero_offset, where=str(path))
     choice = options.zero_offset if options.zero_offset is not None else reading.rules.zero_offset
     ordered = in_order(reading, where=str(path), choice=options.clock, source=source)
-    reading = zero.settle(possible.impossible(ordered), choice)
+    reading = calm_zeros.without(zero.settle(possible.impossible(ordered), choice))
     for check in (
         quality.faults,
         quality.negative,

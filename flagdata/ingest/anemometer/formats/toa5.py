@@ -45,7 +45,7 @@ _NAMES: tuple[tuple[str, str], ...] = (
     (r"u_?z(_.*)?|w_?\d?m?|csat_?w", "wind_z"),
     (r"ws(_ms)?(_\d+m?)?(_avg|_s_wvt)?|wind_?sp(ee)?d(_ms)?(_avg|_s_wvt)?|w(i)?ndspd.*", "wind_speed"),
     (r"(wd|wind_?dir(ection)?)(_deg)?(_\d+m?)?(_d1_wvt|_smp)?", "wind_direction"),
-    (r"t_?sonic|t_?s|fw_?ts", "sonic_temperature"),
+    (r"t_?sonic(_\d+)?|t_?s(_\d+)?|fw_?ts", "sonic_temperature"),
     (r"air_?t(c|f)?(_avg)?|air_?temp.*|t_?air.*|t_hmp(_avg)?", "air_temperature"),
     (r"rh(_avg)?|rh_hmp(_avg)?", "relative_humidity"),
     (r"press(ure)?(_avg)?|bp(_mbar|_kpa)?(_avg)?|amb_press(_avg)?", "air_pressure"),

@@ -42,6 +42,7 @@ WS = ("WS_ms_Avg", "meters/second", "Avg")
         ("Wind_Speed", "kph", "wind_speed", 36, 10),
         ("WindDir_D1_WVT", "Deg", "wind_direction", 180, np.pi),
         ("WindDir", "degrees", "wind_direction", 90, np.pi / 2),
+        ("Ts_1", "C", "sonic_temperature", 20, 293.15),
         ("AirTC_Avg", "Deg C", "air_temperature", 20, 293.15),
         ("AirTF", "Deg F", "air_temperature", 50, 283.15),
         ("RH", "%", "relative_humidity", 55, 0.55),
