@@ -15,6 +15,7 @@ VALIDATIONS = {
     "flags": "tests.validation.flags",
     "flow-ablation": "tests.validation.flow_ablation",
     "flutter": "tests.validation.flutter",
+    "forecast-floor": "tests.validation.forecast_floor",
     "foreign": "tests.validation.foreign",
     "gate": "tests.validation.gate",
     "hanging-cloth": "tests.validation.hanging_cloth",
