@@ -234,14 +234,14 @@ def _in_unit_of_all(
     whole: Any, table: list[dict[str, str]], names: dict[str, None]
 ) -> tuple[list[dict[str, str]], dict[str, None]]:
     """The rows and columns with the units that the whole object states, one for all speeds or one for each name."""
-    of_each = next((own for key in ("unit", "units") if isinstance(own := _member(whole, key), dict)), None)
+    stated = [whole.get(key) for key in ("unit", "units")] if isinstance(whole, dict) else []
+    of_each = next((own for own in stated if isinstance(own, dict)), None)
     if of_each is not None:
         named = {name: of_each.get(name.rpartition(".")[2]) for name in names}
         return _renamed(table, names, {
             name: f"{name} [{unit}]" for name, unit in named.items()
             if isinstance(unit, str) and spelled(unit) is not None and understand(name).unit is None
         })  # fmt: skip
-    stated = [whole.get(key) for key in ("unit", "units")] if isinstance(whole, dict) else []
     known = next((unit for text in stated if isinstance(text, str) and (unit := spelled(text)) is not None), None)
     if known is None:
         return table, names
@@ -251,10 +251,6 @@ def _in_unit_of_all(
         if heading.quantity.endswith("wind_speed") and heading.unit is None and fits("wind_speed", known)
     }  # fmt: skip
     return _renamed(table, names, renamed)
-
-
-def _member(whole: Any, key: str) -> Any:
-    return whole.get(key) if isinstance(whole, dict) else None
 
 
 def _renamed(

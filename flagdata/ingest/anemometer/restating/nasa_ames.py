@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 
 from flagdata.findings import Finding, Severity
@@ -107,7 +107,7 @@ def as_table(source: TextFile) -> TableText | None:
         return stated
     text = f"{flagged} rows have a numflag other than 0, which may say that they are invalid: all are read"
     found = Finding(kind="flags-not-heeded", severity=Severity.WARNING, count=flagged, what=text)
-    return TableText.of(source, stated.text, [*stated.findings[len(source.findings) :], found])
+    return replace(stated, findings=(*stated.findings, found))
 
 
 def _row(header: _Header, cells: Sequence[str]) -> list[str] | None:

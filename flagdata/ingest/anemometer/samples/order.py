@@ -197,10 +197,8 @@ def _risen(reading: Reading, lag: NDArray[np.int64], few: int, where: str, *, se
         backwards = np.flatnonzero(np.diff(time) < 0) + 1
         at = int(backwards[np.argmax(lag[backwards])])
         sort = "if all stamps are right and only the rows are out of order: --clock sort"
-        whose = (
-            "if one log's clock was set anew, say whose stamps are right: --clock first (before it) or --clock last "
-        )
-        ways = [f"or, {whose}(after it)"] if settable else []
+        whose = "--clock first (before it) or --clock last (after it)"
+        ways = [f"or, if one log's clock was set anew, say whose stamps are right: {whose}"] if settable else []
         why = "the logger's clock was set back, or files were joined"
         if len(backwards) > _JOINED:
             ways = [sort, *ways, "if rows of several stations are mixed, name the column that tells them apart as site"]

@@ -85,14 +85,11 @@ class Delimited:
             raise UsageError(
                 "no table in its first lines", where=where, fix="describe it by a recipe: --recipe FILE.toml"
             )
-        if proposal.doubts:
-            what = "; ".join(doubt.what for doubt in proposal.doubts)
-            open_needs = [need.fix for need in proposal.needs if need.without(options)]
-            raise InputError(what, where=where, fix="; ".join([*(doubt.fix for doubt in proposal.doubts), *open_needs]))
         unsaid = [need for need in proposal.needs if need.without(options)]
-        if any(need.option == "platform" for need in unsaid):
-            what = next(need.what for need in unsaid if need.option == "platform")
-            raise InputError(what, where=where, fix="; ".join(need.fix for need in unsaid))
+        afloat = [need for need in unsaid if need.option == "platform"]
+        if proposal.doubts or afloat:
+            what = "; ".join(one.what for one in proposal.doubts or afloat)
+            raise InputError(what, where=where, fix="; ".join(one.fix for one in (*proposal.doubts, *unsaid)))
         winds = proposal.winds if options.wind is None else site_labels.of_column(proposal.winds, options.wind)
         if len(winds) > 1:
             raise InputError(
@@ -104,7 +101,7 @@ class Delimited:
             turned = replace(options, azimuth=_WEST) if proposal.of_earth and options.azimuth is None else options
             reading = _read(source, recipe, turned, where)
         except TimeError as error:
-            rest = [n.fix for n in proposal.needs if n.without(options) and f"--{n.option}" not in error.fix]
+            rest = [need.fix for need in unsaid if f"--{need.option}" not in error.fix]
             same = [need.fix for need in proposal.needs if f"--{need.option}" in error.fix]
             more = (fix for fix in same if "(line " in fix or fix.startswith(f"{error.fix}; columns"))
             told = next(more, error.fix)

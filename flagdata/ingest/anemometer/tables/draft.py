@@ -128,12 +128,13 @@ def draft(
     layout = lay_out(lines, interest=interest)
     if layout is None:
         return None
-    layout, named = with_letters(layout), False
+    layout = with_letters(layout)
+    by_user: Wind | None = None
     unit = None if unit is None else canonical(unit)
     if columns is not None:
         known = stated_columns.stated(layout, columns, unit=unit, order=order, where=where)
-        time, winds, remarks = known.time, (known.wind,), ()
-        warnings, afloat = stated_against.warnings(layout, known.wind), stated_against.afloat(layout, known.wind)
+        by_user = known.wind
+        time, winds, remarks, warnings = known.time, (by_user,), (), ()
         of_time = time.columns if time is not None else ()
         mixed = None if known.site is None else (known.site, tuple(sorted(set(layout.column(known.site)) - {""})))
     else:
@@ -143,18 +144,18 @@ def draft(
         if time is not None:
             mixed = sites(layout, time=of_time, stamps=stamps_of(layout, of_time))
         winds, remarks, warnings = find_winds(layout, time=of_time, told=unit)
-        afloat = ""
         for part in () if wind is None else site_labels.parts(wind, mixed[1] if mixed is not None else ()):
             if part in {one.label for one in winds}:
                 break
             said, odd = named_wind(layout, part, time=of_time, told=unit)
-            winds, warnings, named = (*winds, *said), (*warnings, *odd), bool(said)
+            winds, warnings = (*winds, *said), (*warnings, *odd)
             if said:
-                warnings = (*warnings, *stated_against.warnings(layout, said[0]))
-                afloat = stated_against.afloat(layout, said[0])
+                by_user = said[0]
                 break
         if time is None and not winds:
             return None
+    named = columns is None and by_user is not None
+    warnings = warnings if by_user is None else (*warnings, *stated_against.warnings(layout, by_user))
     parts: tuple[str, ...] = ("",)
     layout = replace(layout, site=devices_by if mixed is None else mixed[0])
     if mixed is not None:
@@ -207,11 +208,12 @@ def draft(
         remarks = (*remarks, *unread_winds.remark(layout, time, chosen, winds, remarks))
     remarks = (*remarks, *unread_rest.remark(layout, time, winds, (*layout.strange, *remarks, *warnings)))
     toml = recipe_of(layout, time, chosen)
-    needs = needs_of(lines, layout, time) + (over_ground(layout, chosen) if columns is None and not named else ())
+    needs = (*needs_of(lines, layout, time), *(over_ground(layout, chosen) if by_user is None else ()))
     return Draft(
         toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
         warnings=warnings,
-        doubts=tuple(doubts), needs=needs, afloat=afloat,
+        doubts=tuple(doubts), needs=needs,
+        afloat="" if by_user is None else stated_against.afloat(layout, by_user),
         unsure=tuple(one.label for one in winds if not one.sure),
         winds=labels, parts=parts, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
         of_earth=chosen is not None and chosen.of_earth, stretches=bool(anew),

@@ -301,6 +301,7 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
     timed = time is not None
     steady, own = None if timed else _steady(layout), own_motion.columns(layout)
     stamped, apart = _stamped(layout), series.members(layout.names, layout.units)
+    headed = any(bow.heading_of(layout, at).channel == "wind_direction" for at in range(len(layout.names)))
     if not timed and (serial := _serial(layout)) is not None:
         found[0], timed = f"time[{serial}]", True
     elif steady is not None:
@@ -336,11 +337,7 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             found[at] = f"{heading.channel}[{guessed or _guessed(heading.channel)}]"
         elif heading.quantity:
             continue
-        elif (
-            may_be_direction(layout, at)
-            and not any("wind_direction" in entry for entry in found.values())
-            and not any(bow.heading_of(layout, other).channel == "wind_direction" for other in range(len(layout.names)))
-        ):
+        elif not headed and may_be_direction(layout, at) and not any("wind_direction" in e for e in found.values()):
             channel = "apparent_wind_direction" if bow.to_bow(layout, at) else "wind_direction"
             channel = TOWARDS if channel == "wind_direction" and _blows_to(layout, at) else channel
             found[at] = channel if compass_unit(layout, at) else f"{channel}[deg]"

@@ -84,6 +84,8 @@ def _of_its_rows(layout: Layout, speed: int, winds: Sequence[Wind]) -> Wind:
         return np.isfinite(numbers(layout.column(column), decimal=layout.decimal).value)
 
     own = known(speed)
+    if bool(known(next(iter(winds[0].columns.values())).index)[own].all()):
+        return winds[0]  # as in most tables, of which some have hundreds of winds
     return max(winds, key=lambda wind: int((own & known(next(iter(wind.columns.values())).index)).sum()))
 
 

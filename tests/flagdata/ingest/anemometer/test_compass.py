@@ -82,3 +82,29 @@ def test_degrees_of_the_wind_are_its_direction(log_file: Write, heading: str) ->
 @pytest.mark.parametrize("unit", list(compass.BY_UNIT))
 def test_every_table_of_points_has_sixteen_directions(unit: str) -> None:
     assert sorted(set(compass.BY_UNIT[unit].values())) == [22.5 * at for at in range(16)]
+
+
+def test_sixteenths_are_an_eighth_of_pi_each(log_file: Write) -> None:
+    rows = "".join(f"2026-05-01T12:00:{at:02d}Z,3.5,{at}\n" for at in range(16))
+    path = log_file(f"time,Wind speed (m/s),Wind direction\n{rows}")
+    assert any("sixteenths" in finding.what for finding in read_log(path).findings)
+    line = "time,wind_speed[m/s],wind_direction[sixteenths]"
+    log = read_log(path, WindOptions(columns=line))
+    np.testing.assert_allclose(np.rad2deg(log.series.channels["wind_direction"]), 22.5 * np.arange(16))
+    assert any("counted clockwise from north, the first of which is 0" in finding.what for finding in log.findings)
+
+
+def test_numbers_up_to_16_are_no_sixteen_sectors_counted_from_0(log_file: Write) -> None:
+    rows = "".join(f"2026-05-01T12:00:{at:02d}Z,3.5,{at}\n" for at in range(17))
+    log = read_log(log_file(f"time,Wind speed (m/s),Wind direction\n{rows}"))
+    assert "wind_direction" not in log.series.channels
+    assert not any("[sixteenths]" in finding.what for finding in log.findings)
+
+
+@pytest.mark.parametrize(("constant", "doubted"), [("4", True), ("30", True), ("0", False), ("270", False)])
+def test_a_small_direction_that_never_changes_is_doubted(log_file: Write, constant: str, doubted: bool) -> None:
+    """A vane that counts sixteenths may stand still for as long as a file lasts; 0 is the north in all units."""
+    rows = "".join(f"2026-05-01T12:00:{at:02d}Z,3.5,{constant}\n" for at in range(16))
+    log = read_log(log_file(f"time,Wind speed (m/s),Wind direction\n{rows}"))
+    assert np.rad2deg(log.series.channels["wind_direction"][0]) == pytest.approx(float(constant))
+    assert any("sixteenth of the compass" in finding.what for finding in log.findings) is doubted

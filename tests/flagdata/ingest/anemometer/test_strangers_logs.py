@@ -476,29 +476,3 @@ def test_numbers_of_columns_above_their_names_are_no_row(log_file: Write) -> Non
 @pytest.mark.parametrize(("text", "form"), [("202603141000", "%Y%m%d%H%M%S"), ("2026314", "%Y%m%d")])
 def test_digits_with_nothing_between_are_not_cut_elsewhere(text: str, form: str) -> None:
     assert not parse([text], form).valid[0]
-
-
-def test_sixteenths_are_an_eighth_of_pi_each(log_file: Write) -> None:
-    rows = "".join(f"2026-05-01T12:00:{at:02d}Z,3.5,{at}\n" for at in range(16))
-    path = log_file(f"time,Wind speed (m/s),Wind direction\n{rows}")
-    assert any("sixteenths" in finding.what for finding in read_log(path).findings)
-    line = "time,wind_speed[m/s],wind_direction[sixteenths]"
-    log = read_log(path, WindOptions(columns=line))
-    np.testing.assert_allclose(np.rad2deg(log.series.channels["wind_direction"]), 22.5 * np.arange(16))
-    assert any("counted clockwise from north, the first of which is 0" in finding.what for finding in log.findings)
-
-
-def test_numbers_up_to_16_are_no_sixteen_sectors_counted_from_0(log_file: Write) -> None:
-    rows = "".join(f"2026-05-01T12:00:{at:02d}Z,3.5,{at}\n" for at in range(17))
-    log = read_log(log_file(f"time,Wind speed (m/s),Wind direction\n{rows}"))
-    assert "wind_direction" not in log.series.channels
-    assert not any("[sixteenths]" in finding.what for finding in log.findings)
-
-
-@pytest.mark.parametrize(("constant", "doubted"), [("4", True), ("30", True), ("0", False), ("270", False)])
-def test_a_small_direction_that_never_changes_is_doubted(log_file: Write, constant: str, doubted: bool) -> None:
-    """A vane that counts sixteenths may stand still for as long as a file lasts; 0 is the north in all units."""
-    rows = "".join(f"2026-05-01T12:00:{at:02d}Z,3.5,{constant}\n" for at in range(16))
-    log = read_log(log_file(f"time,Wind speed (m/s),Wind direction\n{rows}"))
-    assert np.rad2deg(log.series.channels["wind_direction"][0]) == pytest.approx(float(constant))
-    assert any("sixteenth of the compass" in finding.what for finding in log.findings) is doubted
