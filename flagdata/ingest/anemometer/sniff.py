@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import datetime as dt
-import re
 from dataclasses import replace
 from pathlib import Path
 
 from flagdata.errors import FlagdataError, NotFoundError
+from flagdata.ingest.anemometer import foreign
 from flagdata.ingest.anemometer.documents import excel
 from flagdata.ingest.anemometer.documents.opening import first_bytes, open_text, signature
 from flagdata.ingest.anemometer.options import Limits
@@ -22,8 +22,6 @@ from flagdata.ingest.anemometer.text.signs import SIGNS
 from flagdata.ingest.anemometer.text.source import TextFile
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
-_METAR = re.compile(r"\b(\d{3}|VRB)\d{2,3}(G\d{2,3})?(KT|MPS)\b")
-_SYNOP = re.compile(r"\b(?:AAXX|BBXX|OOXX)\s")
 _MESHES = {".obj", ".ply", ".stl", ".off"}
 
 
@@ -66,10 +64,9 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
         source = restate(opened)
     except FlagdataError as error:
         return (Guess(format="unknown", score=0.0, reasons=(error.what,), kind="other", fix=error.fix),)
-    if source.head(1) == ["FORMAT-1"]:
-        text = "profiles of a SODAR, in blocks whose stamp stands above them (Scintec, APRun, FORMAT-1)"
-        fix = "write a table of one height with the program that reads them: one row a time, with speed and direction"
-        return (Guess(format="SODAR profiles", score=0.0, reasons=(text,), kind="other", fix=fix),)
+    surely = foreign.surely(source.head())
+    if surely is not None:
+        return (surely,)
     rewritten = tuple(finding.what for finding in source.findings)
     found = tuple(replace(guess, notes=(*rewritten, *guess.notes)) for guess in recognise(source))
     return found or (unknown(source),)
@@ -85,20 +82,9 @@ def _asking(dated: TextFile, need: str) -> tuple[Guess, ...]:
 
 def unknown(source: TextFile) -> Guess:
     """What a text is that no format knows, and what its user can do."""
-    start = next((line for line in source.head() if line.strip()), "")
-    if start.lstrip("\ufeff \t").startswith(("<?xml", "<gpx", "<html", "<!DOCTYPE")):
-        text = "this is XML or HTML, not a table of text"
-        fix = "convert it to CSV with one row a reading: its time and its wind (GPX: with the program that wrote it)"
-        return Guess(format="XML", score=0.0, reasons=(text,), kind="other", fix=fix)
-    if sum(bool(_METAR.search(line)) for line in source.head()) > len(source.head()) / 3:
-        text = "METAR reports, which hold the wind as a code of three digits of direction and two of speed"
-        fix = "their month is not told: put the date and time of each report [UTC] before it, as archives do "
-        fix += '("202601271850 METAR EFHK 271850Z 08006KT …"), or decode them to a table with one row a report'
-        return Guess(format="METAR", score=0.0, reasons=(text,), kind="other", fix=fix)
-    if any(_SYNOP.search(line) for line in source.head()):
-        text = "SYNOP reports (WMO-No. 306), of ships, or of land stations without a day, a wind or its unit (iw)"
-        fix = "decode them to a table with one row a report: its time, station, speed and direction, each with its unit"
-        return Guess(format="SYNOP", score=0.0, reasons=(text,), kind="other", fix=fix)
+    other = foreign.told(source.head())
+    if other is not None:
+        return other
     table = skeleton(source.head(HEAD_LINES))
     if table is not None:
         what, offered, recipe = table

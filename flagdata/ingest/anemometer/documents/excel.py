@@ -57,7 +57,7 @@ def open_sheet(path: Path, *, limits: Limits) -> TableText:
     if size > limits.size:
         raise LimitError(
             f"the workbook unpacks to {size} bytes, more than {limits.size}", where=where,
-            fix="save the sheet as CSV, or give read_log wider limits",
+            fix="save the sheet as CSV",
         )  # fmt: skip
     try:
         openpyxl = importlib.import_module("openpyxl")
@@ -106,9 +106,7 @@ def _lines(sheet: Any, limits: Limits, where: str) -> list[str]:
     lines: list[str] = []
     for row in sheet.iter_rows(values_only=True):
         if len(lines) >= limits.rows:
-            raise LimitError(
-                f"more than {limits.rows} rows", where=where, fix="split the sheet, or give read_log wider limits"
-            )
+            raise LimitError(f"more than {limits.rows} rows", where=where, fix="split the sheet")
         if len(row) > _WIDEST:
             raise LimitError(f"more than {_WIDEST} columns", where=where, fix="save the columns needed as CSV")
         out = io.StringIO()

@@ -1,6 +1,6 @@
 """The file under a log, opened: refused when it is no text or too large, its encoding settled.
 
-A workbook and JSON are opened as the table that they hold.
+Workbooks, databases, JSON, XML, pages and files of columns are opened as the table that they hold.
 """
 
 from __future__ import annotations
@@ -14,11 +14,13 @@ import numpy as np
 
 from flagdata.errors import InputError, LimitError, NotFoundError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.documents import excel, json_text
+from flagdata.ingest.anemometer.documents import excel, html_text, json_text, parquet, sqlite, xml_text
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.text.source import GZIP, TextFile, opened
 
 _CHUNK = 1 << 20
+_DOCUMENTS = (json_text, xml_text, html_text)
+"""Text that is read as a whole, and made a table."""
 HEAD = 65_536
 """Bytes looked at to tell what a file is."""
 
@@ -42,8 +44,6 @@ _SIGNATURES: tuple[tuple[int, bytes, str, str], ...] = (
     (0, b"\x00\x00\x01\xba", "a video (MPEG)", "ingest it as a camera file"),
     (0, b"\x89HDF", "an HDF5 or netCDF-4 file", "export the readings as CSV"),
     (0, b"CDF\x01", "a netCDF file", "export the readings as CSV"),
-    (0, b"PAR1", "a Parquet file", "export the readings as CSV"),
-    (0, b"SQLite format 3", "an SQLite database", "export the readings as CSV"),
     (0, b"\x89MCAP", "an MCAP record", "it is a record already"),
     (0, b"TOB1", "a Campbell TOB1 binary table", "convert it to TOA5 with LoggerNet's CardConvert"),
     (0, b'"TOB', "a Campbell binary table", "convert it to TOA5 with LoggerNet's CardConvert"),
@@ -111,10 +111,14 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
         raise LimitError(
             f"the file has {size} bytes, more than {limits.size}",
             where=where,
-            fix="split it, or give read_log wider limits",
+            fix="split it",
         )
     if excel.is_workbook(path, head):
         return excel.open_sheet(path, limits=limits)
+    if head.startswith(sqlite.MAGIC):
+        return sqlite.open_database(path, limits=limits)
+    if parquet.is_columnar(head):
+        return parquet.open_columnar(path, head, limits=limits)
     other = signature(head)
     if other:
         raise InputError(f"this is {other[0]}, not a text log", where=where, fix=other[1])
@@ -133,8 +137,10 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
             "the gzip file is damaged or incomplete", where=where, fix="copy it again, or save what is left: gunzip"
         ) from None
     text = TextFile(path=path, encoding=codec, lines=lines, findings=(*problem, *findings))
-    table = json_text.as_table(text) if json_text.matches(text.head()) else None
-    return table or text
+    for kind in _DOCUMENTS:
+        if kind.matches(text.head()):
+            return kind.as_table(text) or text
+    return text
 
 
 def _looks_utf16(head: bytes) -> bool:
@@ -175,7 +181,7 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
             while chunk := stream.read(_CHUNK):
                 size += len(chunk)
                 if size > limits.size:
-                    fix = "split it, or give read_log wider limits"
+                    fix = "split it"
                     raise LimitError(f"the file unpacks to more than {limits.size} bytes", where=where, fix=fix)
                 decoder.decode(chunk)
                 done += chunk.count(b"\n")
@@ -217,6 +223,12 @@ def _by_words(path: Path) -> str | None:
     return None
 
 
+def _is_document(chunk: bytes) -> bool:
+    """Whether a file may have long lines by its beginning: JSON, XML, HTML, and dumps of databases."""
+    start = chunk.lstrip(codecs.BOM_UTF8 + b" \r\n\t")
+    return start[:1] in (b"{", b"[", b"<") or b"INSERT INTO" in chunk
+
+
 def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Finding, ...]]:
     """Line ends of each kind, NUL bytes and the longest line, within the limits.
 
@@ -225,11 +237,11 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
     where = str(path)
     unix = windows = mac = nul = lines = tail = before = 0
     last = b""
-    size, json = 0, False
+    size, document = 0, False
     with opened(path) as stream:
         while chunk := stream.read(_CHUNK):
             nul += chunk.count(0)
-            json = json if size else chunk.lstrip(codecs.BOM_UTF8 + b" \r\n\t")[:1] in (b"{", b"[")
+            document = document if size else _is_document(chunk)
             size += len(chunk)
             pairs = chunk.count(b"\r\n") + (last == b"\r" and chunk[:1] == b"\n")
             feeds, returns = chunk.count(b"\n"), chunk.count(b"\r")
@@ -240,15 +252,13 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
             spans = np.diff(np.concatenate(([-1 - tail], ends, [len(data)])))
             tail = int(spans[-1]) - 1
             if lines > limits.rows:
-                raise LimitError(
-                    f"more than {limits.rows} lines", where=where, fix="split the file, or give read_log wider limits"
-                )
-            if int(spans.max()) > limits.line:
+                raise LimitError(f"more than {limits.rows} lines", where=where, fix="split the file")
+            longest = limits.document if document else limits.line
+            if int(spans.max()) > longest:
                 at = int(np.append(ends, len(data))[int(np.argmax(spans))])
                 number = before + max(chunk.count(b"\n", 0, at), chunk.count(b"\r", 0, at)) + 1
-                fix = "check that this is the log, or give read_log wider limits"
-                fix = f"if it is JSON, put it in lines: python -m json.tool FILE NEWFILE; {fix}" if json else fix
-                raise LimitError(f"a line longer than {limits.line} bytes", where=f"{where}, line {number}", fix=fix)
+                fix = "split it" if document else "check that this is the log"
+                raise LimitError(f"a line longer than {longest} bytes", where=f"{where}, line {number}", fix=fix)
             before = lines
             last = chunk[-1:]
     found: list[Finding] = []

@@ -1,6 +1,9 @@
-"""Abbreviations of time zones, of those that mean one offset; CST, IST, BST and the like mean several."""
+"""Abbreviations of time zones: those that mean one offset, and those that mean several."""
 
 from __future__ import annotations
+
+import re
+from collections.abc import Sequence
 
 ABBREVIATED = {
     "WEST": 1, "CET": 1, "CEST": 2, "MEZ": 1, "MESZ": 2, "EET": 2, "EEST": 3, "MSK": 3, "JST": 9, "KST": 9, "AEST": 10,
@@ -8,3 +11,26 @@ ABBREVIATED = {
     "PST": -8, "PDT": -7, "AKST": -9, "AKDT": -8, "HST": -10, "BRT": -3,
 }  # fmt: skip
 """Hours east of UTC (tz database)."""
+SEVERAL = {
+    "MST": (("-07:00", "Mountain Standard Time of North America"), ("+08:00", "Malaysia")),
+    "CST": (("-06:00", "Central Standard Time of North America"), ("+08:00", "China"), ("-05:00", "Cuba")),
+    "AST": (("-04:00", "Atlantic Standard Time"), ("+03:00", "Arabia")),
+    "IST": (("+05:30", "India"), ("+01:00", "Irish summer time"), ("+02:00", "Israel")),
+    "BST": (("+01:00", "British summer time"), ("+06:00", "Bangladesh")),
+    "GST": (("+04:00", "the Gulf"), ("-02:00", "South Georgia")),
+}
+"""What abbreviations may mean, as `--zone` takes it, the likeliest first."""
+_IN_HEADING = re.compile(rf"(?:^|[^A-Za-z])({'|'.join(SEVERAL)})(?![A-Za-z])")
+_STAMP = re.compile(r"\d[-/.]\d{1,2}[-/.]\d|\d:\d\d")
+
+
+def advice(lines: Sequence[str]) -> str:
+    """What an abbreviation of several meanings above the first stamp may say of the zone; "" where there is none."""
+    for number, line in enumerate(lines, start=1):
+        if _STAMP.search(line):
+            return ""
+        found = _IN_HEADING.search(line)
+        if found is not None:
+            means = ", ".join(f"--zone {name} if it is {place}" for name, place in SEVERAL[found[1]])
+            return f"line {number} says {found[1]!r}, which has several meanings: {means}"
+    return ""

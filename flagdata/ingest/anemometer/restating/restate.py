@@ -19,10 +19,12 @@ from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 
 WITHIN = (
+    "flagdata.ingest.anemometer.restating.percent_encoded",
     "flagdata.ingest.anemometer.restating.clock_words",
     "flagdata.ingest.anemometer.restating.twice_told",
 )
 KINDS = (
+    "flagdata.ingest.anemometer.restating.sql_dump",
     "flagdata.ingest.anemometer.restating.expedition",
     "flagdata.ingest.anemometer.restating.metar",
     "flagdata.ingest.anemometer.restating.synop",

@@ -1,8 +1,4 @@
-"""Rows in brackets, as programs print tuples and lists and databases write inserts, without what is around them.
-
-('2026-05-01 12:00:01', 3.2, 231)
-INSERT INTO wind VALUES ('2026-05-01 12:00:01', 3.2, 231);
-"""
+"""Rows in brackets, as programs print tuples and lists, without them: ('2026-05-01 12:00:01', 3.2, 231)."""
 
 from __future__ import annotations
 
@@ -11,11 +7,7 @@ from collections.abc import Sequence
 
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 
-_LINE = re.compile(
-    r"\s*(?:INSERT\s[^(]*\([^()]*\)\s*VALUES\s*|INSERT\s[^(]*|[\[(]?)"
-    r"[(\[](?P<cells>[^()\[\]{}]*,[^()\[\]{}]*)[)\]]\s*[,;]?\s*\]?",
-    re.IGNORECASE,
-)
+_LINE = re.compile(r"\s*[\[(]?[(\[](?P<cells>[^()\[\]{}]*,[^()\[\]{}]*)[)\]]\s*[,;]?\s*\]?")
 _QUOTE = re.compile(r"'([^',]*)'")
 _SHARE = 0.8
 _LEAST = 3

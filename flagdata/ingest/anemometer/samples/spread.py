@@ -1,6 +1,6 @@
 """Rows that share a stamp, given instants of their own by the rate at which they came.
 
-Three causes, told apart by the stamps themselves:
+Five causes, told apart by the stamps themselves:
 
 - The stamps are coarse or held: nearly every stamp stands for several rows. It may be written to the second only, or
   come from a clock that is read less often than the sensor (a GPS fix once a minute). The sensor's own period is the
@@ -15,6 +15,7 @@ Three causes, told apart by the stamps themselves:
 - Rows come when something happens, and their stamps are coarse: stamps lie unevenly, or stand for more or fewer rows
   than the time to the next one explains, and no period tells when a row came. Rows are spread within the resolution of
   their own stamp.
+- Rows of one stamp of a slow log hold the same readings: they are one reading, said again. The first is kept.
 - Few rows of a slow, even logger share a stamp and there is no room: two rows claim one instant. The first is kept.
 
 All rows that are moved, and those of coarse or held stamps altogether, are flagged TIME_UNSURE.
@@ -45,6 +46,11 @@ _EVEN = 0.9
 """Share of the stamps whose rows must fit a period for the rows to have come evenly."""
 
 
+_PAIRS, _TIMES, _ALIKE, _SHARED = 5, 3, 0.95, 0.5
+"""Rows that repeat a stamp, and rows of one, from and up to which they may be one reading said again; the shares of
+them that hold the same readings, and at most of the rows of stamps that follow each other."""
+_SLOW = 60 * NANOSECONDS
+"""Time between stamps of a slow log, whose readings change from one to the next [ns]."""
 _APART = (
     "log a stamp with every row; if the rows of one stamp are of several stations, name the column that tells them "
     "apart as site in --columns"
@@ -76,10 +82,40 @@ def distinct(reading: Reading) -> Reading:
         return reading
     if _irregular(reading):
         return _without_rest(_within(reading))
+    if _said_twice(reading, again):
+        return _once(reading, again)
     shared = again | np.concatenate((again[1:], [False]))
     if float(shared.mean()) < 0.5:
         return _few(reading, again)
     return _without_rest(_spread(reading, again))
+
+
+def _said_twice(reading: Reading, again: NDArray[np.bool_]) -> bool:
+    """Whether rows of one stamp of a slow log hold the same readings, as those of stamps that follow do not.
+
+    They are one reading, written again when another cell of its row was filled or corrected.
+    """
+    runs = _Runs.of(reading.time)
+    if len(runs.room) < _PAIRS or int(again.sum()) < _PAIRS or int(runs.rows.max()) > _TIMES:
+        return False
+    if int(np.median(runs.room)) < _SLOW:
+        return False
+    same = np.ones(len(again) - 1, dtype=bool)
+    for values in reading.channels.values():
+        same &= (values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))
+    return float(same[again[1:]].mean()) >= _ALIKE and float(same[~again[1:]].mean()) <= _SHARED
+
+
+def _once(reading: Reading, again: NDArray[np.bool_]) -> Reading:
+    """The first row of each stamp."""
+    finding = Finding(
+        kind="readings-repeated", severity=Severity.WARNING, count=int(again.sum()),
+        where=f"line {reading.line[again][0]}",
+        what=f"{int(again.sum())} rows hold the stamp and the readings of the row before them, and differ only in "
+        "cells that are not read: taken as the same readings, and left out",
+        fix=_APART,
+    )  # fmt: skip
+    return reading.take(~again).with_findings((finding,))
 
 
 def _irregular(reading: Reading) -> bool:

@@ -22,6 +22,8 @@ BAND = 0.05
 """Widest spread of an idle reading within a stretch [m/s], or four steps of its resolution if that is more."""
 LARGEST = 1.0
 """An idle reading beyond this is no zero offset but steady wind [m/s]."""
+_BELOW = 0.1
+"""Readings below an idle one, over those that are idle, beyond which it is no calm air's."""
 LEAST_JUMP = 0.1
 """A smaller step out of idling is no dead zone [m/s]."""
 
@@ -82,6 +84,8 @@ def estimate(time: NDArray[np.int64], speed: NDArray[np.float64]) -> Zero | None
     if same.sum() * WINDOW < SHORTEST:
         return None
     idle = np.isfinite(speed) & (np.abs(speed - offset) <= band)
+    if (speed < offset - band).sum() > _BELOW * idle.sum():
+        return None  # a speed that often falls below it blows there
     leaves = np.flatnonzero(idle[:-1] & ~idle[1:] & np.isfinite(speed[1:]))
     jump = float(np.median(speed[leaves + 1] - offset)) if len(leaves) else float("nan")
     return Zero(

@@ -11,6 +11,7 @@ stamps, the column may number the samples of a stamp as well, so that is a warni
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import SeveralDevicesError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.instants.abbreviations import ABBREVIATED, SEVERAL
 from flagdata.ingest.anemometer.instants.clock import JITTER
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
@@ -41,11 +43,15 @@ _SAMPLE = 100_000
 """Rows, evenly over the file, by which its devices are told."""
 _AT_ONCE = 0.5
 """Share of the rows that lie in the time of another device."""
+_INSIDE = 0.9
+"""Share of the shorter of two devices' rows that lie in the time of the longer."""
 _SHARED = 0.5
 """Share of the rows that share a stamp."""
 _TURNS, _STRICT = 10, 0.95
 """Turns that names take, row by row, and the share of the rows that keep to them."""
 _NAMED = 3
+_MEASURED = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
+"""A number with a fraction, which names no device."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,7 +170,8 @@ def _coded(time: Instants, cells: Mapping[int, Sequence[str]]) -> _Rows:
     names: dict[int, tuple[str, ...]] = {}
     for at, column in cells.items():
         kinds = sorted(set(column))
-        if 2 <= len(kinds) <= min(_MOST, len(column) // _NAMED) and "" not in kinds:
+        measured = all(_MEASURED.fullmatch(kind) for kind in kinds)
+        if 2 <= len(kinds) <= min(_MOST, len(column) // _NAMED) and "" not in kinds and not measured:
             number = {kind: index for index, kind in enumerate(kinds)}
             code[at] = np.array([number[cell] for cell in column], dtype=np.int64)
             names[at] = tuple(kinds)
@@ -187,7 +194,23 @@ def _each_rises(rows: _Rows, at: int) -> bool:
     for device in range(len(rows.names[at])):
         own = time[code == device]
         within |= (code != device) & (time >= own.min()) & (time <= own.max())
-    return float(within.mean()) >= _AT_ONCE
+    return float(within.mean()) >= _AT_ONCE or _follow(rows, at)
+
+
+def _follow(rows: _Rows, at: int) -> bool:
+    """Whether names of letters follow each other, time runs back where they change, and the shorter lies in the longer.
+
+    So a long table of several stations looks that was cut in the second one. Names of zones change with the clock.
+    """
+    code, time, names = rows.code[at], rows.time, rows.names[at]
+    changes = np.flatnonzero(np.diff(code))
+    back = np.flatnonzero(np.diff(time) < -JITTER)
+    worded = all(any(map(str.isalpha, name)) and name.upper() not in {*ABBREVIATED, *SEVERAL} for name in names)
+    if len(names) != 2 or not worded or len(changes) != 1 or not np.array_equal(changes, back):
+        return False
+    first, second = time[: changes[0] + 1], time[changes[0] + 1 :]
+    shorter, longer = sorted((first, second), key=len)
+    return float(((shorter >= longer[0]) & (shorter <= longer[-1])).mean()) >= _INSIDE
 
 
 def _parts_stamps(rows: _Rows, at: int) -> bool:

@@ -23,7 +23,7 @@ from flagdata.ingest.anemometer.winds.angles import compass_unit, in_tens, may_b
 from flagdata.ingest.anemometer.winds.directions import Judged, judge
 from flagdata.ingest.anemometer.winds.found import COMPONENTS, SPEEDS, Column, Wind
 from flagdata.ingest.anemometer.winds.weather import WEATHER
-from flagdata.ingest.anemometer.words import headings, series
+from flagdata.ingest.anemometer.words import extremes, headings, series
 from flagdata.ingest.anemometer.words.events import of_event
 from flagdata.ingest.anemometer.words.headings import fits, understand
 from flagdata.schema import CHANNELS
@@ -322,6 +322,8 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         elif winds and heading.channel in WEATHER:
             continue  # which of the columns is the weather of this wind was told already
         elif heading.channel and heading.channel not in {entry.split("[")[0] for entry in found.values()}:
+            if heading.channel == "wind_direction" and extremes.is_extreme(layout.names[at]):
+                continue  # the direction of a gust is none of a mean
             if compass_unit(layout, at) is not None:
                 found[at] = heading.channel
                 continue

@@ -41,6 +41,11 @@ PARTS = {
     "year": "%Y", "month": "%m", "day": "%d", "day_of_year": "%j", "hour": "%H", "minute": "%M", "second": "%S%f",
 }  # fmt: skip
 """Parts of a date and the directives they are written with."""
+ALIASES = {"doy": "day_of_year", "yday": "day_of_year", "julian_day": "day_of_year"}
+"""Other names of parts of a date."""
+_WITH_FRACTION = {"%j": "%J", "%H": "%Q"}
+"""Directives of days and hours, and those of them with their fraction."""
+_FRACTION = re.compile(r"\d{1,3}[.,]\d*[1-9]\d*")
 FREE = ("date", "time")
 SITE = "site"
 _COUNTS = {form.removeprefix("elapsed-"): form for form in counted.UNITS} | {"µs": "elapsed-us", "μs": "elapsed-us"}
@@ -100,12 +105,13 @@ def parse(text: str) -> tuple[Entry, ...]:
         if "?" in (match["column"], match["name"], match["detail"]):
             fix = "write there what it is, or leave the entry blank where the column is not needed"
             raise UsageError(f"{part.strip()!r} still has a question mark, entry {number}", where=_WHERE, fix=fix)
-        if match["name"] not in (*_NAMES, *FREE, *PARTS, SITE, TOWARDS):
-            raise _unknown(match["name"])
+        name = ALIASES.get(match["name"], match["name"])
+        if name not in (*_NAMES, *FREE, *PARTS, SITE, TOWARDS):
+            raise _unknown(name)
         column = match["column"].strip() if by_name else number - 1
         detail = (match["detail"] or "").strip()
-        detail = counted.WORDS.get(detail.lower(), detail) if match["name"] in FREE else detail
-        entries.append(Entry(column=column, name=match["name"], detail=detail))
+        detail = counted.WORDS.get(detail.lower(), detail) if name in FREE else detail
+        entries.append(Entry(column=column, name=name, detail=detail))
     names = [entry.name for entry in entries if entry.name not in FREE]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -202,7 +208,7 @@ def _time(layout: Layout, entries: Sequence[tuple[int, Entry]], order: Order | N
     if not entries:
         return None
     forms = [_COUNTS.get(entry.detail, entry.detail) or PARTS.get(entry.name) for _, entry in entries]
-    forms = [_short_year(layout, index, form) for (index, _), form in zip(entries, forms, strict=True)]
+    forms = [_as_written(layout, index, form) for (index, _), form in zip(entries, forms, strict=True)]
     columns = tuple(index for index, _ in entries)
     said = f"{' and '.join(named(layout, index) for index in columns)} as the time"
     first = " ".join(layout.rows[0][index].strip() for index in columns)
@@ -243,13 +249,15 @@ def _time(layout: Layout, entries: Sequence[tuple[int, Entry]], order: Order | N
     return choice
 
 
-def _short_year(layout: Layout, index: int, form: str | None) -> str | None:
-    """The directive of a year or month as its column writes it: two digits, or letters."""
+def _as_written(layout: Layout, index: int, form: str | None) -> str | None:
+    """The directive of a part of a date as its column writes it: two digits, letters, or with a fraction."""
     cells = [cell for cell in layout.column(index) if cell]
     if form == "%Y" and cells and all(len(cell) == 2 for cell in cells):
         return "%y"
     if form == "%m" and cells and cells[0].isalpha():
         return "%b"
+    if form in _WITH_FRACTION and any(_FRACTION.fullmatch(cell) for cell in cells):
+        return _WITH_FRACTION[form]
     return form
 
 

@@ -15,7 +15,7 @@ _TIMES = frozenset(
         "시각", "나타난날", "나타난시각", "발생일", "발생시각", "起時", "起日", "時刻",
     }
 )  # fmt: skip
-_EXTREMES = GUSTS | MAXIMA | {"peak", "highest", "lowest", "höchsten", "stärksten"}
+_EXTREMES = GUSTS | MAXIMA | {"peak", "highest", "lowest", "fastest", "höchsten", "stärksten"}
 _JOINED = re.compile(
     r"hora.*(?:max|min(?!u)|racha)|time(?:of|at)(?:max|min|gust|peak)|time(?:max|gust|peak)|(?:max|gust|peak).*time"
 )
@@ -26,3 +26,8 @@ def of_extreme(heading: str) -> bool:
     """Whether a heading is of the day or time of an extreme, as "Date of max gust" or "horaracha"."""
     words = words_of(heading)
     return bool(set(words) & _TIMES and set(words) & _EXTREMES) or _JOINED.search("".join(words)) is not None
+
+
+def is_extreme(heading: str) -> bool:
+    """Whether a heading is of an extreme, as "fastest2minwinddir" or "Max gust"."""
+    return bool(set(words_of(heading)) & _EXTREMES) or heading.lower().startswith("fastest")

@@ -124,6 +124,21 @@ def test_days_in_another_order_and_an_hour_that_comes_again_are_one_device(log_f
     assert [found.value for found in log.findings if found.kind == "clock-set-back"] == [-3600]
 
 
+def test_a_table_that_was_cut_in_its_second_device_is_of_two(log_file: Write) -> None:
+    body = "".join(row("north 1", 0, at) for at in range(MANY)) + "".join(row("south 2", 1, at) for at in range(60))
+    path = log_file("time,memo,wind speed (m/s),wind dir\n" + body)
+    with pytest.raises(SeveralDevicesError, match="2 devices") as caught:
+        read_log(path)
+    check = WindOptions(columns=offered(str(caught.value.fix)))
+    assert [len(read_log(path, replace(check, wind=name)).series) for name in ("north 1", "south 2")] == [MANY, 60]
+
+
+def test_numbers_with_a_fraction_name_no_device(log_file: Write) -> None:
+    body = "".join(row(f"{at % 2 * 0.25:.2f}", 0, at // 2) for at in range(200))
+    log = read_log(log_file("time,rain,wind speed (m/s),wind dir\n" + body))
+    assert "devices-mixed" not in {found.kind for found in log.findings}
+
+
 def test_the_user_may_say_that_it_is_one_device(log_file: Write) -> None:
     path = log_file(stacked(("A", "B"), late=30, count=100))
     assert len(read_log(path, WindOptions(clock="sort")).series) == 200

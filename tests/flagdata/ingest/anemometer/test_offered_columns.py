@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flagdata.errors import InputError
+from flagdata.errors import FlagdataError, InputError
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]
@@ -117,3 +117,11 @@ def test_nothing_in_place_of_a_question_mark_is_no_column(read: Read) -> None:
     rows = "".join(f"2026-05-01T12:{at:02d}:00Z,{200 + at}\n" for at in range(12))
     log = read(f"time,angle\n{rows}", columns="1=time,2=wind_direction[deg],=wind_speed[]")
     assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx(np.arange(200, 212))
+
+
+def test_the_direction_of_an_extreme_is_not_offered_beside_a_mean(read: Read) -> None:
+    rows = "".join(f"2026-05-{day:02d};{3 + day / 10:.1f};{200 + day};{9 + day / 10:.1f}\n" for day in range(1, 20))
+    with pytest.raises(FlagdataError) as caught:
+        read(f"date;avgwindspeed;fastest2minwinddir;fastest2minwindspeed\n{rows}", zone="UTC", unit="mph")
+    (line, *_) = re.findall(r'--columns "([^"]*)"', str(caught.value.fix))
+    assert "direction" not in line

@@ -191,6 +191,13 @@ def test_a_zero_offset_is_reported_but_not_applied_unless_asked() -> None:
     assert bool(np.all(done.flags[:2000] == SampleFlag.DEAD_ZONE))
 
 
+def test_a_steady_breeze_below_which_the_wind_often_falls_is_no_calm_air() -> None:
+    steady = np.round(0.7 + stream(8, "steady").normal(0, 0.005, 3000), 2)
+    speed = np.concatenate([steady, np.abs(gusts(3000) - np.median(gusts(3000)))])
+    assert np.mean(speed < 0.6) > 0.1
+    assert zero.estimate(np.arange(6000) * 10_000_000, speed) is None
+
+
 def idle_then_gusts(offset: float) -> Reading:
     """20 s idle at `offset`, then gusts that begin 0.4 m/s above it; a hundred rows a second."""
     speed = np.concatenate([np.full(2000, offset), [offset + 0.4], offset + gusts(1999)])

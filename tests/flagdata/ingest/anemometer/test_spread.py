@@ -151,3 +151,26 @@ def test_two_first_records_of_a_slow_logger_do_not_begin_the_log_earlier() -> No
     log = ordered(np.array([0, 0, 1, 2, 3, 4, 5]) * 600 * S, smooth(7), step=60 * S)
     assert int(log.time[0]) == T0
     assert [(f.kind, f.severity) for f in log.findings] == [("duplicate-stamps", Severity.ERROR)]
+
+
+def twice(values: np.ndarray, seconds: int) -> str:
+    """Rows of which each stands twice, but for a cell that is no reading."""
+    start = np.datetime64("2026-05-01T00:00:00", "s")
+    rows = [f"{start + at // 2 * seconds}Z,{values[at // 2]:.3f},{at % 2}" for at in range(2 * len(values))]
+    return "\n".join(["time,wind speed [m/s],pass", *rows]) + "\n"
+
+
+def test_readings_said_again_under_their_stamp_are_taken_once(read: Read) -> None:
+    values = np.round(smooth(20), 3)
+    found = read(twice(values, 3600))
+    assert found.series.channels["wind_speed"].tolist() == values.tolist()
+    assert np.diff(found.series.time).tolist() == [3600 * S] * 19
+    assert "readings-repeated" in {finding.kind for finding in found.findings}
+
+
+def test_rows_of_one_stamp_with_readings_of_their_own_are_all_kept() -> None:
+    assert len(ordered(np.repeat(np.arange(20), 2) * 3600 * S, smooth(40), step=3600 * S).time) == 40
+
+
+def test_equal_readings_of_a_fast_log_are_all_kept(read: Read) -> None:
+    assert len(read(twice(smooth(20), 1)).series.time) == 40

@@ -288,3 +288,11 @@ def test_a_time_in_words_is_offered_for_its_format(log_file: Callable[[str], Pat
     series = read_log(path, WindOptions(zone="UTC", columns=columns)).series
     assert str(series.time[1].astype("datetime64[ns]"))[:16] == "2018-09-27T23:01"
     assert series.channels["wind_speed"][0] == pytest.approx(3 * 0.44704)
+
+
+@pytest.mark.parametrize("name", ["day_of_year", "doy", "yday"])
+def test_a_day_of_the_year_may_have_a_fraction(read: Read, name: str) -> None:
+    rows = "".join(f"1996 {255 + at / 48:.4f} {3 + at}.0\n" for at in range(12))
+    log = read(rows, zone="UTC", columns=f"year,{name},wind_speed[m/s]")
+    start = np.datetime64("1996-09-11T00:00", "s").astype(np.int64)
+    assert log.series.time / 1e9 - start == pytest.approx(np.arange(12) * 1800.0, abs=5.0)
