@@ -11,7 +11,7 @@ read. Written by these descriptions; no file of the instrument was at hand.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
@@ -34,6 +34,7 @@ _NAMES = (
 )
 _WITHOUT = {"wind dir": "deg", "prevailing wind direction": "deg", "wind direction": "deg", "out hum": "%"}
 _PROGRAM_UNITS = ("mph", "km/h", "m/s", "kn")
+_SPEEDS = ("wind speed", "hi speed", "wind hi speed", "low speed")
 _ENOUGH = 5
 """Different speeds above 0 that tell the unit of whole miles per hour."""
 _FIX = "export with units from weatherlink.com, or describe the file by a recipe that names the unit"
@@ -76,7 +77,9 @@ class Davis:
         first = 3 if len(lines) > 2 and set(lines[2].strip()) <= {"-", "\t", " "} and lines[2].strip() else 2
         rows = [cut(line, delimiter) for line in lines[first:] if line.strip()]
         speed = next(column.number for column in columns if column.name.lower() == "wind speed")
-        spelled = options.unit or _unit_of(row[speed - 1] for row in rows if len(row) >= speed)
+        speeds = [column.number for column in columns if column.name.lower() in _SPEEDS]
+        shown = _unit_of(_cells(rows, [speed])) or _unit_of(_cells(rows, speeds))
+        spelled = options.unit or shown
         if spelled is None:
             raise InputError(
                 "the export carries no units, and its speeds do not show them", where=f"{where}, line {first + 1}",
@@ -94,9 +97,7 @@ class Davis:
         stamps = [" ".join(row[:2]) for row in rows if len(row) > 1]
         form, found = stamp_format(stamps, options, f"{where}, line {first + 1}")
         decimal = "," if any(re.fullmatch(r"\d+,\d", row[speed - 1]) for row in rows if len(row) >= speed) else "."
-        why = "as you said" if options.unit else "since its values are whole miles per hour converted"
-        text = f"the export carries no units: wind is in {spelled}, {why}"
-        finding = Finding(kind="unit-from-resolution", severity=Severity.WARNING, what=text, fix=_FIX)
+        told = _about_unit(spelled, shown, said=options.unit is not None)
         export = Export(
             name=self.name,
             file=FileLayout(delimiter=delimiter, decimal=decimal, preamble=first, header=0),
@@ -107,7 +108,10 @@ class Davis:
             averaged=True,
             compass=_directions(assigned.channels),
         )
-        return read_export(source, export, options).with_findings((*found, finding, *_gusts(columns, spelled, form)))
+        reading = read_export(source, export, options)
+        if any(finding.kind == "unit-doubtful" for finding in reading.findings):
+            told = ()
+        return reading.with_findings((*found, *told, *_gusts(columns, spelled, form)))
 
     def _read_site(self, source: TextFile, lines: Sequence[str], at: int, options: WindOptions) -> Reading:
         where = str(source.path)
@@ -136,6 +140,18 @@ class Davis:
 # Specification of the Vantage Pro2 anemometer: ±5 % or ±0.9 m/s (2 mph), resolution 1 mph; the limits are taken as
 # rectangular (JCGM 100:2008, 4.3.7): divided by √3.
 _SENSOR = Sensor(name="Davis anemometer", resolution=0.44704, accuracy=0.52, accuracy_relative=0.0289)
+
+
+def _about_unit(spelled: str, shown: str | None, *, said: bool) -> tuple[Finding, ...]:
+    """How the unit is known, and that the speeds show another one than the user says."""
+    if said and shown in (None, spelled):
+        return ()
+    text = f"wind is in {spelled}, as you said, but its values are whole miles per hour converted to {shown}"
+    fix = f"check the unit set in the program; if it is {shown}: --unit {shown}"
+    if said:
+        return (Finding(kind="unit-doubtful", severity=Severity.WARNING, what=text, fix=fix),)
+    text = f"the export carries no units: wind is in {spelled}, since its values are whole miles per hour converted"
+    return (Finding(kind="unit-from-resolution", severity=Severity.WARNING, what=text, fix=_FIX),)
 
 
 def _directions(channels: Mapping[str, ChannelLayout]) -> tuple[int, ...]:
@@ -197,6 +213,11 @@ def _site(lines: Sequence[str]) -> int | None:
         if cells and cells[0] == "Date & Time" and any(cell.startswith("Avg Wind Speed - ") for cell in cells):
             return index
     return None
+
+
+def _cells(rows: Sequence[Sequence[str]], columns: Sequence[int]) -> Iterator[str]:
+    """The cells of columns, by their numbers from 1."""
+    return (row[number - 1] for row in rows for number in columns if len(row) >= number)
 
 
 def _unit_of(cells: Iterable[str]) -> str | None:

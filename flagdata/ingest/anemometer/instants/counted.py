@@ -31,8 +31,10 @@ from flagdata.timebase import NANOSECONDS, iso
 _EPOCH = {"epoch-us": 1_000, "epoch-ns": 1}
 _SERIAL = {"excel-days": 25_569, "datenum": 719_529}
 """Number of the day 1970-01-01."""
+SERIAL_DAYS = tuple((form, day + 7_305, day + 25_567) for form, day in _SERIAL.items())
+"""Formats of serial days, each with its numbers of 1 January 1990 and of 2040, between which logs lie."""
 _YEARS = "decimal-years"
-_FIRST_YEAR, _LAST_YEAR = 1990, 2100
+_FIRST_YEAR, _LAST_YEAR, _LATEST = 1990, 2100, 2040
 WORDS = {"years": _YEARS, "excel": "excel-days", "excel-day": "excel-days", "matlab": "datenum"}
 """Other words for formats of this module."""
 _ELAPSED = {
@@ -61,8 +63,7 @@ def serial_days(value: NDArray[np.float64]) -> str | None:
         return None
     if float(np.median(steps)) > 0.5:  # seconds of the day rise by one
         return None
-    bounds = [(form, day + 7_305, day + 47_482) for form, day in _SERIAL.items()]
-    bounds.append((_YEARS, _FIRST_YEAR - 1, _LAST_YEAR))
+    bounds = (*SERIAL_DAYS, (_YEARS, _FIRST_YEAR - 1, _LATEST))
     return next((form for form, low, high in bounds if bool(np.all((value > low) & (value < high)))), None)
 
 

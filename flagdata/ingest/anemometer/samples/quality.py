@@ -25,6 +25,8 @@ STALE_SHORTEST = 5
 """Rows; a shorter run of repeats is never called stale."""
 STALE_SECONDS = 1.0
 """A shorter run is never called stale either: fast loggers read a smoothed signal several times over."""
+COARSE_STEP, LEAST_OFF = 0.2, 0.1
+"""Step between speeds [m/s] from which on an instrument is coarse, and how far its least speed may be from that."""
 VANE_ROWS, VANE_SPEEDS = 20, 3
 """Rows and different speeds from which on a direction that stays the same is told."""
 STUCK_SECONDS = 60.0
@@ -264,6 +266,16 @@ def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
     return flags, tuple(found)
 
 
+def _least(reading: Reading) -> NDArray[np.bool_]:
+    """(n,) rows whose speed is the least that a coarse instrument shows above calm: it stays there as calm air does."""
+    speed = reading.channels.get("wind_speed", np.zeros(len(reading.time)))
+    levels = np.unique(speed[np.isfinite(speed) & (speed > 0)])
+    step = float(np.diff(levels).min()) if len(levels) > 1 else 0.0
+    if step < COARSE_STEP or abs(levels[0] - step) > LEAST_OFF * step:
+        return np.zeros(len(speed), dtype=bool)
+    return speed == levels[0]
+
+
 def _stale_rows(reading: Reading, names: list[str]) -> tuple[NDArray[np.int64], tuple[Finding, ...]]:
     """Indices of stale rows among rows that hold all of `names`."""
     n = len(reading.time)
@@ -275,6 +287,7 @@ def _stale_rows(reading: Reading, names: list[str]) -> tuple[NDArray[np.int64], 
         values = reading.channels[name]
         same &= values[1:] == values[:-1]
     same &= (reading.flags[1:] & (SampleFlag.DEAD_ZONE | SampleFlag.OUT_OF_RANGE)) == 0
+    same &= ~_least(reading)[1:]
     starts, lengths = _runs(same)
     if len(starts) == 0:
         return nothing, ()

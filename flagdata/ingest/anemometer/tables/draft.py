@@ -51,6 +51,8 @@ from flagdata.units import canonical
 
 _BELOW, _OFTEN, _FEW = -0.5, 0.1, 5
 """Speeds below this [in the file's unit], in this share of at least so many rows, are those of a component."""
+_LISTED = 30
+"""Columns of a table that a message names."""
 _ORDER = Literal["dmy", "mdy", "ymd"]
 
 
@@ -225,7 +227,7 @@ def _doubts(
     lines: Sequence[str], layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], chosen: Wind | None
 ) -> list[Doubt]:
     found: list[Doubt] = []
-    names = ", ".join(repr(name) for name in layout.names if name) or "no names"
+    names = _listed(layout)
     dates = _bare_dates(layout, time, chosen or next(iter(winds), None))
     if dates and winds:
         one = " and ".join(stated_columns.named(layout, at) for at in dates)
@@ -285,6 +287,13 @@ def _doubts(
         what += f"; {own}" if own else ""
         found.append(Doubt(what=what, fix=fix))
     return found
+
+
+def _listed(layout: Layout) -> str:
+    """The names of a table's columns, the first of many."""
+    names = [repr(name) for name in layout.names if name]
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return (", ".join(names[:_LISTED]) or "no names") + more
 
 
 def _stretches(layout: Layout, time: TimeChoice, wind: Wind) -> list[Doubt]:

@@ -329,6 +329,9 @@ def _without_year(layout: Layout, columns: Sequence[Sequence[str]], named: Mappi
         month = "%b" if share(_MONTH_NAME, columns[named["month"]]) else "%m"
         taken = [named["month"], named["day"], *of_clock]
         yield from read(layout, columns, taken, [f"{month} %d {clock}"], score=1.9)
+    elif {"month", "day"} <= set(named) and "hour" not in named:
+        month = "%b" if share(_MONTH_NAME, columns[named["month"]]) else "%m"
+        yield from read(layout, columns, [named["month"], named["day"]], [f"{month} %d"], score=0.85)
 
 
 def _beside_dates(

@@ -387,7 +387,7 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
         return  # a part of a date, such as 12.75 h, counts from no start
     if names_time(name) and float(steps.max()) < 400:
         daily = float(np.median(steps[steps > 0])) > 0.5  # seconds of the day rise by one, days by fractions of one
-        for form, low, high in () if daily else (("excel-days", 32_874.0, 73_050.0), ("datenum", 726_834.0, 767_010.0)):
+        for form, low, high in () if daily else counted.SERIAL_DAYS:
             if bool(np.all((value > low) & (value < high))) and np.any(value % 1 != 0):
                 yield time_choice(layout, (index,), form, counted.parse(texts, form), 1.5)
                 return

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
+from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.words.headings import Heading, understand, words_of
 
@@ -12,6 +15,9 @@ _TO_BOW = frozenset({"rel", "relative", "apparent", "bow", "awa", "awd", "twa"})
 _ANGLES = frozenset({"angle", "ang"})
 _HEADINGS = frozenset({"heading", "hdg", "hdt", "hdm"})
 """Words of where the platform's bow points to."""
+_SIDES, _KINDS = frozenset({"tack", "side", "amure"}), 3
+"""Words of the side of the bow, and how many kinds such a column holds at most."""
+_HALF_A_TURN = 180.0
 
 
 def to_bow(layout: Layout, index: int) -> bool:
@@ -30,3 +36,20 @@ def heading_of(layout: Layout, index: int) -> Heading:
         return found
     channel = "apparent_wind_direction"
     return replace(found, channel=found.channel and channel, quantity=channel)
+
+
+def side(layout: Layout, angle: int) -> int | None:
+    """The column that tells on which side of the bow an angle is that never leaves 0° to 180°; `None` for none.
+
+    Args:
+        angle: the column of an angle to the bow.
+    """
+    value = numbers(layout.column(angle), decimal=layout.decimal).value
+    known = value[np.isfinite(value)]
+    if not len(known) or known.min() < 0 or known.max() > _HALF_A_TURN:
+        return None
+    for index, name in enumerate(layout.names):
+        kinds = {cell for cell in layout.column(index) if cell}
+        if set(words_of(name)) & _SIDES and 1 <= len(kinds) <= _KINDS:
+            return index
+    return None

@@ -206,9 +206,10 @@ def _column(found: Found, index: int, channel: str, told: str | None) -> Column:
 
 def _speeds(found: Found, told: str | None) -> list[Wind]:
     groups: dict[tuple[object, ...], dict[str, list[int]]] = {}
-    for index in found.of(*SPEEDS):
+    own = _of_the_platform(found)
+    for index in [at for at in found.of(*SPEEDS) if at not in own]:
         groups.setdefault(found.key(index), {}).setdefault(found.headings[index].channel, []).append(index)
-    named = [i for i in found.of(*SPEEDS) if found.headings[i].sure]
+    named = [i for i in found.of(*SPEEDS) if found.headings[i].sure and i not in own]
     moving = own_motion.may_have_speed(found.layout)
     winds: list[Wind] = []
     for by_channel in groups.values():
@@ -233,8 +234,7 @@ def _speeds(found: Found, told: str | None) -> list[Wind]:
                 towards = _direction(found, index, _DIRECTION_OF[channel])
                 if towards is not None:
                     columns[towards[0]] = towards[1]
-            said = set(words_of(found.layout.names[first]))
-            lone = bool(said & {"speed", "spd", "velocity", "vel"}) and not any("wind" in word for word in said)
+            lone = _of_anything(found.layout.names[first])
             winds.append(Wind(
                 label=found.name(first), height=found.headings[first].height, columns=columns,
                 sure=found.headings[first].sure and not (lone and moving),
@@ -246,6 +246,23 @@ def _speeds(found: Found, told: str | None) -> list[Wind]:
         )  # fmt: skip
         winds = [wind for wind in winds if wind.sure]
     return winds
+
+
+def _of_anything(name: str) -> bool:
+    """Whether a heading is a speed and does not say that it is the wind's."""
+    said = set(words_of(name))
+    return bool(said & {"speed", "spd", "velocity", "vel"}) and not any("wind" in word for word in said)
+
+
+def _of_the_platform(found: Found) -> list[int]:
+    """Speeds of nothing that is named, beside the wind past a platform that moves: they are the platform's own."""
+    if not found.of("apparent_wind_speed", "theoretical_wind_speed"):
+        return []
+    own = [at for at in found.of("wind_speed") if _of_anything(found.layout.names[at])]
+    found.remarks.extend(
+        f"column {found.name(at)!r} is likely the platform's own speed, beside the wind past it: left out" for at in own
+    )
+    return own
 
 
 def _distinct(found: Found, indices: Sequence[int]) -> list[int]:
@@ -382,6 +399,11 @@ def _next_to(found: Found, speed: int, directions: Sequence[int]) -> list[int]:
 def _as_direction(found: Found, index: int, channel: str) -> tuple[str, Column] | None:
     """A column as a direction, by its heading and numbers; `None` where they are none."""
     heading, value = found.headings[index], found.values[index]
+    side = bow.side(found.layout, index) if channel.startswith(("apparent", "theoretical")) else None
+    if side is not None:
+        told = f"column {found.name(side)!r} tells the side of the bow on which {heading.name!r} is, 0° to 180°"
+        found.warnings.append(f"{told}: the angle alone is no direction, and is left out")
+        return None
     judged = judge(heading, value, channel)
     if judged.left_out:
         found.remarks.append(f"column {heading.name!r} {judged.left_out}")

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.words.headings import understand, words_of
+from flagdata.ingest.anemometer.words.wind_words import ALONG_BEAM
 
 _CLASSES = frozenset({"bft", "beaufort", "bf"})
 _MILLIS = re.compile(r"(?<![^\W_])m[VA](?![^\W_])")
@@ -19,6 +20,8 @@ _COUNTED = frozenset(
     }
 )  # fmt: skip
 """Words of what an anemometer gives before its calibration."""
+_SHOWN = 5
+"""Columns of one kind that are told by name."""
 _ELECTRIC = frozenset({"v", "mv", "volt", "volts", "voltage", "ma"})
 """Those that a battery has as well."""
 
@@ -53,15 +56,19 @@ def of_no_mean(layout: Layout) -> str:
     """Why columns with the heading of a wind's speed are not it: words, or gusts and statistics; "" for no such."""
     words: list[str] = []
     others: list[str] = []
+    beams: list[str] = []
     for index, name in enumerate(layout.names):
         heading = understand(name, layout.units[index])
         kinds = {cell_kind(cell) for cell in layout.column(index)} - {"missing"}
-        if heading.quantity == "wind_speed" and heading.spread and "number" in kinds:
+        if set(words_of(name)) & ALONG_BEAM and "number" in kinds:
+            beams.append(name)
+        elif heading.quantity == "wind_speed" and heading.spread and "number" in kinds:
             others.append(name)
         elif heading.quantity == "wind_speed" and kinds == {"text"}:
             words.append(name)
     return "; ".join([
         *([f"{_listed(words)} no numbers in the first rows"] if words else []),
+        *([f"{_listed(beams[:_SHOWN])} the wind along a beam, of which winds are retrieved"] if beams else []),
         *([f"{_listed(others)} gusts, extremes or another statistic by the heading"] if others else []),
     ])  # fmt: skip
 

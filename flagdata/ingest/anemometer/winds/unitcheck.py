@@ -85,6 +85,23 @@ def from_resolution(values: NDArray[np.float64]) -> Evidence | None:
     return best[1] if best is not None else None
 
 
+def _whole(values: NDArray[np.float64], stated: str) -> bool:
+    """Whether values are whole numbers of another unit written in the stated one, by a factor rounded before."""
+    known = np.unique(values[np.isfinite(values) & (values > 0)])
+    rounding = _rounding(known)
+    for native in ("mph", "kn", "km/h", "m/s"):
+        grid = unit(native).scale / unit(stated).scale
+        if native == stated or grid < 5 * rounding:
+            continue
+        whole = np.round(known / grid)
+        # n times the factor that was rounded first, as 0.9 for 2 mph where 1 mph is 0.45 m/s
+        off = np.minimum(np.abs(known - whole * grid), np.abs(known - whole * np.round(grid / rounding) * rounding))
+        chance = len(known) * float(np.log10(2 * rounding / grid))
+        if bool(np.all(off <= rounding * 0.51 + _FACTOR * known)) and chance < np.log10(CHANCE):
+            return True
+    return False
+
+
 def _rounding(known: NDArray[np.float64]) -> float:
     """The last digit that is used."""
     for digits in range(6):
@@ -122,7 +139,7 @@ def contradiction(
     """
     scale = unit(stated).scale
     found = from_resolution(values)
-    if found is not None and abs(unit(found.unit).scale / scale - 1) > 1e-9:
+    if found is not None and abs(unit(found.unit).scale / scale - 1) > 1e-9 and not _whole(values, stated):
         return _finding(channel, stated, found)
     known = np.abs(values[np.isfinite(values)]) * scale
     if not len(known) or scale < unit("km/h").scale or (len(known) < 10 and float(np.median(known)) < IMPOSSIBLE):

@@ -31,10 +31,12 @@ COURSES = frozenset({"heading", "course"})
 """Words of the wind's direction that leave open whether it blows from or to it."""
 VERTICAL = frozenset({"vertical", "vert", "vertikal", "verticale", "verticaal", "vertikale", "vertic"})
 """Words of the component of the wind upwards, which is no speed of wind."""
+ALONG_BEAM = frozenset({"radial", "los", "sight", "doppler"})
+"""Words of the component of the wind along the beam of a lidar or radar, which is no speed of wind."""
 OTHER = frozenset(
     {
         "chill", "run", "power", "ground", "sog", "cog", "stw", "gps", "vehicle", "boat", "platform", "sound", "sos",
-        "rotor", "radial", "rpm", "hz", "ticks", "clicks", "rotations", "revolutions", "adc",
+        "rotor", *ALONG_BEAM, "rpm", "hz", "ticks", "clicks", "rotations", "revolutions", "adc",
         "cross", "crosswind", "head", "headwind", "tail", "tailwind", "rain", "wave", "current", "fan", "motor",
         "hub", "pitch", "roll", "yaw", "inclination", "tilt", "count", "counts", "pulse", "pulses", "freq", "frequency",
         "volt", "volts", "voltage", "mv", "battery", "ustar", "friction", "scalar", "beaufort", "bft", "level", "pwm",

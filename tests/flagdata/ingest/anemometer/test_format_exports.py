@@ -218,6 +218,13 @@ def test_weatherlink_speeds_that_show_no_unit_are_refused(read: Read) -> None:
     assert "recipe" in (caught.value.fix or "")
 
 
+def test_a_unit_of_the_user_that_weatherlink_speeds_speak_against_is_doubted(read: Read) -> None:
+    text = weatherlink(MPH["km/h"])
+    assert {"unit-doubtful", "unit-from-resolution"}.isdisjoint(kinds(read(text, zone="UTC", unit="km/h")))
+    (doubt,) = (found for found in read(text, zone="UTC", unit="m/s").findings if found.kind == "unit-doubtful")
+    assert "--unit km/h" in (doubt.fix or "")
+
+
 def test_weatherlink_com_names_its_units(read: Read) -> None:
     head = (
         '"Date & Time","Temp - °C","Hum - %","Barometer - mb","Avg Wind Speed - km/h","Prevailing Wind Direction",'

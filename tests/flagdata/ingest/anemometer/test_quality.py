@@ -191,6 +191,18 @@ def test_a_zero_offset_is_reported_but_not_applied_unless_asked() -> None:
     assert bool(np.all(done.flags[:2000] == SampleFlag.DEAD_ZONE))
 
 
+def test_the_least_speed_of_a_coarse_instrument_stays_as_calm_air_does() -> None:
+    steps = stream(6, "coarse").integers(0, 8, 400)
+    speed = 0.447 * np.concatenate([steps, np.ones(40), steps])
+    least, higher = (
+        quality.stale(replace(idle_then_gusts(0.0), time=np.arange(len(speed)) * 10**9, line=np.arange(len(speed)),
+                              flags=np.zeros(len(speed), dtype=np.uint16), channels={"wind_speed": values}))
+        for values in (speed, np.where(np.arange(len(speed)) // 40 == 10, 5 * speed, speed))
+    )  # fmt: skip
+    assert least[1] == ()
+    assert [found.kind for found in higher[1]] == ["stale-repeats"]
+
+
 def test_a_steady_breeze_below_which_the_wind_often_falls_is_no_calm_air() -> None:
     steady = np.round(0.7 + stream(8, "steady").normal(0, 0.005, 3000), 2)
     speed = np.concatenate([steady, np.abs(gusts(3000) - np.median(gusts(3000)))])

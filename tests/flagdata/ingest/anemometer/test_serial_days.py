@@ -34,6 +34,13 @@ def test_serial_days_without_a_heading_are_offered_with_their_format(log_file: W
     assert bool((np.diff(stamps) == _HOUR).all())
 
 
+def test_days_that_are_yet_to_come_are_none(log_file: Write) -> None:
+    rows = "".join(f"{762_186.002 + at / 4:.3f}\t20.{at % 5}3\t1.{at % 9}5\n" for at in range(48))  # October 2086
+    with pytest.raises(InputError) as caught:
+        read_log(log_file(rows), WindOptions())
+    assert "datenum" not in str(caught.value.fix)
+
+
 def test_a_count_that_is_no_serial_day_is_offered_as_before(log_file: Write) -> None:
     rows = "".join(f"{at * 0.5:.1f}\t-{at % 5}.31\t{70 + at % 9}.25\t{2 + at % 4}.15\n" for at in range(48))
     with pytest.raises(InputError, match=r"time\[\?\]"):

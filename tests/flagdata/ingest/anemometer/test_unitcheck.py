@@ -82,3 +82,9 @@ def test_a_column_without_a_unit_is_refused_with_the_likely_one(log_file: Callab
     with pytest.raises(Exception, match="likely km/h") as caught:
         read_log(log_file("time,wind\n" + rows), WindOptions(zone="UTC"))
     assert "--unit km/h" in caught.value.fix  # type: ignore[attr-defined]
+
+
+def test_whole_numbers_of_another_unit_by_a_rounded_factor_are_of_the_stated_one() -> None:
+    values = np.array([0.45, 0.9, 1.34, 1.79, 2.24, 2.68] * 4)  # 1 to 6 mph in m/s, the second as twice 0.45
+    assert unitcheck.contradiction(values, "m/s", span=3600.0) is None
+    assert unitcheck.contradiction(written("m/s", 0.1, "mph", 2), "m/s", span=3600.0) is not None

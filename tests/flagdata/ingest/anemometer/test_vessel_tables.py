@@ -71,3 +71,25 @@ def test_a_wind_by_its_users_word_keeps_the_warning_of_a_moving_platform(read: R
     assert "'Ext_SOG' shows that the platform moves" in told(named, "heading-doubtful")
     right = read(HEADING + ROWS, zone="UTC", columns="1=date,2=time,4=apparent_wind_speed[kn]")
     assert not told(right, "heading-doubtful")
+
+
+SAIL = "time,sog,hdg,awa,aws,tack,speed,twa,tws\n" + "".join(
+    f"2026-05-01T12:00:{at:02d}Z,5.{at % 9},120,{40 + at},{11 + at % 3}.5,{1 if at < 9 else -1}.0,6.{at % 9},{60 + at},"
+    f"9.{at % 9}\n"
+    for at in range(18)
+)
+
+
+def test_a_speed_of_nothing_that_is_named_beside_apparent_wind_is_the_boats(read: Read) -> None:
+    log = read(SAIL, unit="kn")
+    assert "wind_speed" not in log.series.channels
+    assert {"apparent_wind_speed", "theoretical_wind_speed"} <= set(log.series.channels)
+    assert "column 'speed' is likely the platform's own speed" in told(log, "columns-not-read")
+
+
+def test_angles_of_half_a_turn_beside_the_side_they_are_on_are_no_directions(read: Read) -> None:
+    log = read(SAIL, unit="kn")
+    assert not any(name.endswith("direction") for name in log.series.channels)
+    assert "'tack' tells the side of the bow on which 'awa' is" in told(log, "heading-doubtful")
+    whole = read(SAIL.replace(",40,", ",-40,"), unit="kn")
+    assert "apparent_wind_direction" in whole.series.channels

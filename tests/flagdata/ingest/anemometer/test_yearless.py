@@ -121,3 +121,15 @@ def test_lines_of_an_instrument_after_dates_without_a_year(
     assert sniff(log_file(text))[0].kind == "anemometer"
     with pytest.raises(TimeError, match="--date 2027-12-31"):
         read_log(log_file(text), WindOptions(zone="UTC", date=dt.date(2027, 12, 30)))
+
+
+def test_days_by_month_and_day_alone_are_completed_by_the_first_rows_date(read: Read) -> None:
+    days = [dt.date(2026, 5, 1) + dt.timedelta(days=at) for at in range(45)]
+    text = "Ozone,Wind,Month,Day\n" + "".join(
+        f"41,{3 + at % 7}.4,{day.month},{day.day}\n" for at, day in enumerate(days)
+    )
+    with pytest.raises(TimeError, match="no year"):
+        read(text, unit="mph", zone="UTC")
+    log = read(text, unit="mph", zone="UTC", date=days[0])
+    assert log.series.time.astype("datetime64[ns]").astype("datetime64[D]").tolist() == days
+    assert "dates-alone" in {finding.kind for finding in log.findings}
