@@ -39,7 +39,7 @@ def open_database(path: Path, *, limits: Limits) -> TableText:
             return _read(base, path, limits)
     except sqlite3.Error as error:
         fix = "copy it again while no program writes to it, or export the table as CSV: sqlite3 -header -csv FILE"
-        raise InputError(f"the database cannot be read: {error}", where=where, fix=fix) from None
+        raise InputError(f"the SQLite database cannot be read: {error}", where=where, fix=fix) from None
 
 
 def _read(base: sqlite3.Connection, path: Path, limits: Limits) -> TableText:
