@@ -27,6 +27,8 @@ _ALIKE = 0.7
 """Scores of two times within this are those of times that their headings do not tell apart."""
 _STAMP, _ABOUT_SURE = 2, 2.0
 """Columns that hold a stamp at most, and the score from which a choice is of a date and a time."""
+_QUARTER, _NEAR = 900.0, 60.0
+"""Quarters of an hour, which zones are apart, and what stamps of the same rows may differ by beside [s]."""
 _EVENER = 0.5
 """A clock is steadier than another where its steps deviate by less than this share of the other's."""
 
@@ -109,6 +111,33 @@ def left_out(layout: Layout, best: TimeChoice, choices: Sequence[TimeChoice]) ->
         if not set(choice.columns) & set(best.columns) and all(names_time(layout.names[at]) for at in choice.columns):
             found |= set(choice.columns)
     return tuple(sorted(found))
+
+
+def disagreement(layout: Layout, best: TimeChoice, choices: Sequence[TimeChoice]) -> str | None:
+    """What is said of other stamps of the rows that are farther from the time than a row, their zones apart.
+
+    Zones are whole quarters of an hour apart. Stamps by whose headings a period begins or ends lie a period apart.
+    """
+    if best.form is None or best.counts:
+        return None
+    one = _read(layout, best)
+    others = set(left_out(layout, best, choices))
+    for choice in choices:
+        if choice.form is None or not set(choice.columns) <= others:
+            continue
+        two = _read(layout, choice)
+        if len(one.ns) != len(two.ns) or not _moves(one) or not _moves(two):
+            continue
+        apart = (two.ns - one.ns) / NANOSECONDS
+        beside = apart - _QUARTER * np.round(np.median(apart) / _QUARTER)
+        row = float(np.median(np.diff(one.ns))) / NANOSECONDS
+        if np.abs(beside).max() > max(row, _NEAR) and np.ptp(apart) > _NEAR:
+            return (
+                f"{_shown(layout, choice)} is another time of the rows, {apart.min():.6g} to {apart.max():.6g} s from "
+                f"{_shown(layout, best)}, which is taken: the two clocks do not agree; to take the other, name it as "
+                "time in --columns"
+            )
+    return None
 
 
 def _whole(choice: TimeChoice) -> bool:

@@ -78,7 +78,8 @@ def find_time(layout: Layout, *, order: Order | None = None, told: bool = False)
         return None
     if best.form is not None:
         best = second_times.with_part_of_second(layout, second_times.settle(layout, best, choices), time_as)
-    return replace(best, others=second_times.left_out(layout, best, choices))
+    remark = best.remark or second_times.disagreement(layout, best, choices)
+    return replace(best, remark=remark, others=second_times.left_out(layout, best, choices))
 
 
 def event_stamps(layout: Layout) -> tuple[int, ...]:

@@ -80,3 +80,20 @@ def test_two_stamps_of_one_clock_are_the_finer_one_without_a_doubt(read: Read) -
     found = read(table("", lambda at: f"{T0 + at // 4},{T0 * 1000 + at * 250}"), wind="3", unit="m/s")
     assert found.series.time.tolist() == (T0 * S + np.arange(N) * S // 4).tolist()
     assert doubts(found) == []
+
+
+def _two_clocks(drift: float, zone: int = 0) -> str:
+    start = np.datetime64("2026-05-01T12:00:00", "s")
+    rows = [
+        f"{start + 60 * at},{start + 60 * at + 3600 * zone + int(drift * at)},{3 + at % 4}.5,{200 + at}"
+        for at in range(40)
+    ]
+    return "\n".join(["Logger time,GPS time,wind speed [m/s],wind dir [deg]", *rows]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("drift", "zone", "told"), [(0.0, 0, False), (0.2, 2, False), (0.0, -7, False), (5.0, 0, True)]
+)
+def test_clocks_of_the_same_rows_that_run_apart_are_told(read: Read, drift: float, zone: int, told: bool) -> None:
+    log = read(_two_clocks(drift, zone), zone="UTC")
+    assert any("clocks do not agree" in finding.what for finding in log.findings) == told
