@@ -33,6 +33,10 @@ _STATEMENTS = tuple(re.compile(rf"[^\S\n]*{text}", re.IGNORECASE) for text in (_
 _BEGINS = re.compile(r"^[^\S\n]*(?:INSERT|REPLACE|COPY|CREATE\s+TABLE)\b", re.IGNORECASE | re.MULTILINE)
 _TOKEN = re.compile(r"'(?:[^'\\]|\\.|'')*'|[(),;]|[^\s'(),;]+", re.DOTALL)
 _ESCAPED = re.compile(r"\\(.)|''", re.DOTALL)
+_CUT_OFF = Finding(
+    kind="cut-off", severity=Severity.WARNING, count=1,
+    what="the dump ends within a row, as when it was interrupted; left out", fix="make the dump again",
+)  # fmt: skip
 _NO_COLUMN = frozenset({"PRIMARY", "KEY", "UNIQUE", "CONSTRAINT", "INDEX", "FOREIGN", "CHECK", "FULLTEXT", "SPATIAL"})
 
 
@@ -53,7 +57,8 @@ def as_table(source: TextFile) -> TableText | None:
         raise LimitError(f"a dump of more than {LARGEST} characters", where=str(source.path), fix=fix)
     names: dict[str, list[str]] = {}
     rows: dict[str, list[list[str]]] = {}
-    for called, columns, cells in _filled(text, names):
+    cut_off: list[str] = []
+    for called, columns, cells in _filled(text, names, cut_off):
         names[called] = columns or names.get(called, [])
         rows.setdefault(called, []).extend(cells)
     filled = [name for name in rows if rows[name]]
@@ -66,6 +71,8 @@ def as_table(source: TextFile) -> TableText | None:
     kept = [row for row in rows[chosen] if len(row) == len(names[chosen])]
     what = f"a dump of a database, table {chosen!r}"
     found = table(source, names[chosen], kept, kind="sql-table", what=what, left_out=len(rows[chosen]) - len(kept))
+    if found is not None and chosen in cut_off:
+        found = TableText.of(found, found.text, [_CUT_OFF])
     if found is None or len(winds) < 2:
         return found
     others = ", ".join(repr(name) for name in winds if name != chosen)
@@ -82,8 +89,15 @@ def _without_names(source: TextFile, rows: Sequence[Sequence[str]]) -> TableText
     return TableText.of(source, out.getvalue().splitlines())
 
 
-def _filled(text: str, names: dict[str, list[str]]) -> Iterator[tuple[str, list[str], list[list[str]]]]:
-    """Each statement that fills a table: the table, the columns it names, and its rows; `names` those of CREATE."""
+def _filled(
+    text: str, names: dict[str, list[str]], cut_off: list[str]
+) -> Iterator[tuple[str, list[str], list[list[str]]]]:
+    """Each statement that fills a table: the table, the columns it names, and its rows.
+
+    Args:
+        names: columns of each table by its CREATE TABLE; filled.
+        cut_off: tables whose last row is incomplete; filled.
+    """
     at = 0
     while (begins := _BEGINS.search(text, at)) is not None:
         insert, copy, create = (pattern.match(text, begins.start()) for pattern in _STATEMENTS)
@@ -98,6 +112,8 @@ def _filled(text: str, names: dict[str, list[str]]) -> Iterator[tuple[str, list[
             at = end
         elif insert is not None:
             cells, at = _tuples(text, insert.end())
+            if at > len(text):
+                cut_off.append(_bare(insert["table"]))
             yield _bare(insert["table"]), _listed(insert["columns"]), cells
 
 
@@ -124,7 +140,7 @@ def _created(text: str, at: int) -> tuple[list[str], int]:
 
 
 def _tuples(text: str, at: int) -> tuple[list[list[str]], int]:
-    """The rows of a statement from its first bracket on, and where it ends."""
+    """The rows of a statement from its first bracket on, and where it ends: beyond the text where a row is cut off."""
     rows: list[list[str]] = []
     row: list[str] = []
     cell: list[str] = []
@@ -145,7 +161,7 @@ def _tuples(text: str, at: int) -> tuple[list[list[str]], int]:
             return rows, token.start()  # the semicolon, or what stands behind the rows
         elif depth and word != ",":
             cell.append(word)
-    return rows, len(text)
+    return rows, len(text) + (depth > 0)
 
 
 def _value(tokens: Sequence[str]) -> str:

@@ -69,6 +69,13 @@ def test_a_dump_on_long_lines_is_read(log_file: Write) -> None:
     assert len(log.series.time) == 3000
 
 
+def test_a_dump_that_ends_within_a_row_says_so(log_file: Write) -> None:
+    text = dumps()["mysqldump"]
+    log = read_log(log_file(text[: text.index(f"({COUNT - 1},") + 20]), WindOptions(zone="UTC"))
+    assert len(log.series.time) == COUNT - 1
+    assert "cut-off" in {finding.kind for finding in log.findings}
+
+
 def test_of_two_tables_with_a_wind_the_other_is_told(log_file: Write) -> None:
     text = dumps()["mysqldump"] + "INSERT INTO gusts (ts, wind_gust_ms) VALUES ('2026-05-01 12:00:00', 9.0);\n"
     (told,) = (
