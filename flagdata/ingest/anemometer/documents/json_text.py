@@ -22,7 +22,7 @@ from typing import Any
 
 from flagdata.errors import InputError, LimitError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.documents import coverage_json, json_keyed, json_measures, json_series
+from flagdata.ingest.anemometer.documents import coverage_json, json_choice, json_keyed, json_measures, json_series
 from flagdata.ingest.anemometer.documents.json_instants import holds_instant, is_instant
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
@@ -101,7 +101,9 @@ def as_table(source: TextFile) -> TableText | None:
     if unread and not any("wind" in understand(name).quantity for row in series or () for name in row):
         raise InputError(f"CoverageJSON: {unread[0].what}", where=str(source.path), fix=unread[0].fix)
     columns = None if series is None else [{name: _text(value) for name, value in row.items()} for row in series]
-    if columns is None and isinstance(whole, dict):
+    chosen = json_choice.log_of_several(whole) if isinstance(whole, dict) and columns is None else None
+    whole = list(chosen.rows) if chosen is not None else whole
+    if columns is None and isinstance(whole, dict) and json_choice.own_reading(whole) is None:
         columns = _columns(whole)
     before: list[tuple[str, str]] = []
     if columns is not None:
@@ -132,6 +134,7 @@ def as_table(source: TextFile) -> TableText | None:
     writer.writerows([row.get(name, "") for name in names] for row in kept)
     text = f"JSON, read as a table of {len(names)} columns; lines are counted with its heading as the first"
     found = [Finding(kind="json-table", severity=Severity.NOTE, what=text)]
+    found += [] if chosen is None else [chosen.finding()]
     if unread:
         text = "; ".join(defect.what for defect in unread[:_TOLD])
         text += f"; and {len(unread) - _TOLD} more" if len(unread) > _TOLD else ""
@@ -324,7 +327,7 @@ def _items(whole: Any) -> list[Any]:
     """
     if isinstance(whole, list):
         return json_measures.by_station(whole)
-    own = _own_reading(whole)
+    own = json_choice.own_reading(whole)
     if own is not None:
         return [own]
     timed = json_measures.by_time(whole)
@@ -347,19 +350,6 @@ def _items(whole: Any) -> list[Any]:
         if lists or not level:
             break
     return [whole]
-
-
-def _own_reading(whole: dict[str, Any]) -> dict[str, Any] | None:
-    """An object without its lists, where its plain members are a reading of the wind at an instant and no list is."""
-    plain = {key: value for key, value in whole.items() if not isinstance(value, dict | list)}
-    lists = [value for value in whole.values() if isinstance(value, list) and value]
-    if not lists or not holds_instant(plain):
-        return None
-    if any(isinstance(row, dict) and holds_instant(row) for rows in lists for row in rows):
-        return None
-    if not any("wind" in understand(key).quantity for key, value in plain.items() if not isinstance(value, bool)):
-        return None
-    return plain
 
 
 def _objects(member: Any) -> list[dict[str, Any]]:

@@ -42,7 +42,7 @@ _STAMP = re.compile(
 _AFTER = re.compile(r"(?<=\*[0-9A-Fa-f]{2})\s.*")
 """What a program wrote behind a sentence."""
 _EPOCH = re.compile(
-    r"\s*[\"\[(]?(?P<epoch>\d{10}(?:\.\d{1,9})?|\d{13})[\"\])]?[\s,;>|]+"
+    r"\s*[\"\[(]?(?P<epoch>\d{10}(?:\.\d{1,9})?|\d{13})[\"\])]?(?:\[[^\]]{0,10}\])?[\s,;>|]+"
     r"(?:(?:\w{0,40}[,;]){1,2}(?=\"?[$!]))?(?P<raw>\S.*)"
 )
 _MONTH = re.compile(

@@ -49,6 +49,7 @@ KINDS = (
     "flagdata.ingest.anemometer.restating.thies",
     "flagdata.ingest.anemometer.restating.uploads",
     "flagdata.ingest.anemometer.restating.broken_headings",
+    "flagdata.ingest.anemometer.restating.broken_rows",
     "flagdata.ingest.anemometer.restating.line_breaks",
     "flagdata.ingest.anemometer.restating.quoted_commas",
     "flagdata.ingest.anemometer.restating.objects_in_cells",
@@ -64,6 +65,7 @@ KINDS = (
     "flagdata.ingest.anemometer.restating.listed_fields",
     "flagdata.ingest.anemometer.restating.counted_fields",
     "flagdata.ingest.anemometer.restating.legend",
+    "flagdata.ingest.anemometer.restating.fixed_width",
     "flagdata.ingest.anemometer.restating.stacked_headings",
     "flagdata.ingest.anemometer.restating.headings_anew",
 )

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from time import time_ns
 from typing import Literal
 
 import numpy as np
@@ -242,6 +243,8 @@ def _doubts(
         fix += f" ({above})" if above else ""
         what = f"no column is a time in a format that is known; {unread.events(layout)}the columns are {names}"
         found.append(Doubt(what=what, fix=fix))
+    elif (other := truncated.of_another_century(layout, time, now=time_ns())) is not None:
+        found.append(Doubt(what=other[0], fix=other[1]))
     elif time.doubt is not None and time.fix is not None:
         offered = f"; {offered_columns.offer(layout, time, winds)}" if time.counts else ""
         found.append(Doubt(what=time.doubt, fix=f"{time.fix}{offered}"))

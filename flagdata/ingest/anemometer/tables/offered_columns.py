@@ -389,8 +389,8 @@ def _part(form: str, parts: Mapping[str, str]) -> str:
     """The entry of a column that is a part of a time, written as `form`; `parts` are names by directives."""
     if form in parts:
         return parts[form]
-    if form == "%b":
-        return "month"
+    if form in ("%b", "%y"):
+        return "month" if form == "%b" else "year"
     if form == "%H%M":
         return "time[%H%M]"
     if form in ("%Q", "%J"):

@@ -9,6 +9,8 @@ from flagdata.ingest.anemometer.text.layout import Layout, cut
 
 _SEVERAL, _FILLED = 3, 0.8
 """Lines of numbers above a table that are told, and the share of their filled cells that holds numbers or stamps."""
+_FIRST, _HALF = 3, 0.5
+"""Cells by which a line is like the rows where blanks divide them and no line names them, and its share of numbers."""
 
 
 def rows_above(lines: Sequence[str], layout: Layout) -> str:
@@ -31,13 +33,25 @@ def _of_numbers(above: Sequence[str], layout: Layout) -> str:
         number for number, cells in enumerate(kinds, start=1)
         if len(cells) > 1 and cells.count("number") + cells.count("stamp") >= _FILLED * len(cells)
     ]  # fmt: skip
-    if len(found) < _SEVERAL or layout.delimiter == " ":
+    if layout.delimiter == " " and not layout.header:
+        found = [
+            number for number, cells in enumerate(kinds, start=1)
+            if cells[:_FIRST] == [cell_kind(cell) for cell in layout.rows[0][:_FIRST]] and _numbers(cells) >= _HALF
+        ]  # fmt: skip
+    elif layout.delimiter == " ":
+        return ""
+    if len(found) < _SEVERAL:
         return ""
     return (
         f"{len(found)} of lines {found[0]} to {found[-1]} hold numbers as the rows do, but stand among others above "
         f"the first row that is read (line {layout.lines[0]}): left out; put the rows of one form into a file of their "
         "own"
     )
+
+
+def _numbers(cells: Sequence[str]) -> float:
+    """The share of the kinds of cells that is of numbers and stamps."""
+    return (cells.count("number") + cells.count("stamp")) / max(1, len(cells))
 
 
 def _is_row(line: str, layout: Layout) -> bool:

@@ -53,7 +53,7 @@ _BEHIND: dict[str, tuple[str, frozenset[str]]] = {
 """Headings that are of a part of a time only behind another part: they are short, or mean other things as well."""
 _ZONES = (
     r"( (?:d[aeo] |de la |del |della )?(?:medi[cç][aã]o|medici[oó]n|observa[cç][aã]o|observaci[oó]n|leitura|lectura|"
-    r"misura|osservazione|mesure|observation))?( utc| gmt| local| lst)?"
+    r"misura|osservazione|mesure|observation))?( utc| gmt| local| lst| hoa)?"
 )
 """What may stand behind the heading of a part of a time: that it is the measurement's, and in which zone."""
 _LIMITS = {
@@ -76,6 +76,8 @@ _OF_YEAR = (
     "the days are taken as those of the year, since no column holds a month; if they are days of a month, the times "
     "are wrong: add a column of the month"
 )
+YEAR_LAST = re.compile(r"(0[1-9]|[12]\d|3[01])(0[1-9]|[12]\d|3[01])((?:19|20)\d\d)")
+"""A date of eight digits whose year comes last."""
 _SIX = re.compile(r"^\s*\d{6}(\d\d)?\s*$")
 _TWO_BEHIND = re.compile(r"\d[T ,;_](\d{1,2})\s*$")
 _MONTH_NAME = re.compile(r"^\s*(?:jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)[a-z]{0,6}\.?\s*$", re.IGNORECASE)
@@ -417,13 +419,25 @@ def date_forms(layout: Layout, index: int, order: Order | None) -> tuple[str, ..
         TimeError: their numbers may be day and month, or month and day.
     """
     named = ("%Y%m%d", "%Y%j", "%Y:%m:%d", *(date.format(s=sign) for sign in "- /" for date in MONTHS))
+    cells = layout.column(index)
+    together = _together(cells)
     try:
-        numbered = decide(layout.column(index), told=order or order_of(layout.names[index]), where="").directives()
+        decision = decide(together or cells, told=order or order_of(layout.names[index]), where="")
+        numbered = decision.directives().replace("/", "") if together else decision.directives()
     except TimeError as error:
         if "may be" in error.what:
             raise
         return named
     return (*named, numbered)
+
+
+def _together(cells: Sequence[str]) -> list[str]:
+    """Dates of eight digits whose year comes last, 25082026, with signs between; none where the year comes first."""
+    filled = [cell.strip() for cell in cells if cell.strip()]
+    matches = [YEAR_LAST.fullmatch(cell) for cell in filled]
+    if not filled or not all(matches) or fits(parse_as(filled, "%Y%m%d")[0]):
+        return []
+    return [YEAR_LAST.sub(r"\1/\2/\3", cell) for cell in filled]
 
 
 def order_of(heading: str) -> Order | None:

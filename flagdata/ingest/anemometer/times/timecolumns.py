@@ -152,7 +152,7 @@ def _choices(layout: Layout, order: Order | None, events: Collection[int]) -> It
         texts = [cell for cell in cells if cell]
         if not texts or index in events:
             continue
-        if share(_DATE, texts):
+        if share(_DATE, texts) or (names_time(layout.names[index]) and share(dateparts.YEAR_LAST, texts)):
             dates.append(index)
         elif dateparts.hour_alone(layout, columns, index):
             continue

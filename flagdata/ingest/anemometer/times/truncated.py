@@ -11,8 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from flagdata.ingest.anemometer.instants.midnight import parse_as
+from flagdata.ingest.anemometer.instants.stamps import DAY
 from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.words.headings import names_time
+from flagdata.timebase import iso
 
 _CUT = re.compile(r"(\d{1,2}):([0-5]\d)\.\d")
 _DATE = re.compile(
@@ -34,6 +38,19 @@ def too_early(column: str, cells: Sequence[str]) -> tuple[str, str]:
     """What is wrong with a column of dates before 1970, and what its owner can do."""
     what = f"column {column} holds dates before 1970 ({cells[0]!r}), which a recording cannot hold"
     return what, "if a clock was never set, leave the column out by --columns, and give --start TIME --rate HZ"
+
+
+def of_another_century(layout: Layout, time: TimeChoice, *, now: int) -> tuple[str, str] | None:
+    """What is wrong with years of two digits that would all be after `now` [UTC ns]; `None` where they are not."""
+    if time.form is None or "%y" not in time.form or time.counts:
+        return None
+    texts = [" ".join(cells) for cells in zip(*(layout.column(at) for at in time.columns), strict=True)]
+    found = parse_as([text for text in texts if text.strip()], time.form)[0]
+    if not found.valid.any() or int(found.ns[found.valid].min()) <= now + DAY:
+        return None
+    year = iso(int(found.ns[found.valid].min()))[:4]
+    what = f"years of two digits would be {year} and later, after today, and a recording cannot hold dates before 1970"
+    return what, too_early("", ("",))[1]
 
 
 def doubt(layout: Layout) -> tuple[str, str] | None:

@@ -77,6 +77,8 @@ def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tupl
             return index, tuple(kinds)
         if (words <= _SITES | _NUMBERED or addresses) and len(cells) >= 3 * len(kinds):
             return index, tuple(kinds)
+        if words <= _SITES and len(kinds) == len(cells) and all(map(_is_name, kinds)):
+            return index, tuple(kinds)
         apart = {(stamp, cell) for stamp, cell in zip(stamps, cells, strict=True)}
         if shared and len(apart) > 0.9 * len(cells) > 1.2 * len(set(stamps)):
             apart_by.append((index, tuple(kinds)))
@@ -98,6 +100,11 @@ def _each_once(cells: Sequence[str], stamps: Sequence[str]) -> bool:
     if not 2 <= len(kinds) <= _HIGHEST or rows < 2 or any(cell_kind(kind) != "number" for kind in kinds):
         return False
     return len(set(zip(stamps, cells, strict=True))) == len(cells) >= _SHARE * len(kinds) * rows
+
+
+def _is_name(cell: str) -> bool:
+    """Whether a cell is a name of words alone: of as many rows with one each every row is of another place."""
+    return cell_kind(cell) == "text" and not any(map(str.isdigit, cell))
 
 
 def _is_place(cell: str) -> bool:

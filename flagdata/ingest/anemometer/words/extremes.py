@@ -20,11 +20,17 @@ _JOINED = re.compile(
     r"hora.*(?:max|min(?!u)|racha)|time(?:of|at)(?:max|min|gust|peak)|time(?:max|gust|peak)|(?:max|gust|peak).*time"
 )
 """Headings whose words are joined."""
+_WRITTEN_TOGETHER = re.compile(
+    r"(?:최대|최고|최저|순간)\S*(?:일자|일시|시각|날짜)|(?:最大|极大|極大|瞬間)\S*(?:日期|时间|時間|日時|時刻|起時)"
+)
+"""Headings of languages that write words together, before they are put into English."""
 
 
 def of_extreme(heading: str) -> bool:
     """Whether a heading is of the day or time of an extreme, as "Date of max gust" or "horaracha"."""
     words = words_of(heading)
+    if _WRITTEN_TOGETHER.search(heading):
+        return True
     return bool(set(words) & _TIMES and set(words) & _EXTREMES) or _JOINED.search("".join(words)) is not None
 
 

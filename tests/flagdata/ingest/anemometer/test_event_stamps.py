@@ -16,6 +16,7 @@ T0 = 1_777_636_800
 EVENTS = [
     "lightning_time", "LightningTime", "last_strike", "lastRain", "Last rain", "Sunrise", "sunset_utc",
     "date installed", "calibration date", "lastboot", "Firmware date", "timeMaxGust", "Time of Min Temp",
+    "최대풍속일자", "최대순간풍속시각", "最大風速起時",
 ]  # fmt: skip
 
 

@@ -404,3 +404,12 @@ def test_stamps_as_asctime_writes_them_are_read_before_sentences(read: Read) -> 
     assert iso(int(log.series.time[0])) == "2018-07-17T19:48:36.971Z"
     assert log.series.channels["theoretical_wind_speed"] == pytest.approx(3 + np.arange(8) / 10)
     assert split_stamp("Jul  7 12:48:36 2018 > $X")[0] == "2018-07-07T12:48:36"
+
+
+def test_milliseconds_in_brackets_before_another_mark_are_a_computers_stamp(read: Read) -> None:
+    text = "".join(
+        f"[17776368{at:02d}{at * 31 % 1000:03d}][**] $WIMWV,{200 + at}.0,R,{3 + at % 5}.0,N,A\n" for at in range(20)
+    )
+    log = read(text, platform="fixed")
+    assert log.format == "nmea-stamped"
+    assert log.series.time.tolist() == [(1_777_636_800 + at) * 10**9 + at * 31 % 1000 * 10**6 for at in range(20)]
