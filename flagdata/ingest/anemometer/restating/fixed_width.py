@@ -15,6 +15,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
+from flagdata.ingest.anemometer.recognition import recognise
 from flagdata.ingest.anemometer.restating.restate import LOOKED_AT, table
 from flagdata.ingest.anemometer.text.kinds import cell_kind, is_unit
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
@@ -22,8 +23,8 @@ from flagdata.ingest.anemometer.text.source import TableText, TextFile
 _LEAST_ROWS, _LEAST_COLUMNS = 8, 4
 _NUMBERS = 2
 """Numbers that a line must hold to be a row."""
-_ALIKE = 0.95
-"""Share of the rows with one number of words from which blanks divide them well enough."""
+_ALIKE, _SEVERAL = 0.95, 3
+"""Share of the rows with one number of words from which blanks divide them well enough, but for so many others."""
 _CLEAN = 0.98
 """Share of the filled cells of a column that must be of one kind."""
 _HEADING_LINES = 3
@@ -40,6 +41,9 @@ def matches(lines: Sequence[str]) -> bool:
 
 def as_table(source: TextFile) -> TableText | None:
     """The rows cut at the blanks that all of them share; `None` where those further down share none."""
+    guesses = recognise(source)
+    if guesses and guesses[0].format != "delimited":
+        return None
     lines = list(source.each_line())
     rows = _rows(lines)
     spans = _spans(rows)
@@ -61,7 +65,8 @@ def _rows(lines: Sequence[str]) -> list[str]:
 def _spans(rows: Sequence[str]) -> list[Span]:
     """The columns of characters of the rows; none where blanks divide them alike, or they stand in no columns."""
     counts = Counter(len(row.split()) for row in rows)
-    if len(rows) < _LEAST_ROWS or max(counts.values()) >= _ALIKE * len(rows):
+    others = len(rows) - max(counts.values(), default=0)
+    if len(rows) < _LEAST_ROWS or others < max(_SEVERAL, (1 - _ALIKE) * len(rows)):
         return []
     width = max(map(len, rows))
     used = [False] * width
