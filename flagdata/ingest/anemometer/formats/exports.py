@@ -28,6 +28,7 @@ from flagdata.ingest.anemometer.text.columns import Columns
 from flagdata.ingest.anemometer.text.rows import RowReader
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.ingest.anemometer.winds.sonic import with_horizontal
+from flagdata.ingest.anemometer.words.headings import understand
 from flagdata.schema import CHANNELS
 from flagdata.signals import Sensor
 from flagdata.timebase import NANOSECONDS
@@ -41,6 +42,10 @@ _INCHES = ("in", "inches")
 _REST = re.compile(
     r"\s+\d{1,2}:\d{2}(?P<s>:\d{2})?(?P<f>[.,]\d+)?(?P<b>\s*)(?P<p>[AaPp](?:\.?[Mm]\.?)?)?\s*(?P<z>Z|[+-]\d{2}:?\d{2})?$"
 )
+
+
+_LISTED, _LONGEST = 60, 120
+"""Columns that are not read which a note names, and letters of each."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -265,8 +270,9 @@ def column_findings(assigned: Assigned) -> tuple[Finding, ...]:
             )
         )  # fmt: skip
     if assigned.unread:
-        text = ", ".join(assigned.unread)
-        found.append(
-            Finding(kind="columns-not-read", severity=Severity.NOTE, count=len(assigned.unread), what=text[:2000])
-        )
+        # Columns that speak of the wind come first, so that none of them is lost among a hundred others.
+        names = sorted(assigned.unread, key=lambda name: "wind" not in understand(name).quantity)
+        more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+        what = ", ".join(name[:_LONGEST] for name in names[:_LISTED]) + more
+        found.append(Finding(kind="columns-not-read", severity=Severity.NOTE, count=len(names), what=what))
     return tuple(found)

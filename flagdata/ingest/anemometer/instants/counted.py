@@ -186,6 +186,9 @@ def since_start(
             count = count + np.concatenate(([0], np.cumsum(over))) * span
     _refuse_restarts(count, line=line, where=where)
     what = f"the stamps count from a start; the first row was at {iso(start)}, as given"
+    if int(count[0]) > max(int(np.diff(count[:2]).max(initial=0)), NANOSECONDS):
+        what += f", its count being {count[0] / NANOSECONDS:g} s; if that was the zero of the count instead, "
+        what += f"give --start {iso(start + int(count[0]))}"
     found.append(Finding(kind="elapsed-time", severity=Severity.NOTE, what=what))
     return count - count[0] + start, tuple(found)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flagdata import compass
 from flagdata.errors import InputError, UnknownNameError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.instants import zones
+from flagdata.ingest.anemometer.instants import counted, zones
 from flagdata.ingest.anemometer.instants.stamps import YEARS
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
@@ -224,7 +224,13 @@ def read_table(
     line = gathered.line()[order]
     findings.extend(found)
     if zone_name is not None and gathered.host is None and gathered.clock.stated():
-        text = f"the stamps state their own zone: {zone_name} is not used"
+        counts = counted.is_elapsed(gathered.clock.form)
+        why = (
+            "the stamps count from a start, which has a zone of its own"
+            if counts
+            else "the stamps state their own zone"
+        )
+        text = f"{why}: {zone_name} is not used"
         findings.append(Finding(kind="zone-not-needed", severity=Severity.NOTE, what=text))
         zone_name = None
     told, zone_name = zone_name, zone_name or recipe.time.zone

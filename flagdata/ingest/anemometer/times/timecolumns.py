@@ -392,7 +392,7 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
             if bool(np.all((value > low) & (value < high))) and np.any(value % 1 != 0):
                 yield time_choice(layout, (index,), form, counted.parse(texts, form), 1.5)
                 return
-    told = (*words, *words_of(layout.units[index]))
+    told = (*words, *words_of(layout.units[index]), *(["minutes"] if _IN_MINUTES.search(name) else []))
     form = next((form for form, known in _COUNTERS if set(told) & known), None)
     if form is None and not (names_time(name) or words[:1] == ["t"]):
         return
@@ -440,6 +440,8 @@ _YEAR_AND_DAY = frozenset({"date", "yyddd", "yrdoy", "yydoy"})
 _PARTS_OF_DATES = frozenset({"hour", "hours", "hr", "day", "days", "doy", "jday", "julian", "year", "month"})
 _YEARS_AND_PARTS = frozenset({"decimal", "decyear", "dyear", "decdate", "decimalyear", "decimaldate"})
 _HOURS = frozenset({"hour", "hours", "hr", "hrs", "h"})
+_IN_MINUTES = re.compile(r"[\[(]\s*min\.?\s*[\])]", re.IGNORECASE)
+"""A unit behind a time; alone it may as well be a minimum."""
 _LAST_HOUR = 2300
 """Hours and minutes in one number, from which on a day is over: a count without a unit would not end there."""
 _SLOW = 5000.0

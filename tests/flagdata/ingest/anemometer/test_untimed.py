@@ -148,3 +148,15 @@ def test_the_instant_that_a_heading_counts_from_is_proposed(log_file: Write) -> 
     with pytest.raises(FlagdataError) as caught:
         read_log(path)
     assert "--start 2026-05-01T12:00:00" in (caught.value.fix or "")
+
+
+@pytest.mark.parametrize(("first", "told"), [(420, True), (0, False)])
+def test_a_count_that_does_not_begin_at_zero_is_told_with_the_start_that_it_may_mean(
+    tmp_path: Path, first: int, told: bool
+) -> None:
+    path = tmp_path / "wind.csv"
+    path.write_text("time [min],wind speed [m/s]\n" + "".join(f"{first + 5 * at},{3 + at % 4}.5\n" for at in range(12)))
+    log = read_log(path, WindOptions(start=1_777_636_800 * 10**9, zone="UTC"))
+    (what,) = (finding.what for finding in log.findings if finding.kind == "elapsed-time")
+    assert ("--start 2026-05-01T19:00:00Z" in what) == told
+    assert not any("state their own zone" in finding.what for finding in log.findings)
