@@ -16,10 +16,9 @@ from urllib.parse import quote
 
 from flagdata.errors import InputError, LimitError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.documents import choice_of_table
 from flagdata.ingest.anemometer.options import Limits
-from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.source import TableText
-from flagdata.ingest.anemometer.words.headings import names_time, understand
 
 MAGIC = b"SQLite format 3\x00"
 _WIDEST = 2000
@@ -66,25 +65,15 @@ def _read(base: sqlite3.Connection, path: Path, limits: Limits) -> TableText:
     lines = out.getvalue().splitlines()
     what = f"a database of SQLite, table {chosen!r}; lines are counted with the names of its columns as the first"
     found = [Finding(kind="database-table", severity=Severity.NOTE, what=what)]
-    if len(filled) > 1:
-        others = ", ".join(repr(name) for name in filled if name != chosen)
-        what = f"of {len(filled)} tables with a wind {chosen!r} is read, the longest; not {others}"
-        fix = 'export another one as CSV to read it: sqlite3 -header -csv FILE "SELECT …"'
-        several = Finding(kind="several-tables", severity=Severity.WARNING, count=len(filled), what=what, fix=fix)
-        found.append(several)
+    fix = 'export another one as CSV to read it: sqlite3 -header -csv FILE "SELECT …"'
+    found += choice_of_table.others_left_out(chosen, list(filled), fix=fix)
     return TableText(path=path, encoding="utf-8", lines=len(lines), findings=tuple(found), text=tuple(lines))
 
 
 def _holds_wind(base: sqlite3.Connection, name: str) -> bool:
-    """Whether a table has a time and, by the name of a column or its own, a wind."""
     columns = [row[1] for row in base.execute(f"PRAGMA table_info({_quoted(name)})")]
-    wind = "wind" in name.lower() or any("wind" in understand(column).quantity for column in columns)
-    return wind and (any(map(names_time, columns)) or _stamped(base, name))
-
-
-def _stamped(base: sqlite3.Connection, name: str) -> bool:
     first: Sequence[object] = base.execute(f"SELECT * FROM {_quoted(name)} LIMIT 1").fetchone() or ()
-    return any(isinstance(cell, str) and cell_kind(cell) == "stamp" for cell in first)
+    return choice_of_table.holds_wind(name, columns, first)
 
 
 def _count(base: sqlite3.Connection, name: str) -> int:

@@ -16,10 +16,9 @@ from collections.abc import Iterator, Sequence
 
 from flagdata.errors import LimitError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.documents import choice_of_table
 from flagdata.ingest.anemometer.restating.restate import table
-from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
-from flagdata.ingest.anemometer.words.headings import names_time, understand
 
 LARGEST = 512 * 1024**2
 """Characters of the largest dump that is read."""
@@ -62,7 +61,7 @@ def as_table(source: TextFile) -> TableText | None:
         names[called] = columns or names.get(called, [])
         rows.setdefault(called, []).extend(cells)
     filled = [name for name in rows if rows[name]]
-    winds = [name for name in filled if _holds_wind(name, names[name], rows[name][0])]
+    winds = [name for name in filled if choice_of_table.holds_wind(name, names[name], rows[name][0])]
     if not filled:
         return None
     chosen = max(winds or filled, key=lambda name: len(rows[name]))
@@ -73,13 +72,10 @@ def as_table(source: TextFile) -> TableText | None:
     found = table(source, names[chosen], kept, kind="sql-table", what=what, left_out=len(rows[chosen]) - len(kept))
     if found is not None and chosen in cut_off:
         found = TableText.of(found, found.text, [_CUT_OFF])
-    if found is None or len(winds) < 2:
-        return found
-    others = ", ".join(repr(name) for name in winds if name != chosen)
-    text = f"of {len(winds)} tables with a wind {chosen!r} is read, the longest; not {others}"
-    fix = "save another table as a file of its own to read it"
-    several = Finding(kind="several-tables", severity=Severity.WARNING, count=len(winds), what=text, fix=fix)
-    return TableText.of(found, found.text, [several])
+    if found is None:
+        return None
+    told = choice_of_table.others_left_out(chosen, winds, fix="save another table as a file of its own to read it")
+    return TableText.of(found, found.text, told)
 
 
 def _without_names(source: TextFile, rows: Sequence[Sequence[str]]) -> TableText:
@@ -183,9 +179,3 @@ def _listed(columns: str | None) -> list[str]:
 
 def _bare(name: str) -> str:
     return name.rpartition(".")[2].strip('`"[]')
-
-
-def _holds_wind(called: str, names: Sequence[str], row: Sequence[str]) -> bool:
-    """Whether a table has a time, by a name or the cells of a row, and a wind, by a name of a column or its own."""
-    wind = "wind" in called.lower() or any("wind" in understand(name).quantity for name in names)
-    return wind and (any(map(names_time, names)) or any(cell_kind(cell) == "stamp" for cell in row))
