@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading, streams
+from flagdata.ingest.anemometer.samples.zero import resolution
 from flagdata.schema import SampleFlag
 from flagdata.timebase import NANOSECONDS
 
@@ -269,11 +270,11 @@ def stale(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
 def _least(reading: Reading) -> NDArray[np.bool_]:
     """(n,) rows whose speed is the least that a coarse instrument shows above calm: it stays there as calm air does."""
     speed = reading.channels.get("wind_speed", np.zeros(len(reading.time)))
-    levels = np.unique(speed[np.isfinite(speed) & (speed > 0)])
-    step = float(np.diff(levels).min()) if len(levels) > 1 else 0.0
-    if step < COARSE_STEP or abs(levels[0] - step) > LEAST_OFF * step:
+    above = speed[np.isfinite(speed) & (speed > 0)]
+    step, least = resolution(above), float(above.min(initial=np.inf))
+    if step < COARSE_STEP or abs(least - step) > LEAST_OFF * step:
         return np.zeros(len(speed), dtype=bool)
-    return speed == levels[0]
+    return speed == least
 
 
 def _stale_rows(reading: Reading, names: list[str]) -> tuple[NDArray[np.int64], tuple[Finding, ...]]:

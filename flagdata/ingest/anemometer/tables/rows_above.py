@@ -28,18 +28,16 @@ def rows_above(lines: Sequence[str], layout: Layout) -> str:
 
 def _of_numbers(above: Sequence[str], layout: Layout) -> str:
     """What is said of lines above a table that hold little but numbers, divided as its rows are."""
+    blanks = layout.delimiter == " "
+    if blanks and layout.header:
+        return ""  # a title's words and numbers are divided by blanks as well
     kinds = [[kind for cell in cut(line, layout.delimiter) if (kind := cell_kind(cell)) != "missing"] for line in above]
+    first = [cell_kind(cell) for cell in layout.rows[0][:_FIRST]]
     found = [
         number for number, cells in enumerate(kinds, start=1)
-        if len(cells) > 1 and cells.count("number") + cells.count("stamp") >= _FILLED * len(cells)
+        if (cells[:_FIRST] == first and _numbers(cells) >= _HALF if blanks
+            else len(cells) > 1 and _numbers(cells) >= _FILLED)
     ]  # fmt: skip
-    if layout.delimiter == " " and not layout.header:
-        found = [
-            number for number, cells in enumerate(kinds, start=1)
-            if cells[:_FIRST] == [cell_kind(cell) for cell in layout.rows[0][:_FIRST]] and _numbers(cells) >= _HALF
-        ]  # fmt: skip
-    elif layout.delimiter == " ":
-        return ""
     if len(found) < _SEVERAL:
         return ""
     return (
