@@ -15,7 +15,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.documents.opening import open_text
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
-from flagdata.ingest.anemometer.instants import abbreviations, zones
+from flagdata.ingest.anemometer.instants import zones
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recognition import recognise
@@ -75,7 +75,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     try:
         reading = reader.read(source, options)
     except ZoneMissingError as error:
-        hint = abbreviations.advice(source.head(zones.LINES)) if statement is None else statement.advice()
+        hint = zones.hint(statement, source.head(zones.LINES))
         if not hint:
             raise
         raise ZoneMissingError(error.what, where=error.where, fix=f"{error.fix}; {hint}") from None

@@ -13,6 +13,7 @@ from datetime import UTC, datetime, timedelta, tzinfo
 
 from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.instants import abbreviations
 from flagdata.ingest.anemometer.instants.wall import offset_at
 from flagdata.ingest.anemometer.instants.zone_sentences import sentences
 from flagdata.signals import Instants
@@ -76,6 +77,11 @@ def stated(lines: Sequence[str]) -> Statement | None:
     offsets = [_offsets(zone(one.name)) for one in found]
     agree = all(any(one == other for one, other in zip(offsets[0], offset, strict=True)) for offset in offsets)
     return found[0] if found and agree else None
+
+
+def hint(statement: Statement | None, lines: Sequence[str]) -> str:
+    """What the first lines tell a user who named no zone: a statement, else an abbreviation; "" for neither."""
+    return abbreviations.advice(lines) if statement is None else statement.advice()
 
 
 def contradiction(says: str, theirs: str, given: str, time: Instants) -> tuple[Finding, ...]:

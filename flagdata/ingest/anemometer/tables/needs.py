@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from flagdata.ingest.anemometer.instants import abbreviations, counted, yearless, zones
+from flagdata.ingest.anemometer.instants import counted, yearless, zones
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.tables import stated_rate
 from flagdata.ingest.anemometer.text.layout import Layout
@@ -47,9 +47,8 @@ def needs_of(lines: Sequence[str], layout: Layout, time: TimeChoice | None) -> t
         what, fix = yearless.missing(time.form, int(read.ns[read.valid].flat[0]))
         found.append(Need(what=what, fix=fix, option="date"))
     if not time.zoned and time.zone is None:
-        statement = zones.stated(lines)
         fix = "name the zone of the logger's clock, e.g. --zone Europe/Amsterdam or --zone +01:00"
-        hint = abbreviations.advice(lines) if statement is None else statement.advice()
+        hint = zones.hint(zones.stated(lines), lines)
         fix = f"{fix}; {hint}" if hint else fix
         fix = f"{fix}; {time.zone_advice}" if time.zone_advice else fix
         found.append(Need(what="its stamps have no zone", fix=fix, option="zone"))
