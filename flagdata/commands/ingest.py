@@ -44,9 +44,10 @@ from flagdata.errors import UsageError
 @click.option("--true-fps", type=float, metavar="HZ", help="Camera: rate at which a high-speed camera really ran.")
 @click.option("--sequence-fps", type=float, metavar="HZ", help="Camera: rate of pictures that carry no time stamps.")
 @click.option(
-    "--rate", default="25", show_default=True, metavar="HZ|native",
+    "--rate", default="25", show_default=True, metavar="HZ|STEP|native",
     help="Camera: frames a second to keep. Meshes, markers: frames a second there are, by default as the source says. "
-    "Wind: readings a second of a log whose rows carry no time, from --start on.",
+    "Wind: readings a second of a log whose rows carry no time, from --start on. A length of time, e.g. 10min, is that "
+    "from one to the next.",
 )  # fmt: skip
 @click.option(
     "--crop", default="whole", show_default=True, metavar="BOX",

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from flagdata.commands.durations import written_seconds
 from flagdata.errors import TimeError, UsageError
 
 if TYPE_CHECKING:
@@ -91,7 +93,7 @@ def camera_options(
         zone=None if start is not None and timebase.names_zone(start) else zone_name,
         true_fps=true_fps,
         sequence_fps=sequence_fps,
-        rate="native" if rate.strip().lower() == "native" else _number(rate, "--rate", "a rate in Hz, or native"),
+        rate="native" if rate.strip().lower() == "native" else _rate(rate, "frames a second, or native"),
         crop=parse_crop(crop),
         exposure=exposure,
     )
@@ -158,7 +160,7 @@ def wind_options(
             zero_offset=offset,
             unit=unit if unit is not None and unit_of(unit, where="--unit").si == "m/s" else None,
             start=instant,
-            rate=_number(rate, "--rate", "readings a second") if rate not in (None, "native") else None,
+            rate=None if rate in (None, "native") else _rate(rate, "readings a second, or the time between two: 10min"),
             wind=wind,
             columns=columns,
         )
@@ -171,7 +173,7 @@ def mesh_options(*, rate: str | None, length: str) -> MeshIngest:
 
     if rate is None or rate.strip().lower() == "native":
         return MeshIngest(unit=length)
-    return MeshIngest(rate=_number(rate, "--rate", "frames a second"), unit=length)
+    return MeshIngest(rate=_rate(rate, "frames a second, or the time between two, e.g. 40ms"), unit=length)
 
 
 def marker_options(*, rate: str | None, length: str) -> MarkerOptions:
@@ -180,7 +182,16 @@ def marker_options(*, rate: str | None, length: str) -> MarkerOptions:
 
     if rate is None or rate.strip().lower() == "native":
         return MarkerOptions(unit=length)
-    return MarkerOptions(rate=_number(rate, "--rate", "frames a second"), unit=length)
+    return MarkerOptions(rate=_rate(rate, "frames a second, or the time between two, e.g. 40ms"), unit=length)
+
+
+def _rate(text: str, wanted: str) -> float:
+    """A rate [Hz] from a number, with Hz behind it or not, or from the time between two: 10min is 1/600 Hz."""
+    if (step := written_seconds(text)) is not None:
+        if step <= 0:
+            raise UsageError(f"{text!r} is no time between two", where="--rate", fix=f"give {wanted}")
+        return 1 / step
+    return _number(re.sub(r"(?i)\s*hz$", "", text.strip()), "--rate", wanted)
 
 
 def _number(text: str, option: str, wanted: str) -> float:

@@ -164,9 +164,8 @@ def dated(source: TextFile, date: dt.date) -> TextFile:
 
 def _counted(source: TextFile, text: Sequence[str], rate: float, start: int, found: Sequence[Finding] = ()) -> TextFile:
     """The file with these lines, and the finding that says whose clock they are on beside others."""
-    what = (
-        f"its rows carry no time: counted at {rate:g} Hz from {iso(start)}, as given; rows that were lost are not seen"
-    )
+    often = f"at {rate:g} Hz" if rate >= 1 else f"every {1 / rate:g} s"
+    what = f"its rows carry no time: counted {often} from {iso(start)}, as given; rows that were lost are not seen"
     return TableText.of(source, text, [Finding(kind="rate-given", severity=Severity.WARNING, what=what), *found])
 
 
