@@ -22,6 +22,7 @@ from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.ingest.anemometer.reading import streams
 from flagdata.ingest.anemometer.recipe import SENSORS
 from flagdata.ingest.anemometer.samples.neighbours import hours_off
+from flagdata.ingest.before import by_other_options
 from flagdata.ingest.camera import CameraOptions
 from flagdata.ingest.source import Source
 from flagdata.lake import Artifact, Lake, Transaction
@@ -259,6 +260,7 @@ def _read(
     paired = host_clock(log.series)
     findings = (*log.findings, *(paired.findings if paired is not None else ()))
     findings = (*findings, *_beside(lake, log.series, labels.session, branch=branch))
+    findings = (*findings, *by_other_options(lake, Kind.WIND, source.hash, options.recipe(), branch=branch))
     return _Read(log=log, options=options, labels=labels, findings=findings, paired=paired)
 
 

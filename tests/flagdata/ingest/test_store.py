@@ -110,6 +110,18 @@ def test_other_options_are_another_artifact(lake: Lake, video: Path) -> None:
     assert len({whole.artifact.id, cropped.artifact.id, archived.artifact.id}) == 3
 
 
+def test_a_file_that_is_read_by_other_options_names_the_one_before(lake: Lake, tmp_path: Path) -> None:
+    path = tmp_path / "mast.csv"
+    path.write_text("time,wind_speed (m/s)\n" + "".join(f"2026-05-01 12:00:{k:02d},{5 + k % 3}\n" for k in range(60)))
+    wrong = ingest_wind(lake, path, WindIngest(wind=WindOptions(zone="UTC")))
+    right = ingest_wind(lake, path, WindIngest(wind=WindOptions(zone="+02:00")))
+    (found,) = [found for found in right.report["findings"] if found["kind"] == "ingested-before"]
+    assert "zone UTC, now +02:00" in found["what"]
+    assert wrong.artifact.id.startswith(found["fix"].split()[-1])
+    assert not [found for found in wrong.report["findings"] if found["kind"] == "ingested-before"]
+    assert "ingested-before" not in right.artifact.quality
+
+
 @pytest.mark.parametrize("kind", [Kind.CAMERA, Kind.WIND])
 def test_other_labels_than_the_artifact_has_are_refused_and_the_same_ones_find_it(
     lake: Lake, video: Path, wind_log: Path, kind: Kind
