@@ -10,6 +10,7 @@ same wind again.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -47,6 +48,8 @@ _OTHERS = {"VWR": "apparent_wind", "VWT": "theoretical_wind", "MDA": "wind"}
 _NEWER = {"apparent_wind": "MWV,R", "theoretical_wind": "MWV,T", "wind": "MWD"}
 """The sentences of the same winds that are read before them."""
 WINDS = ("MWV", "MWD", *_OTHERS)
+_BEFORE = re.compile(r"(?=[^$!]*\d[^$!]*\d)(?!\\)[^$!]*(?=[$!])")
+"""What stands before a sentence and holds numbers, as a stamp would."""
 _CHANNELS = (
     "apparent_wind_speed", "apparent_wind_direction", "theoretical_wind_speed", "theoretical_wind_direction",
     "wind_speed", "wind_direction", "wind_direction_magnetic",
@@ -62,7 +65,9 @@ class _Stream:
     flags: list[int] = field(default_factory=list)
     times: TimeLine = field(default_factory=TimeLine)
     kinds: Counter[str] = field(default_factory=Counter)
-    talkers: Counter[str] = field(default_factory=Counter)
+    talkers: list[str] = field(default_factory=list)
+    silent: Counter[str] = field(default_factory=Counter)
+    before: list[tuple[int, str]] = field(default_factory=list)
     bad_checksums: list[int] = field(default_factory=list)
     unchecked: int = 0
     not_sentences: list[int] = field(default_factory=list)
@@ -111,6 +116,7 @@ class Nmea:
                 if line.strip(" \t\x00"):
                     _take(stream, line, at, options.talker)
         _take_others(stream)
+        _leave_silent(stream)
         where = str(source.path)
         if not stream.line:
             by = f" of the talker {options.talker}" if options.talker is not None else ""
@@ -119,9 +125,10 @@ class Nmea:
                 f"no valid sentence of wind ({', '.join(WINDS)}){by}{'; there are ' + seen if seen else ''}",
                 where=where, fix="have the instrument send MWV, or check its baud rate if sentences are broken",
             )  # fmt: skip
-        if len(stream.talkers) > 1:
-            what = f"several talkers send wind: {', '.join(sorted(stream.talkers))}; they are different instruments"
-            fix = f"choose one, e.g. --talker {min(stream.talkers)}"
+        talkers = Counter(stream.talkers)
+        if len(talkers) > 1:
+            what = f"several talkers send wind: {', '.join(sorted(talkers))}; they are different instruments"
+            fix = f"choose one, e.g. --talker {talkers.most_common(1)[0][0]}"
             if not stream.times.line:
                 raise InputError(f"{what}, and {NO_TIME}", where=where, fix=f"{NO_TIME_FIX}; then {fix}")
             raise InputError(what, where=where, fix=fix)
@@ -148,10 +155,9 @@ class Nmea:
             )
         channels, about = _platform(channels, stream, options, where)
         flags = np.array(stream.flags, dtype=np.uint16) | np.uint16(SampleFlag.TIME_UNSURE)
-        talkers = ", ".join(sorted(stream.talkers))
         return Reading(
             time=placed.time, channels=channels, flags=flags, line=line,
-            sensor=Sensor(name=f"NMEA 0183 talker {talkers}"), step=NANOSECONDS,
+            sensor=Sensor(name=f"NMEA 0183 talker {next(iter(talkers))}"), step=NANOSECONDS,
             stamped=False, findings=(*_kinds(stream, placed.time), *_findings(stream, placed), *found, *about),
         )  # fmt: skip
 
@@ -166,6 +172,8 @@ def _take(stream: _Stream, line: str, at: int, talker: str | None) -> None:
     if sentence is None:
         stream.not_sentences.append(at)
         return
+    if tagged is None and (before := _BEFORE.match(line)) is not None:
+        stream.before.append((at, before[0].strip()))
     stream.kinds[sentence.kind] += 1
     stream.times.bursts.sentence(f"{sentence.talker}{sentence.kind}", at)
     stream.unchecked += not sentence.checked
@@ -199,10 +207,22 @@ def _take_others(stream: _Stream) -> None:
         added = True
         (_mda if kind == "wind" else _vwr)(stream, sentence, at)
     if added:
-        order = np.argsort(np.array(stream.line, dtype=np.int64), kind="stable").tolist()
-        stream.line = [stream.line[index] for index in order]
-        stream.values = [stream.values[index] for index in order]
-        stream.flags = [stream.flags[index] for index in order]
+        _keep(stream, np.argsort(np.array(stream.line, dtype=np.int64), kind="stable").tolist())
+
+
+def _leave_silent(stream: _Stream) -> None:
+    """Leave out the sentences of talkers whose wind is empty in all of them, where another talker has one."""
+    speaking = {talker for talker, row in zip(stream.talkers, stream.values, strict=True) if row}
+    if speaking:
+        stream.silent = Counter(talker for talker in stream.talkers if talker not in speaking)
+        _keep(stream, [index for index, talker in enumerate(stream.talkers) if talker in speaking])
+
+
+def _keep(stream: _Stream, order: Sequence[int]) -> None:
+    stream.line = [stream.line[index] for index in order]
+    stream.values = [stream.values[index] for index in order]
+    stream.flags = [stream.flags[index] for index in order]
+    stream.talkers = [stream.talkers[index] for index in order]
 
 
 def _vwr(stream: _Stream, sentence: Sentence, at: int) -> None:
@@ -240,13 +260,14 @@ def _mda(stream: _Stream, sentence: Sentence, at: int) -> None:
 
 
 def _speed(fields: Sequence[str]) -> float | None:
-    """The first speed that pairs of a value and a letter hold [m/s]; m/s first, since it has most digits."""
-    pairs = {letter: number(value) for value, letter in zip(fields[0::2], fields[1::2], strict=False)}
-    known = (
-        value * UNITS[SPEED_UNITS[letter]].scale
-        for letter in ("M", "K", "N") if (value := pairs.get(letter)) is not None
-    )  # fmt: skip
-    return next(known, None)
+    """The speed that pairs of a value and a letter hold [m/s], by the one that is written most finely."""
+    known: list[tuple[float, float]] = []
+    for text, letter in zip(fields[0::2], fields[1::2], strict=False):
+        value, unit = number(text), SPEED_UNITS.get(letter)
+        if value is not None and unit is not None:
+            scale = UNITS[unit].scale
+            known.append((scale * 10.0 ** -len(text.strip().partition(".")[2]), value * scale))
+    return min(known)[1] if known else None
 
 
 def _mwv(stream: _Stream, sentence: Sentence, at: int) -> None:
@@ -274,8 +295,8 @@ def _mwd(stream: _Stream, sentence: Sentence, at: int) -> None:
     if len(fields) < 8:
         stream.invalid.append(at)
         return
-    true, magnetic, knots, metres = (number(fields[index]) for index in (0, 2, 4, 6))
-    speed = metres if metres is not None else None if knots is None else knots * UNITS["kn"].scale
+    true, magnetic = number(fields[0]), number(fields[2])
+    speed = _speed((fields[6], "M", fields[4], "N"))
     if true is None and magnetic is None:
         stream.undirected += 1
         return
@@ -293,7 +314,7 @@ def _mwd(stream: _Stream, sentence: Sentence, at: int) -> None:
 
 
 def _add(stream: _Stream, sentence: Sentence, at: int, row: dict[str, float], flag: SampleFlag) -> None:
-    stream.talkers[sentence.talker] += 1
+    stream.talkers.append(sentence.talker)
     stream.line.append(at)
     stream.values.append(row)
     stream.flags.append(int(flag))
@@ -390,6 +411,14 @@ def _findings(stream: _Stream, placed: Placed) -> tuple[Finding, ...]:
             text = f"{len(places)} {what}"
             found.append(Finding(kind=kind, severity=severity, count=len(places), where=f"line {places[0]}", what=text))
 
+    if stream.before:
+        first, text = stream.before[0]
+        what = f"before {len(stream.before)} sentences stands no stamp that is known, as {text[:60]!r}; not read"
+        found.append(Finding(kind="text-before-sentences", severity=Severity.WARNING, count=len(stream.before),
+                             where=f"line {first}", what=what))  # fmt: skip
+    for talker, silent in stream.silent.items():
+        what = f"the {silent} wind sentences of talker {talker} are empty; left out"
+        found.append(Finding(kind="sentences-not-read", severity=Severity.NOTE, count=silent, what=what))
     note(stream.bad_checksums, "checksum-errors", Severity.ERROR, "sentences with a wrong checksum; left out")
     note(stream.not_sentences, "malformed-lines", Severity.WARNING, "lines that are no sentence; left out")
     note(stream.invalid, "malformed-sentences", Severity.ERROR, "wind sentences with fields missing; left out")

@@ -12,6 +12,8 @@ from flagdata.timebase import NANOSECONDS
 
 _OFF = 60.0
 """Median difference that no delay of a serial line explains [s]."""
+_SEEN = 2.0
+"""Median difference that is worth a word [s]: clips are paired with winds by the second."""
 _KINDS = ("ZDA,", "RMC,")
 """Sentences that state a date."""
 
@@ -40,14 +42,14 @@ def report(stamps: Mapping[int, int], marks: Sequence[tuple[int, int]]) -> tuple
     """
     off = [(at, (said - stamps[at]) / NANOSECONDS) for at, said in marks if at in stamps]
     median = float(np.median([seconds for _, seconds in off])) if off else 0.0
-    if abs(median) < _OFF:
+    if abs(median) < _SEEN:
         return ()
-    size = f"{abs(median) / 3600:.3g} h" if abs(median) >= 3600 else f"{abs(median):.0f} s"
+    size = f"{abs(median) / 3600:.3g} h" if abs(median) >= 3600 else f"{abs(median):.1f} s"
     side = "behind" if median < 0 else "before"
     return (
         Finding(
-            kind="receiver-clock-off", severity=Severity.WARNING, count=len(off), value=median,
-            where=f"line {off[0][0]}",
+            kind="receiver-clock-off", severity=Severity.WARNING if abs(median) >= _OFF else Severity.NOTE,
+            count=len(off), value=median, where=f"line {off[0][0]}",
             what=f"the satellite receiver's time (RMC, ZDA) is {size} {side} the stamps of the lines, which are taken",
             fix="check the zone of the stamps and the computer's clock; for the receiver's time, take the stamps out",
         ),

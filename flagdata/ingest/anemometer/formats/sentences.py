@@ -15,7 +15,10 @@ from operator import xor
 from flagdata.ingest.anemometer.instants.stamps import whole_year
 
 # A talker is two letters, or, from canboat's n2kd, the device's address on NMEA 2000 as two hexadecimal digits.
-_SENTENCE = re.compile(r"[$!]([A-Z]{2}|[0-9A-F]{2}|P)([A-Z]{3})((?:,[^,*$!]*)*)(?:\*([0-9A-Fa-f]{2}))?\s*$")
+# What follows P, which makers use for sentences of their own, is theirs: "$PSMDCN,2*19".
+_SENTENCE = re.compile(
+    r"[$!]([A-Z]{2}|[0-9A-F]{2}|P)([A-Z]{3}|(?<=[$!]P)[A-Z0-9]{3,12})((?:,[^,*$!]*)*)(?:\*([0-9A-Fa-f]{2}))?\s*$"
+)
 _TAG = re.compile(r"^\\([^\\]*)\*([0-9A-Fa-f]{2})\\")
 _TAG_TIME = re.compile(r"(?:^|,)c:(\d{10})(\d{3})?(?:,|$)")
 _CLOCK = re.compile(r"^(\d{2})(\d{2})(\d{2})(?:\.(\d{1,9})\d*)?$")

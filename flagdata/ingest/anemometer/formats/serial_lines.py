@@ -54,6 +54,12 @@ _CTIME = re.compile(
     r"(?P<year>\d{4})[\"\])]?[\s,;>|]+(?P<raw>\S.*)"
 )
 """As C's asctime and Python's time.asctime write it, perhaps with a fraction: "Tue Jul 17 12:48:36.971 2018"."""
+_COMPACT = re.compile(
+    r"\s*[\"\[(]?(?P<year>(?:19|20)\d{2})(?P<month>\d{2})(?P<day>\d{2})[T _-]?"
+    r"(?P<hour>\d{2}):?(?P<minute>\d{2}):?(?P<second>\d{2}(?:\.\d{1,9})?)(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?"
+    r"[\s,;>|]+(?P<raw>[$!]\S.*)"
+)
+"""A stamp without signs between its numbers, before a sentence: "20260501 120000+00:00 $WIMWV,…"."""
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 LONGEST = 2000
 """Characters of the longest line of an instrument; longer ones are something else."""
@@ -120,6 +126,10 @@ def split_stamp(line: str) -> tuple[str, str]:
     if match is not None and match["month"].lower() in MONTHS:
         month = MONTHS.index(match["month"].lower()) + 1
         return f"{match['year']}-{month:02d}-{match['day']:0>2}T{match['time']}", _unquoted(match["raw"])
+    match = _COMPACT.match(line)
+    if match is not None:
+        stamp = "{year}-{month}-{day}T{hour}:{minute}:{second}".format(**match.groupdict()) + (match["zone"] or "")
+        return stamp, _AFTER.sub("", match["raw"])
     match = _EPOCH.match(line)
     return (match["epoch"], _unquoted(match["raw"])) if match is not None else ("", _unquoted(line))
 

@@ -44,6 +44,8 @@ _GROUPS: dict[str, str] = {
     "z": rf"\s*(?P<z>Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-](?:0\d|1[0-5])(?::?[0-5]\d)?)?",
     "Z": r"\s*(?:[A-Z]{3,4})?",
 }  # fmt: skip
+_SAME = {"B": "b", "h": "b", "A": "a", "e": "d"}
+"""Directives of C's strftime that others here read as well: a month's name may be whole or cut to three letters."""
 _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _CLOCK_RUN = re.compile(r"%H%M(?:%S)?")
 _CLOCK_RUNS = {
@@ -116,6 +118,7 @@ def pattern(form: str) -> str:
         letter = form[position]
         if letter == "%":
             directive = form[position + 1 : position + 2]
+            directive = _SAME.get(directive, directive)
             if directive == "p" and "%H" in form:
                 used.append("p")
                 out.append(rf"(?:\s*{_GROUPS['p']})?")

@@ -37,12 +37,16 @@ def placed(
         return wall + minute * 60 * NANOSECONDS, (found,)
     if not dates and not _of_days(wall):
         return wall, ()
+    days = round(float(np.median(np.abs(np.diff(wall)))) / DAY) if len(wall) > 1 else 1
+    whole = "a whole day" if days <= 1 else f"the {days} days to the next"
     what = (
-        "the stamps are dates without a time of day: each row stands for a whole day, put at its midnight"
+        f"the stamps are dates without a time of day: each row stands for {whole}, put at its midnight"
         if dates
-        else "the stamps are all of midnight, a day or more apart: each row likely stands for a whole day"
+        else f"the stamps are all of midnight, a day or more apart: each row likely stands for {whole}"
     )
-    fix = "a mean of a day is no wind at a flag: export the log with the times of its readings"
+    fix = (
+        "a mean of a day or more is no wind at a flag: if the logger keeps readings, export those with their times"
+    )
     return wall, (Finding(kind="dates-alone", severity=Severity.WARNING, count=len(wall), what=what, fix=fix),)
 
 

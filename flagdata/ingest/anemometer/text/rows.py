@@ -86,6 +86,8 @@ class RowReader:
                 continue
             if comment and line.startswith(comment):
                 continue
+            if width > 1 and _is_mark(line, self._layout.delimiter):
+                continue
             looked.append(number)
             kept.append(line)
         good: list[list[str]] = []
@@ -184,6 +186,12 @@ class RowReader:
                 )
             )  # fmt: skip
         return tuple(found)
+
+
+def _is_mark(line: str, delimiter: str) -> bool:
+    """Whether a line is one word without letters and digits: a ruler, or "***" where a file ends."""
+    words = line.split()
+    return len(words) == 1 and delimiter not in words[0] and not any(sign.isalnum() for sign in words[0])
 
 
 def blank_cells(line: str) -> list[str]:

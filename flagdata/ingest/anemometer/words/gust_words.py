@@ -23,7 +23,15 @@ GUSTS = frozenset(
 MAXIMA = frozenset(
     {
         "max", "maximum", "maxi", "maxima", "máx", "máxima", "máximo", "maximo", "massima", "massimo",
-        "maximal", "maximale", "höchst", "höchste",
+        "maximal", "maximale", "höchst", "höchste", "höchster", "höchstes", "höchsten", "grösste", "größte", "größter",
+        "hoogste", "grootste", "sterkste", "maximaal", "høyeste", "høyest", "højeste", "højest", "högsta", "högst",
+        "hæsta", "hæsti", "største", "största", "sterkeste", "maks", "maksimal", "maksimum", "maksimi", "suurin",
+        "korkein", "ylin", "najwyższa", "najwyższy", "największa", "maksymalna", "nejvyšší", "největší", "najvyššia",
+        "najveća", "največja", "legnagyobb", "legerősebb", "maximă", "màxima", "màxim", "highest", "strongest",
+        "greatest", "largest", "fastest",
     }
 )  # fmt: skip
-MINIMA = frozenset({"min", "minimum", "mini", "minima", "mín", "mínima", "mínimo", "minimo", "minimal", "minimale"})
+MINIMA = frozenset({"min", "minimum", "mini", "minima", "mín", "mínima", "mínimo", "minimo", "minimal", "minimale",
+     "laveste", "lavest", "lægsta", "lægste", "lägsta", "laagste", "niedrigste", "kleinste", "minste", "minimi", "alin",
+     "najniższa", "nejnižší", "legkisebb", "minimă", "mínim", "lowest", "smallest"}
+)  # fmt: skip

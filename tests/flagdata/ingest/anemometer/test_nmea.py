@@ -140,11 +140,37 @@ def test_knots_kilometres_and_miles_become_metres_a_second(read: Read) -> None:
     assert log.series.channels["apparent_wind_speed"] == pytest.approx([10 * 1852 / 3600, 10, 10, 4.4704])
 
 
+def test_of_a_speed_in_several_units_the_finest_is_read(read: Read) -> None:
+    log = read(times("WIVWR,80,L,20.5,N,10.5,M,38,K", "WIVWR,80,L,20.5,N,10.5,M,37.9,K"))
+    assert log.series.channels["apparent_wind_speed"] == pytest.approx([20.5 * 1852 / 3600, 37.9 / 3.6])
+
+
+def test_a_talker_without_values_is_left_out_beside_one_that_has_some(read: Read) -> None:
+    empty = f"IIMDA{',' * 20}"
+    log = read(times("WIMWV,1,R,10,N,A", empty, "WIMWV,1,R,12,N,A"))
+    assert len(log.series.time) == 2
+    assert log.series.sensor.name == "NMEA 0183 talker WI"
+    assert any("talker II are empty" in found.what for found in log.findings)
+
+
+def test_text_before_sentences_that_may_be_a_time_is_told(read: Read) -> None:
+    lines = times("WIMWV,1,R,10,N,A", "WIMWV,1,R,12,N,A").splitlines()
+    log = read("\r\n".join(f"day 121 at 43{index:03d} {line}" for index, line in enumerate(lines)))
+    (found,) = [found for found in log.findings if found.kind == "text-before-sentences"]
+    assert found.count == 4
+    assert "day 121 at 43000" in found.what
+
+
+def test_sentences_of_a_makers_own_are_sentences(read: Read) -> None:
+    log = read(f"{times('WIMWV,1,R,10,N,A', 'WIMWV,1,R,10,N,A')}\r\n{stream('PSMDCN,2')}")
+    assert not [found for found in log.findings if found.kind == "malformed-lines"]
+
+
 def test_mwd_is_wind_over_ground(read: Read) -> None:
     log = read(
-        times("WIMWD,090.0,T,087.0,M,10.0,N,5.1,M", "WIMWD,100.0,T,097.0,M,10.0,N,,M", "WIMWD,110.0,T,,M,10.0,N,5.3,M")
+        times("WIMWD,090.0,T,087.0,M,10.0,N,5.14,M", "WIMWD,100.0,T,097.0,M,10.0,N,,M", "WIMWD,110.0,T,,M,,N,5.3,M")
     )
-    assert log.series.channels["wind_speed"] == pytest.approx([5.1, 10 * 1852 / 3600, 5.3])
+    assert log.series.channels["wind_speed"] == pytest.approx([5.14, 10 * 1852 / 3600, 5.3])
     assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([90, 100, 110])
     assert np.degrees(log.series.channels["wind_direction_magnetic"][:2]) == pytest.approx([87, 97])
     assert np.isnan(log.series.channels["wind_direction_magnetic"][2])
