@@ -14,6 +14,7 @@ BENCHMARKS = {
     "render": "tests.benchmarks.bench_render",
     "sim": "tests.benchmarks.bench_sim",
     "sim-cost": "tests.benchmarks.bench_sim_cost",
+    "verdict": "tests.benchmarks.bench_verdict",
 }
 
 if __name__ == "__main__":

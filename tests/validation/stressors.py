@@ -56,6 +56,7 @@ SPEEDS = (4.0, 5.0, 6.0)
 DURATION = 8.8
 RATE, LOG_RATE = 100, 10
 VERTICES = 96
+ACROSS_MARKERS = 10
 INTENSITY, LENGTH = 0.11, 20.0
 ACROSS, UPWARD = 0.8, 0.5
 """Deviations of the wind across its mean and upward, over that along it (EN 1991-1-4 literature)."""
@@ -219,29 +220,36 @@ def _holds(estimate: Estimate, true: float) -> bool:
     return bool(estimate.low <= true <= estimate.high)
 
 
-def experiment(truth: Truth, stressor: str, seed: int) -> Experiment:
-    """What a user would bring, read as it would be."""
+def experiment(truth: Truth, stressor: str, seed: int, *, across: int = ACROSS_MARKERS) -> Experiment:
+    """What a user would bring, read as it would be.
+
+    Args:
+        across: markers along the flag, as the truth has them.
+    """
     rng = stream(seed, stressor, "recorded")
     seen = [STRESSORS[stressor](truth, index, rng) for index in range(len(SPEEDS))]
     setup = Setup(material=CAMEL, outline=sheet(WIDTH, HEIGHT), pins=Hold.HOIST_CORNERS, vertices=VERTICES)
-    return observe([_observation(made, speed) for made, speed in zip(seen, SPEEDS, strict=True)], setup).experiment
+    rest = markers(across)
+    observations = [_observation(made, speed, rest) for made, speed in zip(seen, SPEEDS, strict=True)]
+    return observe(observations, setup).experiment
 
 
-def _observation(made: Recorded, speed: float) -> Observation:
+def _observation(made: Recorded, speed: float, rest: Floats) -> Observation:
     return from_arrays(
         name=f"{speed:g} m-s",
         positions=made.positions,
-        rest=markers(),
+        rest=rest,
         rate=made.rate,
         wind=made.wind,
         noise=made.noise,
     )
 
 
-def markers() -> Floats:
-    """(70, 2) rest coordinates [m], up to the edges."""
-    across, up = np.linspace(0, WIDTH, 10), np.linspace(0, HEIGHT, 7)
-    return np.stack(np.meshgrid(across, up, indexing="ij"), axis=-1).reshape(-1, 2)
+def markers(across: int = ACROSS_MARKERS) -> Floats:
+    """(70, 2) rest coordinates [m], up to the edges, or with so many along the flag as many as are needed."""
+    rows = round(across * 7 / ACROSS_MARKERS)
+    grid_of = np.meshgrid(np.linspace(0, WIDTH, across), np.linspace(0, HEIGHT, rows), indexing="ij")
+    return np.stack(grid_of, axis=-1).reshape(-1, 2)
 
 
 def _truth(folder: Path, case: str, number: int, seed: int) -> Truth:
@@ -249,7 +257,7 @@ def _truth(folder: Path, case: str, number: int, seed: int) -> Truth:
     kept = folder / f"truth-{case.replace(' ', '-') or 'plain'}-{number:02d}.npz"
     if not kept.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        made = _simulated(case, number, seed)
+        made = simulated(case, number, seed)
         part = kept.with_suffix(f".{os.getpid()}.npz")
         np.savez(part, positions=made.positions, winds=made.winds, **made.parameters)  # pyright: ignore
         part.replace(kept)
@@ -259,7 +267,13 @@ def _truth(folder: Path, case: str, number: int, seed: int) -> Truth:
     return Truth(positions=positions, winds=winds, parameters={name: float(value) for name, value in parts.items()})
 
 
-def _simulated(case: str, number: int, seed: int) -> Truth:
+def simulated(case: str, number: int, seed: int, *, across: int = ACROSS_MARKERS) -> Truth:
+    """A null, by numerics and cloth drawn by its number.
+
+    Args:
+        case: "", or another material or turbulence.
+        across: markers along the flag.
+    """
     rng = stream(seed, "stressors", case, "truth", number)
     material, parameters = CAMEL, {}
     if case == _OTHER:
@@ -271,7 +285,7 @@ def _simulated(case: str, number: int, seed: int) -> Truth:
         mesh=flat, material=material, held=tuple(ends), anchors=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, HEIGHT]])
     )
     drawn = banks.prior_batch(
-        specimen, markers=markers(), rate=RATE, duration=DURATION, noise=0.0, speeds=(SPEEDS[0], SPEEDS[-1]),
+        specimen, markers=markers(across), rate=RATE, duration=DURATION, noise=0.0, speeds=(SPEEDS[0], SPEEDS[-1]),
         seed=child_seed(seed, "stressors", case, number),
     )  # fmt: skip
     winds = np.stack([_wind(speed, rng, turbulent=case == _TURBULENT) for speed in SPEEDS])
