@@ -1,7 +1,8 @@
 """What a verdict costs on this machine's cores: three recordings of 9 s, with a bank of nulls and without one.
 
 The recordings are nulls of `tests.validation.stressors`, at 25 Hz in winds that fluctuate, with 70, 204 and 513
-markers. The time with a bank is that of the verdict alone, the median of several; without one the bank is simulated before.
+markers. The time with a bank is that of the verdict alone, the median of several; without one the bank is simulated
+before.
 """
 
 from __future__ import annotations
