@@ -45,6 +45,8 @@ class _Table(dict[str, Unit]):
 
 
 _FACTOR = re.compile(r"(?P<factor>(?:0|[1-9]\d*)?\.?\d+(?:e-?\d+)?)\s*[*x]?\s*(?P<unit>[^\d\s*].*)", re.IGNORECASE)
+_POWERS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻−·⋅∙", "0123456789--...")
+"""Powers, signs and products as they are set in print, and as they are typed."""
 _TENTHS = ("0.1", "0.01", "0.001")
 """Factors with which files spell units."""
 
@@ -98,7 +100,7 @@ SPELLINGS: dict[str, str] = {
     "km/d": "km/day", "kmd-1": "km/day", "km.d-1": "km/day", "kmday-1": "km/day", "km.day-1": "km/day",
     "kmd": "km/day", "kilometers/day": "km/day", "kilometres/day": "km/day", "km/24h": "km/day", "km/tag": "km/day",
     "km/jour": "km/day", "km/día": "km/day", "km/dia": "km/day",
-    "kt": "kn", "kts": "kn", "knot": "kn", "knots": "kn", "nauticalmiles/hour": "kn",
+    "kt": "kn", "kts": "kn", "knt": "kn", "knts": "kn", "knot": "kn", "knots": "kn", "nauticalmiles/hour": "kn",
     "mi/h": "mph", "mi/hr": "mph", "miles/hour": "mph", "mile/hour": "mph", "milesperhour": "mph",
     "fps": "ft/s", "fpm": "ft/min", "ft/sec": "ft/s", "feet/second": "ft/s", "feet/minute": "ft/min",
     "°": "deg", "ø": "deg", "degs": "deg", "degree": "deg", "degrees": "deg", "degt": "deg", "°t": "deg",
@@ -191,10 +193,14 @@ def _factored(text: str) -> str | None:
     return f"{float(match['factor']):g} {name}"
 
 
+def plain_powers(text: str) -> str:
+    """A unit's spelling with its powers as digits and a point for products: W/m² and W/m**2 as W/m2, m·s⁻¹ as m.s-1."""
+    return re.sub(r"\*\*|\^", "", text.translate(_POWERS))
+
+
 def _key(text: str) -> str:
     """A spelling in lower case, without blanks, and with one way to write degrees, powers, products and "per"."""
-    key = text.lower().replace("º", "°").replace("⁻", "-").replace("−", "-").replace("¹", "1")
-    key = key.replace("^", "").replace("·", ".").replace("-per-", "/").replace("(-1)", "-1")
+    key = plain_powers(text.lower().replace("º", "°")).replace("-per-", "/").replace("(-1)", "-1")
     for per in (" per ", " pro ", " por ", " par ", " al "):
         key = key.replace(per, "/")
     key = "".join(key.split())

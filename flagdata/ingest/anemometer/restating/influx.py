@@ -22,7 +22,7 @@ from flagdata.units import spelled
 
 _ANNOTATIONS = ("#datatype", "#group", "#default")
 _NEEDED = frozenset({"_time", "_value", "_field"})
-_PLAIN = frozenset({"value", "state"})
+PLAIN = frozenset({"value", "state"})
 """Fields that say nothing of the quantity."""
 _NAMING = ("entity_id", "friendly_name", "topic", "sensor", "name")
 """Tags that name the quantity where the field does not."""
@@ -36,13 +36,23 @@ def matches(lines: Sequence[str]) -> bool:
 
 def as_table(source: TextFile) -> TableText | None:
     """The values of all series, one row a time; `None` where they are in columns of their own, or none is a speed."""
-    rows = list(_rows(line for _, lines in source.blocks() for line in lines))
+    return of_series(source, _rows(source.each_line()), what="series of InfluxDB")
+
+
+def of_series(source: TextFile, values: Iterable[dict[str, str]], *, what: str, left_out: int = 0) -> TableText | None:
+    """The values of series, each with its tags, its time, its field and its measurement, as one row a time.
+
+    Args:
+        what: what the file holds, for the finding that says so.
+        left_out: lines that hold no value.
+    """
+    rows = list(values)
     if not rows:
         return None
     tags = [tag for tag in dict.fromkeys(tag for row in rows for tag in row) if _is_tag(tag)]
     apart = [tag for tag in tags if tag not in _NAMING and len({row.get(tag, "") for row in rows}) > 1]
     records = sorted((_record(row, apart) for row in rows), key=lambda record: record.stamp[0].removesuffix("Z"))
-    return wide(source, ["time", *(["site"] if apart else [])], records, what="series of InfluxDB")
+    return wide(source, ["time", *(["site"] if apart else [])], records, what=what, left_out=[left_out])
 
 
 def _rows(lines: Iterable[str]) -> Iterator[dict[str, str]]:
@@ -68,7 +78,7 @@ def _is_tag(name: str) -> bool:
 def _record(row: dict[str, str], apart: Sequence[str]) -> Record:
     """The value of a row, with the site that the tags `apart` tell."""
     name, measurement = row["_field"], row.get("_measurement", "")
-    if name.lower() in _PLAIN:
+    if name.lower() in PLAIN:
         name = next((row[tag] for tag in _NAMING if row.get(tag)), measurement)
         name = f"{name} [{measurement}]" if spelled(measurement) is not None else name
     site = ("/".join(row.get(tag, "") for tag in apart),) if apart else ()

@@ -31,6 +31,19 @@ _ENTRY = re.compile(
     r"(?P<name>[^\W\d][\w./%()-]{0,40})\s*(?:[:=]|\s[-–]\s|,\s|\t+|\s{3,})\s*(?P<text>\S.{2,300}?)[\s;,\"']*",
     re.IGNORECASE,
 )
+_OF_WORDS = re.compile(
+    r"[\s#%*!;/\"'•-]*(?P<name>[^\W\d][\w./%()-]{0,40}(?: [^\W\d][\w./%()-]{0,40}){1,3}) ?[:=]\s*"
+    r"(?P<text>\S.{2,300}?)[\s;,\"']*"
+)
+"""An entry whose name is of several words, which stand before a colon or an equals sign."""
+_SPAN = re.compile(
+    r"[\s#%*!;/\"'•-]*(?:start|end|begin|first|last)[ _](?:(?:date|time|day)[ _]?)+[(\[]\s*(?:UTC|GMT)\s*[)\]]"
+    r"\s*[:=]\s*\d.{4,60}",
+    re.IGNORECASE,
+)
+"""From when to when the rows are, in UTC, as the lines above them say."""
+_ZONED = re.compile(r"\d:?\d\d(?:[.,]\d+)? ?(?:Z|UTC|GMT|[+-]\d\d(?::?\d\d)?)$")
+"""How a stamp ends that states its zone."""
 _BRACKETED = re.compile(r"[(\[<].*")
 _PART = re.compile(r"\W*(year|month|day|hour|minute|second)s?\b(?! mean| average| wind)", re.IGNORECASE)
 _BARE = re.compile(r"[\[(<]?\s*(?:time|date)", re.IGNORECASE)
@@ -69,6 +82,8 @@ def as_table(source: TextFile) -> TableText | None:
     if heading is None:
         return None
     names = [_better(cell, heading.told.get(cell, "")) for cell in heading.cells]
+    zoned = _zoned(names, source.head(_HEAD), heading)
+    names = names if zoned is None else zoned
     changed = [(old, new) for old, new in zip(heading.cells, names, strict=True) if old != new]
     if not any(interest(new) == 2 for _, new in changed) or len(set(names)) < len(names):
         return None
@@ -81,6 +96,7 @@ def as_table(source: TextFile) -> TableText | None:
     whole[heading.at] = heading.mark + delimiter.join(names)
     shown = ", ".join(f"{old} is {new!r}" for old, new in changed if interest(new) == 2)
     what = f"the lines above line {heading.at + 1} explain its headings, which are read as they say: {shown}"
+    what += "" if zoned is None else "; they give the first or last instant of the log in UTC, as its stamps are read"
     return TableText.of(source, whole, [Finding(kind="explained-headings", severity=Severity.NOTE, what=what)])
 
 
@@ -96,10 +112,25 @@ def _heading(lines: Sequence[str]) -> _Heading | None:
                 enough = known > 1 and 2 * known >= len(cells)
                 if enough and _row_below(lines[at + 1 :], cells, delimiter):
                     return _Heading(at=at, mark=mark, delimiter=delimiter, cells=cells, told=told)
-        found = _ENTRY.fullmatch(line)
+        found = _ENTRY.fullmatch(line) or _OF_WORDS.fullmatch(line)
         if found is not None:
             told.setdefault(found["name"], found["text"])
     return None
+
+
+def _zoned(names: Sequence[str], lines: Sequence[str], heading: _Heading) -> list[str] | None:
+    """The names, that of the first time with UTC where lines above give the log's span in it; else `None`.
+
+    So it is where neither a name nor the first row states a zone of its own.
+    """
+    first = next((at for at, name in enumerate(names) if names_time(name)), None)
+    spans = any(_SPAN.fullmatch(line) for line in lines[: heading.at])
+    if first is None or not spans or any(zone_of(name) for name in names):
+        return None
+    row = next((cut(line.strip(), heading.delimiter) for line in lines[heading.at + 1 :] if line.strip()), [])
+    if any(_ZONED.search(cell) for cell in row):
+        return None
+    return [f"{name} UTC" if at == first else name for at, name in enumerate(names)]
 
 
 def _row_below(lines: Sequence[str], cells: Sequence[str], delimiter: str) -> bool:

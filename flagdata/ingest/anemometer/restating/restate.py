@@ -22,6 +22,7 @@ WITHIN = (
     "flagdata.ingest.anemometer.restating.percent_encoded",
     "flagdata.ingest.anemometer.restating.clock_words",
     "flagdata.ingest.anemometer.restating.twice_told",
+    "flagdata.ingest.anemometer.restating.ruled_headings",
 )
 KINDS = (
     "flagdata.ingest.anemometer.restating.sql_dump",
@@ -57,6 +58,7 @@ KINDS = (
     "flagdata.ingest.anemometer.restating.wrapped",
     "flagdata.ingest.anemometer.restating.two_in_a_cell",
     "flagdata.ingest.anemometer.restating.influx",
+    "flagdata.ingest.anemometer.restating.line_protocol",
     "flagdata.ingest.anemometer.restating.name_value",
     "flagdata.ingest.anemometer.restating.labelled",
     "flagdata.ingest.anemometer.restating.blocks",

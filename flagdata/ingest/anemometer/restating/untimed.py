@@ -18,7 +18,7 @@ from flagdata.errors import TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
 from flagdata.ingest.anemometer.formats.serial_lines import MONTHS, split_stamp
-from flagdata.ingest.anemometer.restating import labelled
+from flagdata.ingest.anemometer.restating import labelled, line_protocol
 from flagdata.ingest.anemometer.restating.restate import restate
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Head
 from flagdata.ingest.anemometer.tables import stated_columns
@@ -61,10 +61,10 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
         fix = "give the instant of the first reading: --start 2026-05-01T12:00:00+02:00"
         raise UsageError("a rate without a start", where=where, fix=fix)
     lines = source.head(HEAD_LINES)
-    if columns is not None:
-        _refuse_times(stated_columns.names_time(columns), where)
+    if columns is not None or line_protocol.matches(lines):
+        _refuse_times(columns is not None and stated_columns.names_time(columns), where)
         source = restate(source)
-        text, found = _table(source, rate, start, where, told=True)
+        text, found = _table(source, rate, start, where, told=columns is not None)
         return _counted(source, text, rate, start, found)
     if sum(bool(_WIND.search(line)) for line in lines) and sum(line.startswith(("$", "!", "\\")) for line in lines):
         _refuse_times(sum(bool(_TIMED.search(line)) for line in lines) > 1, where)

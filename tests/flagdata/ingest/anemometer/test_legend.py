@@ -92,3 +92,29 @@ def test_headings_that_say_enough_stay(log_file: Write) -> None:
     log = only(log_file(text))
     assert "explained-headings" not in {finding.kind for finding in log.findings}
     assert log.series.channels["wind_speed"].tolist() == [minute + 0.5 for minute in range(6)]
+
+
+SPAN = """% Start_Time [UTC]: 20200101T000000Z
+% End_Time [UTC]: 20200101T235959Z
+%
+% when: Acquisition time
+% ws: Mean wind speed [Knt]
+% wd: Wind direction [degrees N]
+
+time,ws,wd
+"""
+
+
+def test_a_span_in_utc_is_the_zone_of_stamps_that_name_none(log_file: Write) -> None:
+    rows = "".join(f"2020-01-01 00:{minute:02d}:00,{minute},20\n" for minute in range(6))
+    log = only(log_file(SPAN + rows))
+    assert log.series.time[0] == 1_577_836_800 * 10**9
+    np.testing.assert_allclose(log.series.channels["wind_speed"], np.arange(6) * 1852 / 3600)
+
+
+@pytest.mark.parametrize(("zone", "hours"), [("Z", 0), ("+02:00", 2)])
+def test_a_span_in_utc_says_nothing_of_stamps_with_a_zone(log_file: Write, zone: str, hours: int) -> None:
+    rows = "".join(f"2020-01-01T00:{minute:02d}:00{zone},{minute},20\n" for minute in range(6))
+    log = only(log_file(SPAN + rows))
+    assert log.series.time[0] == (1_577_836_800 - 3600 * hours) * 10**9
+    assert not any("UTC" in finding.what for finding in log.findings)

@@ -284,7 +284,7 @@ def test_relative_wind_of_older_instruments_is_read(read: Read) -> None:
 
 def test_the_composite_of_a_weather_station_is_wind_over_ground(read: Read) -> None:
     log = read(stream("WIMDA,29.9,I,1.01,B,21.1,C,,C,55.1,,12.1,C,231.0,T,229.0,M,8.2,N,4.2,M"))
-    assert log.series.channels["wind_speed"][0] == pytest.approx(4.2)
+    assert log.series.channels["wind_speed"][0] == pytest.approx(8.2 * 1852 / 3600)
     assert np.degrees(log.series.channels["wind_direction"][0]) == pytest.approx(231.0)
 
 
