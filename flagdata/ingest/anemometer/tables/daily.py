@@ -44,9 +44,7 @@ def placed(
         if dates
         else f"the stamps are all of midnight, a day or more apart: each row likely stands for {whole}"
     )
-    fix = (
-        "a mean of a day or more is no wind at a flag: if the logger keeps readings, export those with their times"
-    )
+    fix = "a mean of a day or more is no wind at a flag: if the logger keeps readings, export those with their times"
     return wall, (Finding(kind="dates-alone", severity=Severity.WARNING, count=len(wall), what=what, fix=fix),)
 
 

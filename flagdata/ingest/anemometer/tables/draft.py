@@ -21,6 +21,7 @@ from flagdata.ingest.anemometer.tables import (
     beside_components,
     offered_columns,
     quality_columns,
+    speeds_offered,
     stated_against,
     stated_columns,
     stated_rate,
@@ -39,8 +40,15 @@ from flagdata.ingest.anemometer.text.layout import Layout, lay_out
 from flagdata.ingest.anemometer.times import bare_dates, stretches, truncated
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time
-from flagdata.ingest.anemometer.winds import cumulated, missing_codes, own_motion, site_labels, unitcheck
-from flagdata.ingest.anemometer.winds.codes import below_zero
+from flagdata.ingest.anemometer.winds import (
+    cumulated,
+    missing_codes,
+    negative,
+    own_motion,
+    radiation,
+    site_labels,
+    unitcheck,
+)
 from flagdata.ingest.anemometer.winds.found import Wind
 from flagdata.ingest.anemometer.winds.instruments import find_winds, named_wind
 from flagdata.ingest.anemometer.winds.no_speeds import beaufort, counts, is_count, of_no_mean
@@ -50,8 +58,6 @@ from flagdata.ingest.anemometer.words import ghcn
 from flagdata.ingest.anemometer.words.headings import interest, understand
 from flagdata.units import canonical
 
-_BELOW, _OFTEN, _FEW = -0.5, 0.1, 5
-"""Speeds below this [in the file's unit], in this share of at least so many rows, are those of a component."""
 _LISTED = 30
 """Columns of a table that a message names."""
 _ORDER = Literal["dmy", "mdy", "ymd"]
@@ -281,9 +287,11 @@ def _doubts(
         if missing:
             found.append(_unit_doubt(lines, layout, time, wind, missing))
             break
-    unsure = [wind.label for wind in winds if not wind.sure] if chosen is None else []
+    unsure = [wind.label for wind in winds if not wind.sure and _may_be_speed(layout, wind)] if chosen is None else []
     if unsure:
-        fix = f"if it is the wind, name it: --wind {in_shell(unsure[0])}"
+        first = next(wind for wind in winds if wind.label == unsure[0])
+        whole = "the wind" if speeds_offered.is_offered(layout, first) else "the wind's whole speed, no component of it"
+        fix = f"if it is {whole}, name it: --wind {in_shell(unsure[0])}"
         fix += "" if time is None or time.counts else f"; or {offered_columns.offer(layout, time, winds)}"
         what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
         own = own_motion.doubt(layout)
@@ -326,18 +334,22 @@ def _below_zero(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
         column = wind.columns.get("wind_speed")
         if column is None:
             continue
-        value = numbers(layout.column(column.index), decimal=layout.decimal).value
-        known = value[np.isfinite(value) & ~np.isin(value, missing_codes.CODES)]
-        known = known[~below_zero(known)]
-        if len(known) < _FEW or float((known < _BELOW).mean()) < _OFTEN:
+        lowest = negative.lowest(layout, column.index)
+        if lowest is None:
             continue
-        what = f"column {wind.label!r} goes below zero, to {known.min():g}: a component of the wind, not its speed"
-        line = offered_columns.offer(layout, time, ())
+        what = f"column {wind.label!r} goes below zero, to {lowest:g}: a component of the wind, not its speed"
+        line = offered_columns.offer(layout, time, (), components=True)
         fix = (
             f"if two columns are its components, say so with wind_x and wind_y (x to the east, y to the north): {line}"
         )
         found.append(Doubt(what=what, fix=fix))
     return found
+
+
+def _may_be_speed(layout: Layout, wind: Wind) -> bool:
+    """Whether the column of a wind's speed may be one."""
+    column = wind.columns.get("wind_speed")
+    return column is None or speeds_offered.may_be(layout, column.index)
 
 
 def _only_numbers(layout: Layout, time: TimeChoice) -> int | None:
@@ -348,7 +360,8 @@ def _only_numbers(layout: Layout, time: TimeChoice) -> int | None:
 
 
 def _directions(layout: Layout) -> list[str]:
-    return [name for name in layout.names if understand(name).channel.endswith("wind_direction")]
+    named = (name for at, name in enumerate(layout.names) if not radiation.is_direct(layout.names, at))
+    return [name for name in named if understand(name).channel.endswith("wind_direction")]
 
 
 def _unit_doubt(

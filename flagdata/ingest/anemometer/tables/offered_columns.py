@@ -13,10 +13,12 @@ import numpy as np
 
 from flagdata.ingest.anemometer.instants import counted
 from flagdata.ingest.anemometer.options import in_shell
+from flagdata.ingest.anemometer.tables import speeds_offered
 from flagdata.ingest.anemometer.tables.stated_columns import PARTS, SITE, TOWARDS, named, shown
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.times import count_units
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice, whole_numbers
 from flagdata.ingest.anemometer.winds import beside, bow, own_motion, vectors
 from flagdata.ingest.anemometer.winds.angles import compass_unit, in_tens, may_be_direction, unit_of
@@ -32,12 +34,19 @@ _COUNT_AND_WIND, _ROWS, _UNEVEN = 2, 4, 0.01
 """Columns and steps from which a count is told, and the share of a step by which others may differ."""
 _SECONDS, _SMALL, _FINE = "elapsed-s", 1.0, 0.5
 """How a count is likely written that grows by less than 1, with a fraction of three digits in most rows."""
+_OPEN = "elapsed-?"
+"""A count whose unit the user is to write in place of the question mark."""
 _WIDE = 12
 """Columns up to which an offer lists all of them."""
 
 
-def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str:
-    """The option with which the user says what the columns are, as far as they are known; "?" where they are not."""
+def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], *, components: bool = False) -> str:
+    """The option with which the user says what the columns are, as far as they are known; "?" where they are not.
+
+    Args:
+        components: whether a wind that is not known is asked for by its components, not by its speed.
+    """
+    winds = [wind for wind in winds if speeds_offered.is_offered(layout, wind)]
     width, own = layout.number_of_columns(), own_motion.columns(layout)
     known = _known(layout, time, winds)
     speeds = [entry for entry in known.values() if entry.split("[")[0] in (*SPEEDS, *COMPONENTS)]
@@ -49,7 +58,9 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
         entries = {entry.split("[")[0] for entry in known.values()}
         listed += ["?=time"] if time is None and not {"time", "date", "hour"} & entries else []
         directed = any("wind_direction" in entry for entry in known.values())
-        listed += ["?=wind_speed[?]"] if not winds and not speeds else []
+        asked = ["?=wind_x[?]", "?=wind_y[?]"] if components else ["?=wind_speed[?]"]
+        listed += asked if not winds and not speeds else []
+        directed = directed or components
         listed += ["?=wind_direction[deg]"] if not winds and not speeds and not directed else []
         line = ",".join(listed)
     else:
@@ -57,12 +68,17 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> str
     others = [
         name for at, name in enumerate(layout.names) if at not in {*known, *own}
         and ("wind_speed" if _alone(layout, at) else understand(name, layout.units[at]).channel)
-        in {entry.split("[")[0] for entry in speeds}
+        in {entry.split("[")[0] for entry in speeds} and speeds_offered.may_stand(layout, at)
     ]  # fmt: skip
     serial = _serial(layout) if time is None else None
     further = f"; name {', '.join(map(repr, others))} in its place in a run of its own" if others else ""
     example = "with a name, or nothing, in place of each ?" if "?" in line else "corrected where it is wrong"
-    if time is None and f"time[{_SECONDS}]" in known.values():
+    if f"time[{_OPEN}]" in known.values():
+        counts = "; of time[elapsed-?] the ? is s, ms, us, min, h or d, the unit of its count: add --start TIME"
+        further = f"{counts}{further}"
+    elif time is None and "time[elapsed-d]" in known.values():
+        further = f"; column 1 grows by parts of a day, as days since a start do: add --start TIME{further}"
+    elif time is None and f"time[{_SECONDS}]" in known.values():
         further = (
             f"; column 1 grows in small steps, as a count of seconds since a start does: add --start TIME{further}"
         )
@@ -281,7 +297,7 @@ def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
         elif len(time.columns) == 1:
             elapsed = time.form is not None and counted.is_elapsed(time.form)
             found[time.columns[0]] = (
-                f"time[{time.form}]" if elapsed else f"time[{time.likely or '?'}]" if time.counts else "time"
+                f"time[{time.form}]" if elapsed else f"time[{time.likely or _OPEN}]" if time.counts else "time"
             )
         else:
             found |= dict(zip(time.columns, ("date", *["time"] * len(time.columns)), strict=False))
@@ -307,17 +323,20 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
     elif steady is not None:
         found[steady] = "hour" if _of_one_day(layout) else "time[?]"
     elif not timed and _grows(layout):
-        found[0], timed = f"time[{_SECONDS}]", True
+        cells = layout.column(0)
+        digits = max(len(re.split("[.,]", cell)[-1]) for cell in cells)
+        likely = count_units.likely(numbers(cells, decimal=layout.decimal).value, digits=digits)
+        found[0], timed = f"time[{likely.form or _OPEN}]", True
     for at in range(len(layout.names)):
         if at in found:
             continue
         kinds = [kind for cell in layout.column(at) if (kind := cell_kind(cell)) != "missing"]
         heading = bow.heading_of(layout, at)
-        if at in apart or (not kinds and "wind" not in heading.channel):
+        if at in apart or (not kinds and speeds_offered.is_none(layout, heading.channel)):
             continue  # the name of a station may read as that of a quantity; an empty column is none
         if not timed and at == stamped and not any(e.startswith("time") for e in found.values()):
             found[at] = "time[?]"
-        elif at in own:
+        elif at in own or (heading.channel in SPEEDS and not speeds_offered.may_be(layout, at)):
             found |= {} if winds else {at: "?"}
         elif winds and heading.channel in WEATHER:
             continue  # which of the columns is the weather of this wind was told already
@@ -347,6 +366,8 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
             not timed and re.search(r"\d{3}|\d.*\d.*\d", layout.rows[0][at])
         ):
             found[at] = "?"
+    if not winds and not any(entry.split("[")[0] in (*SPEEDS, *COMPONENTS) for entry in found.values()):
+        found |= speeds_offered.latest(layout)
     return found
 
 

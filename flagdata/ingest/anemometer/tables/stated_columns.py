@@ -102,7 +102,7 @@ def parse(text: str) -> tuple[Entry, ...]:
         if match is None or not match["name"] or (by_name and match["column"] is None):
             fix = 'write NAME[UNIT] for each, as "time,wind_speed[km/h]", or COLUMN=NAME[UNIT] for each'
             raise UsageError(f"{part.strip()!r} cannot be read", where=_WHERE, fix=fix)
-        if "?" in (match["column"], match["name"], match["detail"]):
+        if "?" in (match["column"], match["name"], (match["detail"] or "").removeprefix("elapsed-")):
             fix = "write there what it is, or leave the entry blank where the column is not needed"
             raise UsageError(f"{part.strip()!r} still has a question mark, entry {number}", where=_WHERE, fix=fix)
         name = ALIASES.get(match["name"], match["name"])

@@ -8,7 +8,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.ingest.anemometer.tables import offered_columns, unread_rest
+from flagdata.ingest.anemometer.tables import offered_columns, speeds_offered, unread_rest
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
@@ -106,7 +106,8 @@ def _is_speed(layout: Layout, index: int) -> bool:
         return False
     kinds = {cell_kind(cell) for cell in layout.column(index)}
     words = _words(layout, index)
-    return bool(words & _SPEEDS) and not words & _NO_SPEEDS and kinds <= {"number", "missing"}
+    named = bool(words & _SPEEDS) and not words & _NO_SPEEDS and kinds <= {"number", "missing"}
+    return named and speeds_offered.may_be(layout, index)
 
 
 def _words(layout: Layout, index: int) -> set[str]:

@@ -7,7 +7,7 @@ from typing import Literal
 
 from flagdata.ingest.anemometer.recipe import MISSING, MISSING_SIGNS
 from flagdata.ingest.anemometer.text.cells import BELOW
-from flagdata.units import UNITS, spelled
+from flagdata.units import UNITS, plain_powers, spelled
 
 CellKind = Literal["number", "stamp", "missing", "text"]
 
@@ -29,8 +29,8 @@ OF_LOGS = frozenset({"m/s", "rad", "K", "Pa", "1"})
 _MISSING = frozenset({*MISSING, "nan.", "inf", "-inf"})
 _UNITS_OF_OTHERS = frozenset(
     {
-        "ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "w/m^2", "v", "yr",
-        "mo", "dy", "hr", "mn", "year", "month", "day", "hour", "mi", "nmi", "-", "none",
+        "ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "v", "yr",
+        "j/m2", "kw", "kwh", "mo", "dy", "hr", "mn", "year", "month", "day", "hour", "mi", "nmi", "-", "none",
         "degrees_north", "degrees_east", "degree_north", "degree_east", "degree_celsius", "celsius", "psu", "ph_t",
     }
 )  # fmt: skip
@@ -54,7 +54,7 @@ def cell_kind(cell: str) -> CellKind:
 
 def is_unit(text: str) -> bool:
     """Whether a cell of a line of units spells one; brackets are looked through."""
-    bare = text.strip().strip("[]()<>").strip()
+    bare = plain_powers(text.strip().strip("[]()<>").strip())
     known = bare.lower() in _UNITS_OF_OTHERS or spelled(bare) is not None
     return known or _COMPOUND.fullmatch(bare.lower()) is not None
 

@@ -18,7 +18,7 @@ from flagdata.units import UNITS, spelled
 
 TAIL = 200
 """Lines at the end of those looked at by which the delimiter is told; half of them where the file is short."""
-_LEAST = 3
+_LEAST = 2
 """Lines at the end that may tell the delimiter where more of them do not."""
 _CANDIDATES = (";", "\t", ",", "|", " ")
 _STRONG = (";", "\t", "|")

@@ -19,7 +19,7 @@ from flagdata.ingest.anemometer.instants.stamps import Stamps
 from flagdata.ingest.anemometer.text.cells import Cell, numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
-from flagdata.ingest.anemometer.times import dateparts, months, second_times, yearless_columns
+from flagdata.ingest.anemometer.times import count_units, dateparts, months, second_times, yearless_columns
 from flagdata.ingest.anemometer.times.dateparts import CLOCKS, MONTHS, clocks_of, date_forms, order_of
 from flagdata.ingest.anemometer.times.timechoice import SHARE, TimeChoice, fits, hours_and_minutes, share, time_choice
 from flagdata.ingest.anemometer.times.truncated import before_1970
@@ -28,7 +28,7 @@ from flagdata.ingest.anemometer.words.headings import names_time, understand, wo
 
 _CLOCK_NAMES = frozenset({"time", "hhmm", "hhmmss", "hour", "hh", "hr", "uur"})
 _DATE = re.compile(
-    r"^\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s*$|^\s*\d{1,2}[- /][A-Za-z]{3}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$"
+    r"^\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s*$|^\s*\d{1,2}[- /][A-Za-z]{3,9}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$"
     r"|^\s*(19|20)\d\d(?:[0-2]\d\d|3[0-6]\d)\s*$|^\s*(19|20)\d\d:\d{2}:\d{2}\s*$"
 )
 _CLOCK = re.compile(
@@ -43,7 +43,7 @@ _ZONED = rf"(?:Z|UTC|GMT|{'|'.join(ABBREVIATED)}|(?:0:00|:00[.,]0+|[T ]0{{4,6}}|
 """How stamps end that state their zone, their digits as 0: an offset stands behind minutes, not behind an hour."""
 _DATE_AND_HOUR = re.compile(r"^\s*(19|20)\d{2}(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])([01]\d|2[0-4])\s*$")
 _STAMPLIKE = re.compile(
-    r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_:-]|\d\s+\d{1,2}:"
+    r"\d[-/.:]\d{1,2}[-/.:]|\d[- /][A-Za-z]{3,9}[- /,]|[A-Za-z]{3}\s+\d|^\d{9}|^\d{8}[ T_:-]|\d\s+\d{1,2}:"
 )
 """What a cell must have in it to be a date and a time."""
 _BLANKS = re.compile(r"\s*(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}(?::\d{2}|\s*$)")
@@ -384,6 +384,9 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
     if serial == "decimal-years" and (set(words) & _YEARS_AND_PARTS or names_time(name)):
         yield time_choice(layout, (index,), serial, counted.parse(texts, serial), 1.5)
         return
+    if set(words) & count_units.DAYS and _by_parts_of_days(value):
+        yield _without_unit(layout, index, texts, value, score=0.2)
+        return
     if set(words) & _PARTS_OF_DATES:
         return  # a part of a date, such as 12.75 h, counts from no start
     if names_time(name) and float(steps.max()) < 400:
@@ -404,17 +407,24 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
         if hours_and_minutes(texts) and (bool(np.any(steps < 0)) or value[-1] >= _LAST_HOUR):
             yield time_choice(layout, (index,), "%H%M", counted.parse(texts, "%H%M"), 0.1)
             return
-        usual = float(np.median(steps[steps > 0]))
-        unit = "ms" if usual >= 5 and bool(np.all(value % 1 == 0)) else "s"
-        likely = f"likely {unit}" if usual < _SLOW else "ms of a slow logger, or us of a fast one"
-        yield TimeChoice(
-            columns=(index,), form=None, zone=None, zoned=False, score=choice.score - 0.1, counts=True,
-            likely=f"elapsed-{unit}" if usual < _SLOW else "",
-            doubt=f"column {name!r} counts in steps of {usual:g}, but its unit is not stated ({likely})",
-            fix=f"say what it counts, {', '.join(counted.UNITS)} ({likely}), and --start TIME",
-        )  # fmt: skip
+        yield _without_unit(layout, index, texts, value, score=choice.score - 0.1)
         return
     yield choice
+
+
+def _without_unit(
+    layout: Layout, index: int, texts: Sequence[str], value: NDArray[np.float64], *, score: float
+) -> TimeChoice:
+    """A count whose unit its heading does not state, which is to be said."""
+    steps = np.diff(value)
+    name, usual = layout.names[index], float(np.median(steps[steps > 0]))
+    digits = max(len(text.partition(".")[2]) if "e" not in text.lower() else _DIGITS for text in texts)
+    likely = count_units.likely(value, digits=digits, words=words_of(name))
+    return TimeChoice(
+        columns=(index,), form=None, zone=None, zoned=False, score=score, counts=True, likely=likely.form,
+        doubt=f"column {name!r} counts in steps of {usual:g}, but its unit is not stated ({likely.words})",
+        fix=f"say what it counts, {', '.join(counted.UNITS)} ({likely.words}), and --start TIME",
+    )  # fmt: skip
 
 
 def _hours_of_a_day(words: Sequence[str], name: str, texts: Sequence[str], value: NDArray[np.float64]) -> bool:
@@ -426,6 +436,13 @@ def _hours_of_a_day(words: Sequence[str], name: str, texts: Sequence[str], value
     return (bool(words) and set(words) <= _HOURS) or (
         names_time(name) and any(re.match(r"\s*0\d", text) for text in texts)
     )
+
+
+def _by_parts_of_days(value: NDArray[np.float64]) -> bool:
+    """Whether numbers of days of a year rise from row to row by parts of a day."""
+    steps = np.diff(value)
+    by_parts = bool(np.all(steps > 0)) and float(np.median(steps)) < 1 and bool(np.any(value % 1 != 0))
+    return by_parts and 0 <= float(value[0]) < float(value[-1]) <= _DAYS
 
 
 _COUNTERS: tuple[tuple[str, frozenset[str]], ...] = (
@@ -442,9 +459,11 @@ _YEARS_AND_PARTS = frozenset({"decimal", "decyear", "dyear", "decdate", "decimal
 _HOURS = frozenset({"hour", "hours", "hr", "hrs", "h"})
 _IN_MINUTES = re.compile(r"[\[(]\s*min\.?\s*[\])]", re.IGNORECASE)
 """A unit behind a time; alone it may as well be a minimum."""
+_DAYS = 732.0
+"""Days of a year, and of one that runs on."""
 _LAST_HOUR = 2300
 """Hours and minutes in one number, from which on a day is over: a count without a unit would not end there."""
-_SLOW = 5000.0
-"""Steps of a count from which it is as likely of microseconds as of milliseconds."""
+_DIGITS = 6
+"""Digits behind the point of numbers that are written with an exponent."""
 _SECONDS = {"elapsed-ms": 1e-3, "elapsed-us": 1e-6, "elapsed-min": 60.0, "elapsed-s": 1.0, "elapsed-h": 3600.0}
 """Seconds a count."""

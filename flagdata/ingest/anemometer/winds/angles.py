@@ -9,6 +9,7 @@ from flagdata import compass
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.winds import radiation
 from flagdata.ingest.anemometer.words.headings import Heading, understand, words_of
 
 _DIRECTIONS = frozenset(
@@ -20,7 +21,7 @@ _OTHERS = frozenset(
     {
         "lat", "latitude", "lon", "lng", "long", "longitude", "heading", "hdg", "course", "cog", "roll", "pitch", "yaw",
         "tilt", "sun", "solar", "elevation", "temp", "temperature", "gust", "max", "min", "std", "sd", "sigma", "wave",
-        "swell", "current", "chill", "f", "c",
+        "swell", "current", "chill", "f", "c", "vessel", "ship", "boat", "track", "platform",
     }
 )  # fmt: skip
 """Words of angles and degrees of other quantities."""
@@ -34,7 +35,7 @@ def may_be_direction(layout: Layout, index: int) -> bool:
     """Whether a column holds points of the compass, or angles below a heading that may be one of a direction."""
     words = set(words_of(layout.names[index]))
     heading = understand(layout.names[index], layout.units[index])
-    if words & _OTHERS or heading.spread:
+    if words & _OTHERS or heading.spread or radiation.is_direct(layout.names, index):
         return False
     if compass_unit(layout, index) is not None:
         return True

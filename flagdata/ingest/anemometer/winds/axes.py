@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from flagdata.ingest.anemometer.text.layout import Layout
-from flagdata.ingest.anemometer.winds import own_motion
+from flagdata.ingest.anemometer.winds import named_axes, own_motion
+from flagdata.ingest.anemometer.winds.beside import has_companions
 from flagdata.ingest.anemometer.words.headings import Heading, words_of
 from flagdata.ingest.anemometer.words.wind_words import VERTICAL
 
@@ -36,6 +37,8 @@ def along_axes(layout: Layout, headings: Sequence[Heading]) -> tuple[list[Headin
         return headings, False
     words = [set() if at in own else set(words_of(name)) for at, name in enumerate(layout.names)]
     found = list(headings)
+    for at, channel in named_axes.components(layout, headings, apart=own).items():
+        found[at] = replace(headings[at], channel=channel, quantity=channel, sure=True, label=())
     sides = [[at for at, said in enumerate(words) if _towards(said, headings[at], side)] for side in _AXES]
     if [len(side) for side in sides[:2]] == [1, 1] and not any(sides[2:]):
         for side, channel in ((sides[0][0], "wind_y"), (sides[1][0], "wind_x")):
@@ -56,7 +59,8 @@ def along_axes(layout: Layout, headings: Sequence[Heading]) -> tuple[list[Headin
         if not any(heading.channel == other for heading in headings):
             for at, heading in enumerate(headings):
                 if heading.channel == own_axis and words_of(layout.names[at])[:1] == [letter]:
-                    found[at] = replace(heading, channel="wind_speed", quantity="wind_speed", sure=False)
+                    said = has_companions(layout, at)
+                    found[at] = replace(heading, channel="wind_speed", quantity="wind_speed", sure=said)
     return found, False
 
 

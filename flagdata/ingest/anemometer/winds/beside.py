@@ -20,6 +20,8 @@ _INSTEAD = (
     ("ws", "wd"), ("vw", "dw"), ("wv", "wd"), ("ff", "dd"),
 )  # fmt: skip
 """What stands in the name of a speed, and in its place in that of its direction."""
+_SPREADS = ("std", "sd", "stdev", "stddev", "sigma")
+"""What stands behind the name of a speed, or of its direction, in that of its standard deviation."""
 _UNIT = re.compile(r"[\[(<{][^\])>}]*[\])>}]")
 _TURN, _MOST = 361.0, 0.9
 """Largest angle [deg], and the share of a column that must be angles; the rest are codes of no value."""
@@ -42,6 +44,18 @@ def direction_of(layout: Layout, speed: int, *, apart: Collection[int] = ()) -> 
         if index not in {speed, *apart} and _plain(name) in named and _turns(layout, index)
     ]  # fmt: skip
     return found[0] if len(found) == 1 else None
+
+
+def has_companions(layout: Layout, speed: int) -> bool:
+    """Whether a direction and a standard deviation stand beside a column under its name, as Udir and Ustd beside U.
+
+    Args:
+        speed: a column that may be a speed.
+    """
+    own = _plain(layout.names[speed])
+    named = {f"{own}{word}" for word in _SPREADS} | {f"{own}{way}{word}" for way in _DIRECTIONS for word in _SPREADS}
+    spread = any(_plain(name) in named for at, name in enumerate(layout.names) if at != speed)
+    return bool(own) and spread and direction_of(layout, speed) is not None
 
 
 def as_direction(heading: Heading, *, of: Heading) -> Heading:

@@ -8,6 +8,7 @@ import numpy as np
 
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.winds import radiation
 from flagdata.ingest.anemometer.words.headings import Heading, understand, words_of
 
 _TO_BOW = frozenset({"rel", "relative", "apparent", "bow", "awa", "awd", "twa"})
@@ -32,6 +33,8 @@ def to_bow(layout: Layout, index: int) -> bool:
 def heading_of(layout: Layout, index: int) -> Heading:
     """What a column's heading says, of the apparent wind where it is an angle of the wind to the bow."""
     found = understand(layout.names[index], layout.units[index])
+    if radiation.is_direct(layout.names, index):
+        return replace(found, channel="", quantity="", sure=False)
     if found.quantity != "wind_direction" or not to_bow(layout, index):
         return found
     channel = "apparent_wind_direction"

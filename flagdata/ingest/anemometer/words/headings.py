@@ -11,13 +11,16 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from flagdata.errors import FlagdataError
-from flagdata.ingest.anemometer.instants.abbreviations import ABBREVIATED
+from flagdata.ingest.anemometer.instants.abbreviations import ABBREVIATED, written_out
+from flagdata.ingest.anemometer.words import weather_words
 from flagdata.ingest.anemometer.words.languages import in_english
 from flagdata.ingest.anemometer.words.wind_words import (
     AXES,
     COURSES,
     DIRECTION,
+    HEIGHTS,
     MEAN,
+    OF_VESSELS,
     OTHER,
     PLACES,
     PLAIN,
@@ -61,25 +64,6 @@ _VESSEL_WIND = {
     "angle": "a", "ang": "a", "speed": "s", "spd": "s", "velocity": "s", "dir": "d", "direction": "d",
 }  # fmt: skip
 """The last letter of what instruments of boats call AWA, AWS, AWD, TWA, TWS, TWD and GWD, by its word."""
-_NO_AIR = frozenset(
-    {
-        "dew", "dewpoint", "dewpt", "dp", "soil", "wet", "bulb", "wetbulb", "chill", "globe", "box", "logger",
-        "battery", "batt", "panel", "internal", "int", "indoor", "case", "board", "cpu", "virtual", "surface", "water",
-        "sea", "heat",
-        "index", "feels", "apparent", "anemometer", "inside", "room", "device", "module", "sst", "wbgt", "grass",
-        "radiometer", "body", "cell", "ptemp", "rad", "road", "pv", "black", "leaf", "potential", "theta", "housing",
-        "heater", "chip", "core", "irga", "crystal", "windchill", "heatindex", "cab", "cabine", "in",
-        "gyro", "mpu", "w", "wt",
-        "wtemp", "watertemp", "therm", "thermistor", "bottom", "seabed", "seafloor", "ocean", "ice", "snow",
-    }
-)  # fmt: skip
-_TEMPERATURE = frozenset(
-    {"temp", "temperature", "temperatur", "température", "temperatura", "tair", "airt", "airtemp", "tmp", "tamb", "ta"}
-)
-_HUMIDITY = frozenset({"rh", "hum", "humidity", "humid", "feuchte", "luftfeuchte", "relhum", "humedad", "humidite"})
-_PRESSURE = frozenset(
-    {"press", "pressure", "baro", "barometer", "druck", "luftdruck", "bp", "barometric", "pression", "presion", "pa"}
-)
 _COMPONENTS = {
     "u": "wind_x", "v": "wind_y", "w": "wind_z", "ux": "wind_x", "uy": "wind_y", "uz": "wind_z", "vx": "wind_x",
     "vy": "wind_y", "vz": "wind_z", "x": "wind_x", "y": "wind_y", "z": "wind_z",
@@ -194,6 +178,8 @@ def understand(name: str, stated: str = "") -> Heading:
         excluded = known & OTHER - allowed
         if "wind" in quantity and excluded:
             quantity, sure = "", False
+    if "wind" in quantity and _of_another(known, unit, text):
+        quantity, sure = "", False
     if quantity == "wind_speed" and len(along := known & {"x", "y", "z"}) == 1:
         quantity, sure = _COMPONENTS[next(iter(along))], bool(known & WIND)
     if quantity.endswith("wind_speed") and known & AXES:
@@ -210,6 +196,14 @@ def understand(name: str, stated: str = "") -> Heading:
         strange=tenfold[0].strip() if tenfold is not None
         else turned[0] if (turned := _TURNED.search(text)) else _strange(text) if unit is None else "",
     )  # fmt: skip
+
+
+def _of_another(known: set[str], unit: str | None, text: str) -> bool:
+    """Whether a heading of a wind is of the height of its mast, or of the speed or course of a vessel."""
+    if known & OF_VESSELS and not known & WIND and not known & (_APPARENT | _THEORETICAL):
+        return True
+    speed = unit is not None and UNITS[unit].si in ("m/s", "rad")
+    return bool(known & HEIGHTS) and not speed and not re.search(r"\d", text)
 
 
 def interest(name: str) -> int:
@@ -257,7 +251,7 @@ def zone_of(name: str) -> str | None:
         return "UTC"
     if found is None:
         short = re.search(r"(?<![A-Za-z])([A-Z]{3,4})\W*$", name.replace("_", " "))
-        hours = ABBREVIATED.get(short[1]) if short is not None else None
+        hours = ABBREVIATED.get(short[1]) if short is not None else written_out(name)
         return None if hours is None else f"{hours:+03d}:00"
     if not found[1]:
         return "UTC"
@@ -405,14 +399,14 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
             return "wind_speed", True, known & WIND
         if _of_a_cup(words):
             return "wind_speed", True, {"cup"}
-        if known >= {"sonic", "scalar"} and not known & (_TEMPERATURE | _HUMIDITY | _PRESSURE):
+        if known >= {"sonic", "scalar"} and not known & weather_words.ALL:
             return "wind_speed", True, {"scalar"}  # the mean of a sonic's speeds, beside that of its vectors
     if si in (None, "rad") and known & {"awa", "twa", "awd"}:
         word = next(iter(sorted(known & {"awa", "twa", "awd"})))
         return _ABBREVIATED[word], True, {word}
     if si == "m/s" and not known & OTHER:
         return "wind_speed", False, set()
-    return _weather(words, compact, si, windy)
+    return ("", False, set()) if windy else weather_words.channel(words, compact, si)
 
 
 def _of_a_cup(words: list[str]) -> bool:
@@ -465,32 +459,6 @@ def _by_platform(known: set[str], quantity: str) -> str:
     if known & _THEORETICAL:
         return f"theoretical_wind_{quantity}"
     return f"wind_{quantity}"
-
-
-def _weather(words: list[str], compact: str, si: str | None, windy: bool) -> tuple[str, bool, set[str]]:
-    known = set(words)
-    if windy:
-        return "", False, set()
-    sonic = bool(known & {"sonic", "son", "acoustic", "tsonic", "ts", "tson", "csat", "tv"})
-    warm = (
-        known & _TEMPERATURE or re.search(r"temp|^t$|^t\d+$|^tair", compact) or (words[:1] == ["t"] and len(words) > 1)
-    )
-    if si in (None, "K") and sonic and (warm or known & {"ts", "tsonic", "tson"}):
-        # TS is a sonic's among u, v and w, the soil's in ICOS's and AmeriFlux's tables.
-        said = bool(known & {"sonic", "son", "acoustic", "tsonic", "tson", "csat"})
-        return "sonic_temperature", said, known & {"sonic", "ts", "temp", "temperature", "t", "tsonic"}
-    if si in (None, "K") and (warm or (si == "K" and not known)) and not known & _NO_AIR and "dew" not in compact:
-        return "air_temperature", True, (known & _TEMPERATURE) or (known & {"t"})
-    if si in (None, "1") and (known & _HUMIDITY or re.search(r"humid|^rh", compact)) and not known & _NO_AIR:
-        return "relative_humidity", True, known & _HUMIDITY
-    pressed = known & _PRESSURE or re.search(r"press|baro|^p$|^p\d+$", compact)
-    if (
-        si in (None, "Pa")
-        and pressed
-        and not known & {"sea", "msl", "slp", "qnh", "vapor", "vapour", "box", "cell", "mslp"}
-    ):
-        return "air_pressure", True, known & (_PRESSURE | {"p"})
-    return "", False, set()
 
 
 def fits(channel: str, unit: str | None) -> bool:

@@ -44,6 +44,10 @@ OTHER = frozenset(
         "id", "unit", "units", "timer", "timers", "rot", "unrot", "rotated", "unrotated",
     }
 )  # fmt: skip
+HEIGHTS = frozenset({"height", "heights", "hgt", "höhe", "hoehe", "hauteur", "altura", "altezza"})
+"""Words of the height of a mast, which beside those of a wind are no wind where no number and no unit speak for one."""
+OF_VESSELS = frozenset({"vessel", "vessels", "ship", "ships", "craft"})
+"""Words of what moves by itself: its speed and course are no wind's."""
 SPREAD = GUSTS | MAXIMA | MINIMA | frozenset(
     {
         "std", "sd", "sdev", "stdev", "stddev", "stdv", "sigma", "dev", "deviation", "var", "variance", "cov",

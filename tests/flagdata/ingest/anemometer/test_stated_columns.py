@@ -201,7 +201,7 @@ def test_numbers_alone_are_offered_as_the_wind_at_a_rate(log_file: Write) -> Non
 def test_a_count_whose_unit_is_not_told_is_offered_with_it_open(log_file: Write) -> None:
     rows = "".join(f"{100_000 * at},{3 + at / 10},{at % 3}\n" for at in range(12))
     path = log_file(f"timestamp,wind_speed [m/s],x\n{rows}")
-    assert '--columns "time[?],wind_speed[m/s],"' in refused(path).fix
+    assert '--columns "time[elapsed-?],wind_speed[m/s],"' in refused(path).fix
     log = read_log(path, WindOptions(columns="time[elapsed-us],wind_speed[m/s]", start=_START))
     assert (log.series.time[-1] - _START) / 1e9 == pytest.approx(1.1)
 
