@@ -26,6 +26,7 @@ from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.ingest.anemometer.winds import site_labels
 from flagdata.ingest.anemometer.winds.sites import site_of_all
 from flagdata.ingest.anemometer.winds.sonic import with_horizontal
+from flagdata.ingest.anemometer.words import unknown_words
 from flagdata.ingest.anemometer.words.headings import interest, understand
 
 _DRAFTED = 0.55
@@ -113,6 +114,9 @@ class Delimited:
         mixed = devices.check(source, source.head(HEAD_LINES), reading, recipe, options, where)
         of_each = drafted(source, options, devices_by=mixed.column) if mixed is not None else None
         found += _not_read((of_each or proposal).remarks)
+        if options.columns is None and options.wind is None:
+            speed = recipe.channels.get("wind_speed")
+            found += unknown_words.told([speed.column] if speed is not None and isinstance(speed.column, str) else [])
         found += [] if mixed is None else [mixed.finding]
         return replace(
             reading, findings=(*reading.findings, *found), drafted=proposal.toml, understood=proposal.understood
