@@ -60,6 +60,11 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
     if start is None:
         fix = "give the instant of the first reading: --start 2026-05-01T12:00:00+02:00"
         raise UsageError("a rate without a start", where=where, fix=fix)
+    if start < 0:
+        raise UsageError(
+            f"a start at {iso(start)}, before 1970, which a recording cannot hold", where="--start",
+            fix="give one from 1970 on that stands for it",
+        )  # fmt: skip
     lines = source.head(HEAD_LINES)
     if columns is not None or line_protocol.matches(lines):
         _refuse_times(columns is not None and stated_columns.names_time(columns), where)

@@ -35,4 +35,5 @@ def without(reading: Reading) -> Reading:
         where=f"line {reading.line[zero][0]}", what=text,
     )  # fmt: skip
     channels = {**reading.channels, "wind_direction": np.where(zero, np.nan, towards)}
-    return replace(reading, channels=channels).with_findings((finding,))
+    kept = tuple(own for own in reading.findings if own.kind != "north-or-calm")  # they are not taken as north
+    return replace(reading, channels=channels, findings=kept).with_findings((finding,))

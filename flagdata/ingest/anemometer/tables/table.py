@@ -27,6 +27,8 @@ from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.timebase import NANOSECONDS
 from flagdata.units import unit
 
+TURNS = ("deg", "10 deg")
+"""Units of directions that services write codes in."""
 DOUBTED = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
 """Channels whose unit is held against their values."""
 _DIRECTIONS = frozenset(name for name in CHANNELS if name.endswith(("wind_direction", "wind_direction_magnetic")))
@@ -113,6 +115,7 @@ class _Gathered:
     bad_stamps: list[int] = field(default_factory=list)
     distant: int = 0
     blank: list[int] = field(default_factory=list)
+    turns: dict[str, list[NDArray[np.float64]]] = field(default_factory=dict)
 
     def columns(self) -> list[_Column]:
         return [*self.channels.values(), *self.extra.values()]
@@ -124,6 +127,7 @@ class _Gathered:
 
     def add(self, line: NDArray[np.int64], block: Block, recipe: Recipe) -> None:
         if self.rows is not None and recipe.rows is not None:
+            self._directions(block, recipe)
             wanted = _among(block, self.rows, (recipe.rows.value,))
             line, block = line[wanted], _where(block, wanted)
             if not len(line):
@@ -154,8 +158,25 @@ class _Gathered:
             right = _among(block, check.index, check.layout.values)
             check.right.append(right[keep])
 
+    def _directions(self, block: Block, recipe: Recipe) -> None:
+        """Keep the directions of all sites, since what stands for calm air is a rule of the whole file."""
+        for name, column in self.channels.items():
+            if _blows_from(name) and column.points is None and recipe.channels[name].unit in TURNS:
+                cells = cells_of(block, column.index)
+                read = numbers(cells, decimal=recipe.file.decimal, missing=recipe.file.missing, suffix=column.suffix)
+                self.turns.setdefault(name, []).append(read.value)
+
+    def beside(self, name: str) -> NDArray[np.float64] | None:
+        """(m,) a direction of all sites' rows as written; `None` where the file has one site."""
+        return np.concatenate(self.turns[name]) if name in self.turns else None
+
     def line(self) -> NDArray[np.int64]:
         return self.lines.view()
+
+
+def _blows_from(name: str) -> bool:
+    """Whether a channel is an angle that the wind blows from."""
+    return CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from")
 
 
 def _in_degrees(cells: Sequence[str] | pa.StringArray, decimal: str, points: Mapping[str, float]) -> list[str]:
@@ -242,6 +263,7 @@ def read_table(
     if gathered.host is not None:
         host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where, given=Given())
     channels: dict[str, NDArray[np.float64]] = {}
+    unsure: dict[str, NDArray[np.bool_]] = {}
     flags = np.zeros(len(line), dtype=np.uint16)
     states = {name: column.state(order) for name, column in gathered.channels.items()}
     still = calm.rows(states)
@@ -255,9 +277,12 @@ def read_table(
             findings.append(calm.report(name, still[name], line))
         elif name in still:
             state, cells = np.where(still[name], np.uint8(Cell.CALM), state), np.where(still[name], np.nan, cells)
-        away = CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from")
-        if name in DOUBTED or (away and layout.unit in ("deg", "10 deg")):
-            coded = codes.within_a_turn(cells) if away else codes.speeds(cells)
+        away = _blows_from(name)
+        if name in DOUBTED or (away and layout.unit in TURNS):
+            beside = gathered.beside(name)
+            coded = codes.within_a_turn(cells, beside=beside) if away else codes.speeds(cells)
+            if away:
+                unsure[name] = codes.north_or_calm(cells, beside=beside)
             findings.extend(codes.report(name, cells, coded, line))
             state = np.where(coded, np.uint8(Cell.MISSING), state)
             cells = np.where(coded, np.nan, cells)
@@ -280,6 +305,9 @@ def read_table(
         channels[name] = value
         if name in WIND_CHANNELS:
             flags |= channel_flags
+    for name, zero in unsure.items():
+        speed = channels.get(name.replace("direction", "speed"))
+        findings.extend(codes.may_be_calm(name, zero if speed is None else zero & (speed > 0), line))
     for check in gathered.checks:
         fault, found = check.faults(order, line)
         flags[fault] |= SampleFlag.SENSOR_FAULT

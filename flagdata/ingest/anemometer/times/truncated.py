@@ -24,6 +24,10 @@ _DATE = re.compile(
     r"|\d{1,2}(?P<between>[-/.])\d{1,2}(?P=between)(?P<last>(?:19|20)\d\d))(?!\d)"
 )
 """A date with a year of four digits."""
+_OTHER_TIMES = (
+    "leave the dates out by --columns, and give --start TIME --rate HZ, with a TIME from 1970 on: the true one where a "
+    "clock was never set, else one that stands for it"
+)
 _LEAST, _STEADY = 3, 0.06
 """Rows that tell, and the difference from the middle step [s] that a clock of tenths leaves a steady rate."""
 
@@ -37,7 +41,7 @@ def before_1970(cells: Sequence[str]) -> bool:
 def too_early(column: str, cells: Sequence[str]) -> tuple[str, str]:
     """What is wrong with a column of dates before 1970, and what its owner can do."""
     what = f"column {column} holds dates before 1970 ({cells[0]!r}), which a recording cannot hold"
-    return what, "if a clock was never set, leave the column out by --columns, and give --start TIME --rate HZ"
+    return what, _OTHER_TIMES
 
 
 def of_another_century(layout: Layout, time: TimeChoice, *, now: int) -> tuple[str, str] | None:
@@ -50,7 +54,7 @@ def of_another_century(layout: Layout, time: TimeChoice, *, now: int) -> tuple[s
         return None
     year = iso(int(found.ns[found.valid].min()))[:4]
     what = f"years of two digits would be {year} and later, after today, and a recording cannot hold dates before 1970"
-    return what, too_early("", ("",))[1]
+    return what, _OTHER_TIMES
 
 
 def doubt(layout: Layout) -> tuple[str, str] | None:

@@ -97,25 +97,63 @@ def angles(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     return found | within_a_turn(np.where(found, np.nan, values))
 
 
-def within_a_turn(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+def within_a_turn(
+    values: NDArray[np.float64], *, beside: NDArray[np.float64] | None = None
+) -> NDArray[np.bool_]:  # fmt: skip
     """(n,) which directions are a code that might be an angle: -1 among angles to 360°, 99 among tens of degrees.
 
     Where north is 360 in steps of ten degrees, 0 is calm air (WMO-No. 306, code table 0877).
 
     Args:
         values: (n,) as written, NaN where missing.
+        beside: of all rows of the file, where these are of one of its sites.
     """
     found = np.zeros(len(values), dtype=bool)
     known = np.isfinite(values)
     if known.any() and float(values[known].max()) > 180:
         found = below_zero(values)
-    rest = values[known & (values != 99)]
+    rest = _angles_among(values if beside is None else beside)
     if len(rest) >= _OTHERS and float(rest.min()) >= 0 and float(rest.max()) <= 36 and bool(np.all(rest % 1 == 0)):
         found |= values == 99
     for north, step in ((360.0, 10.0), (36.0, 1.0)):
         if len(rest) >= _OTHERS and float(rest.max()) == north and bool(np.all(rest % step == 0)):
             found |= values == 0
     return found
+
+
+def _angles_among(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return values[np.isfinite(values) & (values != 99)]
+
+
+def north_or_calm(
+    values: NDArray[np.float64], *, beside: NDArray[np.float64] | None = None
+) -> NDArray[np.bool_]:  # fmt: skip
+    """(n,) which directions are 0 where all others are whole tens and none is 360: north, or a code for calm air.
+
+    Args:
+        values, beside: as in `within_a_turn`.
+    """
+    rest = _angles_among(values if beside is None else beside)
+    others = rest[rest != 0]
+    for north, step in ((360.0, 10.0), (36.0, 1.0)):
+        coarse = len(others) >= _OTHERS and float(others.min()) > 0 and bool(np.all(others % step == 0))
+        if coarse and north / 2 < float(others.max()) < north:
+            return values == 0
+    return np.zeros(len(values), dtype=bool)
+
+
+def may_be_calm(channel: str, zero: NDArray[np.bool_], line: NDArray[np.int64]) -> tuple[Finding, ...]:
+    """The finding about directions of `north_or_calm` at which there is a wind; none where there are none."""
+    if not zero.any():
+        return ()
+    what = (
+        f"{int(zero.sum())} values of {channel} are 0, all others are whole tens of degrees and none is 360: taken as "
+        "north; stations that write directions in tens have 0 for calm or variable air, and 360 for north"
+    )
+    return (Finding(
+        kind="north-or-calm", severity=Severity.WARNING, count=int(zero.sum()), where=f"line {line[zero][0]}",
+        what=what, fix="see what the station's description says of 0",
+    ),)  # fmt: skip
 
 
 def report(

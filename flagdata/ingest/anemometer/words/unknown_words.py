@@ -15,7 +15,8 @@ _NAMES = frozenset(
         "weather", "source", "ultrasonic", "digital", "analog", "height", "surface", "outside", "hourly", "horaria",
         "horario", "horária", "hrly", "daily", "field", "roof", "garden", "local", "meteo", "météo", "wetter",
         "variable", "parameter", "quantity", "observed", "gill", "davis", "vaisala", "lufft", "young", "campbell",
-        "thies", "metek", "windsonic", "windmaster", "trisonica", "kestrel", "airmar", "calypso", "ecowitt", "ambient", "hobo",
+        "thies", "metek", "windsonic", "windmaster", "trisonica", "kestrel", "airmar", "calypso", "ecowitt", "ambient",
+        "hobo",
     }
 )  # fmt: skip
 """Words that say nothing of what was made of the readings."""
