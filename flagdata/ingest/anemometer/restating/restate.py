@@ -60,6 +60,7 @@ KINDS = (
     "flagdata.ingest.anemometer.restating.influx",
     "flagdata.ingest.anemometer.restating.line_protocol",
     "flagdata.ingest.anemometer.restating.name_value",
+    "flagdata.ingest.anemometer.restating.packed_letters",
     "flagdata.ingest.anemometer.restating.labelled",
     "flagdata.ingest.anemometer.restating.blocks",
     "flagdata.ingest.anemometer.restating.bracketed",

@@ -1,7 +1,8 @@
 """Rows into strictly increasing time; what is out of order, repeated or too coarse is reported, flagged or left out.
 
 Rules, in order:
-1. Rows that the file lists out of order are sorted (`disorder`), by evidence or by the user's word.
+1. Rows without any value whose stamps run back are left out, and rows that the file lists out of order are sorted
+   (`disorder`), by evidence or by the user's word.
 2. A stretch that comes again with the same stamps and values, as when downloads overlap, is left out.
 3. Few rows whose stamps leave the log's time and come back to it are left out.
 4. Where time runs back and stays there, the clock was set back (`clock`): the rows are kept and continue the clock of
@@ -46,6 +47,8 @@ ISOLATED = 0.2
 """Share of the pairs of neighbours that share a stamp, up to which the alike among them are taken for copies."""
 _JOINED = 3
 """Places where time runs backwards from which on the rows are in no order, and no clock was set back."""
+_FINE = 60
+"""Steps of the stamps' resolution that lie between two readings where it cannot be the reason that they share one."""
 COPIES, COPIED = 2.0, 0.1
 """Changes of the values within stamps that readings would have shown, and the share of them that copies may show."""
 
@@ -63,7 +66,7 @@ def in_order(
     Raises:
         TimeError: time runs back in a way that no rule explains, or most rows share a date without a time of day.
     """
-    reading = _put_in_order(reading, choice)
+    reading = _put_in_order(_without_empty_rows(reading), choice)
     reading = _without_repeated_stretches(reading)
     reading = _sorted(reading, where, None if choice == "sort" else choice)
     reading = _without_repeats(reading, source)
@@ -90,6 +93,19 @@ def _refuse_bare_dates(reading: Reading, where: str) -> None:
     )  # fmt: skip
 
 
+def _without_empty_rows(reading: Reading) -> Reading:
+    """The rows without those that hold no value, where these run back and the others do so less."""
+    back = int((np.diff(reading.time) < 0).sum())
+    empty = np.logical_and.reduce([np.isnan(values) for values in reading.channels.values()])
+    if not back or not empty.any() or empty.all() or int((np.diff(reading.time[~empty]) < 0).sum()) >= back:
+        return reading
+    finding = Finding(
+        kind="empty-rows", severity=Severity.WARNING, count=int(empty.sum()), where=f"line {reading.line[empty][0]}",
+        what=f"{int(empty.sum())} rows hold no value, some of them with stamps that run back; left out",
+    )  # fmt: skip
+    return reading.take(~empty).with_findings((finding,))
+
+
 def _put_in_order(reading: Reading, choice: ClockChoice | None) -> Reading:
     found = disorder.sorting(reading.time, choice)
     if found is not None:
@@ -109,7 +125,8 @@ def _sorted(reading: Reading, where: str, choice: ClockChoice | None) -> Reading
     wild = clock.excursions(reading.time, most=few) if len(jumps) <= few else np.zeros(len(lag), dtype=bool)
     settled = reading.take(~wild)
     jumps = clock.set_back(settled.time)
-    if len(jumps) > clock.MOST or not all(_believable(settled, jump, choice) for jump in jumps):
+    many = int(wild.sum()) > max(few, len(wild) // SHARE)
+    if many or len(jumps) > clock.MOST or not all(_believable(settled, jump, choice) for jump in jumps):
         settable = choice is None and len(jumps) <= clock.MOST
         return _late_rows_sorted(_one_clock(_risen(reading, lag, few, where, settable=settable), (), choice))
     if wild.any():
@@ -268,7 +285,7 @@ def _without_repeats(reading: Reading, source: TextFile | None) -> Reading:
         return reading
     differs = _differs(reading)
     same = _repeats(reading, differs)
-    if same.any() and source is not None:
+    if same.any() and source is not None and not _stamped_finely(reading):
         differs[same] = written_otherwise(source, reading.line[:-1][same], reading.line[1:][same])
         same = _repeats(reading, differs)
     if not same.any():
@@ -276,13 +293,20 @@ def _without_repeats(reading: Reading, source: TextFile | None) -> Reading:
     twice = np.concatenate(([False], same))
     count, rows = int(twice.sum()), np.diff(np.flatnonzero(np.append(~twice, True)))
     most = int(rows.max())
-    what = f"{count} {'row repeats' if count == 1 else 'rows repeat'} the row before in stamp and in all cells"
+    cells = "all values that are read" if _stamped_finely(reading) else "all cells"
+    what = f"{count} {'row repeats' if count == 1 else 'rows repeat'} the row before in stamp and in {cells}"
     what += f", up to {most} rows alike" if most > 2 else ""
     finding = Finding(
         kind="duplicate-rows", severity=Severity.WARNING, count=count, where=f"line {reading.line[twice][0]}",
         what=f"{what}; left out as copies",
     )  # fmt: skip
     return reading.take(~twice).with_findings((finding,))
+
+
+def _stamped_finely(reading: Reading) -> bool:
+    """Whether a log's stamps are far finer than its steps, so that two readings share none."""
+    period = clock.usual(reading.time)
+    return period >= SMALL and reading.step * _FINE <= period
 
 
 def _repeats(reading: Reading, differs: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
+from itertools import pairwise
 
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
@@ -37,6 +38,8 @@ _FEWEST, _SHARE = 3, 0.6
 """Rows of a site, and the share of the sites that a stamp holds, by which words alone tell sites apart."""
 _AT_ONCE = 3
 """Rows of one stamp, all of other words, from which on they are sites though each has that row alone."""
+_SPARSE = 3
+"""Numbers from the first to the last of a count of rows, for each row that is there."""
 _HIGHEST = 200
 """Heights of a mast or a profiler."""
 _ADDRESS = re.compile(r"(?:[0-9a-f]{2}[:-]){5,7}[0-9a-f]{2}|(?=.*[a-f])(?:[0-9a-f]{12}|[0-9a-f]{16})", re.IGNORECASE)
@@ -80,6 +83,8 @@ def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tupl
         if words <= _SITES and len(kinds) == len(cells) and all(map(_is_name, kinds)):
             return index, tuple(kinds)
         apart = {(stamp, cell) for stamp, cell in zip(stamps, cells, strict=True)}
+        if _counts_rows(cells, stamps):
+            continue
         if shared and len(apart) > 0.9 * len(cells) > 1.2 * len(set(stamps)):
             apart_by.append((index, tuple(kinds)))
     if apart_by:  # a number that each row has for itself tells rows apart, too, but no sites
@@ -100,6 +105,15 @@ def _each_once(cells: Sequence[str], stamps: Sequence[str]) -> bool:
     if not 2 <= len(kinds) <= _HIGHEST or rows < 2 or any(cell_kind(kind) != "number" for kind in kinds):
         return False
     return len(set(zip(stamps, cells, strict=True))) == len(cells) >= _SHARE * len(kinds) * rows
+
+
+def _counts_rows(cells: Sequence[str], stamps: Sequence[str]) -> bool:
+    """Whether a column counts the rows, perhaps with some left out: whole numbers that rise from row to row."""
+    if len(set(stamps)) < 2 or not all(cell.isdigit() for cell in cells):
+        return False
+    numbers = [int(cell) for cell in cells]
+    rises = all(before < after for before, after in pairwise(numbers))
+    return rises and numbers[-1] - numbers[0] <= _SPARSE * len(numbers)
 
 
 def _is_name(cell: str) -> bool:
