@@ -12,6 +12,7 @@ _SYNOP = re.compile(r"\b(?:AAXX|BBXX|OOXX)\s")
 _SHEF = re.compile(r"\.[AEB]R? [A-Z0-9]{3,8} \d{4,8} ")
 _PROFILER = re.compile(r"\s*WINDS\s+rev\s+\d", re.IGNORECASE)
 _BUFKIT = re.compile(r"\s*(?:SNPARM\s*=|STID\s*=\s*\w+\s+STNM\s*=|STN YYMMDD/HHMM)")
+_SLCAN = re.compile(r"\s*(?:<-|->|[<>])?\s*\d*\s*T[0-9A-F]{8}[0-8](?:[0-9A-F]{2}){0,8}\s*$")
 _ONE_HEIGHT = "write a table of one height with the program that reads them: one row a time, with speed and direction"
 _MARKUP = ("<?xml", "<gpx", "<html", "<!doctype", "<kml")
 
@@ -37,6 +38,10 @@ def surely(lines: Sequence[str]) -> Guess | None:
 def told(lines: Sequence[str]) -> Guess | None:
     """What a text is that no format has recognised; `None` where its first lines do not tell."""
     start = next((line for line in lines if line.strip()), "")
+    if sum(bool(_SLCAN.match(line)) for line in lines) > len(lines) / 2:
+        text = "frames of a CAN adapter (SLCAN): behind a T identifier, length and bytes, without a stamp"
+        fix = "write each as candump -l does, with its time in front, which is read: "
+        return _other("SLCAN", text, f"{fix}(1651406400.123456) can0 09FD0202#8FAB30090DFFAFFF")
     if start.lstrip("\ufeff \t").lower().startswith(_MARKUP):
         text = "this is XML or HTML without a table of readings that have a time and a wind"
         fix = "convert it to CSV with one row a reading: its time and its wind (GPX: with the program that wrote it)"

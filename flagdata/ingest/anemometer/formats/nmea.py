@@ -113,7 +113,7 @@ class Nmea:
         stream = _Stream()
         for first, lines in source.blocks():
             for at, line in enumerate(lines, start=first):
-                if line.strip(" \t\x00"):
+                if line.strip(" \t\x00") and not line.lstrip().startswith("#"):
                     _take(stream, line, at, options.talker)
         _take_others(stream)
         _leave_silent(stream)

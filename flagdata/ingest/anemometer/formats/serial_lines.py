@@ -34,7 +34,7 @@ from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Sensor
 
 _STAMP = re.compile(
-    r"\s*(?:[A-Za-z]\w{0,15}[ ,;:\t]+)?"
+    r"\s*(?:[A-Za-z]\w{0,15}[ ,;:\t]+|[A-Za-z][\w.-]{0,60}\t)?"
     r"[\"\[(]?(?P<date>\d{4}[-/]\d{2}[-/]\d{2})[T ,;\t](?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9}|,\d{3}(?=[\s\])]))?)"
     r"(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?[\s,;>|]+"
     r"(?:(?:\w{0,40}[,;]){1,2}(?=\"?[$!])|[^$!]{1,120}(?=[$!][A-Z]{2}[A-Z0-9]{3},))?(?P<raw>\S.*)"
@@ -136,9 +136,15 @@ def split_stamp(line: str) -> tuple[str, str]:
 
 def most_stamped(head: Head) -> bool:
     """Whether most lines are an NMEA 0183 sentence after a computer's stamp."""
-    split = [split_stamp(line) for line in head.lines]
+    lines = without_comments(head.lines)
+    split = [split_stamp(line) for line in lines]
     stamped = sum(bool(stamp) and raw.startswith(("$", "!")) for stamp, raw in split)
-    return stamped >= max(1, len(head.lines) // 2)
+    return stamped >= max(1, len(lines) // 2)
+
+
+def without_comments(lines: Sequence[str]) -> list[str]:
+    """The lines without those that a program marked as its own, by "#"."""
+    return [line for line in lines if not line.lstrip().startswith("#")]
 
 
 def checksum(text: str) -> int:

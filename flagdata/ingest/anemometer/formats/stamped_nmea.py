@@ -18,7 +18,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.formats import receiver_clock
 from flagdata.ingest.anemometer.formats.nmea import WINDS, Nmea
 from flagdata.ingest.anemometer.formats.sentences import ChecksumError, checksum, split
-from flagdata.ingest.anemometer.formats.serial_lines import split_stamp, stamps_of
+from flagdata.ingest.anemometer.formats.serial_lines import split_stamp, stamps_of, without_comments
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.sniffing import Guess, Head
@@ -39,10 +39,11 @@ class StampedNmea:
     def recognise(self, head: Head) -> Guess | None:
         """Lines of a stamp and a sentence, some of them of wind."""
         stamped, wind = count(head)
-        if stamped < max(1, len(head.lines) // 2):
+        lines = without_comments(head.lines)
+        if stamped < max(1, len(lines) // 2):
             return None
         reasons = (
-            f"{stamped} of the first {len(head.lines)} lines are a computer's stamp and an NMEA 0183 sentence",
+            f"{stamped} of the first {len(lines)} lines are a computer's stamp and an NMEA 0183 sentence",
             f"{wind} of them are wind ({', '.join(WINDS)})",
         )
         return Guess(format=self.name, score=0.96 if wind else 0.3, reasons=reasons)

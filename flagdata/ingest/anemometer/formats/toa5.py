@@ -102,6 +102,7 @@ class Toa5:
         wind = next(layout.column for name, layout in recipe.channels.items() if name.startswith("wind_"))
         processing = dict(zip(names, header[3], strict=False)).get(str(wind), "")
         reading = replace(reading, sensor=replace(reading.sensor, averaging=_averaging(processing, reading.time)))
+        reading = reading.with_findings(_mean_of_angles(recipe, names, header[3]))
         return with_horizontal(reading, options.azimuth, where=str(source.path))
 
     def _header(self, source: TextFile) -> list[list[str]]:
@@ -210,6 +211,21 @@ def _averaging(processing: str, time: Instants) -> float | None:
     if kind in ("avg", "wvc") and len(time) > 1:
         return float(np.median(np.diff(time))) / NANOSECONDS
     return None
+
+
+def _mean_of_angles(recipe: Recipe, names: list[str], processing: list[str]) -> tuple[Finding, ...]:
+    """What is said of a direction that the logger averaged as a number: 350° and 10° make 180° then."""
+    layout = recipe.channels.get("wind_direction")
+    processed = dict(zip(names, processing, strict=False))
+    if layout is None or processed.get(str(layout.column), "").strip().lower() != "avg":
+        return ()
+    vectors = [name for name in names if name.endswith("WVc(2)")]  # the second of its numbers is the direction
+    beside = f"; {', '.join(repr(name) for name in vectors)} may be the mean of vectors" if vectors else ""
+    what = (
+        f"{layout.column!r} is the mean of a vane's readings as numbers, which is wrong where they pass north{beside}"
+    )
+    fix = "have the program average the wind as a vector (WindVector), or read that column: --as delimited --columns"
+    return (Finding(kind="direction-mean-of-numbers", severity=Severity.WARNING, what=what, fix=fix),)
 
 
 def _continuity(record: NDArray[np.float64], line: NDArray[np.int64]) -> tuple[Finding, ...]:

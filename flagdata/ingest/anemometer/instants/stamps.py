@@ -209,6 +209,8 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
         if decimal is None:
             continue
         count, rounded, decimal_step = decimal
+        if name == "J" and (part("H") is not None or part("I") is not None):
+            rounded, decimal_step = np.floor(count).astype(np.int64) * length, 0  # the hour says what the fraction does
         ns = ns + rounded - round(first) * length
         valid &= (count >= first) & (count <= last)
     offset, utc = _offset(found, len(text))

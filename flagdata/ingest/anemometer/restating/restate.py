@@ -23,6 +23,7 @@ WITHIN = (
     "flagdata.ingest.anemometer.restating.clock_words",
     "flagdata.ingest.anemometer.restating.twice_told",
     "flagdata.ingest.anemometer.restating.ruled_headings",
+    "flagdata.ingest.anemometer.restating.count_lines",
 )
 KINDS = (
     "flagdata.ingest.anemometer.restating.sql_dump",

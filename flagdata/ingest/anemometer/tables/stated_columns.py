@@ -216,8 +216,10 @@ def _time(layout: Layout, entries: Sequence[tuple[int, Entry]], order: Order | N
     for form in forms:
         if form is not None and "%" not in form and form not in names:
             raise UnknownNameError.of("format of a time", form, names, where=_WHERE)
-    for index in columns:
-        if truncated.before_1970(cells := [cell for cell in layout.column(index) if cell]):
+    for index, form_of in zip(columns, forms, strict=True):
+        cells = [cell for cell in layout.column(index) if cell]
+        years = form_of == "%Y" and truncated.years_before_1970("year", cells)
+        if years or truncated.before_1970(cells):
             what, fix = truncated.too_early(repr(layout.names[index] or index + 1), cells)
             raise InputError(what, where=where, fix=fix)
     known = [form for form in forms if form is not None]

@@ -32,6 +32,7 @@ _UNITS_OF_OTHERS = frozenset(
         "ts", "rn", "smp", "avg", "yyyy-mm-dd", "hh:mm:ss", "hh:mm", "utc", "unitless", "w/m2", "v", "yr",
         "j/m2", "kw", "kwh", "mo", "dy", "hr", "mn", "year", "month", "day", "hour", "mi", "nmi", "-", "none",
         "degrees_north", "degrees_east", "degree_north", "degree_east", "degree_celsius", "celsius", "psu", "ph_t",
+        "c_deg", "hours", "h", "j cm-2", "mj m-2", "mj/m2/d", "mj/m2",
     }
 )  # fmt: skip
 """What stands in a line of units below times, counts and quantities that are not read; some are of UDUNITS."""

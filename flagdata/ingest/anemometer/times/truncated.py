@@ -15,7 +15,7 @@ from flagdata.ingest.anemometer.instants.midnight import parse_as
 from flagdata.ingest.anemometer.instants.stamps import DAY
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
-from flagdata.ingest.anemometer.words.headings import names_time
+from flagdata.ingest.anemometer.words.headings import names_time, words_of
 from flagdata.timebase import iso
 
 _CUT = re.compile(r"(\d{1,2}):([0-5]\d)\.\d")
@@ -28,6 +28,7 @@ _OTHER_TIMES = (
     "leave the dates out by --columns, and give --start TIME --rate HZ, with a TIME from 1970 on: the true one where a "
     "clock was never set, else one that stands for it"
 )
+_YEAR_WORDS = frozenset({"year", "yr", "yyyy", "jahr", "année", "annee", "año", "ano", "anno", "jaar", "år", "rok"})
 _LEAST, _STEADY = 3, 0.06
 """Rows that tell, and the difference from the middle step [s] that a clock of tenths leaves a steady rate."""
 
@@ -36,6 +37,12 @@ def before_1970(cells: Sequence[str]) -> bool:
     """Whether cells begin with dates of which most are before 1970."""
     years = [match["year"] or match["last"] for cell in cells if (match := _DATE.match(cell)) is not None]
     return len(years) >= max(_LEAST, 0.9 * len(cells)) and sum(year < "1970" for year in years) > 0.5 * len(years)
+
+
+def years_before_1970(name: str, cells: Sequence[str]) -> bool:
+    """Whether a column of years holds those before 1970 alone."""
+    years = [cell for cell in cells if re.fullmatch(r"1[89]\d\d", cell)]
+    return bool(_YEAR_WORDS & set(words_of(name))) and len(years) == len(cells) >= _LEAST and max(years) < "1970"
 
 
 def too_early(column: str, cells: Sequence[str]) -> tuple[str, str]:
@@ -61,7 +68,7 @@ def doubt(layout: Layout) -> tuple[str, str] | None:
     """What a column of times lacks, and what its owner can do; `None` where no column was cut so or is too early."""
     for at, name in enumerate(layout.names):
         cells = [cell for cell in layout.column(at) if cell]
-        if names_time(name) and before_1970(cells):
+        if (names_time(name) and before_1970(cells)) or years_before_1970(name, cells):
             return too_early(repr(name), cells)
     for at, name in enumerate(layout.names):
         cells = [cell for cell in layout.column(at) if cell]

@@ -2,6 +2,7 @@
 
 2026 5 1 12 30        year, month, day, hour and minute; or the hour and minute in one number, 1230
 2026 121 1230         year, day of the year and a clock of one number
+2026 5 1              year, month and day, in a log of a row a day
 20260501 1230         a date of eight digits and a clock of one number, perhaps twice: in UTC and local
 20260501 13           a date of eight digits and an hour, in a log of a row an hour
 """
@@ -16,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from flagdata.ingest.anemometer.instants.midnight import parse_with_bare_dates
-from flagdata.ingest.anemometer.instants.stamps import Stamps
+from flagdata.ingest.anemometer.instants.stamps import DAY, Stamps
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.times.timechoice import (
@@ -38,6 +39,8 @@ _SECONDS_OF_MINUTE = re.compile(r"^\s*\d{1,2}(\.\d*)?\s*$")
 _EIGHT = re.compile(r"^\s*(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])\s*$")
 _HOURS = 10
 """Rows that are an hour apart, by which the number of the hour is told from a count of rows."""
+_DAYS = 10
+"""Rows that are a day apart, by which month and day are told from other small numbers."""
 _QUARTER, _FARTHEST = 900, 14 * 3600
 """Offsets of zones are multiples of this, and at most so large [s]."""
 
@@ -50,7 +53,7 @@ def choice(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
     """
     if any(layout.names):
         return None
-    kinds = (_parts, _ordinal, _compact, _dated_hours)
+    kinds = (_parts, _dates, _ordinal, _compact, _dated_hours)
     return next((found for kind in kinds if (found := kind(layout, columns)) is not None), None)
 
 
@@ -138,6 +141,22 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
         found, _ = parse_with_bare_dates(texts, form)
         if fits(found) and bool(np.all(np.diff(found.ns[found.valid]) >= 0)):
             return replace(time_choice(layout, tuple(taken), form, found, 2.2), unnamed=True)
+    return None
+
+
+def _dates(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:
+    """Year, month and day side by side, in a log of a row a day; as day of the year and clock they would not be one."""
+    for index in range(len(columns) - 2):
+        parts = columns[index : index + 3]
+        if not share(YEAR, parts[0]) or not all(share(TWO_DIGITS, cells) for cells in parts[1:]):
+            continue
+        if not whole_numbers(parts[1], 1, 12) or not whole_numbers(parts[2], 1, 31):
+            continue
+        found, _ = parse_with_bare_dates([" ".join(row) for row in zip(*parts, strict=True)], "%Y %m %d")
+        steps = np.diff(found.ns)
+        daily = len(steps) >= _DAYS and bool(found.valid.all()) and float((steps == DAY).mean()) >= SHARE
+        if daily and bool(np.all(steps >= 0)):
+            return replace(time_choice(layout, (index, index + 1, index + 2), "%Y %m %d", found, 2.2), unnamed=True)
     return None
 
 
