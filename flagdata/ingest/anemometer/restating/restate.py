@@ -35,6 +35,7 @@ KINDS = (
     "flagdata.ingest.anemometer.restating.published",
     "flagdata.ingest.anemometer.restating.pywws",
     "flagdata.ingest.anemometer.restating.hours_across",
+    "flagdata.ingest.anemometer.restating.lying",
     "flagdata.ingest.anemometer.restating.smet",
     "flagdata.ingest.anemometer.restating.nead",
     "flagdata.ingest.anemometer.restating.geocsv",

@@ -396,10 +396,9 @@ def _unit_doubt(
         what = f"the heading of column {layout.names[column]!r} says {strange!r}, so that its numbers are no plain unit"
         return Doubt(what=what, fix=f"give what one of them is: --unit '{1 / int(strange[1:]):g} m/s'")
     name = layout.names[column] or f"number {column + 1}"
-    fix = (
-        f"give it: --unit {evidence.unit if evidence else 'm/s'}{'' if evidence else ' (or km/h, mph, kn, ft/s)'}"
-        ", after the instrument's setting or manual"
-    )
+    first = evidence.unit if evidence else "m/s"
+    others = ", ".join(unit for unit in ("m/s", "km/h", "mph", "kn", "ft/s") if unit != first)
+    fix = f"give it: --unit {first} (or {others}), after the instrument's setting or manual"
     return Doubt(what=f"the unit of column {name!r} is not stated{likely}", fix=fix)
 
 
