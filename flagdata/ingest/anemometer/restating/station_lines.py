@@ -90,7 +90,8 @@ def _realtime(line: str) -> list[str] | None:
         return None
     warm = {"C": "degC", "F": "degF"}.get(cells[14], "")
     gust = cells[40] if len(cells) > 40 else ""
-    return [cells[0], cells[1], cells[5], cells[6], gust, cells[7], cells[2] if warm else "", _UNITS[cells[13]], warm]
+    bearing = "" if cells[11] == "---" else cells[7]  # calm air has a bearing of 0 and no point of the compass
+    return [cells[0], cells[1], cells[5], cells[6], gust, bearing, cells[2] if warm else "", _UNITS[cells[13]], warm]
 
 
 def _monthly(line: str) -> list[str] | None:

@@ -139,6 +139,16 @@ def test_cumulus_realtime_names_its_unit_in_each_line(read: Read, name: str, fac
     check(read("\n".join(form.format(t=t, s=s, d=d, u=name) for t, s, d in rows()), zone="UTC"), factor)
 
 
+@pytest.mark.parametrize(("bearing", "point"), [(0, "---"), (360, "N")])
+def test_cumulus_realtime_has_no_direction_in_calm_air(read: Read, bearing: int, point: str) -> None:
+    form = "23/02/26 09:{minute}:30 9.3 81 6.2 0.0 0.4 {d} 0.0 0.2 1009.8 {p} 0 m/s C hPa mm 40.1 -0.1 12.4 80.9 1.1\n"
+    text = form.format(minute=15, d=bearing, p=point) + form.format(minute=16, d=205, p="SSW")
+    log = read(text, zone="UTC")
+    towards = log.series.channels["wind_direction"]
+    assert np.isnan(towards[0]) == (point == "---")
+    assert np.degrees(towards[1]) == pytest.approx(205)
+
+
 @pytest.mark.parametrize("sign", ["/", "-", "."])
 def test_cumulus_realtime_writes_the_day_first(read: Read, sign: str) -> None:
     rest = "09:15:30 9.3 81 6.2 4.0 5.9 205 0.0 0.2 1009.8 SSW 2 m/s C hPa mm 40.1 -0.1 12.4 80.9 1.1\n"
