@@ -291,9 +291,11 @@ def _blank_divided(
 def _days(
     layout: Layout, columns: Sequence[Sequence[str]], dates: Sequence[int], order: Order | None
 ) -> Iterator[TimeChoice]:
-    """Dates without a time of day, one a row: means of days."""
+    """Dates without a time of day, one a row: means of days. A row that is written twice is one."""
+    first = dict(zip(reversed(layout.rows), reversed(range(len(layout.rows))), strict=True))
     for index in dates:
-        texts = [cell for cell in columns[index] if cell]
+        cells = zip(layout.rows, columns[index], strict=True)
+        texts = [cell for at, (row, cell) in enumerate(cells) if cell and first[row] == at]
         if len(texts) < 2 or len(set(texts)) < len(texts):
             continue
         try:

@@ -68,3 +68,9 @@ def test_days_at_uneven_intervals_are_no_clock_that_was_set(read: Read) -> None:
     assert len(log.series.time) == len(days)
     assert "dates-alone" in _kinds(log)
     assert not {kind for kind in _kinds(log) if kind.startswith("clock-set")}
+
+
+def test_a_day_that_is_written_twice_leaves_the_dates_a_time(read: Read) -> None:
+    rows = [f"2026-03-{day:02d},A,{day}.5,{1 + day % 7}.2" for day in range(1, 29)]
+    text = "\n".join(["date,station,gust [m/s],wind speed [m/s]", *rows[:20], rows[19], *rows[20:]])
+    assert len(read(f"{text}\n", zone="UTC").series.time) == 28
