@@ -128,6 +128,8 @@ def _parts(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
                 break
             if directive == "%M" and _shorter(columns[at], [columns[before] for before in taken]):
                 break
+            if directive == "%M" and _places(columns[at], [columns[before] for before in taken]):
+                break
             taken, form = [*taken, at], f"{form} {directive}"
         beyond = taken[-1] + 1
         if form == "%Y %m %d" and beyond < len(columns) and _clock(columns[beyond]):
@@ -154,10 +156,26 @@ def _dates(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
             continue
         found, _ = parse_with_bare_dates([" ".join(row) for row in zip(*parts, strict=True)], "%Y %m %d")
         steps = np.diff(found.ns)
-        daily = len(steps) >= _DAYS and bool(found.valid.all()) and float((steps == DAY).mean()) >= SHARE
-        if daily and bool(np.all(steps >= 0)):
+        daily = steps[steps != 0]  # rows of several stations share their days
+        if (
+            len(daily) >= _DAYS
+            and bool(found.valid.all())
+            and float((daily == DAY).mean()) >= SHARE
+            and daily.min() > 0
+        ):
             return replace(time_choice(layout, (index, index + 1, index + 2), "%Y %m %d", found, 2.2), unnamed=True)
     return None
+
+
+def _places(cells: Sequence[str], before: Sequence[Sequence[str]]) -> bool:
+    """Whether numbers run from 1 to the same few in every hour that is there: stations are counted so, no minutes."""
+    hours: dict[tuple[str, ...], list[int]] = {}
+    for *hour, cell in zip(*before, cells, strict=True):
+        hours.setdefault(tuple(hour), []).append(int(cell))
+    whole = list(hours.values())[:-1]  # the last may be cut off
+    return (
+        len(whole) >= _HOURS // 2 and len(whole[0]) > 1 and all(own == [*range(1, len(whole[0]) + 1)] for own in whole)
+    )
 
 
 def _ordinal(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:

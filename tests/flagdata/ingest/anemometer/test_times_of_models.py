@@ -68,6 +68,14 @@ def test_lines_that_say_how_many_rows_follow_are_left_out(read: Read) -> None:
     assert "count-lines" in kinds(log)
 
 
+def test_numbers_of_stations_are_no_minutes_of_a_printed_line(read: Read) -> None:
+    keys = [(day, site) for day in range(1, 16) for site in (1, 2, 3)]
+    rows = [f"2026 5 {day} 12 {site} {450 + site} {site}.{day % 9} {60 * site}" for day, site in keys]
+    with pytest.raises(InputError) as caught:
+        read("\n".join(rows) + "\n", zone="UTC")
+    assert "minute" not in (caught.value.fix or "")
+
+
 @pytest.mark.parametrize(
     "lines",
     [
