@@ -60,6 +60,10 @@ _LIMITS = {
     "year": (0, 2100), "month": (1, 12), "day": (1, 31), "doy": (1, 367), "hour": (0, 24), "minute": (0, 59),
     "second": (0, 60),
 }  # fmt: skip
+_ROUNDED = 0.3
+"""Hours by which a fraction of the day in two digits may be off."""
+_ZONE_ALONE = re.compile(r"[ecmp]st|utc|gmt|lst|time")
+"""Headings of a time of day that say neither hours nor minutes."""
 _OR_LEAST = frozenset({"min", "mins", "mm"})
 """Headings of minutes that may as well be of minima or millimetres."""
 _HOURS_OF_YEAR = re.compile(r"(?:hour|hr|hours) of (?:the )?year|hoy|hour of yr|year ?hour")
@@ -293,6 +297,8 @@ def _of_parts(
         whole = not share(_DECIMAL, columns[named["doy"]])
         date, of_date = f"%Y {'%j' if whole else '%J'}", [named["year"], named["doy"]]
         if not whole:
+            if _says_the_fraction(columns, named):
+                yield from read(layout, columns, [*of_date, named["hour"]], [f"{date} %H"], score=2.2)
             yield from read(layout, columns, of_date, [date], score=2.1)
             return
     elif {"hour", "minute"} <= set(named) and not {"year", "month", "doy"} & set(named):
@@ -302,6 +308,14 @@ def _of_parts(
     else:
         return
     clock, of_clock = _clock(columns, named)
+    if clock == "%H" and _hours_or_minutes(layout, columns, of_date, named["hour"]):
+        name = layout.names[named["hour"]]
+        yield TimeChoice(
+            columns=(*of_date, *of_clock), form=None, zone=None, zoned=False, score=2.2,
+            doubt=f"the numbers of column {name!r} may be hours, or hours and minutes in one number",
+            fix="say which by --columns: hour for hours, time[%H%M] for both in one number, beside year and day",
+        )  # fmt: skip
+        return
     if clock:
         yield from read(layout, columns, [*of_date, *of_clock], [f"{date} {clock}"], score=2.2)
         return
@@ -311,6 +325,27 @@ def _of_parts(
             forms = [f"{date} {form}" for form in CLOCKS]
             yield from read(layout, columns, [*of_date, index], forms, score=2.1)
     yield from read(layout, columns, of_date, [date], score=0.9)
+
+
+def _says_the_fraction(columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> bool:
+    """Whether a column of whole hours says what the fraction of the day of the year does, which is rounded more."""
+    if "hour" not in named or not whole_numbers([cell for cell in columns[named["hour"]] if cell], 0, 24):
+        return False
+    pairs = [
+        (day, hour) for day, hour in zip(columns[named["doy"]], columns[named["hour"]], strict=True) if day and hour
+    ]
+    return bool(pairs) and all(abs(float(day) % 1 * 24 - float(hour) % 24) <= _ROUNDED for day, hour in pairs)
+
+
+def _hours_or_minutes(
+    layout: Layout, columns: Sequence[Sequence[str]], of_date: Sequence[int], hour: int
+) -> bool:  # fmt: skip
+    """Whether the numbers below a zone's name rise by one within one day, so that they may be its first minutes too."""
+    if _ZONE_ALONE.fullmatch(" ".join(words_of(layout.names[hour]))) is None:
+        return False
+    cells = [cell for cell in columns[hour] if cell]
+    days = {tuple(columns[at][row] for at in of_date) for row in range(len(columns[hour]))}
+    return len(days) == 1 and len(cells) > 1 and bool(np.all(np.diff([int(cell) for cell in cells]) == 1))
 
 
 def _without_year(layout: Layout, columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> Iterator[TimeChoice]:

@@ -42,11 +42,30 @@ def fractions(digits: int) -> str:
     return "year\tday\ttime\twindspeed\twinddir\n" + "\n".join(rows) + "\n"
 
 
-def test_fractions_of_a_day_in_two_digits_are_said_to_be_unsure(read: Read) -> None:
+def test_hours_beside_a_fraction_of_the_day_are_read_where_they_agree(read: Read) -> None:
     log = read(fractions(2), zone="UTC", unit="m/s")
+    assert set(np.diff(log.series.time).tolist()) == {3600 * NANOSECONDS}
+    assert "times-rounded" not in kinds(log)
+
+
+@pytest.mark.parametrize("rows", [12, 40])
+def test_numbers_below_a_zones_name_may_be_the_first_minutes_of_a_day(read: Read, rows: int) -> None:
+    values = [(291 + hour // 24, hour % 24) for hour in range(rows)]
+    text = "Year,DOY,MST,Avg Wind Speed @ 3m [m/s]\n" + "".join(
+        f"2018,{day},{at},{1 + at % 5}.4\n" for day, at in values
+    )
+    if rows > 24:
+        assert set(np.diff(read(text, zone="-07:00").series.time).tolist()) == {3600 * NANOSECONDS}
+        return
+    with pytest.raises(InputError, match="hours and minutes in one number"):
+        read(text, zone="-07:00")
+
+
+def test_fractions_of_a_day_in_two_digits_are_said_to_be_unsure(read: Read) -> None:
+    log = read(fractions(2).replace("time", "flux"), zone="UTC", unit="m/s")
     (found,) = [found for found in log.findings if found.kind == "times-rounded"]
     assert found.value == pytest.approx(0.005 * 86_400)
-    assert "times-rounded" not in kinds(read(fractions(5), zone="UTC", unit="m/s"))
+    assert "times-rounded" not in kinds(read(fractions(5).replace("time", "flux"), zone="UTC", unit="m/s"))
 
 
 def test_an_hour_beside_a_fraction_of_the_day_is_not_added_to_it(read: Read) -> None:
