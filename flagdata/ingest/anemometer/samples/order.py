@@ -29,7 +29,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.instants import clock, disorder
 from flagdata.ingest.anemometer.instants.clock import DAY, JITTER, ClockChoice, Jump
 from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.samples.spread import FAST, distinct
+from flagdata.ingest.anemometer.samples.spread import FAST, PAIRS, distinct
 from flagdata.ingest.anemometer.samples.written import written_otherwise
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import SampleFlag
@@ -285,15 +285,19 @@ def _without_repeats(reading: Reading, source: TextFile | None) -> Reading:
         return reading
     differs = _differs(reading)
     same = _repeats(reading, differs)
-    if same.any() and source is not None and not _stamped_finely(reading):
-        differs[same] = written_otherwise(source, reading.line[:-1][same], reading.line[1:][same])
-        same = _repeats(reading, differs)
+    finely = False
+    if same.any() and source is not None:
+        otherwise = written_otherwise(source, reading.line[:-1][same], reading.line[1:][same])
+        finely = 0 < int(otherwise.sum()) < PAIRS and _stamped_finely(reading)  # many are told by `distinct`
+        if not finely:
+            differs[same] = otherwise
+            same = _repeats(reading, differs)
     if not same.any():
         return reading
     twice = np.concatenate(([False], same))
     count, rows = int(twice.sum()), np.diff(np.flatnonzero(np.append(~twice, True)))
     most = int(rows.max())
-    cells = "all values that are read" if _stamped_finely(reading) else "all cells"
+    cells = "all values that are read" if finely else "all cells"
     what = f"{count} {'row repeats' if count == 1 else 'rows repeat'} the row before in stamp and in {cells}"
     what += f", up to {most} rows alike" if most > 2 else ""
     finding = Finding(

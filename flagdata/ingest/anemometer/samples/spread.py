@@ -46,7 +46,7 @@ _EVEN = 0.9
 """Share of the stamps whose rows must fit a period for the rows to have come evenly."""
 
 
-_PAIRS, _TIMES, _ALIKE, _SHARED = 5, 3, 0.95, 0.5
+PAIRS, _TIMES, _ALIKE, _SHARED = 5, 3, 0.95, 0.5
 """Rows that repeat a stamp, and rows of one, from and up to which they may be one reading said again; the shares of
 them that hold the same readings, and at most of the rows of stamps that follow each other."""
 _SLOW = 60 * NANOSECONDS
@@ -96,7 +96,7 @@ def _said_twice(reading: Reading, again: NDArray[np.bool_]) -> bool:
     They are one reading, written again when another cell of its row was filled or corrected.
     """
     runs = _Runs.of(reading.time)
-    if len(runs.room) < _PAIRS or int(again.sum()) < _PAIRS or int(runs.rows.max()) > _TIMES:
+    if len(runs.room) < PAIRS or int(again.sum()) < PAIRS or int(runs.rows.max()) > _TIMES:
         return False
     if int(np.median(runs.room)) < _SLOW:
         return False
