@@ -6,14 +6,11 @@ in the right one is in the lake twice, and the wrong one would go on being taken
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-import pyarrow.compute as pc
-
 from flagdata.findings import Finding, Severity
-from flagdata.lake import Artifact, Lake
-from flagdata.schema import Kind
+from flagdata.lake import Artifact
 
 _CHOOSES = ("wind", "talker")
 """Options that choose one of several anemometers of a file: another choice is another log, no other reading of it."""
@@ -22,19 +19,20 @@ _ID = 12
 
 
 def by_other_options(
-    lake: Lake, kind: Kind, source_hash: str, recipe: Mapping[str, Any], *, branch: str
-) -> tuple[Finding, ...]:
-    """A note for each artifact on the branch that was read from the same bytes otherwise.
+    others: Sequence[Artifact], source_hash: str, recipe: Mapping[str, Any]
+) -> tuple[Finding, ...]:  # fmt: skip
+    """A note for each of some artifacts that was read from the same bytes otherwise.
 
     Args:
+        others: artifacts of the same kind that are in the lake.
         source_hash: of the file's bytes.
         recipe: all options that shape the result now.
     """
-    same = (pc.field("kind") == kind.value) & (pc.field("source_hash") == source_hash)
+    now = _options(recipe)
     found: list[Finding] = []
-    for artifact in map(Artifact.from_row, lake.rows(at=branch).filter(same).to_pylist()):
-        before, now = _options(artifact.recipe), _options(recipe)
-        if any(before.get(name) != now.get(name) for name in _CHOOSES):
+    for artifact in others:
+        before = _options(artifact.recipe)
+        if artifact.source_hash != source_hash or any(before.get(name) != now.get(name) for name in _CHOOSES):
             continue
         names = sorted(name for name in before.keys() | now.keys() if before.get(name) != now.get(name))
         changed = ", ".join(f"{name} {before.get(name)!s}, now {now.get(name)!s}" for name in names)

@@ -259,8 +259,10 @@ def _read(
         return error
     paired = host_clock(log.series)
     findings = (*log.findings, *(paired.findings if paired is not None else ()))
-    findings = (*findings, *_beside(lake, log.series, labels.session, branch=branch))
-    findings = (*findings, *by_other_options(lake, Kind.WIND, source.hash, options.recipe(), branch=branch))
+    winds = lake.rows(at=branch).filter(pc.field("kind") == Kind.WIND.value).to_pylist()
+    others = [Artifact.from_row(row) for row in winds]
+    findings = (*findings, *_beside(lake, log.series, labels.session, others))
+    findings = (*findings, *by_other_options(others, source.hash, options.recipe()))
     return _Read(log=log, options=options, labels=labels, findings=findings, paired=paired)
 
 
@@ -297,12 +299,13 @@ def _staged(transaction: Transaction, path: Path, source: Source, one: _Read) ->
     return artifact, report
 
 
-def _beside(lake: Lake, series: WindSeries, session: str | None, *, branch: str) -> tuple[Finding, ...]:
-    """Logs of the same session, or of none, on the branch whose wind this one is, hours apart."""
+def _beside(
+    lake: Lake, series: WindSeries, session: str | None, others: Sequence[Artifact]
+) -> tuple[Finding, ...]:  # fmt: skip
+    """Those of other logs, of the same session or of none, whose wind this one is, hours apart."""
     start, end = int(series.time[0]), int(series.time[-1])
-    rows = lake.rows(at=branch).filter(pc.field("kind") == Kind.WIND.value).to_pylist()
     near = [
-        artifact for artifact in map(Artifact.from_row, rows)
+        artifact for artifact in others
         if artifact.session == session and artifact.start is not None and artifact.end is not None
         and min(end, artifact.end) - max(start, artifact.start) > 0
     ]  # fmt: skip

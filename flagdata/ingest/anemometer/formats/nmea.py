@@ -30,7 +30,7 @@ from flagdata.ingest.anemometer.formats.sentences import (
     tag_time,
     time_mark,
 )
-from flagdata.ingest.anemometer.formats.serial_lines import most_stamped
+from flagdata.ingest.anemometer.formats.serial_lines import is_comment, most_stamped
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.samples import possible
@@ -67,7 +67,8 @@ class _Stream:
     kinds: Counter[str] = field(default_factory=Counter)
     talkers: list[str] = field(default_factory=list)
     silent: Counter[str] = field(default_factory=Counter)
-    before: list[tuple[int, str]] = field(default_factory=list)
+    before: list[int] = field(default_factory=list)
+    first_before: str = ""
     bad_checksums: list[int] = field(default_factory=list)
     unchecked: int = 0
     not_sentences: list[int] = field(default_factory=list)
@@ -113,7 +114,7 @@ class Nmea:
         stream = _Stream()
         for first, lines in source.blocks():
             for at, line in enumerate(lines, start=first):
-                if line.strip(" \t\x00") and not line.lstrip().startswith("#"):
+                if line.strip(" \t\x00") and not is_comment(line):
                     _take(stream, line, at, options.talker)
         _take_others(stream)
         _leave_silent(stream)
@@ -173,7 +174,8 @@ def _take(stream: _Stream, line: str, at: int, talker: str | None) -> None:
         stream.not_sentences.append(at)
         return
     if tagged is None and (before := _BEFORE.match(line)) is not None:
-        stream.before.append((at, before[0].strip()))
+        stream.before.append(at)
+        stream.first_before = stream.first_before or before[0].strip()
     stream.kinds[sentence.kind] += 1
     stream.times.bursts.sentence(f"{sentence.talker}{sentence.kind}", at)
     stream.unchecked += not sentence.checked
@@ -412,10 +414,10 @@ def _findings(stream: _Stream, placed: Placed) -> tuple[Finding, ...]:
             found.append(Finding(kind=kind, severity=severity, count=len(places), where=f"line {places[0]}", what=text))
 
     if stream.before:
-        first, text = stream.before[0]
-        what = f"before {len(stream.before)} sentences stands no stamp that is known, as {text[:60]!r}; not read"
+        text = stream.first_before[:60]
+        what = f"before {len(stream.before)} sentences stands no stamp that is known, as {text!r}; not read"
         found.append(Finding(kind="text-before-sentences", severity=Severity.WARNING, count=len(stream.before),
-                             where=f"line {first}", what=what))  # fmt: skip
+                             where=f"line {stream.before[0]}", what=what))  # fmt: skip
     for talker, silent in stream.silent.items():
         what = f"the {silent} wind sentences of talker {talker} are empty; left out"
         found.append(Finding(kind="sentences-not-read", severity=Severity.NOTE, count=silent, what=what))

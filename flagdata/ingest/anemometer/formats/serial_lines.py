@@ -144,7 +144,12 @@ def most_stamped(head: Head) -> bool:
 
 def without_comments(lines: Sequence[str]) -> list[str]:
     """The lines without those that a program marked as its own, by "#"."""
-    return [line for line in lines if not line.lstrip().startswith("#")]
+    return [line for line in lines if not is_comment(line)]
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line is marked by "#" as a program's own."""
+    return line.lstrip().startswith("#")
 
 
 def checksum(text: str) -> int:

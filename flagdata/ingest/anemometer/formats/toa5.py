@@ -100,9 +100,10 @@ class Toa5:
                     )  # fmt: skip
         reading = table.reading.with_findings(tuple(found), flags=flags)
         wind = next(layout.column for name, layout in recipe.channels.items() if name.startswith("wind_"))
-        processing = dict(zip(names, header[3], strict=False)).get(str(wind), "")
-        reading = replace(reading, sensor=replace(reading.sensor, averaging=_averaging(processing, reading.time)))
-        reading = reading.with_findings(_mean_of_angles(recipe, names, header[3]))
+        processed = dict(zip(names, header[3], strict=False))
+        averaging = _averaging(processed.get(str(wind), ""), reading.time)
+        reading = replace(reading, sensor=replace(reading.sensor, averaging=averaging))
+        reading = reading.with_findings(_mean_of_angles(recipe, processed))
         return with_horizontal(reading, options.azimuth, where=str(source.path))
 
     def _header(self, source: TextFile) -> list[list[str]]:
@@ -213,13 +214,16 @@ def _averaging(processing: str, time: Instants) -> float | None:
     return None
 
 
-def _mean_of_angles(recipe: Recipe, names: list[str], processing: list[str]) -> tuple[Finding, ...]:
-    """What is said of a direction that the logger averaged as a number: 350° and 10° make 180° then."""
+def _mean_of_angles(recipe: Recipe, processed: Mapping[str, str]) -> tuple[Finding, ...]:
+    """What is said of a direction that the logger averaged as a number: 350° and 10° make 180° then.
+
+    Args:
+        processed: how the logger made each column, as the header's fourth line says.
+    """
     layout = recipe.channels.get("wind_direction")
-    processed = dict(zip(names, processing, strict=False))
     if layout is None or processed.get(str(layout.column), "").strip().lower() != "avg":
         return ()
-    vectors = [name for name in names if name.endswith("WVc(2)")]  # the second of its numbers is the direction
+    vectors = [name for name in processed if name.endswith("WVc(2)")]  # the second of its numbers is the direction
     beside = f"; {', '.join(repr(name) for name in vectors)} may be the mean of vectors" if vectors else ""
     what = (
         f"{layout.column!r} is the mean of a vane's readings as numbers, which is wrong where they pass north{beside}"

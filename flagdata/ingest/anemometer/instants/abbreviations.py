@@ -35,11 +35,8 @@ _STAMP = re.compile(r"\d[-/.]\d{1,2}[-/.]\d|\d:\d\d")
 def written_out(text: str) -> int | None:
     """Hours east of UTC of a zone whose name is written out in a text; None where it names none."""
     known = " ".join(text.replace("_", " ").lower().split())
-    return next((hours for name, hours in sorted(_WRITTEN_OUT.items(), key=_length) if name in known), None)
-
-
-def _length(item: tuple[str, int]) -> int:
-    return -len(item[0])
+    longest = max((name for name in _WRITTEN_OUT if name in known), key=len, default="")
+    return _WRITTEN_OUT.get(longest)
 
 
 def advice(lines: Sequence[str]) -> str:

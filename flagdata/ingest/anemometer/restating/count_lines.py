@@ -13,7 +13,7 @@ holds one whole number alone and as many rows with more cells stand between it a
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
@@ -32,14 +32,11 @@ def matches(lines: Sequence[str]) -> bool:
 
 def as_table(source: TextFile) -> TableText | None:
     """The rows without the counts."""
-    lines = list(_without_counts(source.each_line()))
-    count = sum(1 for line in source.each_line() if _COUNT.fullmatch(line))
+    lines = list(source.each_line())
+    rows = [line for line in lines if _COUNT.fullmatch(line) is None]
+    count = len(lines) - len(rows)
     text = f"{count} lines that say how many rows follow are left out; lines are counted without them"
-    return TableText.of(source, lines, [Finding(kind="count-lines", severity=Severity.NOTE, count=count, what=text)])
-
-
-def _without_counts(lines: Iterable[str]) -> Iterator[str]:
-    return (line for line in lines if _COUNT.fullmatch(line) is None)
+    return TableText.of(source, rows, [Finding(kind="count-lines", severity=Severity.NOTE, count=count, what=text)])
 
 
 def _groups(lines: Sequence[str]) -> list[tuple[int, int]]:

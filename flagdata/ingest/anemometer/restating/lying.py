@@ -15,12 +15,12 @@ from collections.abc import Sequence
 from flagdata.ingest.anemometer.restating.restate import table
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import cut
+from flagdata.ingest.anemometer.text.signs import SIGNS
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.words.headings import names_time, understand
 
 _LEAST, _MOST = 3, 200
 """Quantities of a table, and lines of one: a table of readings has more."""
-_SIGNS = (",", ";", "\t", "|")
 
 
 def matches(lines: Sequence[str]) -> bool:
@@ -44,7 +44,7 @@ def as_table(source: TextFile) -> TableText | None:
 def _sign(lines: Sequence[str]) -> str | None:
     """The delimiter of a table that lies on its side; `None` where the lines are none."""
     filled = [line for line in lines if line.strip()]
-    for sign in _SIGNS:
+    for sign in SIGNS:
         rows = [row for line in filled if len(row := cut(line, sign)) > 1]
         if len(rows) < max(_LEAST, 0.6 * len(filled)) or len(rows) > _MOST:
             continue

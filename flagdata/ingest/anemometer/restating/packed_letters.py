@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from flagdata.ingest.anemometer.formats.serial_lines import split_stamp
 from flagdata.ingest.anemometer.restating.restate import rows_of, table
@@ -26,27 +27,26 @@ _SHARE = 0.8
 def matches(lines: Sequence[str]) -> bool:
     """Most of the first lines are a stamp and such a word, of the same letters."""
     filled = [line for line in lines if line.strip()]
-    found = [letters for line in filled if (letters := _letters(line)) is not None]
+    found = [packed.letters for line in filled if (packed := _packed(line)) is not None]
     same = max((found.count(letters) for letters in set(found)), default=0)
     return bool(filled) and same >= _SHARE * len(filled)
 
 
 def as_table(source: TextFile) -> TableText | None:
     """A column of stamps, one for each letter, and numbered ones for numbers behind the word."""
-    found = [letters for line in source.head() if (letters := _letters(line)) is not None]
+    found = [packed for line in source.head() if (packed := _packed(line)) is not None]
     if not found:
         return None
-    letters = max(set(found), key=found.count)
-    more = max(len(_behind(line)) for line in source.head() if _letters(line) == letters)
+    all_letters = [packed.letters for packed in found]
+    letters = max(set(all_letters), key=all_letters.count)
+    more = max(len(packed.behind) for packed in found if packed.letters == letters)
 
     def row(line: str) -> list[str] | None:
-        if _letters(line) != letters:
+        packed = _packed(line)
+        if packed is None or packed.letters != letters:
             return None
-        stamp, packed = split_stamp(line)
-        match = _LINE.fullmatch(packed)
-        own = _behind(line)[:more]
-        parts = [] if match is None else [value for _, value in _PART.findall(match["packed"])]
-        return [stamp, *parts, *own, *[""] * (more - len(own))]
+        behind = packed.behind[:more]
+        return [packed.stamp, *packed.values, *behind, *[""] * (more - len(behind))]
 
     rows, other = rows_of(source, row)
     names = ["time", *letters, *(f"behind {number}" for number in range(1, more + 1))]
@@ -54,18 +54,26 @@ def as_table(source: TextFile) -> TableText | None:
     return table(source, names, rows, kind="packed-letters", what=what, left_out=other)
 
 
-def _letters(line: str) -> tuple[str, ...] | None:
-    """The letters of a line's word, each once; `None` where it is no stamp and such a word."""
-    stamp, packed = split_stamp(line)
-    match = _LINE.fullmatch(packed) if stamp else None
+@dataclass(frozen=True, kw_only=True)
+class _Packed:
+    """One line: its stamp, the letters of its word with their numbers, and the numbers behind it."""
+
+    stamp: str
+    letters: tuple[str, ...]
+    values: tuple[str, ...]
+    behind: tuple[str, ...]
+
+
+def _packed(line: str) -> _Packed | None:
+    """What a line says; `None` where it is no stamp and such a word with each letter once."""
+    stamp, text = split_stamp(line)
+    match = _LINE.fullmatch(text) if stamp else None
     if match is None:
         return None
-    letters = tuple(letter for letter, _ in _PART.findall(match["packed"]))
-    return letters if len(set(letters)) == len(letters) else None
-
-
-def _behind(line: str) -> list[str]:
-    """The numbers behind the word."""
-    match = _LINE.fullmatch(split_stamp(line)[1])
-    cells = [] if match is None else re.split(r"[,;]\s*", match["rest"])[1:]
-    return cells[:-1] if cells and not cells[-1] else cells
+    parts = _PART.findall(match["packed"])
+    letters = tuple(letter for letter, _ in parts)
+    if len(set(letters)) < len(letters):
+        return None
+    behind = re.split(r"[,;]\s*", match["rest"])[1:]
+    behind = behind[:-1] if behind and not behind[-1] else behind
+    return _Packed(stamp=stamp, letters=letters, values=tuple(value for _, value in parts), behind=tuple(behind))

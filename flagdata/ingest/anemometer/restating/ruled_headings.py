@@ -64,10 +64,6 @@ def as_table(source: TextFile) -> TableText | None:
     return TableText.of(source, whole, [Finding(kind="ruled-headings", severity=Severity.NOTE, what=what[:600])])
 
 
-def _firsts(line: str) -> list[str]:
-    return line.split()
-
-
 def _plain(line: str) -> str:
     """A line with blanks in place of tabs and of the sign of a comment before it."""
     return _MARK.sub(r"\1 ", line.lstrip("\ufeff").expandtabs())

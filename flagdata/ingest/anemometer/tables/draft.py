@@ -287,13 +287,16 @@ def _doubts(
         if missing:
             found.append(_unit_doubt(lines, layout, time, wind, missing))
             break
-    unsure = [wind.label for wind in winds if not wind.sure and _may_be_speed(layout, wind)] if chosen is None else []
+    candidates = winds if chosen is None else ()
+    unsure = [wind for wind in candidates if not wind.sure and speeds_offered.may_be_wind(layout, wind)]
     if unsure:
-        first = next(wind for wind in winds if wind.label == unsure[0])
+        first = unsure[0]
         whole = "the wind" if speeds_offered.is_offered(layout, first) else "the wind's whole speed, no component of it"
-        fix = f"if it is {whole}, name it: --wind {in_shell(unsure[0])}"
+        fix = f"if it is {whole}, name it: --wind {in_shell(first.label)}"
         fix += "" if time is None or time.counts else f"; or {offered_columns.offer(layout, time, winds)}"
-        what = f"{', '.join(map(repr, unsure))} may be a wind or another speed, the heading does not say"
+        what = (
+            f"{', '.join(repr(wind.label) for wind in unsure)} may be a wind or another speed, the heading does not say"
+        )
         own = own_motion.doubt(layout)
         what += f"; {own}" if own else ""
         found.append(Doubt(what=what, fix=fix))
@@ -344,12 +347,6 @@ def _below_zero(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
         )
         found.append(Doubt(what=what, fix=fix))
     return found
-
-
-def _may_be_speed(layout: Layout, wind: Wind) -> bool:
-    """Whether the column of a wind's speed may be one."""
-    column = wind.columns.get("wind_speed")
-    return column is None or speeds_offered.may_be(layout, column.index)
 
 
 def _only_numbers(layout: Layout, time: TimeChoice) -> int | None:

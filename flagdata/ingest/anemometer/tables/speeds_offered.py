@@ -20,7 +20,13 @@ def is_offered(layout: Layout, wind: Wind) -> bool:
     if speed is None:
         return True
     alone = not wind.sure and "wind_direction" not in wind.columns and named_axes.is_letter(layout, speed.index)
-    return may_be(layout, speed.index) and not alone
+    return may_be_wind(layout, wind) and not alone
+
+
+def may_be_wind(layout: Layout, wind: Wind) -> bool:
+    """Whether a wind is of components, or the column of its speed may be one."""
+    speed = wind.columns.get("wind_speed")
+    return speed is None or may_be(layout, speed.index)
 
 
 def may_be(layout: Layout, index: int) -> bool:

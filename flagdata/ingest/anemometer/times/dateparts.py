@@ -331,10 +331,10 @@ def _says_the_fraction(columns: Sequence[Sequence[str]], named: Mapping[str, int
     """Whether a column of whole hours says what the fraction of the day of the year does, which is rounded more."""
     if "hour" not in named or not whole_numbers([cell for cell in columns[named["hour"]] if cell], 0, 24):
         return False
-    pairs = [
-        (day, hour) for day, hour in zip(columns[named["doy"]], columns[named["hour"]], strict=True) if day and hour
-    ]
-    return bool(pairs) and all(abs(float(day) % 1 * 24 - float(hour) % 24) <= _ROUNDED for day, hour in pairs)
+    day, hour = (numbers(columns[named[part]]).value for part in ("doy", "hour"))
+    off = np.abs(day % 1 * 24 - hour % 24)
+    off = off[np.isfinite(off)]
+    return len(off) > 0 and bool(np.all(off <= _ROUNDED))
 
 
 def _hours_or_minutes(
@@ -345,7 +345,7 @@ def _hours_or_minutes(
         return False
     cells = [cell for cell in columns[hour] if cell]
     days = {tuple(columns[at][row] for at in of_date) for row in range(len(columns[hour]))}
-    return len(days) == 1 and len(cells) > 1 and bool(np.all(np.diff([int(cell) for cell in cells]) == 1))
+    return len(days) == 1 and len(cells) > 1 and bool(np.all(np.diff(numbers(cells).value) == 1))
 
 
 def _without_year(layout: Layout, columns: Sequence[Sequence[str]], named: Mapping[str, int]) -> Iterator[TimeChoice]:

@@ -169,13 +169,12 @@ def _dates(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | Non
 
 def _places(cells: Sequence[str], before: Sequence[Sequence[str]]) -> bool:
     """Whether numbers run from 1 to the same few in every hour that is there: stations are counted so, no minutes."""
-    hours: dict[tuple[str, ...], list[int]] = {}
+    hours: dict[tuple[str, ...], list[str]] = {}
     for *hour, cell in zip(*before, cells, strict=True):
-        hours.setdefault(tuple(hour), []).append(int(cell))
+        hours.setdefault(tuple(hour), []).append(cell.strip().lstrip("0"))
     whole = list(hours.values())[:-1]  # the last may be cut off
-    return (
-        len(whole) >= _HOURS // 2 and len(whole[0]) > 1 and all(own == [*range(1, len(whole[0]) + 1)] for own in whole)
-    )
+    counted = [str(number) for number in range(1, len(whole[0]) + 1)] if whole else []
+    return len(whole) >= _HOURS // 2 and len(counted) > 1 and all(own == counted for own in whole)
 
 
 def _ordinal(layout: Layout, columns: Sequence[Sequence[str]]) -> TimeChoice | None:

@@ -144,3 +144,20 @@ def test_frames_of_a_can_adapter_are_named_with_what_can_be_done(log_file: Write
     guess = sniff(path)[0]
     assert "SLCAN" in guess.reasons[0]
     assert "candump" in (guess.fix or "")
+
+
+@pytest.mark.parametrize("damaged", ["NA", "--", ""])
+def test_a_damaged_cell_of_a_fraction_or_an_hour_is_no_crash(read: Read, damaged: str) -> None:
+    lines = fractions(2).splitlines()
+    for at, column in ((5, 1), (9, 2)):
+        cells = lines[at].split("\t")
+        lines[at] = "\t".join([*cells[:column], damaged, *cells[column + 1 :]])
+    assert len(read("\n".join(lines) + "\n", zone="UTC", unit="m/s").series.time) >= 38
+
+
+def test_a_damaged_number_of_a_station_is_no_crash(read: Read) -> None:
+    keys = [(day, site) for day in range(1, 16) for site in (1, 2, 3)]
+    rows = [f"2026 5 {day} 12 {site} {450 + site} {site}.{day % 9} {60 * site}" for day, site in keys]
+    rows[7] = rows[7].replace(" 12 2 ", " 12 NA ")
+    with pytest.raises(InputError):
+        read("\n".join(rows) + "\n", zone="UTC")
