@@ -58,10 +58,10 @@ _NUMERIC = re.compile(r"%[YymdjHIMS]")
 _WHOLE = re.compile(r"%[YmdjHMSLUNsD](?= |$)")
 """Directives of whole numbers, where a blank or the end follows."""
 _DECIMALS = (
-    ("Q", 3600 * NANOSECONDS, 0.0, 24.0), ("J", DAY, 1.0, 367.0), ("E", 3600 * NANOSECONDS, 0.0, 8784.0),
-    ("G", 60 * NANOSECONDS, 0.0, 1440.0), ("K", NANOSECONDS, 0.0, 86_400.0),
+    ("Q", 3600 * NANOSECONDS, 0.0, 24.0), ("E", 3600 * NANOSECONDS, 0.0, 8784.0),
+    ("G", 60 * NANOSECONDS, 0.0, 1440.0), ("K", NANOSECONDS, 0.0, 86_400.0), ("J", DAY, 1.0, 367.0),
 )  # fmt: skip
-"""Directives of counts with a fraction: letter, length of one [ns], first and last."""
+"""Directives of counts with a fraction: letter, length of one [ns], first and last. The day comes behind the clocks."""
 _SUBSECONDS = {"L": 1_000_000, "U": 1_000, "N": 1}
 """Directives of parts of a second [ns]."""
 _ISO = (
@@ -208,9 +208,12 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
         decimal = _decimal(found, name, length)
         if decimal is None:
             continue
-        count, rounded, decimal_step = decimal
-        if name == "J" and (part("H") is not None or part("I") is not None):
-            rounded, decimal_step = np.floor(count).astype(np.int64) * length, 0  # the hour says what the fraction does
+        count, rounded, last_digit = decimal
+        if name == "J" and any(_field(found, clock) is not None for clock in "HIQGK"):
+            # The clock says what the fraction of the day does, which may be rounded up to the next day.
+            rounded = np.round(count - (ns - days * DAY) / DAY).astype(np.int64) * length
+        else:
+            decimal_step = last_digit
         ns = ns + rounded - round(first) * length
         valid &= (count >= first) & (count <= last)
     offset, utc = _offset(found, len(text))

@@ -104,9 +104,7 @@ def left_out(layout: Layout, best: TimeChoice, choices: Sequence[TimeChoice]) ->
     """The columns of other stamps of a date and a time, by their headings and cells, beside the time that is taken."""
     found: set[int] = set()
     for choice in choices:
-        form = choice.form or ""
-        alone = is_date_alone(form) or counted.is_elapsed(form) or counted.needs_date(form)
-        if choice.counts or alone or len(choice.columns) > _STAMP or choice.score < _ABOUT_SURE:
+        if choice.counts or not _dated(choice.form) or len(choice.columns) > _STAMP or choice.score < _ABOUT_SURE:
             continue
         if not set(choice.columns) & set(best.columns) and all(names_time(layout.names[at]) for at in choice.columns):
             found |= set(choice.columns)
@@ -123,7 +121,7 @@ def disagreement(layout: Layout, best: TimeChoice, choices: Sequence[TimeChoice]
     one = _read(layout, best)
     others = set(left_out(layout, best, choices))
     for choice in choices:
-        if choice.form is None or not set(choice.columns) <= others:
+        if choice.form is None or not _dated(choice.form) or not set(choice.columns) <= others:
             continue
         two = _read(layout, choice)
         if len(one.ns) != len(two.ns) or not _moves(one) or not _moves(two):
@@ -144,6 +142,12 @@ def _whole(choice: TimeChoice) -> bool:
     """Whether a choice is of instants, without anything left to say."""
     form = choice.form
     return form is not None and not choice.counts and choice.zoned and not is_date_alone(form)
+
+
+def _dated(form: str | None) -> bool:
+    """Whether a format is of a date with a time of day; one that is still to be said may be."""
+    form = form or ""
+    return not (is_date_alone(form) or counted.is_elapsed(form) or counted.needs_date(form))
 
 
 def _read(layout: Layout, choice: TimeChoice) -> Stamps:

@@ -97,3 +97,13 @@ def _two_clocks(drift: float, zone: int = 0) -> str:
 def test_clocks_of_the_same_rows_that_run_apart_are_told(read: Read, drift: float, zone: int, told: bool) -> None:
     log = read(_two_clocks(drift, zone), zone="UTC")
     assert any("clocks do not agree" in finding.what for finding in log.findings) == told
+
+
+def test_a_local_date_and_clock_beside_utc_are_not_two_clocks(read: Read) -> None:
+    start = np.datetime64("2013-08-28T22:00", "m")
+    stamps = [start + 60 * at for at in range(45)]
+    local = [f"{29 + at // 24}/08/2013,{at % 24:02}:00" for at in range(45)]
+    rows = [f"{stamp}:00,{here},8.{at % 10}" for at, (stamp, here) in enumerate(zip(stamps, local, strict=True))]
+    found = read("\n".join(["utc,date,time,wind speed [m/s]", *rows]) + "\n")
+    assert found.series.time[0] == start.astype("datetime64[ns]").astype(np.int64)
+    assert doubts(found) == []
