@@ -8,7 +8,7 @@
 
 Each series is a table of its own, one below the other, the next with annotations and a heading again where its columns
 differ. Its field names the quantity; where that is "value", as Home Assistant writes it, the entity does, and the
-measurement is its unit. Other tags that change from series to series tell sites apart.
+measurement is its unit. As few other tags as do it tell sites apart.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import csv
 from collections.abc import Iterable, Iterator, Sequence
 
 from flagdata.ingest.anemometer.restating.name_value import Record, wide
+from flagdata.ingest.anemometer.restating.telling_tags import telling
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.units import spelled
 
@@ -50,7 +51,7 @@ def of_series(source: TextFile, values: Iterable[dict[str, str]], *, what: str, 
     if not rows:
         return None
     tags = [tag for tag in dict.fromkeys(tag for row in rows for tag in row) if _is_tag(tag)]
-    apart = [tag for tag in tags if tag not in _NAMING and len({row.get(tag, "") for row in rows}) > 1]
+    apart = telling(rows, [tag for tag in tags if tag not in _NAMING])
     records = sorted((_record(row, apart) for row in rows), key=lambda record: record.stamp[0].removesuffix("Z"))
     return wide(source, ["time", *(["site"] if apart else [])], records, what=what, left_out=[left_out])
 

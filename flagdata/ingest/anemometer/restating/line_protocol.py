@@ -20,6 +20,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.restating import influx
 from flagdata.ingest.anemometer.restating.name_value import Record, wide
 from flagdata.ingest.anemometer.restating.restate import table
+from flagdata.ingest.anemometer.restating.telling_tags import telling
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.winds.found import COMPONENTS, SPEEDS
@@ -45,8 +46,6 @@ _NUMBER = re.compile(r"[-+]?[\d.]")
 _SHARE = 0.5
 _SIZES = ((10**11, 10**9), (10**14, 10**6), (10**17, 10**3), (10**20, 1))
 """Counts below which an instant is one of seconds, milliseconds, microseconds, nanoseconds [each in ns]."""
-_CALLED = frozenset({"station", "site", "sensor", "device", "location", "node", "mast", "buoy", "anemometer"})
-"""Words of tags by which sites are called rather than by others that tell them apart as well."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -241,19 +240,7 @@ def _alone(rows: Iterable[Mapping[str, str]], speeds: Sequence[str]) -> bool:
 
 
 def _apart(points: Sequence[_Point]) -> list[str]:
-    """The tags that tell sites apart: one that does it alone, else as few as do it together."""
+    """The tags that tell sites apart, quantities set aside."""
     tags = list(dict.fromkeys(tag for point in points for tag in point.tags))
     tags = [tag for tag in tags if tag == "measurement" or not understand(tag).quantity]
-    tags.sort(key=lambda tag: tag != "measurement" and _CALLED.isdisjoint(words_of(tag)))
-    kinds = {tuple(point.tags.get(tag, "") for tag in tags) for point in points}
-    columns = {tag: [one[at] for one in kinds] for at, tag in enumerate(tags)}
-    alone = next((tag for tag in tags if len(kinds) > 1 and len(set(columns[tag])) == len(kinds)), None)
-    if alone is not None:
-        return [alone]
-    chosen: list[str] = []
-    count = 1
-    for tag in tags:
-        now = len(set(zip(*(columns[one] for one in (*chosen, tag)), strict=True)))
-        if now > count:
-            chosen, count = [*chosen, tag], now
-    return chosen
+    return telling((point.tags for point in points), tags, first="measurement")

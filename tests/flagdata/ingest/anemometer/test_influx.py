@@ -62,6 +62,12 @@ def test_tags_that_change_tell_sites_apart(log_file: Callable[[str], Path]) -> N
     assert log.series.channels["wind_speed"][[0, -1]].tolist() == pytest.approx([5, 94])
 
 
+def test_sites_are_called_by_the_tag_that_names_them_and_no_more(log_file: Callable[[str], Path]) -> None:
+    text = heading(",owner,lat,station") + series(0, "wind_speed", 1, tags=",city,52.1,A")
+    text += series(1, "wind_speed", 5, tags=",club,52.3,B") + series(2, "wind_speed", 9, tags=",club,52.4,C")
+    assert anemometers(log_file(text), WindOptions(unit="m/s")) == ("A", "B", "C")
+
+
 def test_fields_in_columns_of_their_own_are_an_ordinary_table(read: Read) -> None:
     rows = "".join(f",_result,0,2026-05-01T12:{at:02d}:00Z,{at + 1},{200 + at}\n" for at in range(20))
     text = "#group,false,false,false,false,false\n#datatype,string,long,dateTime:RFC3339,double,double\n#default,,,,,\n"
