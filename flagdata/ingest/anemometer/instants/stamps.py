@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
 from flagdata.ingest.anemometer.instants.abbreviations import ABBREVIATED
+from flagdata.ingest.anemometer.instants.month_names import ENGLISH, LETTERS, NUMBERS
 from flagdata.timebase import NANOSECONDS
 
 DAY = 86_400 * NANOSECONDS
@@ -39,14 +40,13 @@ _GROUPS: dict[str, str] = {
     "s": r"(?P<s>\d{9,10})", "L": r"(?P<L>\d{1,3})", "U": r"(?P<U>\d{1,6})", "N": r"(?P<N>\d{1,9})",
     "D": r"(?P<D>\d{1,5})",
     "Q": r"(?P<Q>\d{1,2}(?:\.\d{1,9})?)", "J": r"(?P<J>\d{1,3}(?:\.\d{1,9})?)",
-    "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp](?:\.?[Mm]\.?)?)",
-    "b": r"(?P<b>[A-Za-z]{3})(?:[a-z]{1,6}\.?)?", "a": r"(?:(?P<a>[A-Za-z]{3})[a-z]{0,6}\.?,?)",
+    "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp](?:\.?\s?[Mm]\.?)?)",
+    "b": rf"(?P<b>[{LETTERS}]{{3,13}})\.?", "a": rf"(?:(?P<a>[{LETTERS}]{{2,13}})\.?,?)",
     "z": rf"\s*(?P<z>Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-](?:0\d|1[0-5])(?::?[0-5]\d)?)?",
     "Z": r"\s*(?:[A-Z]{3,4})?",
 }  # fmt: skip
 _SAME = {"B": "b", "h": "b", "A": "a", "e": "d"}
-"""Directives of C's strftime that others here read as well: a month's name may be whole or cut to three letters."""
-_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+"""Directives of C's strftime that others here read as well: a month's name may be whole or cut short."""
 _CLOCK_RUN = re.compile(r"%H%M(?:%S)?")
 _CLOCK_RUNS = {
     "%H%M": r"(?P<H>\d{0,2}?)(?P<M>\d{1,2})",
@@ -347,9 +347,12 @@ def _days(found: pa.StructArray, part: Any, year: NDArray[np.int64]) -> tuple[ND
 
 
 def _month(found: pa.StructArray) -> NDArray[np.int64]:
+    """The month of each name, 0 for none: of another language, else of English by its first three letters."""
     names = pc.utf8_lower(pc.coalesce(_field(found, "b"), ""))
-    index = pc.index_in(names, pa.array(_MONTHS))
-    return pc.fill_null(pc.cast(index, pa.int64()), -1).to_numpy(zero_copy_only=False) + 1
+    other = pc.fill_null(pc.index_in(names, pa.array(list(NUMBERS))), -1).to_numpy(zero_copy_only=False)
+    short = pc.utf8_slice_codeunits(names, 0, 3)
+    english = pc.fill_null(pc.index_in(short, pa.array(ENGLISH)), -1).to_numpy(zero_copy_only=False)
+    return np.where(other >= 0, np.array([*NUMBERS.values(), 0])[other], english + 1).astype(np.int64)
 
 
 def _civil(year: NDArray[np.int64], month: NDArray[np.int64], day: NDArray[np.int64]) -> NDArray[np.int64]:

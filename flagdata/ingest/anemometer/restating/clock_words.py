@@ -1,4 +1,4 @@
-"""Clocks with a word beside them: 01.02.2023 14:00 Uhr, 14:00 h, 14:00 hs, kl. 14:00. The word is left out.
+"""Clocks with a word beside them: 01.02.2023 14:00 Uhr, 14:00 h, kl. 14:00, @ 14:00, a las 14:00. It is left out.
 
 It says nothing that the numbers do not: AM and PM, which do, are read elsewhere (`twelve`).
 """
@@ -15,7 +15,10 @@ _CLOCK = r"(?:[01]?\d|2[0-4])[:.][0-5]\d(?:[:.][0-5]\d(?:[.,]\d{1,9})?)?"
 _BEHIND = re.compile(
     rf"(?<![\d:.])(?P<clock>{_CLOCK})\s?(?P<word>Uhr|hrs?|hs|horas?|godz|h)\.?(?![^\W_])", re.IGNORECASE
 )
-_BEFORE = re.compile(rf"(?<![^\W\d_])(?P<word>kl|klo|um|kello)\.?\s?(?P<clock>{_CLOCK})(?![\d:.])", re.IGNORECASE)
+_BEFORE = re.compile(
+    rf"(?<![^\W\d_])(?P<word>kl|klo|um|kello|at|om|[aà] las|alle|[àá]s|à|@)\.?\s?(?P<clock>{_CLOCK})(?![\d:.])",
+    re.IGNORECASE,
+)
 _SHARE = 0.8
 _LEAST = 3
 

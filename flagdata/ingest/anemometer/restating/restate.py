@@ -20,6 +20,7 @@ from flagdata.ingest.anemometer.text.source import TableText, TextFile
 
 WITHIN = (
     "flagdata.ingest.anemometer.restating.percent_encoded",
+    "flagdata.ingest.anemometer.restating.east_asian_stamps",
     "flagdata.ingest.anemometer.restating.clock_words",
     "flagdata.ingest.anemometer.restating.twice_told",
     "flagdata.ingest.anemometer.restating.ruled_headings",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Literal
 
+from flagdata.ingest.anemometer.instants import month_names
 from flagdata.ingest.anemometer.recipe import MISSING, MISSING_SIGNS
 from flagdata.ingest.anemometer.text.cells import BELOW
 from flagdata.units import UNITS, plain_powers, spelled
@@ -18,11 +19,18 @@ _STAMP = re.compile(
     r"|(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}(?::\d{2}(?::\d{2})?)?"
 )
 _DAY_OF_WEEK = r"(?:Mon|Tue|Wed|Thu|Fri|Sat|Sun)[a-z]{0,6}\.?,?\s+"
-_MONTH_NAME = r"(?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]{0,6}\.?,?"
+_ENGLISH = r"(?:Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]{0,6}\.?,?"
 _MONTH_STAMP = re.compile(
     r"\d{1,2}[- ][A-Za-z]{3}[- ]\d{1,4}\b.*|\d{4}-[A-Za-z]{3}-\d{1,2}.*"
-    rf"|(?:{_DAY_OF_WEEK})?(?:\d{{1,2}}[- ])?{_MONTH_NAME}[-\s]+\d{{1,4}}\b.*"
+    rf"|(?:{_DAY_OF_WEEK})?(?:\d{{1,2}}[- ])?{_ENGLISH}[-\s]+\d{{1,4}}\b.*"
 )
+_CLOCK_BEHIND = re.compile(r"[\s,:T]*(?:(?:à|kl|um|at|a las)\.?\s+)?(?:\d{1,2}[:.h]\d.*)?")
+"""What may follow a date in its cell: nothing, or a time of day."""
+_RARE_STAMP = re.compile(
+    rf"[{month_names.LETTERS}]{{2,13}}\.?,?\s+\d{{1,4}}[-/.]\d{{1,2}}[-/.]\d{{1,4}}(?:[ ,T]+\d{{1,2}}:\d{{2}}.*)?"
+    r"|\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?: ?[AaPp]\.?[Mm]\.?)?,?\s+\d{1,4}[-/. ][^\s\d]?\w{1,9}\.?[-/. ]\d{1,4}"
+)
+"""A date of numbers behind a day of the week, or behind the clock."""
 _QUANTITY = re.compile(rf"(?!\d{{5}})({_NUMBER.pattern})\s*(?P<unit>(?:[^\d\s.,:;+-]\s?){{1,8}}(?:-1)?)")
 OF_LOGS = frozenset({"m/s", "rad", "K", "Pa", "1"})
 """SI units of quantities that tables write with their unit in every cell ("4.3 mph", "210°")."""
@@ -48,9 +56,17 @@ def cell_kind(cell: str) -> CellKind:
         return "missing"
     if _NUMBER.fullmatch(text) or unit_behind(text) or re.match(BELOW, text.replace(",", ".")):
         return "number"
-    if _STAMP.fullmatch(text) or _MONTH_STAMP.fullmatch(text):
+    if _STAMP.fullmatch(text) or _MONTH_STAMP.fullmatch(text) or _is_dated(text):
         return "stamp"
     return "text"
+
+
+def _is_dated(text: str) -> bool:
+    """Whether a text is a date with the name of its month, in whichever language, or one put together otherwise."""
+    if _RARE_STAMP.fullmatch(text):
+        return True
+    found = month_names.DATE.match(text)
+    return found is not None and _CLOCK_BEHIND.fullmatch(text, found.end()) is not None
 
 
 def is_unit(text: str) -> bool:

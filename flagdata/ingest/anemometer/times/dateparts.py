@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from flagdata.errors import TimeError
-from flagdata.ingest.anemometer.instants import counted
+from flagdata.ingest.anemometer.instants import counted, month_names
 from flagdata.ingest.anemometer.instants.dates import Order, decide
 from flagdata.ingest.anemometer.instants.midnight import parse_as
 from flagdata.ingest.anemometer.text.cells import numbers
@@ -28,8 +28,6 @@ from flagdata.ingest.anemometer.times.timechoice import (
 )
 from flagdata.ingest.anemometer.words.headings import words_of
 
-MONTHS = ("%d{s}%b{s}%Y", "%d{s}%b{s}%y", "%Y{s}%b{s}%d")
-"""Dates with the name of the month; {s} is the sign between their parts."""
 _WORDS = {
     "year": r"year|yyyy|yr|yy|y|jahr|ann[ée]e|año|ano|anno|vuosi|jaar|år|rok|год|year month day .* yyyy",
     "month": r"month|monat|mois|mes|m[êe]s|mese|kuukausi|maand|måned|miesi[ąa]c|месяц|mon|mo",
@@ -84,9 +82,8 @@ YEAR_LAST = re.compile(r"(0[1-9]|[12]\d|3[01])(0[1-9]|[12]\d|3[01])((?:19|20)\d\
 """A date of eight digits whose year comes last."""
 _SIX = re.compile(r"^\s*\d{6}(\d\d)?\s*$")
 _TWO_BEHIND = re.compile(r"\d[T ,;_](\d{1,2})\s*$")
-_MONTH_NAME = re.compile(r"^\s*(?:jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)[a-z]{0,6}\.?\s*$", re.IGNORECASE)
 _DECIMAL = re.compile(r"^\s*\d{1,3}\.\d+\s*$")
-_CLOCK = re.compile(r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?[Mm]\.?)?\s*$")
+_CLOCK = re.compile(r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?\s*([AaPp]\.?\s?[Mm]\.?)?\s*$")
 CLOCKS = (
     "%H:%M:%S%f", "%H:%M", "%I:%M:%S %p", "%I:%M %p", "%I:%M:%S%p", "%I:%M%p", "%I:%M:%S%f %p", "%I:%M:%S%f%p",
     "%H%M%S", "%H%M", "%H.%M.%S%f", "%Hh%M", "%H h %M", "%H.%M", "%H", "%H:%M:%S%f%p", "%H:%M%p", "%H-%M-%S%f", "%H-%M",
@@ -178,7 +175,7 @@ def _month_by_name(layout: Layout, columns: Sequence[Sequence[str]]) -> Iterator
     """A month's name with day, year and clock in the columns around it, as ctime and date write them."""
     for index, cells in enumerate(columns):
         filled = [cell for cell in cells if cell]
-        if not filled or not share(_MONTH_NAME, filled):
+        if not filled or not share(month_names.ALONE, filled):
             continue
         for first, parts in ((index, ("%b", "%d", "clock", "%Y")), (index, ("%b", "%d", "%Y", "clock")),
                              (index - 1, ("%d", "%b", "%Y", "clock"))):  # fmt: skip
@@ -229,7 +226,7 @@ def _named(layout: Layout, columns: Sequence[Sequence[str]]) -> Mapping[str, int
         for part in _WORDS:
             if not _fits(part, name, before) or (part == "minute" and name in _OR_LEAST and maxima):
                 continue
-            month = part == "month" and share(_MONTH_NAME, cells)
+            month = part == "month" and share(month_names.ALONE, cells)
             clock = part == "hour" and hours_and_minutes(cells)
             said = part == "hour" and _SAYS_MINUTES.search(name) is not None and hours_and_minutes(cells, said=True)
             if part not in found and (month or clock or said or whole_numbers(cells, *_LIMITS[part])):
@@ -291,7 +288,7 @@ def _of_parts(
     dated = {"year", "month", "day"} <= set(named)
     ordinal = {"year", "doy"} <= set(named) and year == "%Y"
     if dated and not (ordinal and named["doy"] < min(named["month"], named["day"]) and "hour" not in named):
-        month = "%b" if share(_MONTH_NAME, columns[named["month"]]) else "%m"
+        month = "%b" if share(month_names.ALONE, columns[named["month"]]) else "%m"
         date, of_date = f"{year} {month} %d", [named[part] for part in ("year", "month", "day")]
     elif ordinal:
         whole = not share(_DECIMAL, columns[named["doy"]])
@@ -363,11 +360,11 @@ def _without_year(layout: Layout, columns: Sequence[Sequence[str]], named: Mappi
     elif "doy" in named and clock:
         yield from read(layout, columns, [named["doy"], *of_clock], [f"%j {clock}"], score=1.9)
     elif {"month", "day"} <= set(named) and clock:
-        month = "%b" if share(_MONTH_NAME, columns[named["month"]]) else "%m"
+        month = "%b" if share(month_names.ALONE, columns[named["month"]]) else "%m"
         taken = [named["month"], named["day"], *of_clock]
         yield from read(layout, columns, taken, [f"{month} %d {clock}"], score=1.9)
     elif {"month", "day"} <= set(named) and "hour" not in named:
-        month = "%b" if share(_MONTH_NAME, columns[named["month"]]) else "%m"
+        month = "%b" if share(month_names.ALONE, columns[named["month"]]) else "%m"
         yield from read(layout, columns, [named["month"], named["day"]], [f"{month} %d"], score=0.85)
 
 
@@ -453,8 +450,10 @@ def date_forms(layout: Layout, index: int, order: Order | None) -> tuple[str, ..
     Raises:
         TimeError: their numbers may be day and month, or month and day.
     """
-    named = ("%Y%m%d", "%Y%j", "%Y:%m:%d", *(date.format(s=sign) for sign in "- /" for date in MONTHS))
     cells = layout.column(index)
+    if any(month_names.DATE.match(cell) for cell in cells):
+        return tuple(f"{day}{form}" for form in month_names.FORMS for day in ("", "%a "))
+    named = ("%Y%m%d", "%Y%j", "%Y-%j", "%Y:%m:%d")
     together = _together(cells)
     try:
         decision = decide(together or cells, told=order or order_of(layout.names[index]), where="")

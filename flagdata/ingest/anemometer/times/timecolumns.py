@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import TimeError
-from flagdata.ingest.anemometer.instants import counted
+from flagdata.ingest.anemometer.instants import counted, month_names
 from flagdata.ingest.anemometer.instants.abbreviations import ABBREVIATED
 from flagdata.ingest.anemometer.instants.dates import Order, decide
 from flagdata.ingest.anemometer.instants.midnight import parse_as, parse_with_bare_dates
@@ -19,8 +19,16 @@ from flagdata.ingest.anemometer.instants.stamps import Stamps
 from flagdata.ingest.anemometer.text.cells import Cell, numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
-from flagdata.ingest.anemometer.times import count_units, dateparts, months, second_times, yearless_columns
-from flagdata.ingest.anemometer.times.dateparts import CLOCKS, MONTHS, clocks_of, date_forms, order_of
+from flagdata.ingest.anemometer.times import (
+    count_units,
+    dateparts,
+    dates_beside,
+    months,
+    rare_stamps,
+    second_times,
+    yearless_columns,
+)
+from flagdata.ingest.anemometer.times.dateparts import CLOCKS, clocks_of, date_forms, order_of
 from flagdata.ingest.anemometer.times.timechoice import SHARE, TimeChoice, fits, hours_and_minutes, share, time_choice
 from flagdata.ingest.anemometer.times.truncated import before_1970
 from flagdata.ingest.anemometer.words.events import of_event
@@ -28,11 +36,12 @@ from flagdata.ingest.anemometer.words.headings import names_time, understand, wo
 
 _CLOCK_NAMES = frozenset({"time", "hhmm", "hhmmss", "hour", "hh", "hr", "uur"})
 _DATE = re.compile(
-    r"^\s*\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}\s*$|^\s*\d{1,2}[- /][A-Za-z]{3,9}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$"
-    r"|^\s*(19|20)\d\d(?:[0-2]\d\d|3[0-6]\d)\s*$|^\s*(19|20)\d\d:\d{2}:\d{2}\s*$"
+    rf"^\s*(?:[{month_names.LETTERS}]{{2,13}}\.?,?\s+)?\d{{1,4}}[-/.]\d{{1,2}}[-/.]\d{{1,4}}\s*$"
+    r"|^\s*\d{1,2}[- /][A-Za-z]{3,9}[- /]\d{2,4}\s*$|^\s*(19|20)\d{6}\s*$"
+    r"|^\s*(19|20)\d\d-?(?:[0-2]\d\d|3[0-6]\d)\s*$|^\s*(19|20)\d\d:\d{2}:\d{2}\s*$"
 )
 _CLOCK = re.compile(
-    r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+|:\d{3})?)?\s*([AaPp]\.?[Mm]\.?)?\s*$|^\s*\d{1,2} ?h ?\d{2}\s*$"
+    r"^\s*\d{1,2}:\d{2}(:\d{2}([.,]\d+|:\d{3})?)?\s*([AaPp]\.?\s?[Mm]\.?)?\s*$|^\s*\d{1,2} ?h ?\d{2}\s*$"
     r"|^\s*\d{4} UTC\s*$|^\s*\d{1,2}\.\d{2}\.\d{2}([.,]\d+)?\s*$"
 )
 _COLONS = re.compile(r"^\s*(19|20)\d\d:\d{2}:\d{2}[ T]")
@@ -48,7 +57,7 @@ _STAMPLIKE = re.compile(
 """What a cell must have in it to be a date and a time."""
 _BLANKS = re.compile(r"\s*(?:\d{1,2} \d{1,2} (?:19|20)\d\d|(?:19|20)\d\d \d{1,2} \d{1,2}) \d{1,2}(?::\d{2}|\s*$)")
 """A date whose numbers are divided by blanks, and a clock or an hour."""
-_DAY_OF_WEEK = re.compile(r"\s*(Mon|Tue|Wed|Thu|Fri|Sat|Sun)", re.IGNORECASE)
+_DAY_OF_WEEK = re.compile(rf"\s*(?!{month_names.NAME}[-\s])[{month_names.LETTERS}]{{2,13}}\.?,?\s", re.IGNORECASE)
 _MILLISECONDS = "%H:%M:%S:%L"
 """A clock with its milliseconds behind a colon, as LabVIEW's and .NET's programs write it."""
 _EPOCHS = ("epoch-s", "epoch-ms", "epoch-us", "epoch-ns")
@@ -152,7 +161,8 @@ def _choices(layout: Layout, order: Order | None, events: Collection[int]) -> It
         texts = [cell for cell in cells if cell]
         if not texts or index in events:
             continue
-        if share(_DATE, texts) or (names_time(layout.names[index]) and share(dateparts.YEAR_LAST, texts)):
+        year_last = names_time(layout.names[index]) and share(dateparts.YEAR_LAST, texts)
+        if share(_DATE, texts) or dates_beside.in_words(texts) or year_last:
             dates.append(index)
         elif dateparts.hour_alone(layout, columns, index):
             continue
@@ -178,6 +188,7 @@ def _choices(layout: Layout, order: Order | None, events: Collection[int]) -> It
     if not dates and not clocks:
         yield from months.choices(layout, columns)
     yield from dateparts.choices(layout, columns, dates=dates, order=order)
+    yield from dates_beside.choices(layout, columns, clocks, dates, order)
     if not dates:
         yield from yearless_columns.choices(layout, columns, clocks, order)
     for index in clocks:
@@ -213,9 +224,14 @@ def _joined(columns: Sequence[Sequence[str]], chosen: tuple[int, ...]) -> list[s
 
 def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Order | None) -> TimeChoice | None:
     """Date and time in `texts`."""
-    if texts and share(_BLANKS, texts):
+    if not texts:
+        return None
+    if share(_BLANKS, texts):
         return _blank_divided(layout, columns, texts, order)
-    if not any(_STAMPLIKE.search(text) for text in texts[:5]):
+    rare = rare_stamps.choice(layout, columns, texts, lambda usual: _whole(layout, columns, usual, order))
+    if rare is not None:
+        return rare
+    if not any(_STAMPLIKE.search(text) or month_names.DATE.match(text) for text in texts[:5]):
         return None
     # 2023070100 is an hour of July 2023 before it is the Unix time of a day in 2034.
     hours = ("%Y%m%d%H",) if share(_DATE_AND_HOUR, texts) else ()
@@ -238,7 +254,7 @@ def _whole(layout: Layout, columns: tuple[int, ...], texts: list[str], order: Or
         found, _ = parse_with_bare_dates(texts, form + zoned)
         if fits(found):
             return time_choice(layout, columns, form + zoned, found, 2.0)
-    if re.search("[A-Za-z]{3}", re.sub(r"(UTC|GMT|[A-Z]{3,4})$", "", shape) if zoned else shape):
+    if re.search(rf"[{month_names.LETTERS}]{{3}}", re.sub(r"(UTC|GMT|[A-Z]{3,4})$", "", shape) if zoned else shape):
         if cell_kind(texts[0]) != "stamp":
             return None
         return _with_month_names(layout, columns, texts, zoned)
@@ -310,7 +326,7 @@ def _days(
 
 def _gaps(shape: str) -> tuple[str, ...]:
     """What may stand between date and time."""
-    found = re.match(r"0{1,4}[-/.]0{1,2}[-/.]0{1,4}([_,;.-]+)0", shape)
+    found = re.match(r"0{1,4}[-/.]0{1,2}[-/.]0{1,4}([_,;.-]+ ?)0", shape)
     return (found[1],) if found else (" ",)
 
 
@@ -349,10 +365,11 @@ def _compact(shape: str) -> tuple[str, ...]:
 
 
 def _with_month_names(layout: Layout, columns: tuple[int, ...], texts: Sequence[str], zoned: str) -> TimeChoice | None:
-    dates = [form.format(s=sign) for sign in "- /" for form in MONTHS] + ["%b %d %Y", "%b %d, %Y", "%d. %b %Y"]
-    forms = [f"{date}{gap}{clock}{zoned}" for date in dates for gap in (" ", ":") for clock in CLOCKS[:6]]
+    gaps = [gap for gap in (" ", ":", ", ") if gap == " " or any(re.search(rf"\d{gap}", text) for text in texts[:20])]
+    forms = [f"{date}{gap}{clock}{zoned}" for date in month_names.FORMS for gap in gaps for clock in CLOCKS[:6]]
     if _DAY_OF_WEEK.match(texts[0]):
-        forms = [f"%a {form}" for form in ("%b %d %H:%M:%S%f %Y", *forms)]
+        clocks = ("%H:%M:%S%f", "%H:%M:%S%f%z", "%I:%M:%S%f %p", "%I:%M:%S%f %p%z", "%H:%M:%S%f%Z")
+        forms = [f"%a {form}" for form in (*(f"%b %d {clock} %Y" for clock in clocks), *forms)]
     for form in forms:
         found, _ = parse_with_bare_dates(texts[:20], form)
         if fits(found):
