@@ -15,6 +15,7 @@ from flagdata.ingest.anemometer.recognition import recognise
 from flagdata.ingest.anemometer.restating import bulletins, spelled_stamps, untimed
 from flagdata.ingest.anemometer.restating.restate import restate
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, GuessKind
+from flagdata.ingest.anemometer.tables import numbered_across
 from flagdata.ingest.anemometer.tables.drafted_recipe import skeleton
 from flagdata.ingest.anemometer.tables.line_kinds import line_kinds
 from flagdata.ingest.anemometer.text.kinds import cell_kind
@@ -85,6 +86,9 @@ def unknown(source: TextFile) -> Guess:
     other = foreign.told(source.head())
     if other is not None:
         return other
+    across = numbered_across.told(source.head(HEAD_LINES))
+    if across is not None:
+        return Guess(format="unknown", score=0.0, reasons=(across[0],), kind="other", fix=across[1])
     table = skeleton(source.head(HEAD_LINES))
     if table is not None:
         what, offered, recipe = table

@@ -52,6 +52,8 @@ _TURNS, _STRICT = 10, 0.95
 _NAMED = 3
 _MEASURED = re.compile(r"[+-]?\d*\.\d+(?:[eE][+-]?\d+)?")
 """A number with a fraction, which names no device."""
+_ANSWERS = frozenset({"true", "false", "yes", "no", "on", "off", "0", "1", "y", "n", "t", "f", "ok", "good", "bad"})
+"""Words of what is so or not in a row, which name no devices."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,7 +172,7 @@ def _coded(time: Instants, cells: Mapping[int, Sequence[str]]) -> _Rows:
     names: dict[int, tuple[str, ...]] = {}
     for at, column in cells.items():
         kinds = sorted(set(column))
-        measured = all(_MEASURED.fullmatch(kind) for kind in kinds)
+        measured = all(_MEASURED.fullmatch(kind) for kind in kinds) or _ANSWERS.issuperset(map(str.lower, kinds))
         if 2 <= len(kinds) <= min(_MOST, len(column) // _NAMED) and "" not in kinds and not measured:
             number = {kind: index for index, kind in enumerate(kinds)}
             code[at] = np.array([number[cell] for cell in column], dtype=np.int64)
@@ -225,7 +227,8 @@ def _in_turn(layout: Layout, rows: _Rows, at: int) -> bool:
     worded = all(any(letter.isalpha() for letter in name) for name in names) and compass_unit(layout, at) is None
     if not worded or len(code) < _TURNS * count or len(set(code[:count].tolist())) < count:
         return False
-    return float((code[count:] == code[:-count]).mean()) >= _STRICT
+    changes = float((np.diff(code) != 0).mean())  # a name that most rows have is no turn
+    return changes >= _STRICT and float((code[count:] == code[:-count]).mean()) >= _STRICT
 
 
 def _best(layout: Layout, rows: _Rows, columns: Sequence[int]) -> int | None:

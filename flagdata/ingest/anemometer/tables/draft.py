@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from flagdata.ingest.anemometer.instants import counted, yearless
+from flagdata.ingest.anemometer.instants.stamps import is_date_alone
 from flagdata.ingest.anemometer.options import in_shell
 from flagdata.ingest.anemometer.tables import (
     against_components,
@@ -37,7 +38,7 @@ from flagdata.ingest.anemometer.tables.unit_letters import with_letters
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout, lay_out
-from flagdata.ingest.anemometer.times import bare_dates, stretches, truncated
+from flagdata.ingest.anemometer.times import bare_dates, given_clock, stretches, truncated
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time
 from flagdata.ingest.anemometer.winds import (
@@ -139,7 +140,7 @@ def draft(
         return None
     layout = with_letters(layout)
     by_user: Wind | None = None
-    unit = None if unit is None else canonical(unit)
+    written, unit = unit, None if unit is None else canonical(unit)
     if columns is not None:
         known = stated_columns.stated(layout, columns, unit=unit, order=order, where=where)
         by_user = known.wind
@@ -216,11 +217,13 @@ def draft(
         remarks = (*remarks, *own_motion.remarks(layout), *(unread.times(layout, time, remarks) if time else ()))
         remarks = (*remarks, *unread_winds.remark(layout, time, chosen, winds, remarks))
     remarks = (*remarks, *unread_rest.remark(layout, time, winds, (*layout.strange, *remarks, *warnings)))
+    if given_clock.index(layout) is not None and any("--columns" in text for text in remarks):
+        remarks = (*remarks, given_clock.AS_GIVEN)
     toml = recipe_of(layout, time, chosen)
     needs = (*needs_of(lines, layout, time), *(over_ground(layout, chosen) if by_user is None else ()))
     return Draft(
-        toml=toml, understood=tuple(_understood(layout, time, winds)), remarks=(*layout.strange, *remarks),
-        warnings=warnings,
+        toml=toml, understood=_as_written(_understood(layout, time, winds), unit, written),
+        remarks=(*layout.strange, *remarks), warnings=_as_written(warnings, unit, written),
         doubts=tuple(doubts), needs=needs,
         afloat="" if by_user is None else stated_against.afloat(layout, by_user),
         unsure=tuple(one.label for one in winds if not one.sure),
@@ -228,6 +231,11 @@ def draft(
         of_earth=chosen is not None and chosen.of_earth, stretches=bool(anew),
         first=layout.lines[0] - 1,
     )  # fmt: skip
+
+
+def _as_written(texts: Sequence[str], unit: str | None, written: str | None) -> tuple[str, ...]:
+    """Messages with the unit that the user gave as it was written, where they say that it was given."""
+    return tuple(text.replace(f"{unit}, as you said", f"{written}, as you said") for text in texts)
 
 
 def _doubts(
@@ -305,7 +313,7 @@ def _doubts(
 
 def _listed(layout: Layout) -> str:
     """The names of a table's columns, the first of many."""
-    names = [repr(name) for name in layout.names if name]
+    names = [repr(name) for name in layout.names[: given_clock.own_columns(layout)] if name]
     more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
     return (", ".join(names[:_LISTED]) or "no names") + more
 
@@ -376,13 +384,15 @@ def _unit_doubt(
         fix = "say what one of it is in m/s, from the anemometer's data sheet: "
         return Doubt(what=what, fix=fix + offered_columns.calibrated(layout, time, column))
     value = numbers(layout.column(column), decimal=layout.decimal, missing=missing_codes.of(layout, wind)).value
-    if missing[0] == "wind_speed" and (unlike := cumulated.unlike_speed(value)):
+    daily = time is not None and time.form is not None and is_date_alone(time.form)
+    unlike = cumulated.unlike_speed(value) or ("" if daily else unitcheck.no_wind(value))
+    if missing[0] == "wind_speed" and unlike:
         what = f"column {layout.names[column]!r} may be no speed, and its unit is not stated: {unlike}"
         fix = "name the column of the speed: --wind COLUMN; if it is a speed all the same, give its unit: --unit m/s"
         return Doubt(what=what, fix=fix)
     if layout.names[column] in ghcn.ELEMENTS:
         return Doubt(what=f"the unit of {layout.names[column]!r} is not stated", fix=f"give it: {ghcn.UNITS}")
-    evidence = unitcheck.likely(value) if missing[0] == "wind_speed" else None
+    evidence = unitcheck.likely(value, daily=daily) if missing[0] == "wind_speed" else None
     known = value[np.isfinite(value)]
     if evidence is not None and unitcheck.from_resolution(value) is None and bool(np.all(known % 1 == 0)):
         fix = "give it, after the file's description: --unit '0.1 m/s' (as weather services do), "
@@ -400,6 +410,21 @@ def _unit_doubt(
 
 
 def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> list[str]:
+    added = given_clock.index(layout) is not None
+    found = [*given_clock.understood(layout)] if added else _columns_and_time(layout, time)
+    for wind in winds:
+        height = f" at {wind.height:g} m" if wind.height is not None else ""
+        site = f" of rows with {wind.site[1]!r} in column {_shown(layout, wind.site[0])}" if wind.site else ""
+        parts = [
+            f"{channel} from column {_shown(layout, column.index)}, {column.told or 'unit not stated'}"
+            for channel, column in wind.columns.items()
+        ]
+        found.append(f"anemometer {wind.label!r}{height}{site}: {'; '.join(parts)}")
+    return found
+
+
+def _columns_and_time(layout: Layout, time: TimeChoice | None) -> list[str]:
+    """How the cells of a table are divided, which line names its columns, and which of them are its time."""
     named = (
         f"line {layout.preamble + 1} names the {layout.number_of_columns()} columns"
         if layout.header
@@ -419,14 +444,6 @@ def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) 
         unknown = "a count in a unit that is not told" if time.counts else "a date in an order that is not told"
         zone = "from a start" if time.counts else zone
         found.append(f"column {stamps} is the time, as {time.form or unknown}, {zone}")
-    for wind in winds:
-        height = f" at {wind.height:g} m" if wind.height is not None else ""
-        site = f" of rows with {wind.site[1]!r} in column {_shown(layout, wind.site[0])}" if wind.site else ""
-        parts = [
-            f"{channel} from column {_shown(layout, column.index)}, {column.told or 'unit not stated'}"
-            for channel, column in wind.columns.items()
-        ]
-        found.append(f"anemometer {wind.label!r}{height}{site}: {'; '.join(parts)}")
     return found
 
 

@@ -18,11 +18,11 @@ from flagdata.ingest.anemometer.tables.stated_columns import PARTS, SITE, TOWARD
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
-from flagdata.ingest.anemometer.times import count_units
+from flagdata.ingest.anemometer.times import count_units, given_clock
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice, whole_numbers
 from flagdata.ingest.anemometer.winds import beside, bow, own_motion, vectors
 from flagdata.ingest.anemometer.winds.angles import compass_unit, in_tens, may_be_direction, unit_of
-from flagdata.ingest.anemometer.winds.directions import Judged, judge
+from flagdata.ingest.anemometer.winds.directions import Judged, holds_marks, judge
 from flagdata.ingest.anemometer.winds.found import COMPONENTS, SPEEDS, Column, Wind
 from flagdata.ingest.anemometer.winds.weather import WEATHER
 from flagdata.ingest.anemometer.words import extremes, headings, series
@@ -47,7 +47,7 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], *, com
         components: whether a wind that is not known is asked for by its components, not by its speed.
     """
     winds = [wind for wind in winds if speeds_offered.is_offered(layout, wind)]
-    width, own = layout.number_of_columns(), own_motion.columns(layout)
+    width, own = given_clock.own_columns(layout), own_motion.columns(layout)
     known = _known(layout, time, winds)
     speeds = [entry for entry in known.values() if entry.split("[")[0] in (*SPEEDS, *COMPONENTS)]
     if speeds:  # weather of a unit that nothing tells is not to be asked for with the wind
@@ -72,6 +72,7 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], *, com
     ]  # fmt: skip
     serial = _serial(layout) if time is None else None
     further = f"; name {', '.join(map(repr, others))} in its place in a run of its own" if others else ""
+    further += "" if given_clock.index(layout) is None else f"; {given_clock.AS_GIVEN}"
     example = "with a name, or nothing, in place of each ?" if "?" in line else "corrected where it is wrong"
     if f"time[{_OPEN}]" in known.values():
         counts = "; of time[elapsed-?] the ? is s, ms, us, min, h or d, the unit of its count: add --start TIME"
@@ -289,7 +290,7 @@ def of_stretches(layout: Layout, time: TimeChoice, wind: Wind, site: int) -> str
 def _understood(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> dict[int, str]:
     """Entries of the columns of the site, of the time and of the first wind, by their index."""
     found: dict[int, str] = {} if layout.site is None else {layout.site: SITE}
-    if time is not None:
+    if time is not None and given_clock.index(layout) is None:
         forms = (time.form or "").split(" ")
         parts = {form: name for name, form in PARTS.items()}
         if 1 < len(time.columns) == len(forms):
@@ -327,7 +328,7 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         digits = max(len(re.split("[.,]", cell)[-1]) for cell in cells)
         likely = count_units.likely(numbers(cells, decimal=layout.decimal).value, digits=digits)
         found[0], timed = f"time[{likely.form or _OPEN}]", True
-    for at in range(len(layout.names)):
+    for at in range(given_clock.own_columns(layout)):
         if at in found:
             continue
         kinds = [kind for cell in layout.column(at) if (kind := cell_kind(cell)) != "missing"]
@@ -341,7 +342,7 @@ def _known(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind]) -> di
         elif winds and heading.channel in WEATHER:
             continue  # which of the columns is the weather of this wind was told already
         elif heading.channel and heading.channel not in {entry.split("[")[0] for entry in found.values()}:
-            if heading.channel == "wind_direction" and extremes.is_extreme(layout.names[at]):
+            if heading.channel == "wind_direction" and (extremes.is_extreme(layout.names[at]) or _marks(layout, at)):
                 continue  # the direction of a gust is none of a mean
             if compass_unit(layout, at) is not None:
                 found[at] = heading.channel
@@ -397,6 +398,12 @@ def _alone(layout: Layout, index: int) -> bool:
     """Whether a column is a component of the wind, and none along another axis is beside it."""
     along = {understand(name, stated).channel for name, stated in zip(layout.names, layout.units, strict=True)}
     return along & set(COMPONENTS) == {understand(layout.names[index], layout.units[index]).channel}
+
+
+def _marks(layout: Layout, index: int) -> bool:
+    """Whether a column below the heading of a direction holds marks, 0 and 1."""
+    heading = understand(layout.names[index], layout.units[index])
+    return holds_marks(heading, numbers(layout.column(index), decimal=layout.decimal).value)
 
 
 def _in_doubt(layout: Layout, index: int) -> bool:

@@ -24,7 +24,7 @@ from flagdata.ingest.anemometer.instants.stamps import EPOCH
 from flagdata.ingest.anemometer.recipe import COLUMNS_LIMIT
 from flagdata.ingest.anemometer.text.cells import Cell, numbers
 from flagdata.ingest.anemometer.text.layout import Layout
-from flagdata.ingest.anemometer.times import truncated
+from flagdata.ingest.anemometer.times import given_clock, truncated
 from flagdata.ingest.anemometer.times.dateparts import CLOCKS, date_forms
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time, time_as
@@ -185,13 +185,13 @@ def stated(layout: Layout, text: str, *, unit: str | None, order: Order | None, 
 
 def _index(layout: Layout, column: int | str) -> int:
     """The index of a column by its place, heading or number."""
-    width = layout.number_of_columns()
+    width = given_clock.own_columns(layout)
     if isinstance(column, int):
         if column < width:
             return column
         fix = f"the first row is {shown(layout)}"
         raise UsageError(f"entry {column + 1}, but the table has {width} columns", where=_WHERE, fix=fix)
-    same = [index for index, name in enumerate(layout.names) if name == column]
+    same = [index for index, name in enumerate(layout.names[:width]) if name == column]
     if len(same) == 1:
         return same[0]
     if re.fullmatch(r"#?\d{1,5}", column) and 1 <= int(column.lstrip("#")) <= min(width, COLUMNS_LIMIT):
@@ -200,7 +200,7 @@ def _index(layout: Layout, column: int | str) -> int:
         numbered = ", ".join(str(index + 1) for index in same)
         fix = f"name one by its number: {numbered}"
         raise UsageError(f"{len(same)} columns are called {column!r}", where=_WHERE, fix=fix)
-    raise UnknownNameError.of("column", column, [name for name in layout.names if name], where=_WHERE)
+    raise UnknownNameError.of("column", column, [name for name in layout.names[:width] if name], where=_WHERE)
 
 
 def _time(layout: Layout, entries: Sequence[tuple[int, Entry]], order: Order | None, where: str) -> TimeChoice | None:
@@ -283,7 +283,7 @@ def _column(layout: Layout, index: int, channel: str, detail: str, unit: str | N
         if not fits(channel, name):
             wanted = CHANNELS[channel].unit
             raise UsageError(f"{channel} is measured in {wanted}, not in {detail}", where=_WHERE, fix="correct it")
-        how = f"in {name}, as you said"
+        how = f"in {detail}, as you said"
     else:
         heading = understand(layout.names[index], layout.units[index]).unit
         name = heading if fits(channel, heading) else None
@@ -317,7 +317,7 @@ def named(layout: Layout, index: int) -> str:
 
 def shown(layout: Layout) -> str:
     """The first row with the numbers of its columns, for a message."""
-    cells = [cell[:30] for cell in layout.rows[0]]
+    cells = [cell[:30] for cell in layout.rows[0][: given_clock.own_columns(layout)]]
     return "; ".join(f"{number}: {cell}" for number, cell in enumerate(cells, start=1) if cell)[:600]
 
 

@@ -102,7 +102,21 @@ def directions(
             continue
         line = offered_columns.read_also(layout, time, wind, index)
         found.append(f'column {called} may be the wind\'s direction, but is not read; if it is: --columns "{line}"')
+    found = found or _of_several(layout, time, wind, remarks)
     return tuple(found) or _of_another(layout, time, wind, winds) or _unnamed_direction(layout, time, wind, taken)
+
+
+def _of_several(layout: Layout, time: TimeChoice, wind: Wind, remarks: Sequence[str]) -> list[str]:
+    """A remark with the line that reads the first of several directions, none of which is surely that of the wind."""
+    for index, name in enumerate(layout.names):
+        if not any(text.startswith("none of the directions") and repr(name) in text for text in remarks):
+            continue
+        heading = understand(name, layout.units[index])
+        judged = judge(heading, numbers(layout.column(index), decimal=layout.decimal).value, "wind_direction")
+        if heading.channel == "wind_direction" and judged.unit is not None:
+            line = offered_columns.read_also(layout, time, wind, index, unit_name=judged.unit)
+            return [f'if {name!r} is its direction: --columns "{line}"; another by its number for {index + 1}']
+    return []
 
 
 def _of_another(layout: Layout, time: TimeChoice, wind: Wind, winds: Sequence[Wind]) -> tuple[str, ...]:

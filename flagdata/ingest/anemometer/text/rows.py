@@ -48,11 +48,13 @@ class RowReader:
         self.first_line = layout.preamble + layout.header + 1
         self.shift = 0
         self.header: list[str] | None = None
+        self._headed = 0
         if layout.header:
             names = head[layout.preamble].lstrip("\ufeff")
             self.header = [cell.strip() for cell in _cut([names], layout.delimiter)[0]]
             row = _cut(head[layout.preamble + layout.header :], layout.delimiter)
             used = max((at for at, cell in enumerate(row[0], start=1) if cell.strip()), default=0) if row else 0
+            self._headed = len(self.header)
             while len(self.header) > max(1, used) and not self.header[-1]:
                 self.header.pop()
 
@@ -94,7 +96,8 @@ class RowReader:
         where: list[int] = []
         for number, row in zip(looked, _cut(kept, self._layout.delimiter), strict=True):
             size = len(row)
-            fits = size >= width if named is None else size == named or _only_empty_beyond(row, named)
+            # Cells below the empty headings at the end, which hold something in some rows only, shift no others.
+            fits = named is None or size in (named, self._headed) or _only_empty_beyond(row, named)
             if fits and size >= width:
                 good.append(row)
                 where.append(number)

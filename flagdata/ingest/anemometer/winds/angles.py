@@ -10,6 +10,7 @@ from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.winds import radiation
+from flagdata.ingest.anemometer.winds.directions import holds_marks
 from flagdata.ingest.anemometer.words.headings import Heading, understand, words_of
 
 _DIRECTIONS = frozenset(
@@ -44,7 +45,7 @@ def may_be_direction(layout: Layout, index: int) -> bool:
         return False
     value = numbers(layout.column(index), decimal=layout.decimal).value
     known = value[np.isfinite(value)]
-    return len(known) > 0 and bool(np.all((known >= 0) & (known <= _TURN)))
+    return len(known) > 0 and bool(np.all((known >= 0) & (known <= _TURN))) and not holds_marks(heading, value)
 
 
 def unit_of(layout: Layout, index: int) -> str:

@@ -20,7 +20,7 @@ _EIGHT = 8
 """The highest number of eight sectors that are counted from 1."""
 _FEW = 3
 """Different values from which a column with a stated unit shows that it is in another."""
-_DEGREES = frozenset({"d", "dg", "dgr", "gr", "grd", "º"})
+_DEGREES = frozenset({"d", "dg", "dgr", "gr", "grd", "º", "?", "\ufffd"})
 """What stands for degrees behind a direction, and for nothing or something else elsewhere."""
 
 
@@ -58,6 +58,8 @@ def judge(heading: Heading, value: NDArray[np.float64], channel: str) -> Judged:
         return Judged(unit=heading.unit, told="as points of the compass, 22.5° apart")
     if heading.strange and heading.strange.lower() not in _DEGREES:
         return Judged(left_out=f"is in {heading.strange!r}, which is no direction clockwise from north: left out")
+    if holds_marks(heading, value):
+        return Judged(left_out="holds nothing but 0 and 1, as a mark does, no angles: left out")
     stated = f"in {heading.unit} by its heading"
     if heading.unit in ("gon", "mil", "0.1 deg", "0.01 deg"):
         return Judged(unit=heading.unit, told=stated)
@@ -100,6 +102,15 @@ def judge(heading: Heading, value: NDArray[np.float64], channel: str) -> Judged:
         doubt = "is taken as where the wind comes from"
         return Judged(unit=unit, told=told, doubt=doubt)
     return Judged(unit=unit, told=told)
+
+
+def holds_marks(heading: Heading, value: NDArray[np.float64]) -> bool:
+    """Whether a column holds 0 and 1 and nothing else, as a mark does, below a heading that states no unit.
+
+    Args:
+        value: (n,) its numbers, NaN where there is none.
+    """
+    return heading.unit is None and set(np.unique(value[np.isfinite(value)]).tolist()) == {0.0, 1.0}
 
 
 def _misstated(stated: str, low: float, high: float) -> Judged:

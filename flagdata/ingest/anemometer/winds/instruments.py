@@ -23,7 +23,7 @@ from flagdata.ingest.anemometer.winds import (
 )  # fmt: skip
 from flagdata.ingest.anemometer.winds.angles import compass_unit, day_of_month, degrees, may_be_points, may_be_two
 from flagdata.ingest.anemometer.winds.axes import along_axes
-from flagdata.ingest.anemometer.winds.directions import judge
+from flagdata.ingest.anemometer.winds.directions import holds_marks, judge
 from flagdata.ingest.anemometer.winds.found import COMPONENTS, SPEEDS, Column, Found, Wind
 from flagdata.ingest.anemometer.winds.no_speeds import beaufort
 from flagdata.ingest.anemometer.winds.vanes import number, vanes
@@ -237,7 +237,7 @@ def _speeds(found: Found, told: str | None) -> list[Wind]:
             lone = _of_anything(found.layout.names[first])
             winds.append(Wind(
                 label=found.name(first), height=found.headings[first].height, columns=columns,
-                sure=found.headings[first].sure and not (lone and moving),
+                sure=(found.headings[first].sure and not (lone and moving)) or _of_a_mast(found, first),
             ))  # fmt: skip
     if any(wind.sure for wind in winds):
         found.remarks.extend(
@@ -252,6 +252,17 @@ def _of_anything(name: str) -> bool:
     """Whether a heading is a speed and does not say that it is the wind's."""
     said = set(words_of(name))
     return bool(said & {"speed", "spd", "velocity", "vel"}) and not any("wind" in word for word in said)
+
+
+def _of_a_mast(found: Found, index: int) -> bool:
+    """Whether a mean speed at a stated height has its spread or extremes beside it, in a table with directions."""
+    heading = found.headings[index]
+    if heading.height is None or not heading.mean or heading.unit is None or not found.of("wind_direction"):
+        return False
+    return any(
+        other.spread and other.height == heading.height and other.label == heading.label and other.unit == heading.unit
+        for other in found.headings
+    )
 
 
 def _of_the_platform(found: Found) -> list[int]:
@@ -354,7 +365,11 @@ def _components(found: Found, told: str | None) -> list[Wind]:
 def _direction(found: Found, speed: int, channel: str) -> tuple[str, Column] | None:
     """The direction that belongs to a speed, as a channel and a column."""
     name = found.layout.names[speed]
-    candidates = [at for at in found.of(channel) if not places_in_names.are_of_two(name, found.layout.names[at])]
+    candidates = [
+        at for at in found.of(channel)
+        if not places_in_names.are_of_two(name, found.layout.names[at])
+        and not holds_marks(found.headings[at], found.values[at])
+    ]  # fmt: skip
     exact = [index for index in candidates if found.key(index) == found.key(speed)]
     height = found.headings[speed].height
     near = [i for i in candidates if height is not None and found.headings[i].height is not None

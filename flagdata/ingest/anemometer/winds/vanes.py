@@ -38,7 +38,7 @@ def number(heading: Heading) -> str:
 
 
 def _is_called(heading: Heading) -> bool:
-    return heading.channel == "wind_speed" and heading.unit is None and words_of(heading.name)[:1] == [_VANE]
+    return heading.channel == "wind_speed" and heading.unit is None and _VANE in words_of(heading.name)
 
 
 def _turns(value: NDArray[np.float64]) -> bool:

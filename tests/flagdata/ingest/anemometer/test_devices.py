@@ -178,3 +178,16 @@ def test_lines_beside_devices_that_share_stamps_name_their_column(read: Read, na
     offered = re.findall(r'--columns "([^"]*)"', told)
     assert offered
     assert all(line.startswith("1=site,") for line in offered), offered
+
+
+def test_a_mark_that_few_rows_have_tells_no_devices(read: Read) -> None:
+    rows = [f"2026-05-01T12:{at:02d}:00Z,{3 + at % 4}.5,{'TRUE' if at == 1 else 'FALSE'},turbine {'AB'[at == 4]}"
+            for at in range(40)]  # fmt: skip
+    found = read("\n".join(["time,wind speed (m/s),FaultMsg,state text", *rows]) + "\n")
+    assert len(found.series.time) == 40
+    assert not [one for one in found.findings if one.kind == "devices-mixed"]
+
+
+def test_answers_in_strict_turn_tell_no_devices(read: Read) -> None:
+    rows = [f"2026-05-01T12:{at:02d}:00Z,{3 + at % 4}.5,{('yes', 'no')[at % 2]}" for at in range(40)]
+    assert len(read("\n".join(["time,wind speed (m/s),heater", *rows]) + "\n").series.time) == 40

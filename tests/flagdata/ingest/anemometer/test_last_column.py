@@ -58,3 +58,10 @@ def test_the_row_names_of_r_have_no_name(read: Read) -> None:
     body = "".join(f'"{at + 1}",{row}' for at, row in enumerate(rows(lambda _: "7").splitlines(keepends=True)))
     log = read('"time","wind speed (m/s)","wind dir","other"\n' + body)
     assert log.series.channels["wind_speed"][[0, 239]].tolist() == pytest.approx([3.0, 5.39])
+
+
+def test_a_remark_below_an_empty_last_heading_loses_no_row(read: Read) -> None:
+    rows = [f"2026-05-01T12:{at:02d}:00Z,{3 + at % 4}.5,{200 + at},{'=' if at == 7 else ''}" for at in range(20)]
+    log = read("\n".join(["Time,Wind Speed (m/s),Wind Dir (deg),", *rows]) + "\n")
+    assert len(log.series.time) == 20
+    assert "malformed-lines" not in {found.kind for found in log.findings}

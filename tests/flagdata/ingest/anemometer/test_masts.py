@@ -58,3 +58,39 @@ def test_deviations_and_extremes_are_no_wind_of_their_own(heading: str) -> None:
 @pytest.mark.parametrize("heading", ["Cup_Frequency", "Cup [Hz]", "Sonic_Temp", "Sonic_Scalar_Temp", "Sonic100m_Mean"])
 def test_what_else_such_instruments_give_is_no_speed(heading: str) -> None:
     assert understand(heading).quantity != "wind_speed"
+
+
+def _with_vanes(vane: str) -> str:
+    heading = f"Date/Time,80m_N Avg [m/s],80m_N Std [m/s],50m Avg [m/s],50m Std [m/s],78m {vane},48m {vane}"
+    rows = [f"2026-05-01 {at // 6:02d}:{at % 6}0,{7 + at % 5}.25,0.{at % 7},{5 + at % 3}.5,0.2,{20 + at % 30},"
+            f"{(340 + at) % 360}" for at in range(60)]  # fmt: skip
+    return "\n".join([heading, *rows]) + "\n"
+
+
+@pytest.mark.parametrize("vane", ["WV [?]", "WV [\ufffd]", "WV"])
+def test_vanes_called_wv_behind_their_height_are_no_speeds(log_file: Callable[[str], Path], vane: str) -> None:
+    path = log_file(_with_vanes(vane))
+    assert anemometers(path, WindOptions(zone="UTC")) == ("80m_N Avg [m/s]", "50m Avg [m/s]")
+    high = read_log(path, WindOptions(zone="UTC", wind="80m_N Avg [m/s]")).series
+    assert high.channels["wind_speed"][:3].tolist() == pytest.approx([7.25, 8.25, 9.25])
+    low = read_log(path, WindOptions(zone="UTC", wind="50m Avg [m/s]")).series
+    assert low.channels["wind_speed"][:3].tolist() == pytest.approx([5.5, 6.5, 7.5])
+    towards = [np.degrees(series.channels["wind_direction"][:2]).tolist() for series in (high, low)]
+    assert towards == [pytest.approx([20, 21]), pytest.approx([340, 341])]
+
+
+def test_numbers_between_0_and_360_without_a_unit_are_asked_about_as_directions(
+    log_file: Callable[[str], Path],
+) -> None:
+    rows = [f"2026-05-01T12:{at:02d}:00Z,{(97 * at) % 360}" for at in range(58)]
+    with pytest.raises(InputError, match="as directions do") as caught:
+        read_log(log_file("\n".join(["time,wind velocity", *rows]) + "\n"), WindOptions())
+    assert "km/" not in (caught.value.fix or "")
+
+
+def test_no_unit_is_offered_for_numbers_that_are_beyond_every_wind(log_file: Callable[[str], Path]) -> None:
+    rows = [f"2026-05-01T12:{at:02d}:00Z,{1500 + (97 * at) % 300}" for at in range(58)]
+    path = log_file("\n".join(["time,wind velocity", *rows]) + "\n")
+    with pytest.raises(InputError, match="beyond every wind") as caught:
+        read_log(path, WindOptions())
+    assert "km/" not in (caught.value.fix or "")

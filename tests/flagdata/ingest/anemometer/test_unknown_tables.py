@@ -195,3 +195,13 @@ def test_a_line_of_units_of_which_few_are_of_a_wind_is_one(log_file: Write) -> N
     channels = read_log(log_file(heads + units + rows)).series.channels
     np.testing.assert_allclose(channels["wind_speed"], (18 + np.arange(12)) / 3.6)
     np.testing.assert_allclose(np.rad2deg(channels["wind_direction"]), 200 + np.arange(12))
+
+
+def test_hours_across_of_places_without_a_day_are_named_with_what_can_be_done(log_file: Callable[[str], Path]) -> None:
+    rows = [
+        f"{50 + at},{-3 - at},place{at}," + ",".join(f"{(at + hour) % 7}.5" for hour in range(23)) for at in range(9)
+    ]
+    path = log_file("\n".join([f"lat,lon,station,{','.join(map(str, range(23)))}", *rows]) + "\n")
+    with pytest.raises(FlagdataError, match="columns 4 to 26 are numbered 0 to 22") as caught:
+        read_log(path, WindOptions())
+    assert "each row is one reading" in (caught.value.fix or "")
