@@ -22,7 +22,14 @@ from typing import Any
 
 from flagdata.errors import InputError, LimitError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.documents import coverage_json, json_choice, json_keyed, json_measures, json_series
+from flagdata.ingest.anemometer.documents import (
+    coverage_json,
+    json_choice,
+    json_epochs,
+    json_keyed,
+    json_measures,
+    json_series,
+)
 from flagdata.ingest.anemometer.documents.json_instants import holds_instant, is_instant
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
@@ -96,7 +103,7 @@ def as_table(source: TextFile) -> TableText | None:
         InputError: CoverageJSON of which no wind can be read.
     """
     whole = _whole(source)
-    series = json_series.table(whole)
+    series = json_epochs.table(whole) or json_series.table(whole)
     unread = coverage_json.unread(whole)
     if unread and not any("wind" in understand(name).quantity for row in series or () for name in row):
         raise InputError(f"CoverageJSON: {unread[0].what}", where=str(source.path), fix=unread[0].fix)

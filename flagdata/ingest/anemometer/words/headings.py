@@ -141,6 +141,7 @@ class Heading:
 def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
     text = in_english("" if is_format(name) else name[:120].strip().strip('"').strip())
+    text = re.sub(r"^[Øø⌀]\s?(?=[^\W\d_]{2})", "mean ", text)
     text = re.sub(r"(?<=direction), ?\*$", ", deg", text, flags=re.IGNORECASE)  # a sign for degrees, lost by HOBO
     text = _PERIOD.sub(r"\1\2min", _ABOVE.sub(" ", _RATE.sub(" ", text)))
     text = _U_SONIC.sub("sonic", _OF_BRIDGE.sub(r"wind speed \1 ", _TENTHS.sub("0.1 ", text)))
@@ -272,6 +273,15 @@ _SPEED_AND_UNIT = re.compile(r"(\w*(?:speed|spd|gust|velocity))(mph|kmh|kph|kts|
 """A speed with its unit in one word, as "windspeedmph"."""
 
 
+_SHORT_AND_STATISTIC = re.compile(r"(?<![^\W_])(WS|WD|FF|DD)([a-z]{1,6})(?![^\W_])")
+"""A short name in capitals with its statistic or unit behind it, as WSavg or WSms."""
+
+
+def _cut_behind(found: re.Match[str]) -> str:
+    known = found[2] in MEAN | SPREAD or found[2] in _INSIDE
+    return f"{found[1]} {found[2]}" if known else found[0]
+
+
 def words_of(name: str) -> list[str]:
     """Words of a heading, lower-case."""
     return _words(in_english(name))
@@ -280,6 +290,7 @@ def words_of(name: str) -> list[str]:
 def _words(text: str) -> list[str]:
     found: list[str] = []
     text = text.replace("WDrs", "wdir")  # the resultant direction of Campbell's programs
+    text = _SHORT_AND_STATISTIC.sub(_cut_behind, text)
     text = re.sub(r"(?<![^\W_])([ATG]W)(?=(?:angle|speed|spd|dir))", r"\1 ", text)
     for word in _WORD.findall(text.replace("µ", "u")):
         if word[0].isdigit():
@@ -395,6 +406,8 @@ def _quantity(words: list[str], compact: str, unit: str | None, rest: str) -> tu
                 bool(named - {"sp"}) or windy,
                 named | (known & (_APPARENT | _THEORETICAL)),
             )
+        if windy and words[-1] == "from" and si in (None, "rad"):
+            return "wind_direction", True, known & WIND
         if windy and (not known - WIND - MEAN - (PLAIN - {"d", "u"}) or _of_a_place(known)):
             return "wind_speed", True, known & WIND
         if _of_a_cup(words):

@@ -59,7 +59,7 @@ SPREAD = GUSTS | MAXIMA | MINIMA | frozenset(
         "setpoint", "predicted", "prediction", "pred", "modelled", "modeled", "simulated", "synthetic", "expected",
         "target", "nominal", "rated", "alarm", "limit", "bias", "correction", "spikes", "spike", "strg", "storage",
         "rand", "random", "outlier", "outliers", "mask", "nan", "nans", "iqr", "quantile", "quartile", "residual",
-        "anomaly", "skw", "kur", "qcflag", "itc", "scf", "zcl", "timelag",
+        "anomaly", "skw", "kur", "mx", "qcflag", "itc", "scf", "zcl", "timelag",
     }
 )  # fmt: skip
 AXES = frozenset(

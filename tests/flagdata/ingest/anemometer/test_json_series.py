@@ -113,3 +113,16 @@ def test_values_told_last_are_of_the_same_site(log_file: Write) -> None:
     assert anemometers(path) == ("Dale", "Hill")
     series = read_log(path, WindOptions(wind="Hill")).series
     np.testing.assert_allclose(np.rad2deg(series.channels["wind_direction"]), [100, 101, 102, 103, 104, 105])
+
+
+def test_values_that_are_called_by_their_unix_times_are_rows(read: Callable[..., WindLog]) -> None:
+    def series(unit: str, first: float, *, late: int = 0) -> dict[str, object]:
+        times = reversed(range(30))  # the order of the keys of an object says nothing
+        return {"unit": unit, "list": {str(1777636800 + late + 300 * at): f"{first + at:.1f}" for at in times}}
+
+    wind = {"wind_speed": series("mph", 2), "wind_gust": series("mph", 5), "wind_direction": series("º", 200)}
+    whole = {"code": 0, "msg": "success", "data": {"wind": wind, "outdoor": {"temperature": series("ºF", 60)}}}
+    log = read(json.dumps(whole))
+    assert log.series.time[[0, -1]].tolist() == [1777636800 * 10**9, (1777636800 + 300 * 29) * 10**9]
+    assert log.series.channels["wind_speed"][:2].tolist() == pytest.approx([2 * 0.44704, 3 * 0.44704])
+    assert np.degrees(log.series.channels["wind_direction"][:2]).tolist() == pytest.approx([200, 201])

@@ -93,3 +93,21 @@ def test_a_mean_wind_in_one_word_is_asked_for_its_unit_and_its_maximum_is_named(
 @pytest.mark.parametrize("name", ["Bottom Temp (degC)", "Water Temp", "SST (degC)", "Ice temperature (°C)"])
 def test_a_temperature_of_water_or_ice_is_not_that_of_the_air(name: str) -> None:
     assert understand(name).channel == ""
+
+
+@pytest.mark.parametrize(
+    ("heading", "channel", "spread"),
+    [
+        ("Ø Wind [km/h]", "wind_speed", False), ("WSavg", "wind_speed", False), ("WSms", "wind_speed", False),
+        ("WSmax", "", True), ("WDavg", "wind_direction", False), ("MxSpd", "", True),
+        ("wind from", "wind_direction", False),
+        ("WSpd", "wind_speed", False), ("WDir", "wind_direction", False),
+    ],
+)  # fmt: skip
+def test_short_names_with_a_statistic_behind_them(heading: str, channel: str, spread: bool) -> None:
+    found = understand(heading)
+    assert (found.channel, found.spread) == (channel, spread)
+
+
+def test_short_names_of_one_instrument_go_together() -> None:
+    assert understand("WSpd").label == understand("WDir").label == ()
