@@ -25,6 +25,7 @@ WITHIN = (
     "flagdata.ingest.anemometer.restating.twice_told",
     "flagdata.ingest.anemometer.restating.ruled_headings",
     "flagdata.ingest.anemometer.restating.count_lines",
+    "flagdata.ingest.anemometer.restating.sentences_in_lines",
 )
 KINDS = (
     "flagdata.ingest.anemometer.restating.sql_dump",
@@ -33,6 +34,7 @@ KINDS = (
     "flagdata.ingest.anemometer.restating.synop",
     "flagdata.ingest.anemometer.restating.global_hourly",
     "flagdata.ingest.anemometer.restating.isd",
+    "flagdata.ingest.anemometer.restating.akterm",
     "flagdata.ingest.anemometer.restating.published",
     "flagdata.ingest.anemometer.restating.pywws",
     "flagdata.ingest.anemometer.restating.hours_across",
