@@ -95,7 +95,10 @@ from flagdata.errors import UsageError
 @click.option(
     "--columns", metavar="LIST",
     help="Wind: what the columns of a table are, in their order or by heading or number, such as "
-    "'date,time,wind_speed[km/h],,wind_direction[deg]' or '1=time,7=wind_speed[kn]'.",
+    "'date,time,wind_speed[km/h],,wind_direction[deg]' or '1=time,7=wind_speed[kn]'. Names: time, date, year, month, "
+    "day, day_of_year, hour, minute, second, wind_speed, wind_direction, wind_direction_to, wind_x, wind_y, wind_z, "
+    "apparent_wind_speed, apparent_wind_direction, air_temperature, relative_humidity, air_pressure, site. What is "
+    "measured has its unit in brackets. A name that is not known is refused with the list of all.",
 )  # fmt: skip
 @json_option
 @lake_option

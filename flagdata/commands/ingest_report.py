@@ -122,7 +122,7 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
         click.echo(f"  {guess['kind']}: {guess['format']}{recipe} ({_how_sure(guess)})")
         for reason in _few(guess["reasons"]):
             click.echo(f"    because {reason}")
-        if guess["fix"] and guess["kind"] not in ("camera", "anemometer"):
+        if guess["fix"] and guess["kind"] != "camera" and not guess["doubts"]:
             click.echo(f"    to do: {guess['fix']}")
         for note in guess["notes"]:
             click.echo(f"    not taken or odd: {note}")

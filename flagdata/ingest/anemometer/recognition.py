@@ -15,7 +15,7 @@ def recognise(source: TextFile) -> tuple[Guess, ...]:
 
     Where a format knows the file, a draft with doubts has nothing to ask and is left out.
     """
-    head = Head(lines=tuple(source.head(HEAD_LINES)))
+    head = Head(lines=tuple(source.head(HEAD_LINES)), counted=source.counted)
     found: list[Guess] = []
     for name in FORMATS:
         reader: Format = FORMATS[name]()

@@ -44,9 +44,15 @@ SURE = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class Head:
-    """The beginning of a text file: up to `HEAD_LINES` lines without their ends."""
+    """The beginning of a text file.
+
+    Attributes:
+        lines: up to `HEAD_LINES`, without their ends.
+        counted: whether the stamps before them are none of the file's, but counted at a rate that the user gave.
+    """
 
     lines: tuple[str, ...]
+    counted: bool = False
 
 
 HEAD_LINES = 1000

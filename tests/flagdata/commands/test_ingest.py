@@ -75,6 +75,13 @@ def test_sniff_says_what_and_why_and_touches_no_lake(run, lake: Lake, video: Pat
     assert lake.rows().num_rows == 0
 
 
+def test_sniff_says_what_to_do_with_sentences_of_which_none_is_wind(run, tmp_path: Path) -> None:
+    log = tmp_path / "boat.nmea"
+    log.write_text("$IIMTW,16.8,C\n$IIDPT,14.8,0.4,100.0\n$IIMTW,16.9,C\n")
+    _, out, _ = run("--sniff", log)
+    assert "to do: its first 3 lines hold no sentence of wind" in out
+
+
 def test_sniff_goes_on_after_a_source_it_cannot_read_and_says_what_is_missing(
     run, video: Path, wind_log: Path, tmp_path: Path
 ) -> None:

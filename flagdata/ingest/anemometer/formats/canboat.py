@@ -32,13 +32,15 @@ import numpy as np
 
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.formats import analyzer_clock
 from flagdata.ingest.anemometer.formats.serial_lines import Defect, Instrument, Sample, read_lines
+from flagdata.ingest.anemometer.instants.zones import contradiction
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import SampleFlag
-from flagdata.signals import Sensor, Series
+from flagdata.signals import Instants, Sensor, Series
 from flagdata.units import UNITS
 
 CHANNELS = (
@@ -99,7 +101,9 @@ class Canboat:
             name="wind on NMEA 2000 (PGN 130306)", channels=CHANNELS, parse=network, split=split,
             sensor=Sensor(name="NMEA 2000 wind sensor", resolution=0.01),
         )  # fmt: skip
-        reading = read_lines(_dated(source, options), instrument, zone_name=options.zone)
+        in_utc = analyzer_clock.in_utc(source.head(HEAD_LINES))
+        zone_name = options.zone or ("UTC" if in_utc else None)
+        reading = read_lines(_dated(source, options), instrument, zone_name=zone_name)
         if len(network.devices) > 1:
             listed = ", ".join(sorted(network.devices, key=int))
             raise InputError(
@@ -107,7 +111,10 @@ class Canboat:
                 fix=f"choose one by its address, e.g. --talker {min(network.devices, key=int)}",
             )  # fmt: skip
         dropped = {"non-data-lines"}
-        found = tuple(finding for finding in reading.findings if finding.kind not in dropped)
+        found = (
+            *(finding for finding in reading.findings if finding.kind not in dropped),
+            *_zone(options.zone, reading.time, in_utc),
+        )
         speed = float(np.median(network.speeds)) if network.speeds else None
         channels, about = _over_ground(dict(reading.channels), speed, options, where)
         sensor = Sensor(name=f"NMEA 2000 device {next(iter(network.devices))}", resolution=0.01)
@@ -115,6 +122,16 @@ class Canboat:
             time=reading.time, channels=channels, flags=reading.flags, line=reading.line, sensor=sensor,
             step=reading.step, findings=(*found, about),
         )  # fmt: skip
+
+
+def _zone(given: str | None, time: Instants, in_utc: bool) -> tuple[Finding, ...]:
+    """What is said of the zone where lines of canboat's own program tell that the messages are in UTC."""
+    if not in_utc:
+        return ()
+    if given is not None:
+        return contradiction("the program's own lines between the messages say", "UTC", given, time)
+    what = "the messages carry no zone: taken as UTC, in which the program's own lines between them have the same times"
+    return (Finding(kind="zone-by-program", severity=Severity.NOTE, what=what),)
 
 
 def split(line: str) -> tuple[str, str]:
@@ -329,8 +346,14 @@ def _over_ground(
         text = f"fixed platform, as told: {'ground-referenced' if stated else kind} wind is wind over ground"
         return channels, Finding(kind="fixed-platform", severity=Severity.NOTE, what=text)
     if stated:
+        moves = (speed is not None and speed > MOVING) or options.platform in ("moving", "corrected")
         text = "wind over ground was computed on the network from a moving platform's heading and speed"
-        return channels, Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text)
+        if not moves:
+            text = "wind over ground: if its platform moves, it was computed on the network from its heading and speed"
+        return channels, Finding(
+            kind="computed-true-wind", severity=Severity.WARNING, what=text,
+            fix=None if moves else "if the sensor stands on a mast, say so: --platform fixed",
+        )  # fmt: skip
     known = f"at {speed:.2f} m/s over ground" if speed is not None else "of unknown motion"
     return channels, Finding(
         kind="apparent-wind-only", severity=Severity.WARNING, value=speed,

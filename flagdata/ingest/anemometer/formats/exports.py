@@ -265,8 +265,9 @@ def column_findings(assigned: Assigned) -> tuple[Finding, ...]:
                 kind="several-anemometers", severity=Severity.WARNING, count=len(assigned.rivals),
                 what=f"wind is read from {used!r}, the first of {len(assigned.rivals) + 1} columns of wind; not from "
                 f"{', '.join(assigned.rivals)}",
-                fix="to read the others, too: --as delimited, where flagdata ingest --sniff drafts them; else describe "
-                "the file by a recipe that names the column",
+                fix="to read the others, too, ingest the file with --as delimited, which asks for what the headings do "
+                "not state (such as --unit); where it does not read them, describe the file by a recipe that names "
+                "the column",
             )
         )  # fmt: skip
     if assigned.unread:

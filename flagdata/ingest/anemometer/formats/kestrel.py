@@ -1,7 +1,8 @@
 """Kestrel exports (Kestrel 5000 series by Kestrel LiNK): device lines, a header, units, then rows.
 
-Three traps of real files: a header that promises YYYY-MM-DD over rows in day/month/year, degree signs that went through
-two encodings, and separators that follow the computer's region.
+Four traps of real files: a header that promises YYYY-MM-DD over rows in day/month/year, degree signs that went through
+two encodings, separators that follow the computer's region, and, from the phone's app, columns whose names (record,
+place, notes) stand in the line of units behind the units of the others.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from flagdata.units import spelled as spelled_unit
 
 # Header of a Kestrel → channel. The sign between words is a degree sign or what became of it.
 _COLUMNS: tuple[tuple[str, str], ...] = (
-    (r"direction\W+.*true", "wind_direction"),
-    (r"direction\W+.*mag.*", "wind_direction_magnetic"),
+    (r"direction\W+.*true|compass true direction", "wind_direction"),
+    (r"direction\W+.*mag.*|compass magnetic direction", "wind_direction_magnetic"),
     (r"wind speed", "wind_speed"),
     (r"temperature", "air_temperature"),
     (r"relative humidity|rel\.? hum\.?", "relative_humidity"),
@@ -103,11 +104,14 @@ class Kestrel:
             raise InputError("no rows below the header", where=f"{where}, line {found.header + 1}", fix="export again")
         decision = decide(rows, told=options.date_order, where=f"{where}, line {found.header + 3}")
         form = f"{decision.directives()} {_time_directives(rows, where)}"
+        # The header of the phone's app names fewer columns than its line of units: the lines are cut by number alone.
+        named = 2 if len(found.units) <= len(found.names) or not any(found.units[len(found.names) :]) else 0
         decimal = "," if found.delimiter == ";" and any("," in line for line in lines[found.header + 2 :]) else "."
         recipe = Recipe(
             name="kestrel", about="from the file's own header", source="the file",
             file=FileLayout(
-                delimiter=found.delimiter, decimal=decimal, preamble=found.header, header=2, missing=("***.*",)
+                delimiter=found.delimiter, decimal=decimal, preamble=found.header + 2 - named, header=named,
+                missing=("***.*",),
             ),
             time=TimeLayout(columns=(1,), format=form),
             channels=channels,

@@ -13,6 +13,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -78,6 +79,7 @@ class _Stream:
     speeds: list[float] = field(default_factory=list)
     others: list[tuple[Sentence, int]] = field(default_factory=list)
     beside: Counter[str] = field(default_factory=Counter)
+    sources: dict[str, set[str]] = field(default_factory=lambda: {wind: set() for wind in _NEWER})
 
 
 class Nmea:
@@ -91,7 +93,7 @@ class Nmea:
         """Lines that are sentences, most of them with a right checksum, some of them of wind."""
         if most_stamped(head):
             return None  # they are of the format nmea-stamped
-        right = wrong = wind = 0
+        right = checked = wrong = wind = 0
         for line in head.lines:
             try:
                 sentence = split(line)
@@ -100,14 +102,18 @@ class Nmea:
                 continue
             if sentence is not None:
                 right += 1
+                checked += sentence.checked
                 wind += sentence.kind in WINDS
         if right < max(1, len(head.lines) // 2):
             return None
+        sure = " with right checksums" if checked == right else f", {checked or 'none'} of them with a checksum"
+        more = f"; {wrong} more have a wrong one" if wrong or checked else ""
         reasons = (
-            f"{right} of the first {len(head.lines)} lines are NMEA 0183 sentences with right checksums, {wrong} wrong",
+            f"{right} of the first {len(head.lines)} lines are NMEA 0183 sentences{sure}{more}",
             f"{wind} of them are wind ({', '.join(WINDS)})",
         )
-        return Guess(format="nmea", score=0.95 if wind else 0.3, reasons=reasons)
+        fix = None if wind else no_wind(head.lines, self.name)
+        return Guess(format="nmea", score=0.95 if wind else 0.3, reasons=reasons, fix=fix)
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read all wind sentences."""
@@ -121,9 +127,8 @@ class Nmea:
         where = str(source.path)
         if not stream.line:
             by = f" of the talker {options.talker}" if options.talker is not None else ""
-            seen = ", ".join(f"{count} {kind}" for kind, count in stream.kinds.most_common(6))
             raise InputError(
-                f"no valid sentence of wind ({', '.join(WINDS)}){by}{'; there are ' + seen if seen else ''}",
+                f"no valid sentence of wind ({', '.join(WINDS)}){by}{_others_seen(stream.kinds)}",
                 where=where, fix="have the instrument send MWV, or check its baud rate if sentences are broken",
             )  # fmt: skip
         talkers = Counter(stream.talkers)
@@ -207,6 +212,7 @@ def _take_others(stream: _Stream) -> None:
             stream.beside[sentence.kind] += 1
             continue
         added = True
+        stream.sources[kind].add(sentence.kind)
         (_mda if kind == "wind" else _vwr)(stream, sentence, at)
     if added:
         _keep(stream, np.argsort(np.array(stream.line, dtype=np.int64), kind="stable").tolist())
@@ -278,6 +284,7 @@ def _mwv(stream: _Stream, sentence: Sentence, at: int) -> None:
         stream.invalid.append(at)
         return
     kind = "apparent" if fields[1] == "R" else "theoretical"
+    stream.sources[f"{kind}_wind"].add(f"MWV,{fields[1]}")
     angle, speed, unit = number(fields[0]), number(fields[2]), SPEED_UNITS.get(fields[3])
     row: dict[str, float] = {}
     unstated = len(fields) == 4  # canboat's n2kd leaves the status out
@@ -302,6 +309,7 @@ def _mwd(stream: _Stream, sentence: Sentence, at: int) -> None:
     if true is None and magnetic is None:
         stream.undirected += 1
         return
+    stream.sources["wind"].add("MWD")
     row: dict[str, float] = {}
     if true is not None:
         row["wind_direction"] = float(np.radians(true))
@@ -333,22 +341,26 @@ def _platform(
                 f"the platform was said to be fixed, but moves at {moving:.1f} kn over ground in the median",
                 where=where, fix="leave out --platform",
             )  # fmt: skip
-        return _fixed(channels, options, where)
+        return _fixed(channels, stream, options, where)
     if options.azimuth is not None:
         raise UsageError(
             "an azimuth belongs to a fixed platform", where=where, fix="add --platform fixed, or leave it out"
         )
-    if "wind_speed" in channels:
-        text = "wind over ground (MWD) was computed by the instrument from a moving platform's heading and speed"
-        return channels, (Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text),)
     fix = None
     if moving and moving > MOVING:
         known = f"a platform that moves at {moving:.1f} kn"
-    elif options.platform == "moving":
+    elif options.platform in ("moving", "corrected"):
         known = "a moving platform, as told"
     else:
         known = "a platform of unknown motion"
         fix = "if the sensor stands on a mast, say so: --platform fixed"
+    if "wind_speed" in channels:
+        text = f"wind over ground ({_sources(stream, 'wind')})"
+        if fix is None:
+            text += f" was computed by the instrument from heading and speed of {known}"
+        else:
+            text += ": if its platform moves, the instrument computed it from that platform's heading and speed"
+        return channels, (Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text, fix=fix),)
     return channels, (
         Finding(
             kind="apparent-wind-only", severity=Severity.WARNING, value=moving,
@@ -358,7 +370,7 @@ def _platform(
 
 
 def _fixed(
-    channels: dict[str, np.ndarray], options: WindOptions, where: str
+    channels: dict[str, np.ndarray], stream: _Stream, options: WindOptions, where: str
 ) -> tuple[dict[str, np.ndarray], tuple[Finding, ...]]:
     kind = "apparent" if "apparent_wind_speed" in channels else "theoretical"
     speed, angle = f"{kind}_wind_speed", f"{kind}_wind_direction"
@@ -372,18 +384,16 @@ def _fixed(
             raise UsageError(f"an azimuth was given, but {what}", where=where, fix="leave out --azimuth")
         out["wind_direction"] = np.mod(out.pop(angle) + options.azimuth, 2 * np.pi)
     text = f"fixed platform, as told: {kind} wind is wind over ground"
+    if stated:
+        text = f"fixed platform, as told: the wind over ground is that of {_sources(stream, 'wind')}"
     return out, (Finding(kind="fixed-platform", severity=Severity.NOTE, what=text),)
 
 
 def _kinds(stream: _Stream, time: Instants) -> tuple[Finding, ...]:
     """How many sentences of each kind of wind there are, and how far apart, where a stream holds several kinds."""
-    told = {
-        "apparent_wind": "relative (MWV,R)",
-        "theoretical_wind": "theoretical (MWV,T)",
-        "wind": "over ground (MWD)",
-    }
     parts: list[str] = []
-    for prefix, name in told.items():
+    for prefix, kind in (("apparent_wind", "relative"), ("theoretical_wind", "theoretical"), ("wind", "over ground")):
+        name = f"{kind} ({_sources(stream, prefix)})"
         at = [index for index, row in enumerate(stream.values) if f"{prefix}_speed" in row]
         if len(at) > 1:
             parts.append(f"{len(at)} {name}, one every {np.median(np.diff(time[at])) / NANOSECONDS:.3g} s")
@@ -393,6 +403,29 @@ def _kinds(stream: _Stream, time: Instants) -> tuple[Finding, ...]:
         return ()
     text = f"{len(stream.line)} wind sentences of {len(parts)} kinds: {'; '.join(parts)}"
     return (Finding(kind="wind-kinds", severity=Severity.NOTE, count=len(stream.line), what=text),)
+
+
+def _sources(stream: _Stream, wind: str) -> str:
+    """The sentences that a wind was read from."""
+    return " and ".join(sorted(stream.sources[wind]))
+
+
+def no_wind(lines: Sequence[str], format_name: str) -> str:
+    """What to do with a log of which no sentence in these first lines is of wind."""
+    kinds: Counter[str] = Counter()
+    for line in lines:
+        with suppress(ChecksumError):
+            sentence = split(line)
+            kinds.update([] if sentence is None else [sentence.kind])
+    return (
+        f"its first {len(lines)} lines hold no sentence of wind ({', '.join(WINDS)}){_others_seen(kinds)}: have the "
+        f"instrument send MWV; if winds come later in the file: --as {format_name}"
+    )
+
+
+def _others_seen(kinds: Counter[str]) -> str:
+    seen = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common(6))
+    return f"; there are {seen}" if seen else ""
 
 
 def _findings(stream: _Stream, placed: Placed) -> tuple[Finding, ...]:

@@ -61,6 +61,7 @@ _COMPACT = re.compile(
 )
 """A stamp without signs between its numbers, before a sentence: "20260501 120000+00:00 $WIMWV,…"."""
 MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+GIVEN_CLOCK = "they carry no time of their own: they are on the clock that was given"
 LONGEST = 2000
 """Characters of the longest line of an instrument; longer ones are something else."""
 _SECONDS = re.compile(r"\d{10}(\.\d+)?")
@@ -170,7 +171,7 @@ def guess(head: Head, format_name: str, what: str, parse: Parse, split: Split = 
     stamps = sum(bool(split(line)[0]) for line in lines)
     reasons = (
         f"{right} of the first {len(lines)} lines are {what}",
-        f"{stamps} of them carry the stamp of the computer that logged them",
+        GIVEN_CLOCK if head.counted else f"{stamps} of them carry the stamp of the computer that logged them",
     )
     return Guess(format=format_name, score=0.95, reasons=reasons)
 

@@ -16,9 +16,9 @@ import numpy as np
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.formats import receiver_clock
-from flagdata.ingest.anemometer.formats.nmea import WINDS, Nmea
+from flagdata.ingest.anemometer.formats.nmea import WINDS, Nmea, no_wind
 from flagdata.ingest.anemometer.formats.sentences import ChecksumError, checksum, split
-from flagdata.ingest.anemometer.formats.serial_lines import split_stamp, stamps_of, without_comments
+from flagdata.ingest.anemometer.formats.serial_lines import GIVEN_CLOCK, split_stamp, stamps_of, without_comments
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.sniffing import Guess, Head
@@ -42,11 +42,15 @@ class StampedNmea:
         lines = without_comments(head.lines)
         if stamped < max(1, len(lines) // 2):
             return None
+        what = "a computer's stamp and an NMEA 0183 sentence"
+        if head.counted:
+            what = f"NMEA 0183 sentences; {GIVEN_CLOCK}"
         reasons = (
-            f"{stamped} of the first {len(lines)} lines are a computer's stamp and an NMEA 0183 sentence",
+            f"{stamped} of the first {len(lines)} lines are {what}",
             f"{wind} of them are wind ({', '.join(WINDS)})",
         )
-        return Guess(format=self.name, score=0.96 if wind else 0.3, reasons=reasons)
+        fix = None if wind else no_wind([split_stamp(line)[1] for line in lines], self.name)
+        return Guess(format=self.name, score=0.96 if wind else 0.3, reasons=reasons, fix=fix)
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read all wind sentences, each at its own stamp."""

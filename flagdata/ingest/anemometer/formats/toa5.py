@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.formats import toa5_headings
 from flagdata.ingest.anemometer.formats.exports import Assigned, column_findings, known_unit, stamp_format
 from flagdata.ingest.anemometer.formats.windographer import NAMES as MAST_NAMES
 from flagdata.ingest.anemometer.options import WindOptions
@@ -162,6 +163,10 @@ class Toa5:
                 "no column looks like wind speed or a wind component", where=f"{source.path}, line 2",
                 fix=f"{_offer(source)}describe the file by a recipe; its columns are {', '.join(names)}",
             )  # fmt: skip
+        direction, told = toa5_headings.direction(source, channels)
+        if direction is not None:
+            channels["wind_direction"] = direction
+            unread = [name for name in unread if name != direction.column]
         rows = [row[names.index(stamp)] for row in csv.reader(source.head(5000)[4:]) if len(row) == len(names)]
         form, found = _FORM, ()
         own = sum(_OWN.match(text) is not None for text in rows)
@@ -176,7 +181,7 @@ class Toa5:
             sensor=Sensor(name=f"{about[1] if len(about) > 1 else ''} on {model or 'Campbell logger'}".strip()),
         )  # fmt: skip
         assigned = Assigned(channels=channels, names=taken, unread=tuple(unread), rivals=tuple(rivals))
-        return recipe, assigned, list(found)
+        return recipe, assigned, [*found, *told, *toa5_headings.contradictions(source, channels)]
 
 
 def _stamp_name(names: list[str]) -> str | None:

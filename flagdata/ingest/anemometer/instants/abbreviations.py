@@ -29,6 +29,15 @@ _WRITTEN_OUT = {
     "new zealand standard time": 12, "south africa standard time": 2, "greenwich mean time": 0,
 }  # fmt: skip
 _IN_HEADING = re.compile(rf"(?:^|[^A-Za-z])({'|'.join(SEVERAL)})(?![A-Za-z])")
+_CELL, _WORD = re.compile(r"[^,;\t|]+"), re.compile(r"\S+")
+_HEADINGS = 5
+"""Cells of a line from which on it names columns, of which an abbreviation alone may be one of another quantity."""
+_SENTENCE = re.compile(r"(?<!\w)(?:in|is|are|was|were|the|all|of|to|as|at|by|from)(?!\w)", re.IGNORECASE)
+_OF_TIME = re.compile(
+    r"time|zone|date|stamp|clock|zeit|heure|fecha|(?<![a-z])(?:hours?|utc|gmt|local|uhr|datum|stunde|hora|ora|tid|tijd|"
+    r"uur|czas|tz|hr|hh|hhmm|hrmn|mm|ss|min|sec)(?![a-z])",
+    re.IGNORECASE,
+)
 _STAMP = re.compile(r"\d[-/.]\d{1,2}[-/.]\d|\d:\d\d")
 
 
@@ -44,8 +53,22 @@ def advice(lines: Sequence[str]) -> str:
     for number, line in enumerate(lines, start=1):
         if _STAMP.search(line):
             return ""
-        found = _IN_HEADING.search(line)
+        found = next((found for found in _IN_HEADING.finditer(line) if not _is_column(line, found)), None)
         if found is not None:
             means = ", ".join(f"--zone {name} if it is {place}" for name, place in SEVERAL[found[1]])
             return f"line {number} says {found[1]!r}, which has several meanings: {means}"
     return ""
+
+
+def _is_column(line: str, found: re.Match[str]) -> bool:
+    """Whether an abbreviation is the whole heading of a column among others, and none of a time stands before it.
+
+    GST is also the gust of tables of buoys, "... WDIR WSPD GST PRES"; in "Date Time GST Speed Direction" it is a zone.
+    """
+    cells = list(_CELL.finditer(line))
+    if len(cells) < _HEADINGS:
+        cells = list(_WORD.finditer(line)) if len(cells) == 1 and _SENTENCE.search(line) is None else []
+    at = next((at for at, cell in enumerate(cells) if cell.end() > found.start(1)), 0)
+    if len(cells) < _HEADINGS or cells[at][0].strip(" \r\n#\"'") != found[1]:
+        return False
+    return at == 0 or _OF_TIME.search(cells[at - 1][0]) is None

@@ -4,8 +4,9 @@ Directives: %Y %y %m %d %j %H %I %p %M %S %b %a, and %f, which stands for an opt
 ".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read 00.05, 00.1, 00.15. %z stands for an
 optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02", "CEST"), %Z for letters of a zone that are not read, %p
 for "AM", "p.m." or a bare "a" or "p" (with %H it may be left out: 13:05 beside 1:05 PM), %a for a day of the week,
-which is not read. %Q is the hour with its fraction, %J the day of the year with its own (1.5 is noon of 1 January).
-%E is the hour of the year since New Year, %G the minute and %K the second of the day, each with a fraction or none.
+which is not read, %b for the name of a month, whole or short, in the languages of `month_names`. %Q is the hour with
+its fraction, %J the day of the year with its own (1.5 is noon of 1 January); behind a clock only its day is read. %E is
+the hour of the year since New Year, %G the minute and %K the second of the day, each with a fraction or none.
 %s is Unix time in seconds; %L, %U and %N are the milli-, micro- and nanoseconds of a second in a number of their own
 ("12:00:01 50" with %L is 01.050). %D is a day numbered from a start that the user gives. Numbers between blanks may
 end in ".0", as tables of floats have them. 24:00 is the midnight that ends a day (ISO 8601:2004, 4.2.3). A blank

@@ -1,15 +1,15 @@
 """Tables of weather services and station programs whose headings state neither unit nor zone, as descriptions do.
 
 Each is told by headings that no other table has together, and stated again with unit and zone in its headings. Sources:
-NOAA NDBC, "Measurement Descriptions and Units" (UTC, m/s; 99, 999 and MM missing); DWD, descriptions of the hourly and
-10-minute wind (m/s, -999 missing; UTC, of 10 minutes before 2000 CET); KNMI, headings of its files (0.1 m/s, hour 24
-ends the day, UT; direction 0 calm, 990 variable); Météo-France, descriptions of SYNOP (UTC, m/s, K, Pa; mq missing) and
-of hourly and daily data (m/s, FFM the daily mean; no zone is stated); AEMET OpenData, metadata (m/s; daily directions
-in tens of degrees, 99 variable, 88 none); MeteoSwiss, "Open Data: automatic weather stations", parameters, and legends
-of IDAweb and VQHA80 (UTC; fkl, fk1 in m/s, fu3 in km/h, of 10 minutes (z), an hour (h) or a day (d); "-" missing);
-Meteostat, "Hourly Data" (km/h); Iowa Environmental Mesonet, "ASOS download" (sped in mph, M or null missing; the zone
-is chosen there); WeeWX, "Units" (usUnits 1: mph, °F and inHg; 16: km/h, °C, mbar; 17: m/s, °C, mbar), which wview's
-archive shares.
+NOAA NDBC, "Measurement Descriptions and Units" (UTC, m/s; 99, 999 and MM missing; of supplemental data the wind is the
+highest of one minute); DWD, descriptions of the hourly and 10-minute wind (m/s, -999 missing; UTC, of 10 minutes before
+2000 CET); KNMI, headings of its files (0.1 m/s, hour 24 ends the day, UT; direction 0 calm, 990 variable);
+Météo-France, descriptions of SYNOP (UTC, m/s, K, Pa; mq missing) and of hourly and daily data (m/s, FFM the daily mean;
+no zone is stated); AEMET OpenData, metadata (m/s; daily directions in tens of degrees, 99 variable, 88 none);
+MeteoSwiss, "Open Data: automatic weather stations", parameters, and legends of IDAweb and VQHA80 (UTC; fkl, fk1 in m/s,
+fu3 in km/h, of 10 minutes (z), an hour (h) or a day (d); "-" missing); Meteostat, "Hourly Data" (km/h); Iowa
+Environmental Mesonet, "ASOS download" (sped in mph, M or null missing; the zone is chosen there); WeeWX, "Units"
+(usUnits 1: mph, °F and inHg; 16: km/h, °C, mbar; 17: m/s, °C, mbar), which wview's archive shares.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.restating.restate import LOOKED_AT, table
 from flagdata.ingest.anemometer.text.signs import BLANKS, SIGNS
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
@@ -40,6 +41,7 @@ class _Published:
         whole: whether other columns are kept.
         zoned: whether `stamp` tells the zone.
         clean: of a cell.
+        warning: of what its wind is, where that is no mean wind.
     """
 
     about: str
@@ -50,6 +52,7 @@ class _Published:
     whole: bool = False
     zoned: bool = True
     clean: Callable[[str], str] = str.strip
+    warning: str = ""
 
 
 def _digits(*names: str, zone: str = "Z") -> Callable[[Row], str]:
@@ -81,6 +84,8 @@ def _buoy(row: Row) -> str:
         for names in (("#YY", "YY", "YYYY", "#YYYY"), ("MM",), ("DD",), ("hh",))
     )
     minute = row.get("mm", "00").strip()
+    if re.fullmatch(r"\d{4}", clock := row.get("hhmm", "").strip()):
+        hour, minute = clock[:2], clock[2:]
     if not all(part.isdigit() for part in (year, month, day, hour, minute)):
         return ""
     whole = int(year) + (0 if len(year) == 4 else 1900 if int(year) >= 70 else 2000)
@@ -132,18 +137,33 @@ _SWISS = tuple(
 )  # fmt: skip
 """Headings of the wind's speed, its direction and its gust, and the unit of the speeds; m/s goes first."""
 _NO_BUOY = frozenset({"99", "99.0", "99.00", "999", "999.0", "999.00", "9999", "9999.0", "MM"})
+_BUOY = {
+    "WSPD": "wind speed [m/s]", "WDIR": "wind direction [deg]", "WD": "wind direction [deg]", "GST": "gust [m/s]",
+    "GDR": "gust direction [deg]", **_WEATHER_OF_BUOYS,
+}  # fmt: skip
+_MISSING_OF_BUOYS = {
+    name: frozenset(code for code in _NO_BUOY if not heading.endswith("[deg]") or code.partition(".")[0] != "99")
+    for name, heading in _BUOY.items()
+}
+"""99 is a direction as others are; a missing one is 999."""
 _PUBLISHED = (
+    _Published(
+        about="NOAA NDBC's supplemental table of a buoy", needs=(_need("#YY", "MM", "DD", "hh", "WSPD", "WTIME"),),
+        columns=_BUOY, stamp=_buoy, missing=_MISSING_OF_BUOYS,
+        warning="WSPD of NDBC's supplemental table is not the mean wind: it is the highest wind of one minute, at the "
+        "time of its column WTIME, and stands at the time of its row here",
+    ),
+    _Published(
+        about="NOAA NDBC's table of a drifting buoy", needs=(_need("#YY", "MM", "DD", "hhmm", "WSPD", "WDIR"),),
+        columns={**_BUOY, "LAT": "latitude", "LON": "longitude"}, stamp=_buoy,
+        missing={**_MISSING_OF_BUOYS, **dict.fromkeys(("LAT", "LON"), frozenset({"MM"}))},
+    ),
     _Published(
         about="NOAA NDBC's table of a buoy",
         needs=tuple(
             _need(year, "MM", "DD", "hh", "WSPD", away) for year in ("#YY", "YY", "YYYY") for away in ("WDIR", "WD")
         ),
-        columns={
-            "WSPD": "wind speed [m/s]", "WDIR": "wind direction [deg]", "WD": "wind direction [deg]",
-            "GST": "gust [m/s]", **_WEATHER_OF_BUOYS,
-        },
-        stamp=_buoy,
-        missing=dict.fromkeys(("WSPD", "WDIR", "WD", "GST", *_WEATHER_OF_BUOYS), _NO_BUOY),
+        columns={"#STN": "station", **_BUOY}, stamp=_buoy, missing=_MISSING_OF_BUOYS,
     ),
     _Published(
         about="the Iowa Environmental Mesonet's table of airports",
@@ -254,9 +274,8 @@ _PUBLISHED = (
 )  # fmt: skip
 _DATES = frozenset(
     {
-        "#YY", "YY", "YYYY", "MM", "DD", "hh", "mm", "MESS_DATUM", "YYYYMMDD", "HH", "date", "AAAAMMJJHH", "AAAAMMJJ",
-        "DATE", "eor",
-        "reference_timestamp", "time", "Date",
+        "#YY", "YY", "YYYY", "MM", "DD", "hh", "mm", "hhmm", "MESS_DATUM", "YYYYMMDD", "HH", "date", "AAAAMMJJHH",
+        "AAAAMMJJ", "DATE", "eor", "reference_timestamp", "time", "Date",
     }
 )  # fmt: skip
 _NAMED = 40
@@ -295,7 +314,11 @@ def as_table(source: TextFile) -> TableText | None:
         if left
         else kind.about
     )
-    return table(source, heading, rows, kind="published-table", what=what, left_out=other[0])
+    stated = table(source, heading, rows, kind="published-table", what=what, left_out=other[0])
+    if stated is None or not kind.warning:
+        return stated
+    warning = Finding(kind="highest-wind", severity=Severity.WARNING, what=kind.warning)
+    return TableText.of(stated, stated.text, [warning])
 
 
 def _rows(source: TextFile, found: _Found, taken: Sequence[str], other: list[int]) -> Iterator[list[str]]:

@@ -24,7 +24,8 @@ from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Head
 from flagdata.ingest.anemometer.tables import stated_columns
 from flagdata.ingest.anemometer.tables.rows_above import rows_above
 from flagdata.ingest.anemometer.text.layout import Layout, cut, lay_out
-from flagdata.ingest.anemometer.text.source import TableText, TextFile
+from flagdata.ingest.anemometer.text.source import RATE_GIVEN, TableText, TextFile
+from flagdata.ingest.anemometer.times import given_clock
 from flagdata.ingest.anemometer.times.timecolumns import find_time
 from flagdata.ingest.anemometer.words.headings import interest
 from flagdata.timebase import NANOSECONDS, iso
@@ -171,7 +172,7 @@ def _counted(source: TextFile, text: Sequence[str], rate: float, start: int, fou
     """The file with these lines, and the finding that says whose clock they are on beside others."""
     often = f"at {rate:g} Hz" if rate >= 1 else f"every {1 / rate:g} s"
     what = f"its rows carry no time: counted {often} from {iso(start)}, as given; rows that were lost are not seen"
-    return TableText.of(source, text, [Finding(kind="rate-given", severity=Severity.WARNING, what=what), *found])
+    return TableText.of(source, text, [Finding(kind=RATE_GIVEN, severity=Severity.WARNING, what=what), *found])
 
 
 def _refuse_times(said: bool, where: str) -> None:
@@ -240,7 +241,7 @@ def _table(
         found.append(Finding(kind="malformed-lines", severity=Severity.ERROR, count=others, what=what))
     if (above := rows_above(lines, layout)) != "":
         found.append(Finding(kind="heading-doubtful", severity=Severity.WARNING, what=above))
-    return _written(_names(layout.names, layout.units), kept), found
+    return _written(given_clock.headings(layout.names, layout.units), kept), found
 
 
 def _single(source: TextFile, rate: float, start: int, where: str) -> list[str]:
@@ -251,7 +252,7 @@ def _single(source: TextFile, rate: float, start: int, where: str) -> list[str]:
     if not rows or sum(bool(_NUMBER.fullmatch(row)) for row in rows) < 0.9 * len(rows):
         raise UsageError("neither a table nor sentences of wind: --rate is not used", where=where, fix="leave it out")
     cells = ([row.replace(",", "."), _stamp(start, at, rate)] for at, row in enumerate(rows))
-    return _written(_names([heading], [""]), cells)
+    return _written(given_clock.headings([heading], [""]), cells)
 
 
 def _lines_from(source: TextFile, first: int) -> Iterator[str]:
@@ -264,11 +265,6 @@ def _points(row: Sequence[str], layout: Layout) -> list[str]:
     if layout.decimal == ".":
         return list(row)
     return [re.sub(r"^([-+]?\d+),(\d+)", r"\1.\2", cell) for cell in row]
-
-
-def _names(names: Sequence[str], units: Sequence[str]) -> list[str]:
-    named = [name or f"column {at}" for at, name in enumerate(names, start=1)]
-    return [*(f"{name} [{unit}]" if unit else name for name, unit in zip(named, units, strict=True)), "time"]
 
 
 def _written(names: Sequence[str], rows: Iterable[list[str]]) -> list[str]:

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
+from flagdata.ingest.anemometer.text.source import RATE_GIVEN
 from flagdata.schema import SampleFlag
 from flagdata.signals import Instants
 from flagdata.timebase import NANOSECONDS
@@ -49,6 +50,8 @@ _EVEN = 0.9
 PAIRS, _TIMES, _ALIKE, _SHARED = 5, 3, 0.95, 0.5
 """Rows that repeat a stamp, and rows of one, from and up to which they may be one reading said again; the shares of
 them that hold the same readings, and at most of the rows of stamps that follow each other."""
+_OF_STAMPS = frozenset({"coarse-stamps", "held-stamps", "uneven-stamps", "equal-stamps"})
+"""Findings about the stamps of a log, in words of what its clock did."""
 _SLOW = 60 * NANOSECONDS
 """Time between stamps of a slow log, whose readings change from one to the next [ns]."""
 _APART = (
@@ -74,7 +77,24 @@ class _Runs:
 
 
 def distinct(reading: Reading) -> Reading:
-    """Rows in non-decreasing time as rows in strictly increasing time, by the rules above."""
+    """Rows in non-decreasing time as rows in strictly increasing time, by the rules above.
+
+    Of stamps that were counted at a rate which the user gave, that alone is said: the log has none of its own.
+    """
+    found = _distinct(reading)
+    if all(finding.kind != RATE_GIVEN for finding in reading.findings):
+        return found
+    spread = [finding for finding in found.findings if finding.kind in _OF_STAMPS]
+    if not spread:
+        return found
+    count = int((np.diff(reading.time) == 0).sum())
+    what = f"{count} readings stand between two that were counted, and have no time of their own: all are spread "
+    what += "evenly up to the next that was counted, and unsure by as much"
+    own = Finding(kind="counted-together", severity=Severity.WARNING, count=count, where=spread[0].where, what=what)
+    return replace(found, findings=(*(item for item in found.findings if item not in spread), own))
+
+
+def _distinct(reading: Reading) -> Reading:
     if len(reading.time) < 2:
         return reading
     again = np.concatenate(([False], np.diff(reading.time) == 0))

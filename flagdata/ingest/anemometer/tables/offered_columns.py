@@ -73,7 +73,8 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], *, com
     serial = _serial(layout) if time is None else None
     further = f"; name {', '.join(map(repr, others))} in its place in a run of its own" if others else ""
     further += "" if given_clock.index(layout) is None else f"; {given_clock.AS_GIVEN}"
-    example = "with a name, or nothing, in place of each ?" if "?" in line else "corrected where it is wrong"
+    example = f"with a name{_names(line)}, or nothing, in place of each ?"
+    example = example if "?" in line else "corrected where it is wrong"
     if f"time[{_OPEN}]" in known.values():
         counts = "; of time[elapsed-?] the ? is s, ms, us, min, h or d, the unit of its count: add --start TIME"
         further = f"{counts}{further}"
@@ -97,6 +98,16 @@ def offer(layout: Layout, time: TimeChoice | None, winds: Sequence[Wind], *, com
         }[serial]  # fmt: skip
         further = f"; column 1 rises as {rises} do: write another format in its place where it is none{further}"
     return f'say what the columns are: --columns "{line}" {example}{further} (the first row is {shown(layout)})'
+
+
+def _names(line: str) -> str:
+    """The names that are most used, for a line without any; where they are listed, for one with some; else ""."""
+    entries = [entry.split("=")[-1] for entry in line.split(",") if entry]
+    if "?" not in entries:
+        return ""
+    if set(entries) != {"?"}:
+        return " of those that flagdata ingest --help lists"
+    return " (time, date, wind_speed[m/s], wind_direction[deg], wind_x[m/s], site or others of flagdata ingest --help)"
 
 
 def _serial(layout: Layout) -> str | None:
@@ -223,6 +234,7 @@ def read_instead(layout: Layout, time: TimeChoice, wind: Wind, speed: int | None
     direction = others.get("wind_direction")
     apart = (*time.columns, *([direction.index] if direction else []))
     own = None if speed is None else beside.direction_of(layout, speed, apart=apart)
+    own = beside.direction_of_gust(layout, speed, apart=apart) if own is None and speed is not None else own
     if own is None and speed is not None and direction is not None and _of_another_height(layout, speed, direction):
         entries, direction = {at: entry for at, entry in entries.items() if at != direction.index}, None
         own = _at_its_height(layout, speed)

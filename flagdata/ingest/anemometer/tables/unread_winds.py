@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,17 +68,46 @@ def remark(
     speed = next((index for index in speeds if _words(layout, index) & _HIGHEST), next(iter(speeds), None))
     if speed is None or time is None or wind is None:
         return (what,)
-    wind = _of_its_rows(layout, speed, (wind, *winds))
-    option = offered_columns.read_instead(layout, time, wind, speed)
+    every = (wind, *winds)
+    option = offered_columns.read_instead(layout, time, _of_its_rows(layout, speed, every), speed)
     read = f"to read {layout.names[speed]!r} as a wind of its own, ingest the file once more with"
     others = [at for at in speeds if at != speed and beside.direction_of(layout, at, apart=time.columns) is not None]
     further = (
-        f"{layout.names[at]!r} likewise with {offered_columns.read_instead(layout, time, wind, at)}" for at in others
+        f"{layout.names[at]!r} likewise with "
+        f"{offered_columns.read_instead(layout, time, _of_its_rows(layout, at, every), at)}"
+        for at in others
     )
     return ("; ".join([what, f"{read} {option}", *further]),)
 
 
 def _of_its_rows(layout: Layout, speed: int, winds: Sequence[Wind]) -> Wind:
+    """The wind of the same instrument as a further speed, or else the first that has values in most of its rows.
+
+    Where the table has several directions, and none of its instruments is that of the speed, it is without a direction.
+    """
+    same = [wind for wind in winds if _instrument(layout, wind) == _key(layout, speed)]
+    if same:
+        return _in_its_rows(layout, speed, same)
+    directions = {column.index for wind in winds if (column := wind.columns.get("wind_direction")) is not None}
+    if len(directions) > 1:
+        wind = _in_its_rows(layout, speed, winds)
+        return replace(wind, columns={name: one for name, one in wind.columns.items() if name != "wind_direction"})
+    return _in_its_rows(layout, speed, winds)
+
+
+def _key(layout: Layout, index: int) -> tuple[tuple[str, ...], float | None]:
+    """The words and the height of a heading that tell its instrument from others."""
+    heading = understand(layout.names[index], layout.units[index])
+    return heading.label, heading.height
+
+
+def _instrument(layout: Layout, wind: Wind) -> tuple[tuple[str, ...], float | None]:
+    """The words and the height of a wind's speed, or of its first column."""
+    speed = wind.columns.get("wind_speed") or next(iter(wind.columns.values()))
+    return _key(layout, speed.index)
+
+
+def _in_its_rows(layout: Layout, speed: int, winds: Sequence[Wind]) -> Wind:
     """The first of the winds that has values in most rows in which a further speed has them."""
 
     def known(column: int) -> NDArray[np.bool_]:

@@ -392,7 +392,8 @@ def _heading(
             continue
         cells, plain = _names(line, delimiter, *widths)
         if cells is None:
-            if not candidates and any(interest(cell) for cell in cut(_MARK.sub("", line), delimiter)):
+            remarked = line.lstrip().startswith("*")  # a comment, whose cells are words
+            if not candidates and not remarked and any(map(interest, cut(_MARK.sub("", line), delimiter))):
                 count = len(cut(_MARK.sub("", line), delimiter))
                 strange.append(f"line {number + 1} seems to name columns, but {count} for {width} cells a row")
             if candidates:

@@ -17,6 +17,9 @@ from flagdata.findings import Finding
 GZIP = b"\x1f\x8b"
 """First bytes of a file compressed by gzip (RFC 1952); a log may be: it is read as what is in it."""
 
+RATE_GIVEN = "rate-given"
+"""The finding that the stamps of a file were counted at a rate that the user gave."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class TextFile:
@@ -33,6 +36,11 @@ class TextFile:
     encoding: str
     lines: int
     findings: tuple[Finding, ...] = ()
+
+    @property
+    def counted(self) -> bool:
+        """Whether the stamps of its lines are none of its own: counted at a rate that the user gave."""
+        return any(finding.kind == RATE_GIVEN for finding in self.findings)
 
     def blocks(self, size: int = 200_000) -> Iterator[tuple[int, list[str]]]:
         """Lines without their ends, `size` at a time, each block with the number (from 1) of its first line."""

@@ -23,6 +23,7 @@ from flagdata.ingest.anemometer.times import (
     count_units,
     dateparts,
     dates_beside,
+    given_clock,
     months,
     rare_stamps,
     second_times,
@@ -72,6 +73,8 @@ def find_time(layout: Layout, *, order: Order | None = None, told: bool = False)
         order: of dates written with numbers only, as the user says.
         told: whether the user says that the columns of the table are its time.
     """
+    if (added := given_clock.index(layout)) is not None:
+        return time_as(layout, (added,), "iso")
     best: TimeChoice | None = None
     events = set[int]() if told else {index for index, name in enumerate(layout.names) if of_event(name)}
     choices = [choice for choice in _choices(layout, order, events) if not events & set(choice.columns)]

@@ -11,7 +11,8 @@ import numpy as np
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.winds.angles import compass_unit
-from flagdata.ingest.anemometer.words.headings import Heading
+from flagdata.ingest.anemometer.words.gust_words import GUSTS
+from flagdata.ingest.anemometer.words.headings import Heading, understand, words_of
 
 _DIRECTIONS = ("dir", "direction", "wd")
 """What stands before or behind the name of a speed in that of its direction."""
@@ -22,6 +23,8 @@ _INSTEAD = (
 """What stands in the name of a speed, and in its place in that of its direction."""
 _SPREADS = ("std", "sd", "stdev", "stddev", "sigma")
 """What stands behind the name of a speed, or of its direction, in that of its standard deviation."""
+_OF_GUSTS = GUSTS | {"peak"}
+"""Words of a gust, beside which a direction is that of the gust; "max" is that of the vane's readings, too."""
 _UNIT = re.compile(r"[\[(<{][^\])>}]*[\])>}]")
 _TURN, _MOST = 361.0, 0.9
 """Largest angle [deg], and the share of a column that must be angles; the rest are codes of no value."""
@@ -43,6 +46,26 @@ def direction_of(layout: Layout, speed: int, *, apart: Collection[int] = ()) -> 
         index for index, name in enumerate(layout.names)
         if index not in {speed, *apart} and _plain(name) in named and _turns(layout, index)
     ]  # fmt: skip
+    return found[0] if len(found) == 1 else None
+
+
+def direction_of_gust(layout: Layout, speed: int, *, apart: Collection[int] = ()) -> int | None:
+    """The one column of angles that is the direction of a gust, by its words, beside a gust of the same instrument.
+
+    Args:
+        speed: the gust's column.
+        apart: columns that are none.
+    """
+    own = understand(layout.names[speed], layout.units[speed])
+    if not set(words_of(layout.names[speed])) & _OF_GUSTS:
+        return None
+    found: list[int] = []
+    for index, name in enumerate(layout.names):
+        heading = understand(name, layout.units[index])
+        alike = (heading.label, heading.height) == (own.label, own.height)
+        of_gust = heading.quantity == "wind_direction" and set(words_of(name)) & _OF_GUSTS
+        if of_gust and alike and index not in {speed, *apart} and _turns(layout, index):
+            found.append(index)
     return found[0] if len(found) == 1 else None
 
 

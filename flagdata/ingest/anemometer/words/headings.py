@@ -15,11 +15,13 @@ from flagdata.ingest.anemometer.instants.abbreviations import ABBREVIATED, writt
 from flagdata.ingest.anemometer.words import weather_words
 from flagdata.ingest.anemometer.words.languages import in_english
 from flagdata.ingest.anemometer.words.wind_words import (
+    ANY_SPEED,
     AXES,
     COURSES,
     DIRECTION,
     HEIGHTS,
     MEAN,
+    OF_ROTORS,
     OF_VESSELS,
     OTHER,
     PLACES,
@@ -200,7 +202,9 @@ def understand(name: str, stated: str = "") -> Heading:
 
 
 def _of_another(known: set[str], unit: str | None, text: str) -> bool:
-    """Whether a heading of a wind is of the height of its mast, or of the speed or course of a vessel."""
+    """Whether a heading of a wind is of the height of its mast, or of the speed or course of a vessel or a rotor."""
+    if known & OF_ROTORS and not known & WIND and known & SPEED <= ANY_SPEED:
+        return True
     if known & OF_VESSELS and not known & WIND and not known & (_APPARENT | _THEORETICAL):
         return True
     speed = unit is not None and UNITS[unit].si in ("m/s", "rad")

@@ -48,6 +48,20 @@ HEIGHTS = frozenset({"height", "heights", "hgt", "höhe", "hoehe", "hauteur", "a
 """Words of the height of a mast, which beside those of a wind are no wind where no number and no unit speak for one."""
 OF_VESSELS = frozenset({"vessel", "vessels", "ship", "ships", "craft"})
 """Words of what moves by itself: its speed and course are no wind's."""
+OF_ROTORS = frozenset(
+    {
+        "rotate", "rotates", "rotating", "rotation", "rotational", "generator", "generators", "gen", "blade", "blades",
+        "spin", "spinning", "shaft", "gearbox",
+    }
+)  # fmt: skip
+"""Words of what turns in a machine: its speed is no wind's, unless the heading says the wind."""
+ANY_SPEED = frozenset(
+    {
+        "speed", "spd", "sp", "vel", "velocity", "velocidad", "velocidade", "vitesse", "vit", "geschwindigkeit",
+        "geschw", "snelheid", "velocita", "velocità", "hastighet",
+    }
+)  # fmt: skip
+"""Words of a speed that do not say of what."""
 SPREAD = GUSTS | MAXIMA | MINIMA | frozenset(
     {
         "std", "sd", "sdev", "stdev", "stddev", "stdv", "sigma", "dev", "deviation", "var", "variance", "cov",

@@ -60,6 +60,9 @@ def test_nrg_channels_are_told_by_their_history(read: Read) -> None:
     assert (log.series.sensor.name, log.series.sensor.height, log.series.sensor.averaging) == ("NRG S1", 40.0, 600.0)
     several = next(finding for finding in log.findings if finding.kind == "several-anemometers")
     assert "Ch2" in several.what
+    assert several.fix is not None
+    assert "ingest the file with --as delimited" in several.fix
+    assert "--sniff" not in several.fix
 
 
 def test_an_nrg_zone_that_the_user_contradicts_is_reported(read: Read) -> None:

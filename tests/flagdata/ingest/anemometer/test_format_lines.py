@@ -413,3 +413,39 @@ def test_milliseconds_in_brackets_before_another_mark_are_a_computers_stamp(read
     log = read(text, platform="fixed")
     assert log.format == "nmea-stamped"
     assert log.series.time.tolist() == [(1_777_636_800 + at) * 10**9 + at * 31 % 1000 * 10**6 for at in range(20)]
+
+
+def _analyzed(*, own: str = "12", zone: str = "") -> str:
+    return "".join(
+        f"INFO 2026-05-01T{own}:00:0{i}.125Z [analyzer] New PGN 130306 for device 36 (heap 5000 bytes)\n"
+        f"2026-05-01-12:00:0{i}.126{zone} 2  36 255 130306 Wind Data:  SID = 177; Wind Speed = {5 + i / 100:.2f} m/s; "
+        "Wind Angle = 57.2958 deg; Reference = Apparent\n" for i in range(4)
+    )  # fmt: skip
+
+
+def test_the_lines_of_canboats_program_tell_the_zone_of_its_messages(read: Read) -> None:
+    log = read(_analyzed())
+    assert iso(int(log.series.time[1])) == "2026-05-01T12:00:01.126Z"
+    assert "zone-by-program" in kinds(log)
+    told = read(_analyzed(), zone="+02:00")
+    assert iso(int(told.series.time[1])) == "2026-05-01T10:00:01.126Z"
+    assert "zone-contradicts" in kinds(told)
+
+
+def test_a_recording_that_canboats_program_reads_later_has_another_zone(read: Read) -> None:
+    with pytest.raises(TimeError, match="no time zone"):
+        read(_analyzed(own="11"))
+    assert "zone-by-program" not in kinds(read(_analyzed(own="11", zone="Z")))
+
+
+@pytest.mark.parametrize(
+    ("options", "says", "fix"),
+    [({}, "if its platform moves", "--platform fixed"), ({"platform": "moving"}, "from a moving platform's", "")],
+)
+def test_wind_over_ground_on_a_network_is_said_to_be_computed_where_something_moves(
+    read: Read, options: dict[str, str], says: str, fix: str
+) -> None:
+    log = read("".join(raw(i, speed=500 + i, reference=0) for i in range(4)), **options)
+    (said,) = [finding for finding in log.findings if finding.kind == "computed-true-wind"]
+    assert says in said.what
+    assert fix in (said.fix or "")

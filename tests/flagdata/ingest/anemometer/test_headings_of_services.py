@@ -11,6 +11,7 @@ import pytest
 
 from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest.anemometer.instants import abbreviations
 
 Write = Callable[..., Path]
 
@@ -53,3 +54,18 @@ def test_json_on_one_long_line_is_read(log_file: Write) -> None:
     text = json.dumps({"station": "roof", "observations": items})
     assert len(text) > 65_536
     assert read_log(log_file(text)).series.channels["wind_speed"].tolist() == [3.0 + at % 5 for at in range(1000)]
+
+
+@pytest.mark.parametrize(
+    ("line", "zone"),
+    [
+        ("#YY MM DD hhmm LAT LON WDIR WSPD GST PRES", ""),
+        ("day,clock,WDIR,WSPD,GST,PRES", ""),
+        ("Date Time GST Speed Direction Pressure", "+04:00"),
+        ("day,Time,GST,WDIR,WSPD", "+04:00"),
+        ("All clocks of the station are in IST", "+05:30"),
+        ("Stamp (GST),Speed,Direction,Pressure,Rain", "+04:00"),
+    ],
+)
+def test_the_heading_of_another_column_is_no_zone(line: str, zone: str) -> None:
+    assert f"--zone {zone}" in abbreviations.advice([line]) if zone else abbreviations.advice([line]) == ""

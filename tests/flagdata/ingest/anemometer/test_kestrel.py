@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from flagdata.errors import InputError
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
 from flagdata.timebase import iso
@@ -59,3 +60,44 @@ def test_the_impellers_data_sheet_is_the_sensors(read: Read) -> None:
 def test_speeds_below_the_impellers_start_are_in_its_dead_zone(read: Read) -> None:
     log = read(AMERICAN.replace(",10.0,", ",1.0,"), zone="UTC")  # 1 mph = 0.447 m/s < 0.6 m/s
     assert log.series.flags.tolist() == [SampleFlag.DEAD_ZONE, 0]
+
+
+QUOTED = (
+    "Device Name,K\nDevice Model,5400\nSerial Number,1\nFORMATTED DATE-TIME,Direction – True,Wind Speed,Temperature\n"
+    "YYYY-MM-DD HH:MM:SS,°,m/s,°C\n"
+    '2026-06-13 12:00:00,180,"3,5","21,4"\n2026-06-13 12:00:02,200,"4,0","21,4"\n'
+)
+
+
+@pytest.mark.parametrize("format_name", [None, "delimited"])
+def test_decimal_commas_in_quotes_are_read_in_an_export_of_few_rows(read: Read, format_name: str | None) -> None:
+    channels = read(QUOTED, zone="UTC", format=format_name).series.channels
+    assert channels["wind_speed"] == pytest.approx([3.5, 4.0])
+    assert np.degrees(channels["wind_direction"]) == pytest.approx([180, 200])
+
+
+@pytest.mark.parametrize(
+    "text", [QUOTED.replace('"21,4"', "21.4"), QUOTED.replace('"3,5"', '"3,500"').replace('"4,0"', '"4,000"')]
+)
+def test_a_comma_in_quotes_is_no_decimal_comma_where_that_is_in_doubt(read: Read, text: str) -> None:
+    with pytest.raises(InputError, match="unreadable values of wind_speed"):
+        read(text.replace('"21,4"', "21"), zone="UTC")
+
+
+PHONE = (
+    "Device Name,K\nDevice Model,5400\nSerial Number,1\n"
+    "FORMATTED DATE_TIME,Temperature,Station Pressure,Wind Speed,Compass Magnetic Direction,Compass True Direction\n"
+    "yyyy-MM-dd hh:mm:ss a,°C,mb,km/h,Deg,Deg,Data Type,Record name,Location address,Notes\n"
+    '2026-06-13 11:59:58 AM,21.4,1012.0,36.0,178,180,point,,"1 Main Street, Town",\n'
+    '2026-06-13 12:00:00 PM,21.4,1012.0,7.2,--,--,point,,"1 Main Street, Town",windy\n'
+)
+
+
+def test_the_phones_export_names_its_last_columns_in_the_line_of_units(read: Read) -> None:
+    log = read(PHONE, zone="UTC")
+    assert log.format == "kestrel"
+    assert [iso(t) for t in log.series.time] == ["2026-06-13T11:59:58Z", "2026-06-13T12:00:00Z"]
+    channels = log.series.channels
+    assert channels["wind_speed"] == pytest.approx([10.0, 2.0])
+    assert np.degrees(channels["wind_direction"]) == pytest.approx([180, np.nan], nan_ok=True)
+    assert np.degrees(channels["wind_direction_magnetic"]) == pytest.approx([178, np.nan], nan_ok=True)

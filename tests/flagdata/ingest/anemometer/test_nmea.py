@@ -10,8 +10,11 @@ from operator import xor
 import numpy as np
 import pytest
 
-from flagdata.errors import TimeError, UsageError
+from flagdata.errors import InputError, TimeError, UsageError
+from flagdata.ingest.anemometer.formats.nmea import Nmea
 from flagdata.ingest.anemometer.formats.sentences import ChecksumError, checksum, clock, split, tag_time
+from flagdata.ingest.anemometer.formats.stamped_nmea import StampedNmea
+from flagdata.ingest.anemometer.sniffing import Head
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
 from flagdata.timebase import iso
@@ -309,3 +312,75 @@ def test_marks_a_second_apart_or_winds_that_come_more_often_are_still_interpolat
     clocks = [f"12{at * step // 60:02d}{at * step % 60:02d}" for at in range(6)]
     log = read(stream(*(s for clock in clocks for s in (f"GPRMC,{clock},A,,,,,0.1,,010526,,", *wind))))
     assert "time-interpolated" in {finding.kind for finding in log.findings}
+
+
+def test_older_sentences_are_called_by_their_own_names(read: Read) -> None:
+    bodies = []
+    for second in range(0, 20, 2):
+        bodies += [f"GPZDA,1200{second:02d}.00,01,05,2026,00,00", f"IIVWR,80,L,5.{second % 7},N,,,,"]
+        bodies += [f"IIVWT,70,L,4.{second % 7},N,,,,", f"IIMDA,,,,,,,,,,,,,260.3,T,249.9,M,{second}.8,N,,M"]
+    log = read(stream(*bodies, "GPZDA,120020.00,01,05,2026,00,00"))
+    (finding,) = [f for f in log.findings if f.kind == "wind-kinds"]
+    assert all(name in finding.what for name in ("relative (VWR)", "theoretical (VWT)", "over ground (MDA)"))
+    assert "MW" not in finding.what
+
+
+MDA = "WIMDA,29.8,I,1.0,B,22.0,C,,,78.3,,18.0,C,260.3,T,249.9,M,1.8,N,0.9,M"
+
+
+@pytest.mark.parametrize(
+    ("speed", "options", "says", "fix"),
+    [
+        ("", {}, "(MDA): if its platform moves", "--platform fixed"),
+        ("", {"platform": "moving"}, "(MDA) was computed by the instrument from heading and speed of a moving", ""),
+        ("6.0", {}, "(MDA) was computed by the instrument from heading and speed of a platform that moves at 6", ""),
+    ],
+)
+def test_a_wind_over_ground_is_said_to_be_computed_where_something_moves(
+    read: Read, speed: str, options: dict[str, str], says: str, fix: str
+) -> None:
+    times = [f"GPRMC,12000{second}.00,A,5759.0,N,01144.3,E,{speed},28.27,010526,,,A" for second in (0, 1)]
+    log = read(stream(times[0], MDA, times[1]), **options)
+    (said,) = [f for f in log.findings if f.kind == "computed-true-wind"]
+    assert says in said.what
+    assert fix in (said.fix or "")
+
+
+def test_a_wind_that_the_stream_states_over_ground_is_called_so_on_a_fixed_platform(read: Read) -> None:
+    times = [f"GPZDA,12000{second}.00,01,05,2026,00,00" for second in (0, 2)]
+    log = read(stream(times[0], MDA, times[1]), platform="fixed")
+    (said,) = [f for f in log.findings if f.kind == "fixed-platform"]
+    assert said.what.endswith("the wind over ground is that of MDA")
+
+
+@pytest.mark.parametrize(
+    ("lines", "says"),
+    [
+        (["$IIVWR,80,L,5.1,N,,,,"] * 3, "3 of the first 3 lines are NMEA 0183 sentences, none of them with a checksum"),
+        ([line(MDA)] * 2, "2 of the first 2 lines are NMEA 0183 sentences with right checksums; 0 more have a wrong"),
+        ([line(MDA), f"${MDA}"], "2 of the first 2 lines are NMEA 0183 sentences, 1 of them with a checksum; 0 more"),
+    ],
+)
+def test_only_checksums_that_are_there_are_said_to_be_right(lines: list[str], says: str) -> None:
+    guess = Nmea().recognise(Head(lines=tuple(lines)))
+    assert guess is not None
+    assert guess.reasons[0].startswith(says)
+
+
+WITHOUT_WIND = [
+    line(body) for body in ("GPRMC,120000.00,A,5759.0,N,01144.3,E,5.2,28.27,010526,,,A", "IIMTW,16.8,C", "IIMTW,16.9,C")
+]
+
+
+def test_a_log_without_wind_is_told_that_it_has_none(read: Read) -> None:
+    with pytest.raises(InputError, match="not a log of a known format") as caught:
+        read("\n".join(WITHOUT_WIND))
+    assert "hold no sentence of wind" in str(caught.value.fix)
+    assert "there are 2 MTW, 1 RMC" in str(caught.value.fix)
+
+
+@pytest.mark.parametrize(("reader", "before"), [(Nmea, ""), (StampedNmea, "2026-05-01T12:00:00Z,")])
+def test_where_winds_may_come_later_the_format_can_be_named(reader: type[Nmea | StampedNmea], before: str) -> None:
+    guess = reader().recognise(Head(lines=tuple(before + text for text in WITHOUT_WIND)))
+    assert guess is not None
+    assert str(guess.fix).endswith(f"--as {reader.name}")

@@ -51,6 +51,11 @@ def test_a_buoys_table_is_utc_and_its_nines_are_none(read: Read) -> None:
     check(read(BUOY + "\n".join(lines)), 1.0, missing=3)
 
 
+def test_99_is_a_direction_of_a_buoys_wind(read: Read) -> None:
+    lines = [f"{t:%Y %m %d %H %M} {s + 96:3d} {s:4.1f} {s + 2:4.1f} 99.00 1012.3 15.2" for t, s, _ in rows()]
+    assert np.rad2deg(read(BUOY + "\n".join(lines)).series.channels["wind_direction"][0]) == pytest.approx(99)
+
+
 def test_a_buoys_older_table_has_years_of_two_digits(read: Read) -> None:
     head = "YY MM DD hh WD   WSPD GST  WVHT  BAR    ATMP\n"
     lines = [f"94 {t:%m %d %H} {d:3d} {s:4.1f} {s + 2:4.1f} 99.00 1012.3 15.2" for t, s, d in rows()]
@@ -296,3 +301,41 @@ def test_the_speeds_of_the_iowa_mesonet_are_miles_an_hour(read: Read) -> None:
     lines = [f"EDXW,{t:%Y-%m-%d %H:%M},{'M' if at == 3 else s},{'M' if at == 3 else d}" for at, (t, s, d) in
              enumerate(rows())]  # fmt: skip
     check(read("station,valid,sped,drct\n" + "\n".join(lines), zone="UTC"), MILE, missing=3)
+
+
+def test_the_latest_observations_of_buoys_are_a_wind_of_each_station(log_file: Write) -> None:
+    head = "#STN     LAT      LON  YYYY MM DD hh mm WDIR WSPD   GST   PRES  ATMP\n"
+    head += "#text    deg      deg   yr mo day hr mn degT  m/s   m/s    hPa  degC\n"
+    names = ("44005", "44014", "52ST1", "PVGF1")
+    lines = [
+        f"{name:5s}  31.760  -74.840 2024 05 17 {20 + at % 2} {50 - 10 * at:02d} {d:3d}  {s}.0    MM 1012.3    MM"
+        for at, (name, s, d) in enumerate(zip(names, SPEEDS, DEGREES, strict=False))
+    ]
+    logs = anemometers(log_file(head + "\n".join(lines)), WindOptions())
+    assert sorted(logs) == sorted(names)
+    for at, name in enumerate(names):
+        series = read_log(log_file(head + "\n".join(lines)), WindOptions(wind=name)).series
+        assert series.channels["wind_speed"] == pytest.approx([SPEEDS[at]])
+        assert np.rad2deg(series.channels["wind_direction"]) == pytest.approx([DEGREES[at]])
+        assert iso(int(series.time[0])) == f"2024-05-17T{20 + at % 2}:{50 - 10 * at:02d}:00Z"
+
+
+DRIFT = "#YY  MM DD hhmm     LAT      LON WDIR WSPD GST   PRES PTDY ATMP WTMP\n"
+DRIFT += "#yr  mo dy hrmn     deg      deg degT m/s  m/s    hPa  hPa degC degC\n"
+
+
+def test_a_drifting_buoys_table_is_utc_and_its_gust_is_no_zone(read: Read) -> None:
+    lines = [f"{t:%Y %m %d %H%M}   37.24   126.02 {d:3d}  {s}.0   MM 1004.2   MM 24.9 22.1" for t, s, d in rows()]
+    log = read(DRIFT + "\n".join(lines))
+    check(log, 1.0)
+    assert all("GST" not in finding.what for finding in log.findings)
+
+
+def test_the_supplemental_wind_of_a_buoy_is_said_to_be_the_highest(read: Read) -> None:
+    head = "#YY  MM DD hh mm   PRES PTIME  WSPD  WDIR WTIME\n#yr  mo dy hr mn    hPa  hhmm   m/s  degT  hhmm\n"
+    lines = [f"{t:%Y %m %d %H %M} 1019.3  1454     {s}   {d}  {t:%H%M}" for t, s, d in rows()]
+    log = read(head + "\n".join(lines))
+    check(log, 1.0)
+    (said,) = [finding for finding in log.findings if finding.kind == "highest-wind"]
+    assert said.severity.value == "warning"
+    assert "WTIME" in said.what

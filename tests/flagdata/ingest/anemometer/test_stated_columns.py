@@ -296,3 +296,11 @@ def test_a_day_of_the_year_may_have_a_fraction(read: Read, name: str) -> None:
     log = read(rows, zone="UTC", columns=f"year,{name},wind_speed[m/s]")
     start = np.datetime64("1996-09-11T00:00", "s").astype(np.int64)
     assert log.series.time / 1e9 - start == pytest.approx(np.arange(12) * 1800.0, abs=5.0)
+
+
+def test_a_unit_is_told_as_the_user_wrote_it(read: Callable[..., WindLog]) -> None:
+    rows = "".join(f"2026-05-01T12:{at:02d}:00Z,{30 + at}\n" for at in range(12))
+    log = read(f"time,speed of the wind\n{rows}", columns="time,wind_speed[0.1m/s]")
+    assert log.series.channels["wind_speed"][0] == pytest.approx(3.0)
+    assert "in 0.1m/s, as you said" in " ".join(log.reasons)
+    assert "in 0.1m/s, as you said" in " ".join(read(f"time,wind speed\n{rows}", unit="0.1m/s").reasons)

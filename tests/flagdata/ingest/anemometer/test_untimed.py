@@ -160,3 +160,20 @@ def test_a_count_that_does_not_begin_at_zero_is_told_with_the_start_that_it_may_
     (what,) = (finding.what for finding in log.findings if finding.kind == "elapsed-time")
     assert ("--start 2026-05-01T19:00:00Z" in what) == told
     assert not any("state their own zone" in finding.what for finding in log.findings)
+
+
+def test_nothing_is_said_of_stamps_that_were_counted(read: Read) -> None:
+    kinds = [f"$IIVWR,{80 + at},L,5.{at},N,,,,\n$IIVWT,{70 + at},L,4.{at},N,,,,\n" for at in range(6)]
+    log = read("".join(kinds), start=_START, rate=1.0)
+    assert since_start(log) == [at / 2 for at in range(12)]
+    assert "they are on the clock that was given" in log.reasons[0]
+    assert "computer's stamp" not in " ".join(log.reasons)
+    said = {finding.kind: finding for finding in log.findings}
+    assert {"rate-given", "counted-together"} <= set(said)
+    assert {"coarse-stamps", "held-stamps", "equal-stamps", "uneven-stamps"}.isdisjoint(said)
+    assert said["counted-together"].count == 6
+
+
+def test_lines_of_an_instrument_are_on_the_clock_that_was_given(read: Read) -> None:
+    log = read("".join(f"Q,{at:03d},00{at}.10,M,00,\n" for at in range(6)), start=_START, rate=1.0)
+    assert "they carry no time of their own: they are on the clock that was given" in log.reasons
