@@ -41,6 +41,10 @@ _OF_TIME = re.compile(
 _STAMP = re.compile(r"\d[-/.]\d{1,2}[-/.]\d|\d:\d\d")
 
 
+_QUANTITIES = frozenset({"GST"})
+"""Abbreviations that stand for a quantity as well: the gust."""
+
+
 def written_out(text: str) -> int | None:
     """Hours east of UTC of a zone whose name is written out in a text; None where it names none."""
     known = " ".join(text.replace("_", " ").lower().split())
@@ -61,7 +65,7 @@ def advice(lines: Sequence[str]) -> str:
 
 
 def _is_column(line: str, found: re.Match[str]) -> bool:
-    """Whether an abbreviation is the whole heading of a column among others, and none of a time stands before it.
+    """Whether an abbreviation of a quantity, too, is the whole heading of a column, and none of a time stands before it.
 
     GST is also the gust of tables of buoys, "... WDIR WSPD GST PRES"; in "Date Time GST Speed Direction" it is a zone.
     """
@@ -69,6 +73,6 @@ def _is_column(line: str, found: re.Match[str]) -> bool:
     if len(cells) < _HEADINGS:
         cells = list(_WORD.finditer(line)) if len(cells) == 1 and _SENTENCE.search(line) is None else []
     at = next((at for at, cell in enumerate(cells) if cell.end() > found.start(1)), 0)
-    if len(cells) < _HEADINGS or cells[at][0].strip(" \r\n#\"'") != found[1]:
+    if found[1] not in _QUANTITIES or len(cells) < _HEADINGS or cells[at][0].strip(" \r\n#\"'") != found[1]:
         return False
     return at == 0 or _OF_TIME.search(cells[at - 1][0]) is None

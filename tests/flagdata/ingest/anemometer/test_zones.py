@@ -9,6 +9,7 @@ import pytest
 
 from flagdata.errors import TimeError
 from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest.anemometer.instants.abbreviations import advice
 from flagdata.ingest.anemometer.instants.zones import stated
 from flagdata.signals import WindLog
 
@@ -79,3 +80,8 @@ def test_a_missing_zone_is_asked_for_with_what_the_file_says(log_file: Callable[
     path = log_file(f"Timezone=UTC\n{_TABLE}")
     with pytest.raises(TimeError, match="line 1 says 'Timezone=UTC': if that is the zone of the stamps, --zone UTC"):
         read_log(path, WindOptions())
+
+
+@pytest.mark.parametrize("heading", ["CST,Max wind mph,Wind SpeedMPH,Dew", "no,Year,DOY,MST,Direct,Wind speed [m/s]"])
+def test_the_letters_of_a_zone_as_a_heading_are_told_with_what_they_mean(heading: str) -> None:
+    assert "has several meanings" in advice([heading])
