@@ -109,7 +109,7 @@ SPELLINGS: dict[str, str] = {
     "mils": "mil", "graden": "deg", "grader": "deg", "gradi": "deg", "graus": "deg", "degrés": "deg",
     "degrees_true": "deg",
     "knoten": "kn", "knopen": "kn", "nudos": "kn", "nudo": "kn", "nœuds": "kn", "noeuds": "kn", "nœud": "kn",
-    "nodi": "kn",
+    "noeud": "kn", "nds": "kn", "nodi": "kn",
     "nós": "kn", "knop": "kn", "knob": "kn", "knuter": "kn", "węzły": "kn", "узлы": "kn", "solmua": "kn",
     "meter/sekund": "m/s", "meterprsekund": "m/s",
     "kilometer/timme": "km/h", "kilometer/time": "km/h", "km/tim": "km/h",

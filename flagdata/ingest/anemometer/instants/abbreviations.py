@@ -65,7 +65,7 @@ def advice(lines: Sequence[str]) -> str:
 
 
 def _is_column(line: str, found: re.Match[str]) -> bool:
-    """Whether an abbreviation of a quantity, too, is the whole heading of a column, and none of a time stands before it.
+    """Whether an abbreviation of a quantity, too, is the whole heading of a column and no time stands before it.
 
     GST is also the gust of tables of buoys, "... WDIR WSPD GST PRES"; in "Date Time GST Speed Direction" it is a zone.
     """

@@ -84,6 +84,12 @@ _TENTHS = re.compile(r"\btenths? of (?:an? )?", re.IGNORECASE)
 _RATE = re.compile(r"(?<![\d.])\d+(?:\.\d+)?\s?k?Hz(?![^\W_])", re.IGNORECASE)
 """The rate of samples in a heading ("u_20Hz"), which is no unit."""
 _OF_BRIDGE = re.compile(r"^\[?wind\d+(avg|)wind(?![a-z])")
+_PER = re.compile(
+    r"(?P<length>(?<![^\W_])k?m|(?:kilo)?met(?:er|re)s?)[_ ]?per[_ ]?(?P<time>s|sec|second|h|hr|hour)(?![a-z])",
+    re.IGNORECASE,
+)
+"""Units in words that are put together, as in metersPerSecond and km_per_h."""
+_MEAN_BEHIND = re.compile(r"[\s_]+[(\[]?(?P<mean>avg|mean|average|ave)[)\]]?$", re.IGNORECASE)
 _GLUED = re.compile(r"(?:speed|velocity|wind|gust)(?P<unit>km[/._]h|m[/._]s|km/?ph|miles)$", re.IGNORECASE)
 _U_SONIC = re.compile(r"\bu[- ]?sonic\b", re.IGNORECASE)  # an ultrasonic anemometer, as METOS writes; no component u
 """How Meteobridge names the speed of its anemometers ("wind0avgwind-act")."""
@@ -143,6 +149,7 @@ class Heading:
 def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
     text = in_english("" if is_format(name) else name[:120].strip().strip('"').strip())
+    text = _PER.sub(lambda found: f" {'k' * (found['length'][0] in 'kK')}m/{found['time'][0].lower()}", text)
     text = re.sub(r"^[Øø⌀]\s?(?=[^\W\d_]{2})", "mean ", text)
     text = re.sub(r"(?<=direction), ?\*$", ", deg", text, flags=re.IGNORECASE)  # a sign for degrees, lost by HOBO
     text = _PERIOD.sub(r"\1\2min", _ABOVE.sub(" ", _RATE.sub(" ", text)))
@@ -351,6 +358,9 @@ def _unit(text: str, stated: str) -> tuple[str, str | None]:
         spelt = re.sub(r"[._]", "/", glued["unit"]).lower().replace("miles", "mph").replace("km/ph", "km/h")
         if (inside := _known(spelt)) is not None:
             return text[: glued.start("unit")], inside
+    averaged = _MEAN_BEHIND.search(text)
+    if averaged is not None and (inside := _unit(text[: averaged.start()], "")[1]) is not None:
+        return f"{_unit(text[: averaged.start()], '')[0]} {averaged['mean']}", inside
     pieces = re.split(r"(\s*,\s*|\s+|_|;|:|-(?=[a-zA-Z]))", text)
     for count in (5, 3, 1):
         # At the end ("wind_speed_km_h", "Wind Speed, m/s") and at the beginning ("m/s Wind Speed").

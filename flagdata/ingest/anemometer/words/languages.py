@@ -60,7 +60,7 @@ _ASCII = re.compile(
 """What there is of these words in letters of ASCII."""
 
 
-_WIDE = str.maketrans("（）［］／：，％", "()[]/:,%")
+_WIDE = {0xFF01 + at: 0x21 + at for at in range(94)}
 """Signs in the width of Chinese and Japanese letters, and those they stand for."""
 
 

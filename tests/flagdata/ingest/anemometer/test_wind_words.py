@@ -111,3 +111,16 @@ def test_short_names_with_a_statistic_behind_them(heading: str, channel: str, sp
 
 def test_short_names_of_one_instrument_go_together() -> None:
     assert understand("WSpd").label == understand("WDir").label == ()
+
+
+@pytest.mark.parametrize(
+    ("heading", "unit"),
+    [
+        ("wind.speed.metersPerSecond", "m/s"), ("wind_speed_m_per_s", "m/s"), ("vitesse_km_per_h", "km/h"),
+        ("Wind Speed (meters per second)", "m/s"), ("Wind Speed m/s (avg)", "m/s"), ("ws km/h mean", "km/h"),
+        ("風速（ｍ／ｓ）", "m/s"), ("Vitesse du vent (nds)", "kn"),
+    ],
+)  # fmt: skip
+def test_units_in_words_and_before_their_statistic(heading: str, unit: str) -> None:
+    found = understand(heading)
+    assert (found.channel, found.unit) == ("wind_speed", unit)
