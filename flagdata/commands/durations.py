@@ -6,8 +6,8 @@ import re
 
 import click
 
-_SECONDS = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
-_WRITTEN = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(ms|s|min|h)\s*")
+_SECONDS = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86_400.0, "day": 86_400.0}
+_WRITTEN = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(ms|s|min|h|day|d)\s*")
 
 
 def written_seconds(text: str) -> float | None:
@@ -27,7 +27,7 @@ class Duration(click.ParamType):
             return value
         seconds = written_seconds(str(value))
         if seconds is None:
-            self.fail(f"{value!r} is not a length of time; give a number and ms, s, min or h, e.g. 10s", param, ctx)
+            self.fail(f"{value!r} is not a length of time; give a number and ms, s, min, h or d, e.g. 10s", param, ctx)
         return seconds
 
 

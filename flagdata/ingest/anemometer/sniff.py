@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from flagdata.ingest.anemometer.tables.line_kinds import line_kinds
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.signs import SIGNS
 from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.ingest.anemometer.words.headings import interest
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
 _MESHES = {".obj", ".ply", ".stl", ".off"}
@@ -86,6 +88,11 @@ def unknown(source: TextFile) -> Guess:
     other = foreign.told(source.head())
     if other is not None:
         return other
+    alone = [line for line in source.head(HEAD_LINES) if line.strip()]
+    if len(alone) == 1 and sum(interest(cell.strip(' "\ufeff')) > 0 for cell in re.split(r"[,;\t]", alone[0])) > 1:
+        text = "a line that names columns of a time or a wind, and no row below it"
+        fix = "check that the logger recorded anything, and that the file was copied whole"
+        return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix)
     across = numbered_across.told(source.head(HEAD_LINES))
     if across is not None:
         return Guess(format="unknown", score=0.0, reasons=(across[0],), kind="other", fix=across[1])

@@ -138,6 +138,8 @@ class Toa5:
         rivals: list[str] = []
         for name, spelling in zip(names, units, strict=True):
             channel = _channel(name)
+            if channel is not None and not channel.startswith("wind_") and understand(name, spelling).spread:
+                channel = None  # the maximum of a day is not its mean
             if channel is None or channel in channels:
                 if channel is not None and channel.startswith("wind_") and CHANNELS[channel].unit == "m/s":
                     rivals.append(name)

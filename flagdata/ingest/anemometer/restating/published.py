@@ -95,6 +95,7 @@ def _buoy(row: Row) -> str:
 def _knmi(row: Row) -> str:
     """The end of the hour that a row is of; of daily values their day."""
     day, hour = row.get("YYYYMMDD", "").strip(), row.get("HH", "0").strip()
+    day = re.sub(r"^(\d{4})-(\d\d)-(\d\d)$", r"\1\2\3", day)  # as tables that were read and written anew have it
     if not re.fullmatch(r"\d{8}", day) or not hour.isdigit() or int(hour) > 24:
         return ""
     try:
@@ -188,7 +189,7 @@ _PUBLISHED = (
     ),
     _Published(
         about="KNMI's hourly values",
-        needs=(_need("STN", "YYYYMMDD", "HH", "DD", "FF"), _need("STN", "YYYYMMDD", "HH", "DD", "FH")),
+        needs=(_need("YYYYMMDD", "HH", "DD", "FF"), _need("YYYYMMDD", "HH", "DD", "FH")),
         columns={
             "STN": "station", "FF": "wind speed [0.1 m/s]", "FH": "hourly mean wind speed [0.1 m/s]",
             "FX": "gust [0.1 m/s]", "DD": "wind direction [deg]",
@@ -197,7 +198,7 @@ _PUBLISHED = (
     ),
     _Published(
         about="KNMI's daily values",
-        needs=(_need("STN", "YYYYMMDD", "DDVEC", "FG"),),
+        needs=(_need("YYYYMMDD", "DDVEC", "FG"),),
         columns={
             "STN": "station", "FG": "daily mean wind speed [0.1 m/s]", "FXX": "gust [0.1 m/s]",
             "DDVEC": "wind direction [deg]",

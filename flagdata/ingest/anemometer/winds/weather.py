@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flagdata.ingest.anemometer.winds.found import Column, Found, Wind
-from flagdata.ingest.anemometer.words.headings import fits, words_of
+from flagdata.ingest.anemometer.words.headings import Heading, fits, words_of
 
 WEATHER = ("air_temperature", "sonic_temperature", "relative_humidity", "air_pressure")
 _PRESSURES = (("hPa", 800.0, 1100.0), ("kPa", 50.0, 110.0), ("inHg", 20.0, 33.0), ("Pa", 50_000.0, 110_000.0))
 """Ranges of the air pressure by unit [in it]; they do not overlap.
 
 From 500 to 800 it may be in hPa on a mountain or in mmHg."""
+_RELATIVE, _MOIST = frozenset({"rh", "relative", "rel", "relhum"}), 30.0
+"""Words of a humidity in %, and the largest specific or absolute humidity [g/kg, g/m³], which may be meant else."""
+_RAW = frozenset({"v", "mv", "a", "ma", "ohm", "kohm", "counts", "count", "hz", "adc", "raw"})
+"""Units of what a sensor gives before its calibration."""
 
 
 def with_weather(found: Found, wind: Wind, *, many: bool) -> Wind:
@@ -44,18 +49,29 @@ def _weather(found: Found, index: int, channel: str) -> Column | None:
     heading, value = found.headings[index], found.values[index]
     if fits(channel, heading.unit):
         return Column(index=index, unit=heading.unit, told=f"in {heading.unit} by its heading")
-    known = value[value >= 0]  # none is below zero, in K too: -9999 stands for no value
-    median = float(np.median(known)) if len(known) else np.nan
-    guess: str | None = None
-    if heading.unit is None and channel == "relative_humidity" and 1.5 < float(np.nanmax(value)) <= 115:
-        guess = "%"
-    if heading.unit is None and channel == "air_pressure":
-        guess = next((name for name, low, high in _PRESSURES if low <= median <= high), None)
-    if heading.unit is None and channel == "sonic_temperature" and 230 <= median <= 330:
-        guess = "K"
+    raw = heading.strange.lower() in _RAW
+    guess = None if heading.unit is not None or raw else _guessed(heading, value, channel)
     if guess is None:
-        remark = f"column {heading.name!r} looks like {channel}, but its unit is not stated: left out"
+        of_unit = f"but is in {heading.strange!r}" if raw else "but its unit is not stated"
+        remark = f"column {heading.name!r} looks like {channel}, {of_unit}: left out"
         if remark not in found.remarks:
             found.remarks.append(remark)
         return None
-    return Column(index=index, unit=guess, told=f"in {guess} by its values, about {median:.4g}")
+    return Column(index=index, unit=guess, told=f"in {guess} by its values, about {_median(value):.4g}")
+
+
+def _guessed(heading: Heading, value: NDArray[np.float64], channel: str) -> str | None:
+    """The unit of a quantity whose heading states none, by its numbers; `None` where they do not tell."""
+    median = _median(value)
+    if channel == "relative_humidity":
+        least = 1.5 if _RELATIVE & set(words_of(heading.name)) else _MOIST
+        return "%" if least < float(np.nanmax(value)) <= 115 else None
+    if channel == "air_pressure":
+        return next((name for name, low, high in _PRESSURES if low <= median <= high), None)
+    return "K" if channel == "sonic_temperature" and 230 <= median <= 330 else None
+
+
+def _median(value: NDArray[np.float64]) -> float:
+    """That of numbers from zero on: none is below, in K too, and -9999 stands for no value."""
+    known = value[value >= 0]
+    return float(np.median(known)) if len(known) else np.nan

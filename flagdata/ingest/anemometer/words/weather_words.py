@@ -15,7 +15,7 @@ _NO_AIR = frozenset(
         "sea", "heat",
         "index", "feels", "apparent", "anemometer", "inside", "room", "device", "module", "sst", "wbgt", "grass",
         "radiometer", "body", "cell", "ptemp", "rad", "road", "pv", "black", "leaf", "potential", "theta", "housing",
-        "heater", "chip", "core", "irga", "crystal", "windchill", "heatindex", "cab", "cabine", "in",
+        "heater", "chip", "pod", "core", "irga", "crystal", "windchill", "heatindex", "cab", "cabine", "in",
         "gyro", "mpu", "w", "wt",
         "wtemp", "watertemp", "therm", "thermistor", "bottom", "seabed", "seafloor", "ocean", "ice", "snow", "ground",
     }
@@ -39,6 +39,10 @@ _HUMIDITY = frozenset({"rh", "hum", "humidity", "humid", "feuchte", "luftfeuchte
 _PRESSURE = frozenset(
     {"press", "pressure", "baro", "barometer", "druck", "luftdruck", "bp", "barometric", "pression", "presion", "pa"}
 )
+_NO_AIR_PRESSURE = frozenset(
+    {"sea", "msl", "slp", "qnh", "vapor", "vapour", "vap", "vp", "vpd", "saturation", "sat", "partial", "deficit",
+     "box", "cell", "mslp"}
+)  # fmt: skip
 ALL = _TEMPERATURE | _HUMIDITY | _PRESSURE
 """Words of the three quantities."""
 
@@ -68,11 +72,7 @@ def channel(words: list[str], compact: str, si: str | None) -> tuple[str, bool, 
     if si in (None, "1") and (known & _HUMIDITY or re.search(r"humid|^rh", compact)) and not no_air:
         return "relative_humidity", True, known & _HUMIDITY
     pressed = known & _PRESSURE or re.search(r"press|baro|^p$|^p\d+$", compact)
-    if (
-        si in (None, "Pa")
-        and pressed
-        and not known & {"sea", "msl", "slp", "qnh", "vapor", "vapour", "box", "cell", "mslp"}
-    ):
+    if si in (None, "Pa") and pressed and not known & _NO_AIR_PRESSURE:
         return "air_pressure", True, known & (_PRESSURE | {"p"})
     return "", False, set()
 

@@ -109,3 +109,23 @@ def test_a_direction_and_a_deviation_under_its_name_say_that_u_is_the_speed(read
     assert "wind_direction" in log.series.channels
     with pytest.raises(InputError, match="may be a wind or another speed"):
         read(table("time,U (m/s),P,Q,R", row))
+
+
+@pytest.mark.parametrize(
+    "heading",
+    ["Vap_Press_Avg (kPa)", "Pod Humidity (%)", "saturation vapour pressure (hPa)"],
+)
+def test_other_pressures_and_humidities_are_not_those_of_the_air(heading: str) -> None:
+    assert understand(heading).quantity == ""
+
+
+@pytest.mark.parametrize(("heading", "value", "read_as"), [
+    ("humidity", "6.1", False), ("humidity", "61.5", True), ("RH", "6.1", True),
+    ("Relative Humidity (mA)", "56.3", False),
+])  # fmt: skip
+def test_a_humidity_without_a_unit_is_in_percent_where_it_can_be_nothing_else(
+    read: Callable[..., WindLog], heading: str, value: str, read_as: bool
+) -> None:
+    rows = [f"2026-05-01T12:{at:02d}:00Z,{3 + at % 4}.5,{value}" for at in range(20)]
+    log = read("\n".join([f"Time,Wind speed (m/s),{heading}", *rows]) + "\n")
+    assert ("relative_humidity" in log.series.channels) == read_as

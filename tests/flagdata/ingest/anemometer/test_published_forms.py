@@ -339,3 +339,11 @@ def test_the_supplemental_wind_of_a_buoy_is_said_to_be_the_highest(read: Read) -
     (said,) = [finding for finding in log.findings if finding.kind == "highest-wind"]
     assert said.severity.value == "warning"
     assert "WTIME" in said.what
+
+
+def test_knmis_daily_values_are_read_without_their_station_and_with_hyphens(read: Read) -> None:
+    rows = [f"1996-01-{1 + at:02d},-6,8,2,31,72,{51 + at},11,10026,100,{117 + at}" for at in range(20)]
+    log = read("\n".join(["YYYYMMDD,TN,TX,TG,FHN,FHX,FG,RH,PG,UG,DDVEC", *rows]) + "\n")
+    assert log.series.channels["wind_speed"][:2].tolist() == pytest.approx([5.1, 5.2])
+    assert np.degrees(log.series.channels["wind_direction"][:2]).tolist() == pytest.approx([117, 118])
+    assert "relative_humidity" not in log.series.channels

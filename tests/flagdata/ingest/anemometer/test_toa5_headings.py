@@ -49,3 +49,13 @@ def test_components_that_point_where_the_wind_comes_from_are_told(read: Read) ->
     (told,) = contradictions(1)
     assert "points to where the wind comes from by 'u_Avg' and 'v_Avg'" in told
     assert contradictions(-1) == []
+
+
+def test_the_maximum_of_a_temperature_is_not_taken_for_its_mean(read: Read) -> None:
+    head = '"TOA5","met","CR1000","1","CR1000.Std.32","met.CR1","1","day"\n'
+    head += '"TIMESTAMP","RECORD","AirTemp_Max","AirTemp_Avg","WS_ms_Avg","WindDir"\n'
+    head += '"TS","RN","Deg C","Deg C","m/s","Deg"\n'
+    head += '"","","Max","Avg","Avg","Smp"\n'
+    rows = [f'"2026-05-01 12:{at:02d}:00",{at},25.5,{9 + at % 3}.5,3.{at % 10},{200 + at}' for at in range(30)]
+    log = read(head + "\n".join(rows) + "\n", zone="UTC")
+    assert log.series.channels["air_temperature"][:2].tolist() == pytest.approx([282.65, 283.65])

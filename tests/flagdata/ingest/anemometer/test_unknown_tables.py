@@ -205,3 +205,9 @@ def test_hours_across_of_places_without_a_day_are_named_with_what_can_be_done(lo
     with pytest.raises(FlagdataError, match="columns 4 to 26 are numbered 0 to 22") as caught:
         read_log(path, WindOptions())
     assert "each row is one reading" in (caught.value.fix or "")
+
+
+def test_a_heading_without_rows_is_called_so(log_file: Callable[[str], Path]) -> None:
+    with pytest.raises(FlagdataError, match="no row below it") as caught:
+        read_log(log_file("Time,Wind speed,Wind direction: North(180)/South(0)\n"), WindOptions())
+    assert "recorded anything" in (caught.value.fix or "")
