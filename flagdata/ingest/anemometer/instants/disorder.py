@@ -8,6 +8,7 @@ at the logger's step, and fewer steps differ from it than in the file.
 
 from __future__ import annotations
 
+import datetime as dt
 from bisect import bisect_right
 from dataclasses import dataclass
 
@@ -145,3 +146,29 @@ def longest_rise(time: Instants) -> NDArray[np.int64]:
         chain[place] = at
         at = int(previous[at])
     return chain
+
+
+def turned_about(before: int, after: int) -> bool:
+    """Whether the stamp after a fall follows the one before it by a day or less, once day and month of one change.
+
+    Args:
+        before: the latest stamp before the fall [UTC ns].
+        after: the stamp behind it [UTC ns]. Both are tried in all zones of whole hours.
+    """
+    for hours in range(-12, 15):
+        here, there = (_wall(stamp, hours) for stamp in (before, after))
+        for first, second in ((_turned(here), there), (here, _turned(there))):
+            if first is not None and second is not None and dt.timedelta(0) < second - first <= dt.timedelta(days=1):
+                return True
+    return False
+
+
+def _wall(stamp: int, hours: int) -> dt.datetime:
+    return dt.datetime.fromtimestamp(stamp / NANOSECONDS, dt.UTC) + dt.timedelta(hours=hours)
+
+
+def _turned(wall: dt.datetime) -> dt.datetime | None:
+    """A stamp with its month as its day; `None` where that is no date, or the same."""
+    if wall.day > 12 or wall.day == wall.month:
+        return None
+    return wall.replace(month=wall.day, day=wall.month)

@@ -217,7 +217,10 @@ def _risen(reading: Reading, lag: NDArray[np.int64], few: int, where: str, *, se
         whose = "--clock first (before it) or --clock last (after it)"
         ways = [f"or, if one log's clock was set anew, say whose stamps are right: {whose}"] if settable else []
         why = "the logger's clock was set back, or files were joined"
-        if len(backwards) > _JOINED:
+        if disorder.turned_about(int(time[at] + lag[at]), int(time[at])):
+            why = "day and month change places there, as where a spreadsheet read a part of the dates"
+            ways = ["split the file there and ingest each part by itself, with its own --date-order"]
+        elif len(backwards) > _JOINED:
             ways = [sort, *ways, "if rows of several stations are mixed, name the column that tells them apart as site"]
             why = f"so it does in {len(backwards)} places, where rows are in no order or of several stations"
         else:

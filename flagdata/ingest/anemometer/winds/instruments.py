@@ -14,6 +14,7 @@ from flagdata.ingest.anemometer.winds import (
     beside,
     bow,
     codes,
+    longer_periods,
     other_units,
     own_motion,
     places_in_names,
@@ -48,6 +49,9 @@ def find_winds(
         told: unit of the wind by the user's word; it goes before the heading's.
     """
     found = _gathered(layout, time)
+    for index in longer_periods.beside_readings(found):
+        why = "is of a whole day or a longer time by its heading, beside readings; --wind with its name reads it"
+        _leave_out(found, index, why)
     open_ones = [at for at in found.of("wind_speed") if (own := found.headings[at]).unit is None and own.height is None]
     for index, first in other_units.again(found.values, open_ones).items():
         found.remarks.append(f"column {found.name(index)!r} is {found.name(first)!r} in another unit: left out")

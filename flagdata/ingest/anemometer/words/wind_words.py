@@ -14,7 +14,7 @@ SPEED = frozenset(
         "windgeschwindigkeit", "vit", "windspeed", "windspd", "windsp", "wndspd", "wspd", "wspeed", "ws", "wsp", "wsd",
         "ff", "snelheid", "windsnelheid", "velocita", "velocità", "hastighet", "vindhastighet", "anemometer", "anem",
         "wdsp", "wspm", "sknt", "windvelocity", "windgeschw", "geschw", "wg", "wv", "mph", "kmh", "kph", "knots",
-        "windstrength", "winspd", "winspeed", "velmedia", "vvento", "vviento", "vvent",
+        "windstrength", "winspd", "winspeed", "velmedia", "rapidez", "vvento", "vviento", "vvent",
     }
 )  # fmt: skip
 DIRECTION = frozenset(

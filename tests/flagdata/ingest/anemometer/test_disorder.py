@@ -11,9 +11,9 @@ import pytest
 
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import WindOptions, anemometers
+from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
 from flagdata.ingest.anemometer.instants.clock import ClockChoice
-from flagdata.ingest.anemometer.instants.disorder import longest_rise, sorting
+from flagdata.ingest.anemometer.instants.disorder import longest_rise, sorting, turned_about
 from flagdata.rng import stream
 from flagdata.signals import WindLog
 
@@ -227,3 +227,27 @@ def test_a_word_on_the_clock_is_offered_only_where_it_would_have_the_rows_read(r
         assert caught.value.fix.startswith("if all stamps are right and only the rows are out of order: --clock sort")
         assert "split" not in caught.value.fix
     assert len(read(text, zone="UTC", clock="sort").series.time) == 40
+
+
+def test_a_day_and_a_month_that_change_places_are_named(log_file: Callable[[str], Path]) -> None:
+    hours = [dt.datetime(2020, 1, 1, tzinfo=dt.UTC) + dt.timedelta(hours=at) for at in range(24 * 14)]
+    stamps = [f"{one:%m-%d-%Y %H:%M}" if one.day <= 12 else f"{one:%d-%m-%Y %H:%M}" for one in hours]
+    path = log_file(
+        "\n".join(["Date,Wind speed (m/s)", *(f"{stamp},3.{at % 10}" for at, stamp in enumerate(stamps))]) + "\n"
+    )
+    with pytest.raises(TimeError, match="day and month change places there") as caught:
+        read_log(path, WindOptions(zone="Europe/Istanbul"))
+    assert "--clock" not in (caught.value.fix or "")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "turned"),
+    [
+        ("2020-12-01T20:00", "2020-01-12T21:00", True), ("2020-01-31T23:00", "2020-01-02T00:00", True),
+        ("2020-01-31T23:00", "2020-01-20T00:00", False),
+        ("2020-03-10T12:00", "2020-03-10T11:00", False), ("2020-03-10T12:00", "2019-03-10T12:00", False),
+    ],
+)  # fmt: skip
+def test_stamps_follow_once_day_and_month_are_turned_about(before: str, after: str, turned: bool) -> None:
+    first, second = (int(np.datetime64(text, "ns").astype(np.int64)) for text in (before, after))
+    assert turned_about(first, second) == turned

@@ -254,3 +254,24 @@ def test_codes_of_no_value_do_not_tell_a_unit(log_file: Write) -> None:
     with pytest.raises(InputError) as raised:
         read_log(log_file(_table("time,wind speed", rows)), WindOptions())
     assert "extreme wind" not in raised.value.what
+
+
+def test_a_days_mean_and_maximum_beside_readings_are_no_winds(log_file: Callable[[str], Path]) -> None:
+    heading = "DATE,AWND,DailyAverageWindSpeed,DailySustainedWindSpeed,DailySustainedWindDirection,HourlyWindSpeed,"
+    heading += "HourlyWindDirection"
+    rows = [f"2026-05-{1 + at // 24:02d}T{at % 24:02d}:52:00Z,,,,,{3 + at % 5},{200 + at % 50}" for at in range(48)]
+    rows[23] = "2026-05-01T23:59:00Z,,5.7,23,300,,"
+    rows[47] = "2026-05-02T23:59:00Z,8.7,5.9,21,310,,"
+    path = log_file("\n".join([heading, *rows]) + "\n")
+    assert anemometers(path, WindOptions(unit="mph")) in (("HourlyWindSpeed",), ())
+    log = read_log(path, WindOptions(unit="mph"))
+    assert log.series.channels["wind_speed"][:2].tolist() == pytest.approx([3 * 0.44704, 4 * 0.44704])
+    told = " ".join(found.what for found in log.findings)
+    assert "'DailySustainedWindSpeed' is of a whole day" in told
+    assert "'AWND' is of a whole day" in told
+
+
+def test_days_means_alone_are_read(log_file: Callable[[str], Path]) -> None:
+    rows = [f"2026-05-{1 + at:02d},{3 + at % 5}.5" for at in range(20)]
+    path = log_file("\n".join(["date,Daily mean wind speed (m/s)", *rows]) + "\n")
+    assert len(read_log(path, WindOptions(zone="UTC")).series.time) == 20
