@@ -24,7 +24,7 @@ from flagdata.ingest.anemometer.restating.restate import restate
 from flagdata.ingest.anemometer.samples import calm_zeros, future, platform, possible, quality, zero
 from flagdata.ingest.anemometer.samples.order import in_order
 from flagdata.ingest.anemometer.sniff import unknown
-from flagdata.ingest.anemometer.sniffing import SURE
+from flagdata.ingest.anemometer.sniffing import SURE, as_taken
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import CHANNELS, UNUSABLE
 from flagdata.signals import WindLog, WindSeries
@@ -164,10 +164,7 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
         return name, options, (f"the recipe {options.recipe} was named",)
     if options.columns is not None:
         return "delimited", options, ("its columns were named",)
-    guesses = recognise(source)
-    if guesses and guesses[0].score < SURE:
-        # A table in doubt is refused by its own reader, which knows what the user has said already.
-        guesses = tuple(sorted(guesses, key=lambda guess: not guess.doubts))
+    guesses = as_taken(recognise(source))
     if not guesses or (guesses[0].score < SURE and not guesses[0].doubts):
         guesses = guesses or (unknown(source),)
         seen = "; ".join(reason for guess in guesses for reason in guess.reasons)

@@ -15,7 +15,7 @@ from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.recognition import recognise
 from flagdata.ingest.anemometer.restating import bulletins, spelled_stamps, untimed
 from flagdata.ingest.anemometer.restating.restate import restate
-from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, GuessKind
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, GuessKind, as_taken
 from flagdata.ingest.anemometer.tables import numbered_across
 from flagdata.ingest.anemometer.tables.drafted_recipe import skeleton
 from flagdata.ingest.anemometer.tables.line_kinds import line_kinds
@@ -71,7 +71,7 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
     if surely is not None:
         return (surely,)
     rewritten = tuple(finding.what for finding in source.findings)
-    found = tuple(replace(guess, notes=(*rewritten, *guess.notes)) for guess in recognise(source))
+    found = tuple(replace(guess, notes=(*rewritten, *guess.notes)) for guess in as_taken(recognise(source)))
     return found or (unknown(source),)
 
 

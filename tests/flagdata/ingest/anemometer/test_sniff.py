@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.errors import InputError, NotFoundError
-from flagdata.ingest.anemometer import sniff
+from flagdata.errors import FlagdataError, InputError, NotFoundError
+from flagdata.ingest.anemometer import WindOptions, read_log, sniff
 
 Write = Callable[..., Path]
 
@@ -76,3 +76,12 @@ def test_what_is_not_there_or_empty_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "empty.csv").touch()
     with pytest.raises(InputError, match="empty"):
         sniff(tmp_path / "empty.csv")
+
+
+def test_the_first_guess_is_the_one_that_is_tried(log_file: Write) -> None:
+    path = log_file("".join(f"2026-05-01T12:00:{at:02d}.5,{at % 3}.25\n" for at in range(30)))
+    first = sniff(path)[0]
+    with pytest.raises(FlagdataError) as caught:
+        read_log(path, WindOptions())
+    assert first.doubts
+    assert caught.value.what in first.doubts[0]
