@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flagdata.units import unit
 
-_UNITS = ("m/s", "km/h", "mph", "kn", "ft/s")
+_UNITS = ("m/s", "km/h", "mph", "kn", "ft/s", "dm/s", "cm/s")
 _DIFFERENT = 4
 """Different speeds from which a constant ratio between two columns is evidence."""
 _SHARE, _WIDER = 0.95, 3.0

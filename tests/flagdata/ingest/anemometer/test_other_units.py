@@ -34,6 +34,13 @@ def test_a_speed_that_is_another_in_other_units_is_not_read_in_the_users_unit(re
     assert "column 'wind speed B' is 'wind speed A' in another unit: left out" in said
 
 
+@pytest.mark.parametrize("factor", [10, 100])
+def test_a_speed_ten_or_a_hundred_times_another_is_the_same_wind(read: Read, factor: int) -> None:
+    log = read(table("wind speed A", "wind speed B", MPH * factor), unit="mph")
+    np.testing.assert_allclose(log.series.channels["wind_speed"], MPH * 0.44704)
+    assert any("'wind speed B' is 'wind speed A' in another unit" in finding.what for finding in log.findings)
+
+
 def test_two_anemometers_stay_two(read: Read) -> None:
     with pytest.raises(InputError, match="2 anemometers"):
         read(table("wind speed A", "wind speed B", np.array([5.0, 6, 14, 12, 21, 9, 8, 10])), unit="mph")
