@@ -66,7 +66,7 @@ def in_order(
     Raises:
         TimeError: time runs back in a way that no rule explains, or most rows share a date without a time of day.
     """
-    reading = _put_in_order(_without_empty_rows(reading), choice)
+    reading = _put_in_order(_without_empty_twins(_without_empty_rows(reading)), choice)
     reading = _without_repeated_stretches(reading)
     reading = _sorted(reading, where, None if choice == "sort" else choice)
     reading = _without_repeats(reading, source)
@@ -93,10 +93,28 @@ def _refuse_bare_dates(reading: Reading, where: str) -> None:
     )  # fmt: skip
 
 
+def _empty(reading: Reading) -> NDArray[np.bool_]:
+    """Rows that hold no value."""
+    return np.logical_and.reduce([np.isnan(values) for values in reading.channels.values()])
+
+
+def _without_empty_twins(reading: Reading) -> Reading:
+    """The rows without those that hold no value and have the stamp of a row that does: a summary beside a report."""
+    empty = _empty(reading)
+    twins = empty & np.isin(reading.time, reading.time[~empty])
+    if not reading.stamped or not twins.any():
+        return reading
+    finding = Finding(
+        kind="empty-rows", severity=Severity.NOTE, count=int(twins.sum()), where=f"line {reading.line[twins][0]}",
+        what=f"{int(twins.sum())} rows hold no value that is read, beside a row of the same stamp that does; left out",
+    )  # fmt: skip
+    return reading.take(~twins).with_findings((finding,))
+
+
 def _without_empty_rows(reading: Reading) -> Reading:
     """The rows without those that hold no value, where these run back and the others do so less."""
     back = int((np.diff(reading.time) < 0).sum())
-    empty = np.logical_and.reduce([np.isnan(values) for values in reading.channels.values()])
+    empty = _empty(reading)
     if not back or not empty.any() or empty.all() or int((np.diff(reading.time[~empty]) < 0).sum()) >= back:
         return reading
     finding = Finding(

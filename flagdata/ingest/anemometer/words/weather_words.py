@@ -66,7 +66,8 @@ def channel(words: list[str], compact: str, si: str | None) -> tuple[str, bool, 
         # TS is a sonic's among u, v and w, the soil's in ICOS's and AmeriFlux's tables.
         said = bool(known & {"sonic", "son", "acoustic", "tsonic", "tson", "csat"})
         return "sonic_temperature", said, known & {"sonic", "ts", "temp", "temperature", "t", "tsonic"}
-    no_air = bool(known & _NO_AIR) or any(word.startswith(_OF_GROUND) for word in words)
+    panel = words[:2] in (["p", "temp"], ["panel", "t"])  # PTemp_C, the temperature of a Campbell logger's panel
+    no_air = panel or bool(known & _NO_AIR) or any(word.startswith(_OF_GROUND) for word in words)
     if si in (None, "K") and (warm or (si == "K" and not known)) and not no_air and "dew" not in compact:
         return "air_temperature", True, (known & _TEMPERATURE) or (known & {"t"})
     if si in (None, "1") and (known & _HUMIDITY or re.search(r"humid|^rh", compact)) and not no_air:

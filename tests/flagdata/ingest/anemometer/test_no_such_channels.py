@@ -113,7 +113,13 @@ def test_a_direction_and_a_deviation_under_its_name_say_that_u_is_the_speed(read
 
 @pytest.mark.parametrize(
     "heading",
-    ["Vap_Press_Avg (kPa)", "Pod Humidity (%)", "saturation vapour pressure (hPa)"],
+    [
+        "Vap_Press_Avg (kPa)",
+        "Pod Humidity (%)",
+        "saturation vapour pressure (hPa)",
+        "PTemp_C_Avg (degC)",
+        "PanelT (degC)",
+    ],
 )
 def test_other_pressures_and_humidities_are_not_those_of_the_air(heading: str) -> None:
     assert understand(heading).quantity == ""

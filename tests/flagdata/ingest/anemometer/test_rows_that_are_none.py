@@ -90,3 +90,15 @@ def test_numbers_behind_letters_become_columns_that_the_user_names(read: Read) -
 )
 def test_other_lines_are_no_packed_letters(lines: list[str]) -> None:
     assert not packed_letters.matches(lines)
+
+
+def test_a_summary_row_beside_a_report_of_the_same_stamp_moves_none(read: Callable[..., WindLog]) -> None:
+    rows = [f"2026-05-{1 + at // 24:02d}T{at % 24:02d}:00:00Z,{3 + at % 5},," for at in range(72)]
+    for day in (2, 1):
+        rows.insert(24 * day, f"2026-05-{1 + day:02d}T00:00:00Z,,5.7,summary")
+    log = read("\n".join(["Time,Wind speed (m/s),rain,remark", *rows]) + "\n")
+    expected = np.datetime64("2026-05-01", "ns").astype(np.int64) + np.arange(72) * 3600 * 10**9
+    np.testing.assert_array_equal(log.series.time, expected)
+    kinds = {found.kind for found in log.findings}
+    assert "empty-rows" in kinds
+    assert not kinds & {"uneven-stamps", "duplicate-stamps", "equal-stamps"}
