@@ -306,7 +306,8 @@ def _fix(jump: Jump) -> str:
     choice = "if the clock was set, say whose stamps are right: --clock first (before it) or --clock last (after it)"
     if abs(jump.size) != HOUR:
         return choice
-    return f"if it is daylight saving, name the place by --zone Region/City, not a fixed offset; {choice}"
+    place = "if it is daylight saving, and the stamps state no offset, name the place by --zone Region/City"
+    return f"{place}; {choice}"
 
 
 def span(length: int) -> str:
