@@ -5,6 +5,7 @@ And what of the columns that are read contradicts another: components that point
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping
 
 from flagdata.findings import Finding, Severity
@@ -17,7 +18,7 @@ from flagdata.ingest.anemometer.times.timechoice import TimeChoice
 from flagdata.ingest.anemometer.times.timecolumns import find_time
 from flagdata.ingest.anemometer.winds.found import Column, Wind
 from flagdata.ingest.anemometer.winds.instruments import find_winds
-from flagdata.ingest.anemometer.words.headings import interest
+from flagdata.ingest.anemometer.words.headings import interest, understand
 
 
 def direction(
@@ -28,8 +29,10 @@ def direction(
     Args:
         channels: that are read, by names of columns.
     """
+    if "wind_speed" not in channels or {"wind_direction", "wind_x"} & set(channels):
+        return None, ()
     table = _table(source)
-    if table is None or "wind_speed" not in channels or {"wind_direction", "wind_x"} & set(channels):
+    if table is None:
         return None, ()
     layout, time = table
     winds, remarks, _ = find_winds(layout, time=time.columns)
@@ -49,8 +52,10 @@ def direction(
 
 def contradictions(source: TextFile, channels: Mapping[str, ChannelLayout]) -> tuple[Finding, ...]:
     """A warning for each direction that contradicts the components which are read."""
+    if not {"wind_x", "wind_y"} <= set(channels):
+        return ()
     table = _table(source)
-    if table is None or not {"wind_x", "wind_y"} <= set(channels):
+    if table is None:
         return ()
     texts = against_components.warnings(table[0], _as_read(table[0], channels), stated=False)
     return tuple(
@@ -63,7 +68,10 @@ def contradictions(source: TextFile, channels: Mapping[str, ChannelLayout]) -> t
 
 
 def _table(source: TextFile) -> tuple[Layout, TimeChoice] | None:
-    """The table as its headings tell it, with its time; `None` where they do not."""
+    """The table as its headings tell it, with its time; `None` where they do not, or name no direction."""
+    names = next(csv.reader(source.head(2)[1:]), [])
+    if not any("direction" in understand(name).quantity for name in names):
+        return None
     layout = lay_out(source.head(HEAD_LINES), interest=interest)
     time = None if layout is None else find_time(layout)
     return None if layout is None or time is None else (layout, time)
