@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.formats.exports import described
+from flagdata.ingest.anemometer.instants.month_names import ENGLISH
 from flagdata.ingest.anemometer.instants.stamps import Stamps
 from flagdata.ingest.anemometer.instants.stamps import parse as parse_stamps
 from flagdata.ingest.anemometer.reading import Reading
@@ -60,7 +61,6 @@ _COMPACT = re.compile(
     r"[\s,;>|]+(?P<raw>[$!]\S.*)"
 )
 """A stamp without signs between its numbers, before a sentence: "20260501 120000+00:00 $WIMWV,…"."""
-MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 GIVEN_CLOCK = "they carry no time of their own: they are on the clock that was given"
 LONGEST = 2000
 """Characters of the longest line of an instrument; longer ones are something else."""
@@ -124,8 +124,8 @@ def split_stamp(line: str) -> tuple[str, str]:
         raw = _unquoted(match["raw"])
         return stamp, _AFTER.sub("", raw) if raw.startswith(("$", "!")) else raw
     match = _MONTH.match(line) or _CTIME.match(line)
-    if match is not None and match["month"].lower() in MONTHS:
-        month = MONTHS.index(match["month"].lower()) + 1
+    if match is not None and match["month"].lower() in ENGLISH:
+        month = ENGLISH.index(match["month"].lower()) + 1
         return f"{match['year']}-{month:02d}-{match['day']:0>2}T{match['time']}", _unquoted(match["raw"])
     match = _COMPACT.match(line)
     if match is not None:

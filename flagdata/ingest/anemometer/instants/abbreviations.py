@@ -39,8 +39,6 @@ _OF_TIME = re.compile(
     re.IGNORECASE,
 )
 _STAMP = re.compile(r"\d[-/.]\d{1,2}[-/.]\d|\d:\d\d")
-
-
 _QUANTITIES = frozenset({"GST"})
 """Abbreviations that stand for a quantity as well: the gust."""
 
@@ -69,10 +67,12 @@ def _is_column(line: str, found: re.Match[str]) -> bool:
 
     GST is also the gust of tables of buoys, "... WDIR WSPD GST PRES"; in "Date Time GST Speed Direction" it is a zone.
     """
+    if found[1] not in _QUANTITIES:
+        return False
     cells = list(_CELL.finditer(line))
     if len(cells) < _HEADINGS:
         cells = list(_WORD.finditer(line)) if len(cells) == 1 and _SENTENCE.search(line) is None else []
     at = next((at for at, cell in enumerate(cells) if cell.end() > found.start(1)), 0)
-    if found[1] not in _QUANTITIES or len(cells) < _HEADINGS or cells[at][0].strip(" \r\n#\"'") != found[1]:
+    if len(cells) < _HEADINGS or cells[at][0].strip(" \r\n#\"'") != found[1]:
         return False
     return at == 0 or _OF_TIME.search(cells[at - 1][0]) is None

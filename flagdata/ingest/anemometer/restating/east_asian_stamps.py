@@ -43,7 +43,7 @@ def as_table(source: TextFile) -> TableText | None:
 
 def rewritten(line: str) -> str:
     """A line with its stamps as YYYY-MM-DD and HH:MM:SS."""
-    line = _DATE.sub(lambda found: "-".join(_padded(found[f"{part}"] or found[f"{part}2"]) for part in "ymd"), line)
+    line = _DATE.sub(lambda found: "-".join(_padded(found[part] or found[f"{part}2"]) for part in "ymd"), line)
     line = _HALF.sub(_of_twelve, line)
     return _CLOCK.sub(lambda found: ":".join(_padded(part) for part in found.groups() if part), line)
 

@@ -19,7 +19,7 @@ import datetime as dt
 import re
 from collections.abc import Sequence
 
-from flagdata.ingest.anemometer.formats.serial_lines import MONTHS
+from flagdata.ingest.anemometer.instants.month_names import ENGLISH
 from flagdata.ingest.anemometer.restating.restate import rows_of, table
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 
@@ -40,9 +40,9 @@ def matches(lines: Sequence[str]) -> bool:
 def as_table(source: TextFile) -> TableText | None:
     """The day, its mean speed and its prevailing direction; `None` where the month is none or no day is told."""
     title, stated = _found(source.head(), _TITLE), _found(source.head(), _UNIT)
-    if title is None or stated is None or title["month"].lower() not in MONTHS:
+    if title is None or stated is None or title["month"].lower() not in ENGLISH:
         return None
-    month = MONTHS.index(title["month"].lower()) + 1
+    month = ENGLISH.index(title["month"].lower()) + 1
 
     def row(line: str) -> list[str] | None:
         cells = line.split()

@@ -17,7 +17,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from flagdata.errors import TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
-from flagdata.ingest.anemometer.formats.serial_lines import MONTHS, split_stamp
+from flagdata.ingest.anemometer.formats.serial_lines import split_stamp
+from flagdata.ingest.anemometer.instants.month_names import ENGLISH
 from flagdata.ingest.anemometer.restating import labelled, line_protocol
 from flagdata.ingest.anemometer.restating.restate import restate
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Head
@@ -111,9 +112,9 @@ def clocked(source: TextFile) -> bool:
 def year_alone(source: TextFile) -> str | None:
     """The month and day of the first line, as 12-31, where the lines stand after dates without a year."""
     match = next((found for line in source.head(HEAD_LINES) if (found := _CLOCK_BEFORE.match(line))), None)
-    if match is None or not match["month"] or match["month"].lower() not in MONTHS:
+    if match is None or not match["month"] or match["month"].lower() not in ENGLISH:
         return None
-    return f"{MONTHS.index(match['month'].lower()) + 1:02d}-{int(match['day']):02d}"
+    return f"{ENGLISH.index(match['month'].lower()) + 1:02d}-{int(match['day']):02d}"
 
 
 def _of_year(match: re.Match[str], before: dt.date, *, first: bool, where: str) -> dt.date:
@@ -126,7 +127,7 @@ def _of_year(match: re.Match[str], before: dt.date, *, first: bool, where: str) 
         TimeError: no such month or day, or another one than the user gives.
     """
     name = match["month"].lower()
-    month = MONTHS.index(name) + 1 if name in MONTHS else 0
+    month = ENGLISH.index(name) + 1 if name in ENGLISH else 0
     year = before.year + (month < before.month - 6)
     try:
         found = dt.date(year, month, int(match["day"]))
