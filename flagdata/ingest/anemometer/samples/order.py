@@ -101,14 +101,13 @@ def _empty(reading: Reading) -> NDArray[np.bool_]:
 def _without_empty_twins(reading: Reading) -> Reading:
     """The rows without those that hold no value and have the stamp of a row that does: a summary beside a report."""
     empty = _empty(reading)
-    twins = empty & np.isin(reading.time, reading.time[~empty])
-    if not reading.stamped or not twins.any():
+    if not reading.stamped or not empty.any():
         return reading
-    finding = Finding(
-        kind="empty-rows", severity=Severity.NOTE, count=int(twins.sum()), where=f"line {reading.line[twins][0]}",
-        what=f"{int(twins.sum())} rows hold no value that is read, beside a row of the same stamp that does; left out",
-    )  # fmt: skip
-    return reading.take(~twins).with_findings((finding,))
+    twins = empty & np.isin(reading.time, reading.time[~empty])
+    if not twins.any():
+        return reading
+    which = "hold no value that is read, beside a row of the same stamp that does"
+    return _without(reading, twins, which, Severity.NOTE)
 
 
 def _without_empty_rows(reading: Reading) -> Reading:
@@ -117,9 +116,14 @@ def _without_empty_rows(reading: Reading) -> Reading:
     empty = _empty(reading)
     if not back or not empty.any() or empty.all() or int((np.diff(reading.time[~empty]) < 0).sum()) >= back:
         return reading
+    return _without(reading, empty, "hold no value, some of them with stamps that run back", Severity.WARNING)
+
+
+def _without(reading: Reading, empty: NDArray[np.bool_], which: str, severity: Severity) -> Reading:
+    """The rows without these empty ones, and what is said of them."""
     finding = Finding(
-        kind="empty-rows", severity=Severity.WARNING, count=int(empty.sum()), where=f"line {reading.line[empty][0]}",
-        what=f"{int(empty.sum())} rows hold no value, some of them with stamps that run back; left out",
+        kind="empty-rows", severity=severity, count=int(empty.sum()), where=f"line {reading.line[empty][0]}",
+        what=f"{int(empty.sum())} rows {which}; left out",
     )  # fmt: skip
     return reading.take(~empty).with_findings((finding,))
 
