@@ -46,16 +46,22 @@ class Delimited:
     uses = frozenset({"zone", "azimuth", "platform", "start", "date", *_ASKED})
 
     def recognise(self, head: Head) -> Guess | None:
-        """The recipe whose columns the header names; the one with most columns in common. Else the draft of one."""
+        """The recipe whose columns the header names; else the draft of one."""
+        best = self.by_recipe(head)
+        if best is not None:
+            return best
+        proposal = draft(head.lines)
+        return None if proposal is None else guess(proposal)
+
+    @staticmethod
+    def by_recipe(head: Head) -> Guess | None:
+        """The recipe of the catalog whose columns the header names; the one with most columns in common."""
         best: Guess | None = None
         for name in recipes.SENSORS.names():
             found = _match(recipes.load(name), name, head)
             if found and (best is None or found.score > best.score):
                 best = found
-        if best is not None:
-            return best
-        proposal = draft(head.lines)
-        return None if proposal is None else guess(proposal)
+        return best
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read a file by the recipe in `options`, or by its draft."""

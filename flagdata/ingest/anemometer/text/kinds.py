@@ -12,6 +12,8 @@ from flagdata.units import UNITS, plain_powers, spelled
 
 CellKind = Literal["number", "stamp", "missing", "text"]
 
+_NO_VALUE = re.compile(MISSING_SIGNS)
+_BELOW = re.compile(BELOW)
 _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 _STAMP = re.compile(
     r"\d{1,4}[-/.:]\d{1,2}([-/.:]\d{1,4})?([T ,_-]+\d{1,2}([:-]\d{1,2}){0,2}([.,:]\d+)?)?(\s*[AaPp]\.?[Mm]\.?)?"
@@ -52,9 +54,9 @@ _COMPOUND = re.compile(rf"{_ONE}(?:(?:[. ]{_ONE}\^?-[123])+|/{_ONE}[23]?)")
 def cell_kind(cell: str) -> CellKind:
     """What a cell seems to hold."""
     text = cell.strip().strip('"').strip()
-    if text.lower() in _MISSING or re.match(MISSING_SIGNS, text):
+    if text.lower() in _MISSING or _NO_VALUE.match(text):
         return "missing"
-    if _NUMBER.fullmatch(text) or unit_behind(text) or re.match(BELOW, text.replace(",", ".")):
+    if _NUMBER.fullmatch(text) or unit_behind(text) or _BELOW.match(text.replace(",", ".")):
         return "number"
     if _STAMP.fullmatch(text) or _MONTH_STAMP.fullmatch(text) or _is_dated(text):
         return "stamp"

@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 from flagdata.compass import CALM
@@ -90,6 +91,12 @@ def lay_out(lines: Sequence[str], *, interest: Callable[[str], int]) -> Layout |
         lines: the beginning of the file.
         interest: how much a cell looks like the heading of a time or a wind, to tell the line of names.
     """
+    return _laid_out(tuple(lines), interest)
+
+
+@lru_cache(maxsize=4)
+def _laid_out(lines: tuple[str, ...], interest: Callable[[str], int]) -> Layout | None:
+    """See `lay_out`; whoever recognises, completes and reads a table asks for the same lines."""
     filled = [(number, line) for number, line in enumerate(lines) if line.strip(" \t\x00\x1a")]
     tail = min(TAIL, max(1, len(filled) // 2))
     found = _lay_out(lines, filled, tail, interest)
