@@ -25,16 +25,9 @@ def recognise(source: TextFile) -> tuple[Guess, ...]:
         if guess is not None:
             found.append(guess)
     known = any(guess.score >= SURE for guess in found)
-    table = Delimited.by_recipe(head) if known else _table(source, head)
+    table = Delimited.by_recipe(head)
+    if table is None and not known and (proposal := drafted(source, WindOptions())) is not None:
+        table = drafted_guess(proposal)
     if table is not None:
         found.insert(0, table)
     return tuple(sorted(found, key=lambda guess: -guess.score))
-
-
-def _table(source: TextFile, head: Head) -> Guess | None:
-    """The guess at a table, by its later rows as well where they show more of its sites and columns."""
-    guess = Delimited().recognise(head)
-    if guess is None or guess.draft is None or len(head.lines) < HEAD_LINES:
-        return guess
-    proposal = drafted(source, WindOptions())
-    return guess if proposal is None else drafted_guess(proposal)
