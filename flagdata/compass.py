@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 _ROSE = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
-_DEGREES = {name: number * 22.5 for number, name in enumerate(_ROSE)}
+_POINT = 22.5
+_DEGREES = {name: number * _POINT for number, name in enumerate(_ROSE)}
 _WORDS: dict[str, tuple[str, str, str, str]] = {
     "en": ("NORTH", "EAST", "SOUTH", "WEST"), "de": ("NORD", "OST", "SÜD", "WEST"),
     "nl": ("NOORD", "OOST", "ZUID", "WEST"), "fr": ("NORD", "EST", "SUD", "OUEST"),
@@ -73,6 +74,16 @@ def _blowing() -> dict[str, float]:
     return found
 
 
+def _polish() -> dict[str, float]:
+    """PN., PN.-ZACH. and ZACH.PN.-ZACH., as Polish shortens północ, południe, wschód and zachód; the dots may lack."""
+    of = {"N": "PN.", "E": "WSCH.", "S": "PD.", "W": "ZACH."}
+    found: dict[str, float] = {}
+    for point, degrees in _DEGREES.items():
+        name = "".join(of[letter] for letter in point[:-2]) + "-".join(of[letter] for letter in point[-2:])
+        found |= dict.fromkeys((name, name.replace(".", "")), degrees)
+    return found
+
+
 def _letters(north: str, east: str, south: str, west: str) -> dict[str, float]:
     of = {"N": north, "E": east, "S": south, "W": west}
     return {"".join(of[letter] for letter in point): degrees for point, degrees in _DEGREES.items()}
@@ -89,6 +100,7 @@ _NAMES: dict[str, float] = (
     | _iberian()
     | _russian()
     | _blowing()
+    | _polish()
 )
 _COMMON = _NAMES | _FAR_EAST | {name.replace("東", "东"): degrees for name, degrees in _FAR_EAST.items()}
 
@@ -145,6 +157,12 @@ def table_of(cells: Sequence[str], *, heading: str, share: float) -> str | None:
         return known[0]
     told = [unit for unit in known if any(word in heading.lower() for word in _HEADINGS.get(unit, ()))]
     return told[0] if told else None
+
+
+def in_letters(cell: str, unit: str) -> str:
+    """A point of the table `unit` in the letters of English; "" where it holds none."""
+    degrees = BY_UNIT[unit].get(cell.strip().upper())
+    return "" if degrees is None else _ROSE[round(degrees / _POINT)]
 
 
 def may_be_two(cells: Sequence[str], *, share: float) -> bool:

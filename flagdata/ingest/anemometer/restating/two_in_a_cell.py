@@ -1,6 +1,7 @@
 """Tables with the wind's direction and speed in one cell, cut into two.
 
-2026-05-01 12:00,WSW 4.3 km/h        or 249@4.3, 249/12, 12 kt from SW, 4.3/249 below "speed/direction"
+2026-05-01 12:00,WSW 4.3 km/h        or 249@4.3, 249/12, 12 kt from SW, 4.3/249 below "speed/direction",
+                                     pn.-zach. 27 km/h and the like in other languages
 
 Two plain numbers are told apart by the order of the words in the heading, else by their values: no wind is faster than
 a hundred of any unit day after day, and no direction has decimals where the speed has none.
@@ -12,8 +13,9 @@ import csv
 import io
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from flagdata.compass import CALM, POINTS, STILL
+from flagdata.compass import CALM, POINTS, STILL, in_letters, table_of
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES
 from flagdata.ingest.anemometer.text.layout import Layout, cut, lay_out
@@ -25,6 +27,9 @@ _DIRECTION = r"(?P<direction>\d{1,3}(?:\.\d+)?(?=\s?°|\s*[@/])|[A-Za-z]{1,3}(?!
 _SPEED = r"(?P<speed>\d{1,3}(?:[.,]\d+)?)\s?(?P<unit>[^\W\d_]{1,5}(?:/[^\W\d_])?)?"
 _FIRST = re.compile(rf"{_DIRECTION}\s*(?:@|/|,|at)?\s*{_SPEED}", re.IGNORECASE)
 _LAST = re.compile(rf"{_SPEED}\s*(?:from|@|/)?\s+{_DIRECTION.replace('(?=', '(?=$|')}", re.IGNORECASE)
+_WORDS_FIRST = re.compile(rf"(?P<direction>[^\W\d_][^\d@/]*?)\s*{_SPEED}", re.IGNORECASE)
+_WORDS_LAST = re.compile(rf"{_SPEED}\s+(?P<direction>[^\W\d_][^\d@/]*)", re.IGNORECASE)
+"""A point of the compass in letters or words of any language, beside a speed with its unit."""
 _PAIR = re.compile(r"(\d{1,3}(?:[.,]\d+)?)\s?°?\s*[/|]\s*(\d{1,3}(?:[.,]\d+)?)\s?°?")
 """Two plain numbers, of which either may be the speed."""
 _PARTS = re.compile(r"\s*[/|,;&+]\s*|\s+(?:and|und|et|y|e|og|och)\s+")
@@ -33,7 +38,12 @@ _FASTEST = 100
 """A speed that no wind has, in any of the usual units, and many directions."""
 _GALE, _HALF_TURN, _TURN = 60, 180, 360
 """Below a heading that says nothing, speeds [any unit] and directions [deg] that tell a pair of them."""
-_NAMES = frozenset({"wind", "viento", "vent", "vento", "wnd"})
+_NAMES = frozenset(
+    {
+        "wind", "viento", "vent", "vento", "wnd", "wiatr", "vind", "tuuli", "tuul", "szél", "vítr", "vietor", "vjetar",
+        "veter", "rüzgar", "ветер", "вятър", "вітер", "angin", "vânt", "άνεμος",
+    }
+)  # fmt: skip
 _SHARE = 0.9
 _LEAST = 3
 
@@ -49,12 +59,12 @@ def as_table(source: TextFile) -> TableText | None:
     found = _column(source.head(HEAD_LINES))
     if found is None:
         return None
-    layout, column, unit, speed_first, sure = found
+    layout, column = found.layout, found.column
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     heading = [name or f"column {at}" for at, name in enumerate(layout.names, start=1)]
     others = [at for at in range(len(heading)) if at != column]
-    speed = f"wind speed [{unit}]" if unit else "wind speed"
+    speed = f"wind speed [{found.unit}]" if found.unit else "wind speed"
     writer.writerow([*(heading[at] for at in others), "wind direction", speed])
     short = 0
     for number, lines in source.blocks():
@@ -63,12 +73,11 @@ def as_table(source: TextFile) -> TableText | None:
             if len(cells) < len(heading):
                 short += bool(line.strip())
                 continue
-            both = _both(cells[column], speed_first=speed_first)
-            writer.writerow([*(cells[at] for at in others), *(("", "") if both is None else both[:2])])
-    order = "speed and direction" if speed_first else "direction and speed"
+            writer.writerow([*(cells[at] for at in others), *found.parts(cells[column])])
+    order = "speed and direction" if found.speed_first else "direction and speed"
     text = f"column {layout.names[column]!r} holds {order}: read as two columns behind the others"
     notes = [Finding(kind="two-in-a-cell", severity=Severity.NOTE, what=text)]
-    if not sure:
+    if not found.sure:
         text = f"no heading says that column {layout.names[column]!r} is a wind: taken as its {order} by the numbers"
         fix = "check the file's description"
         notes.append(Finding(kind="heading-doubtful", severity=Severity.WARNING, what=text, fix=fix))
@@ -78,10 +87,37 @@ def as_table(source: TextFile) -> TableText | None:
     return TableText.of(source, out.getvalue().splitlines(), notes)
 
 
-def _column(lines: Sequence[str]) -> tuple[Layout, int, str, bool, bool] | None:
-    """The table, the column that holds both, the one unit of its speeds ("" where none is written), whether the speed
-    comes first, and whether the heading says that it is a wind.
+@dataclass(frozen=True, kw_only=True)
+class _Both:
+    """The column of a table that holds the wind's direction and its speed.
+
+    Attributes:
+        layout: of the table.
+        column: its index.
+        unit: the one that all speeds are written with; "" where none is.
+        speed_first: whether the first of two plain numbers is the speed.
+        sure: whether the heading says that it is a wind.
+        points: the table of the compass by which words are its points (see `compass.BY_UNIT`); "" where there are none.
     """
+
+    layout: Layout
+    column: int
+    unit: str
+    speed_first: bool
+    sure: bool
+    points: str = ""
+
+    def parts(self, cell: str) -> tuple[str, str]:
+        """Direction and speed of a cell, "" for what it does not hold."""
+        if not self.points:
+            both = _both(cell, speed_first=self.speed_first)
+            return ("", "") if both is None else both[:2]
+        both = _in_words(cell)
+        return ("", "") if both is None else (in_letters(both[0], self.points), both[1])
+
+
+def _column(lines: Sequence[str]) -> _Both | None:
+    """The column that holds both; `None` where none does."""
     layout = lay_out(lines, interest=interest)
     if layout is None:
         return None
@@ -96,7 +132,16 @@ def _column(lines: Sequence[str]) -> tuple[Layout, int, str, bool, bool] | None:
         both = [found for cell in cells if (found := _both(cell, speed_first=speed_first)) is not None]
         units = {unit for _, _, unit in both}
         if len(both) >= max(_LEAST, _SHARE * len(cells)) and len(units) == 1:
-            return layout, column, units.pop(), speed_first, named
+            return _Both(
+                layout=layout, column=column, unit=units.pop(), speed_first=speed_first, sure=named
+            )  # fmt: skip
+        spoken = [found for cell in cells if (found := _in_words(cell)) is not None]
+        units = {unit for _, _, unit in spoken}
+        points = table_of([direction for direction, _, _ in spoken if direction], heading=name, share=_SHARE)
+        if points is not None and len(spoken) >= max(_LEAST, _SHARE * len(cells)) and len(units - {""}) == 1:
+            return _Both(
+                layout=layout, column=column, unit=(units - {""}).pop(), speed_first=False, sure=named, points=points
+            )  # fmt: skip
     return None
 
 
@@ -138,6 +183,18 @@ def _surely_both(layout: Layout, cells: Sequence[str]) -> bool:
     first, second = zip(*pairs, strict=True)
     whole = all(text.isdigit() for text in second) and any(re.search(r"[.,]", text) for text in first)
     return whole and _highest(first) <= _GALE and _HALF_TURN < _highest(second) <= _TURN
+
+
+def _in_words(cell: str) -> tuple[str, str, str] | None:
+    """Direction, speed and unit of a cell whose direction is in letters or words; calm air has none."""
+    if cell.strip().lower() in STILL:
+        return "", cell.strip(), ""
+    for shape in (_WORDS_FIRST, _WORDS_LAST):
+        match = shape.fullmatch(cell.strip())
+        named = spelled(match["unit"]) if match is not None and match["unit"] else None
+        if match is not None and named is not None and UNITS[named].si == "m/s":
+            return match["direction"].strip(), match["speed"].replace(",", "."), match["unit"]
+    return None
 
 
 def _both(cell: str, *, speed_first: bool) -> tuple[str, str, str] | None:

@@ -433,7 +433,7 @@ def _columns_and_time(layout: Layout, time: TimeChoice | None) -> list[str]:
     if layout.header and layout.named:
         named = f"line {layout.preamble + 1} names {layout.named} columns, of which rows fill the first "
         named += f"{layout.number_of_columns()}"
-    units = f", line {_units_line(layout)} their units" if any(layout.units) else ""
+    units = f", {_units_line(layout)} their units" if any(layout.units) else ""
     decimal = ", numbers have decimal commas" if layout.decimal == "," else ""
     found = [f"cells are divided by {delimiter_name(layout.delimiter)!r}{decimal}; {named}{units}"]
     if time is not None:
@@ -448,7 +448,9 @@ def _columns_and_time(layout: Layout, time: TimeChoice | None) -> list[str]:
 
 
 def _units_line(layout: Layout) -> str:
-    return f"{layout.preamble + 2}" if layout.header == 2 else "below"
+    if all(unit == behind for unit, behind in zip(layout.units, layout.suffixes, strict=True) if unit):
+        return "the cells themselves"
+    return f"line {layout.preamble + 2}" if layout.header == 2 else "line below"
 
 
 def _shown(layout: Layout, index: int) -> str:

@@ -417,7 +417,8 @@ def _counts(layout: Layout, index: int, texts: list[str]) -> Iterator[TimeChoice
             if bool(np.all((value > low) & (value < high))) and np.any(value % 1 != 0):
                 yield time_choice(layout, (index,), form, counted.parse(texts, form), 1.5)
                 return
-    told = (*words, *words_of(layout.units[index]), *(["minutes"] if _IN_MINUTES.search(name) else []))
+    own = words if names_time(name) or _LETTER.search(name) else [word for word in words if len(word) > 1]
+    told = (*own, *words_of(layout.units[index]), *(["minutes"] if _IN_MINUTES.search(name) else []))
     form = next((form for form, known in _COUNTERS if set(told) & known), None)
     if form is None and not (names_time(name) or words[:1] == ["t"]):
         return
@@ -479,6 +480,8 @@ _YEAR_AND_DAY = frozenset({"date", "yyddd", "yrdoy", "yydoy"})
 _PARTS_OF_DATES = frozenset({"hour", "hours", "hr", "day", "days", "doy", "jday", "julian", "year", "month"})
 _YEARS_AND_PARTS = frozenset({"decimal", "decyear", "dyear", "decdate", "decimalyear", "decimaldate"})
 _HOURS = frozenset({"hour", "hours", "hr", "hrs", "h"})
+_LETTER = re.compile(r"(?<![^\W_])[sh](?![^\W_])", re.IGNORECASE)
+"""A letter that stands by itself in a heading, as a unit does; that of "HXI3S" is a part of a code."""
 _IN_MINUTES = re.compile(r"[\[(]\s*min\.?\s*[\])]", re.IGNORECASE)
 """A unit behind a time; alone it may as well be a minimum."""
 _DAYS = 732.0

@@ -30,6 +30,9 @@ _TURN = 361.0
 _UNREADABLE = 0.1
 _NORTHS = frozenset({"true", "mag", "degt", "degm", "deg true", "deg mag"})
 """Units of directions, from true or magnetic north."""
+_SIGNS = frozenset({"°", "º", "˚"})
+_HOTTEST = 60.0
+"""No air is hotter, in °C."""
 
 
 def may_be_direction(layout: Layout, index: int) -> bool:
@@ -45,7 +48,10 @@ def may_be_direction(layout: Layout, index: int) -> bool:
         return False
     value = numbers(layout.column(index), decimal=layout.decimal).value
     known = value[np.isfinite(value)]
-    return len(known) > 0 and bool(np.all((known >= 0) & (known <= _TURN))) and not holds_marks(heading, value)
+    if not len(known) or holds_marks(heading, value) or float(known.min()) < 0 or float(known.max()) > _TURN:
+        return False
+    # The sign of degrees alone may as well be that of a temperature.
+    return bool(named) or layout.units[index].strip() not in _SIGNS or float(known.max()) > _HOTTEST
 
 
 def unit_of(layout: Layout, index: int) -> str:

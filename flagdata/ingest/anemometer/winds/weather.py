@@ -13,6 +13,8 @@ _PRESSURES = (("hPa", 800.0, 1100.0), ("kPa", 50.0, 110.0), ("inHg", 20.0, 33.0)
 """Ranges of the air pressure by unit [in it]; they do not overlap.
 
 From 500 to 800 it may be in hPa on a mountain or in mmHg."""
+_PRESSED = 0.9
+"""Of the numbers of a column, the share within a range that makes them air pressures in its unit."""
 _RELATIVE, _MOIST = frozenset({"rh", "relative", "rel", "relhum"}), 30.0
 """Words of a humidity in %, and the largest specific or absolute humidity [g/kg, g/m³], which may be meant else."""
 _RAW = frozenset({"v", "mv", "a", "ma", "ohm", "kohm", "counts", "count", "hz", "adc", "raw"})
@@ -67,7 +69,9 @@ def _guessed(heading: Heading, value: NDArray[np.float64], channel: str) -> str 
         least = 1.5 if _RELATIVE & set(words_of(heading.name)) else _MOIST
         return "%" if least < float(np.nanmax(value)) <= 115 else None
     if channel == "air_pressure":
-        return next((name for name, low, high in _PRESSURES if low <= median <= high), None)
+        known = value[value > 0]  # neither a failed sensor's 0 nor -9999
+        within = ((name, float(((known >= low) & (known <= high)).mean())) for name, low, high in _PRESSURES)
+        return next((name for name, share in within if len(known) and share >= _PRESSED), None)
     return "K" if channel == "sonic_temperature" and 230 <= median <= 330 else None
 
 

@@ -26,7 +26,7 @@ _DIRECTION = (
     r"smer[\s_]*vetra|r[üu]zgar[\s_]*y[öo]n[üu]|arah\s*angin|tuulen\s*suun\w*|tuule\s*suund|vindretning|vindriktning|"
     r"szélirány|direc[tț]i[ae]\s*v[aâ]ntului|smjer\s*vjetra|(?:διεύθυνση|κατεύθυνση)\s*(?:του\s*)?ανέμου|"
     r"כיוון\s*ה?רוח|اتجاه\s*الرياح|hướng\s*gió|vēja\s*virziens|vėjo\s*kryptis|vindátt|vindstefna|"
-    r"direcció\s*(?:mitjana\s*)?(?:del\s*)?vent|haizearen\s*norabidea|ทิศทางลม|جهت\s*باد|drejtimi\s*i\s*erës"
+    r"\bdd?[\s_]+vi?ento\b|direcció\s*(?:mitjana\s*)?(?:del\s*)?vent|haizearen\s*norabidea|ทิศทางลม|جهت\s*باد|drejtimi\s*i\s*erës"
 )
 _TIME = (
     r"时间|時間|时刻|時刻|日時|日期|年月日|시간|일시|날짜|\b(?:время|годин[аи]|godzina|čas|zaman|waktu|tanggal|aika|"
