@@ -194,8 +194,8 @@ def _factored(text: str) -> str | None:
 
 
 def plain_powers(text: str) -> str:
-    """A unit's spelling with its powers as digits and a point for products: W/m² and W/m**2 as W/m2, m·s⁻¹ as m.s-1."""
-    return re.sub(r"\*\*|\^", "", text.translate(_POWERS))
+    """A unit's spelling with powers as digits and a point for products: W/m² and W/m**2 as W/m2, m·s⁻¹ as m.s-1."""
+    return re.sub(r"(?<=\w)\s*\*\s*(?=\w)", ".", re.sub(r"\*\*|\^", "", text.translate(_POWERS)))
 
 
 def _key(text: str) -> str:

@@ -14,6 +14,7 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element
 
@@ -29,6 +30,8 @@ _WIDEST = 2000
 _DEEPEST = 8
 _UNITS = ("unit", "units", "uom")
 _NAMES = ("name", "id", "type", "code", "parameter", "key", "label", "variable")
+_NAMED = 12
+"""Values that a note names where they are left out."""
 _NOT_XML = ("gpx", "kml", "svg", "html", "rss", "feed")
 """Roots of documents that are no readings."""
 
@@ -63,7 +66,9 @@ def as_table(source: TextFile) -> TableText | None:
     found = _readings(root)
     if found is None:
         return None
-    tag, own, around = found
+    tag, said, around = found
+    own = [one.cells for one in said]
+    apart = tuple(dict.fromkeys(name for one in said for name in one.apart))
     shared = {name: cell for name, cell in around[0].items() if all(row.get(name) == cell for row in around)}
     rows = [
         {name: cell for name, cell in outer.items() if name not in shared} | row
@@ -78,12 +83,27 @@ def as_table(source: TextFile) -> TableText | None:
     writer.writerow(names)
     writer.writerows([row.get(name, "") for name in names] for row in rows)
     what = f"XML, read as a table with a row for each <{tag}>; lines are counted with its heading as the first"
-    return TableText.of(
-        source, out.getvalue().splitlines(), [Finding(kind="xml-table", severity=Severity.NOTE, what=what)]
-    )
+    notes = [Finding(kind="xml-table", severity=Severity.NOTE, what=what)]
+    if apart:
+        what = f"values with an instant or a period of their own are left out, among them {', '.join(apart[:_NAMED])}"
+        notes.append(Finding(kind="other-instants", severity=Severity.NOTE, count=len(apart), what=what))
+    return TableText.of(source, out.getvalue().splitlines(), notes)
 
 
-def _readings(root: Element) -> tuple[str, list[dict[str, str]], list[dict[str, str]]] | None:
+@dataclass(frozen=True, kw_only=True)
+class _Said:
+    """What a reading says.
+
+    Attributes:
+        cells: by the names of their columns.
+        apart: names of values that state an instant or a period of their own, which is none of the reading's.
+    """
+
+    cells: dict[str, str]
+    apart: list[str]
+
+
+def _readings(root: Element) -> tuple[str, list[_Said], list[dict[str, str]]] | None:
     """The elements that are readings: their tag, what each says, and what is said around each."""
     groups: dict[tuple[str, ...], list[tuple[Element, Mapping[str, str]]]] = {}
     for path, element, around in _walk(root, (), {}):
@@ -91,7 +111,7 @@ def _readings(root: Element) -> tuple[str, list[dict[str, str]], list[dict[str, 
     best: tuple[tuple[bool, int, int], tuple[str, ...]] | None = None
     for path, members in groups.items():
         element, around = members[0]
-        said = _said(element)
+        said = _said(element).cells
         timed = any(names_time(name) for name in (*said, *around)) or any(
             cell_kind(cell) == "stamp" for cell in said.values()
         )
@@ -124,16 +144,17 @@ def _walk(
             yield from _walk(child, here, {**around, **plain})
 
 
-def _said(element: Element) -> dict[str, str]:
+def _said(element: Element) -> _Said:
     """What a reading says, by the names of its columns."""
-    found = _attributes(element)
+    found = _Said(cells=_attributes(element), apart=[])
     _fill(found, "", element, 0)
     if not len(element) and (element.text or "").strip():
-        found.setdefault(_tag(element), _text(element.text))
+        found.cells.setdefault(_tag(element), _text(element.text))
     return found
 
 
-def _fill(found: dict[str, str], before: str, element: Element, depth: int) -> None:
+def _fill(found: _Said, before: str, element: Element, depth: int) -> None:
+    cells = found.cells
     counts = Counter(_tag(child) for child in element)
     for number, child in enumerate(element, start=1):
         told = next((child.get(key) for key in _NAMES if child.get(key)), None)
@@ -144,13 +165,17 @@ def _fill(found: dict[str, str], before: str, element: Element, depth: int) -> N
         unit = next((child.get(key) for key in _UNITS if child.get(key)), None)
         others = {key: cell for key, cell in _attributes(child).items() if key not in (*_UNITS, *_NAMES)}
         if not len(child) and (child.text or "").strip():
-            found.setdefault(_with_unit(name, unit), _text(child.text))
+            stamps = {cell for key, cell in others.items() if names_time(key) and cell_kind(cell) == "stamp"}
+            if stamps - set(cells.values()):
+                found.apart.append(name)
+                continue
+            cells.setdefault(_with_unit(name, unit), _text(child.text))
             others = {}
         for key, cell in others.items():
             one = len(others) == 1 or key == "value"
             inner = name if key == "value" else f"{name}.{key}"
-            found.setdefault(_with_unit(inner, unit if one else None), cell)
-        if len(child) and depth < _DEEPEST and len(found) <= _WIDEST:
+            cells.setdefault(_with_unit(inner, unit if one else None), cell)
+        if len(child) and depth < _DEEPEST and len(cells) <= _WIDEST:
             _fill(found, name, child, depth + 1)
 
 

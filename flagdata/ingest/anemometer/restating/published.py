@@ -218,14 +218,14 @@ _PUBLISHED = (
         about="Météo-France's hourly data",
         needs=(_need("NUM_POSTE", "AAAAMMJJHH", "FF", "DD"), _need("POSTE", "DATE", "FF", "DD", "FXI")),
         columns={
-            "POSTE": "station", "NUM_POSTE": "station", "FF": "wind speed [m/s]", "DD": "wind direction [deg]", "FXI": "gust [m/s]",
-            "T": "air temperature [degC]", "U": "relative humidity [%]",
+            "POSTE": "station", "NUM_POSTE": "station", "FF": "wind speed [m/s]", "DD": "wind direction [deg]",
+            "FXI": "gust [m/s]", "T": "air temperature [degC]", "U": "relative humidity [%]",
         },
         stamp=_digits("AAAAMMJJHH", "DATE", zone=""), zoned=False, clean=_pointed,
     ),
     _Published(
         about="Météo-France's daily values",
-        needs=(_need("POSTE", "DATE", "FFM", "QFFM"), _need("POSTE", "DATE", "FFM", "FXI"), _need("NUM_POSTE", "AAAAMMJJ", "FFM", "QFFM")),
+        needs=(_need("POSTE", "DATE", "FFM", "FXI"), _need("NUM_POSTE", "AAAAMMJJ", "FFM", "QFFM")),
         columns={
             "POSTE": "station", "NUM_POSTE": "station", "FFM": "wind speed [m/s]", "FXI": "gust [m/s]",
             "TM": "air temperature [degC]",

@@ -73,6 +73,7 @@ KINDS = (
     "flagdata.ingest.anemometer.restating.listed_fields",
     "flagdata.ingest.anemometer.restating.counted_fields",
     "flagdata.ingest.anemometer.restating.legend",
+    "flagdata.ingest.anemometer.restating.blank_cells",
     "flagdata.ingest.anemometer.restating.fixed_width",
     "flagdata.ingest.anemometer.restating.stacked_headings",
     "flagdata.ingest.anemometer.restating.headings_anew",

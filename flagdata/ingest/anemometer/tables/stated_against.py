@@ -7,7 +7,7 @@ from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.winds import bow, own_motion
 from flagdata.ingest.anemometer.winds.found import Wind
 from flagdata.ingest.anemometer.words.gust_words import GUSTS, MAXIMA, MINIMA
-from flagdata.ingest.anemometer.words.headings import words_of
+from flagdata.ingest.anemometer.words.headings import understand, words_of
 
 _SECTORS = frozenset({"sixteenths", "45 deg"})
 _EXTREMES = GUSTS | MAXIMA | MINIMA | {"peak", "lull"}
@@ -17,9 +17,10 @@ def warnings(layout: Layout, wind: Wind) -> tuple[str, ...]:
     """A warning of a speed that is no mean by its heading, and of a direction that others speak against."""
     found: list[str] = [*against_components.warnings(layout, wind)]
     speed, direction = wind.columns.get("wind_speed"), wind.columns.get("wind_direction")
-    if speed is not None and set(words_of(layout.names[speed.index])) & _EXTREMES:
+    name = layout.names[speed.index] if speed is not None else ""
+    if speed is not None and understand(name).spread and set(words_of(name)) & _EXTREMES:  # the Min of 10 Min is none
         found.append(
-            f"column {layout.names[speed.index]!r} holds gusts or extremes by its heading: stored as wind_speed, as "
+            f"column {name!r} holds gusts or extremes by its heading: stored as wind_speed, as "
             "you said, though it is no mean"
         )
     if direction is not None and direction.unit in _SECTORS:

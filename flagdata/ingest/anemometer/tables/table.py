@@ -387,7 +387,7 @@ def _channel_columns(recipe: Recipe, rows: Rows, where: str) -> dict[str, int]:
 def _channel_column(name: str, index: int, layout: ChannelLayout) -> _Column:
     return _Column(
         index=index, suffix=layout.suffix, points=compass.BY_UNIT.get(layout.unit),
-        calm=compass.STILL if name in DOUBTED else (), absent=tuple(compass.STILL) if name in _DIRECTIONS else (),
+        calm=compass.STILL if name in DOUBTED else (), absent=tuple(compass.CALM) if name in _DIRECTIONS else (),
     )  # fmt: skip
 
 

@@ -65,6 +65,17 @@ def fits(found: Stamps) -> bool:
     return bool(len(found.valid)) and float(found.valid.mean()) >= SHARE
 
 
+_OF_OTHERS = frozenset({"gust", "max", "min", "created", "updated", "start"})
+"""Words of instants that may be none of the reading's own."""
+_LATER = frozenset(
+    {
+        "receipt", "received", "retrieved", "fetched", "downloaded", "scraped", "processed", "inserted", "modified",
+        "ingested", "uploaded",
+    }
+)  # fmt: skip
+"""Words of what was done with a reading after it was made."""
+
+
 def time_choice(layout: Layout, columns: tuple[int, ...], form: str, found: Stamps, score: float) -> TimeChoice:
     """The time that `columns` are, of stamps that were read as `form`; headings that speak for it raise its score."""
     names = [layout.names[index] for index in columns]
@@ -74,7 +85,7 @@ def time_choice(layout: Layout, columns: tuple[int, ...], form: str, found: Stam
     varied = len(np.unique(ns)) / len(ns) if len(ns) > 1 else 1.0
     words = {word for name in names for word in words_of(name)}
     score += (0.8 if zoned else 0.3 if zones else 0.0) + 0.5 * any(map(names_time, names)) + varied
-    score += 0.1 * bool(words & {"end"}) - 0.4 * bool(words & {"gust", "max", "min", "created", "updated", "start"})
+    score += 0.1 * bool(words & {"end"}) - 0.4 * bool(words & _OF_OTHERS) - bool(words & _LATER)
     return TimeChoice(
         columns=columns, form=form, zone=None if zoned or not zones else zones[0], zoned=zoned, score=score
     )

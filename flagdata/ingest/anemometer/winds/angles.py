@@ -31,6 +31,8 @@ _UNREADABLE = 0.1
 _NORTHS = frozenset({"true", "mag", "degt", "degm", "deg true", "deg mag"})
 """Units of directions, from true or magnetic north."""
 _SIGNS = frozenset({"°", "º", "˚"})
+_STANDS = 10
+"""Rows in which a direction does not stay the same to its last digit."""
 _HOTTEST = 60.0
 """No air is hotter, in °C."""
 
@@ -50,6 +52,8 @@ def may_be_direction(layout: Layout, index: int) -> bool:
     known = value[np.isfinite(value)]
     if not len(known) or holds_marks(heading, value) or float(known.min()) < 0 or float(known.max()) > _TURN:
         return False
+    if len(known) >= _STANDS and len(np.unique(known)) == 1:
+        return False  # no vane stands still
     # The sign of degrees alone may as well be that of a temperature.
     return bool(named) or layout.units[index].strip() not in _SIGNS or float(known.max()) > _HOTTEST
 

@@ -11,7 +11,7 @@ import numpy as np
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.winds.angles import compass_unit
-from flagdata.ingest.anemometer.words.gust_words import GUSTS
+from flagdata.ingest.anemometer.words.gust_words import GUSTS, MAXIMA
 from flagdata.ingest.anemometer.words.headings import Heading, understand, words_of
 
 _DIRECTIONS = ("dir", "direction", "wd")
@@ -64,9 +64,20 @@ def direction_of_gust(layout: Layout, speed: int, *, apart: Collection[int] = ()
         heading = understand(name, layout.units[index])
         alike = (heading.label, heading.height) == (own.label, own.height)
         of_gust = heading.quantity == "wind_direction" and set(words_of(name)) & _OF_GUSTS
-        if of_gust and alike and index not in {speed, *apart} and _turns(layout, index):
+        if (
+            of_gust
+            and alike
+            and _of_maximum(name) == _of_maximum(layout.names[speed])
+            and index not in {speed, *apart}
+            and _turns(layout, index)
+        ):
             found.append(index)
     return found[0] if len(found) == 1 else None
+
+
+def _of_maximum(name: str) -> bool:
+    """Whether a heading is of the greatest gust of a period, which is none of each row's gusts."""
+    return bool(set(words_of(name)) & MAXIMA)
 
 
 def has_companions(layout: Layout, speed: int) -> bool:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata import compass
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.text.cells import Cell, Numbers
 
@@ -46,7 +47,8 @@ def words(cells: Sequence[str], parsed: Numbers) -> tuple[str, ...]:
     listed = sorted(set(spoken))
     filled = int((parsed.state == Cell.NUMBER).sum()) + len(spoken)
     plain = all(any(letter.isalpha() for letter in word) and not any(map(str.isdigit, word)) for word in listed)
-    few = len(listed) <= _WORDS and 2 * len(listed) <= len(spoken) <= _SHARE * filled
+    of_no_direction = all(word.lower() in compass.CALM for word in listed) and len(spoken) < filled
+    few = of_no_direction or (len(listed) <= _WORDS and 2 * len(listed) <= len(spoken) <= _SHARE * filled)
     return tuple(listed) if few and plain else ()
 
 

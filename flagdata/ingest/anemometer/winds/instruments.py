@@ -14,6 +14,7 @@ from flagdata.ingest.anemometer.winds import (
     beside,
     bow,
     codes,
+    gusts_beside,
     longer_periods,
     other_units,
     own_motion,
@@ -61,6 +62,7 @@ def find_winds(
     winds = [with_weather(found, wind, many=len(winds) > 1) for wind in winds]
     _doubt_headings(found, winds)
     _check_gusts(found, winds)
+    found.warnings.extend(gusts_beside.never_below(found, winds))
     return tuple(winds), tuple(dict.fromkeys(found.remarks)), tuple(found.warnings)
 
 
@@ -96,7 +98,7 @@ def _gathered(layout: Layout, time: Sequence[int], *, speed: int | None = None) 
         speed: a column that is a speed of the wind by the user's word.
     """
     headings = [bow.heading_of(layout, index) for index in range(len(layout.names))]
-    headings = shipboard.as_coded([_gust_of_weather_pages(layout, heading) for heading in headings])
+    headings = shipboard.as_coded(gusts_beside.as_gusts(layout, headings))
     headings, of_earth = along_axes(layout, headings)
     for index in [at for at, heading in enumerate(headings) if at == speed or heading.channel == "wind_speed"]:
         own = beside.direction_of(layout, index, apart=time)
@@ -127,13 +129,6 @@ def _gathered(layout: Layout, time: Sequence[int], *, speed: int | None = None) 
     for index in vanes(found.headings, found.values):
         found.headings[index] = replace(found.headings[index], channel="wind_direction", quantity="wind_direction")
     return found
-
-
-def _gust_of_weather_pages(layout: Layout, heading: Heading) -> Heading:
-    """The heading as a gust, where it is ff3 or ff10 beside Ff: maxima over hours and between observations (rp5)."""
-    if heading.name.strip() not in ("ff3", "ff10") or not any(name.strip() == "Ff" for name in layout.names):
-        return heading
-    return replace(heading, channel="", quantity="wind_speed", spread=True)
 
 
 def _few_words(found: Found, index: int, parsed: Numbers) -> bool:

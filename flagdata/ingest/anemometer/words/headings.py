@@ -75,7 +75,7 @@ _ENDING_IN_DIRECTION = frozenset({"dir", "direction", "direccion", "direc", "dir
 _INSIDE = {
     "ms": "m/s", "mps": "m/s", "kmh": "km/h", "kph": "km/h", "kts": "kn", "kt": "kn", "knots": "kn", "kn": "kn",
     "sknt": "kn", "mph": "mph", "deg": "deg", "degc": "degC", "degf": "degF", "c": "degC", "f": "degF", "hpa": "hPa",
-    "mbar": "hPa", "kpa": "kPa", "pct": "%", "perc": "%",
+    "mbar": "hPa", "kpa": "kPa", "pct": "%", "perc": "%", "k": "K",
 }  # fmt: skip
 """Words that are a unit behind the quantity, wherever they stand ("WS_ms_S_WVT", "windSpeedMps")."""
 _NORTH_BEHIND = re.compile(r"\s*[\[(]\W?(?P<north>t|true|tn|m|mag|mn)[\])]\s*$", re.IGNORECASE)
@@ -150,6 +150,7 @@ def understand(name: str, stated: str = "") -> Heading:
     """What the heading `name` says, with the cell `stated` of a line of units below it."""
     text = in_english("" if is_format(name) else name[:120].strip().strip('"').strip())
     text = _PER.sub(lambda found: f" {'k' * (found['length'][0] in 'kK')}m/{found['time'][0].lower()}", text)
+    text = re.sub(r"^Ten[_ ]Met(?:er|re)[_ ]Elevation(?=[_ ])", "10m", text, flags=re.IGNORECASE)
     text = re.sub(r"^[Øø⌀]\s?(?=[^\W\d_]{2})", "mean ", text)
     text = re.sub(r"(?<=direction), ?\*$", ", deg", text, flags=re.IGNORECASE)  # a sign for degrees, lost by HOBO
     text = _PERIOD.sub(r"\1\2min", _ABOVE.sub(" ", _RATE.sub(" ", text)))
@@ -170,8 +171,9 @@ def understand(name: str, stated: str = "") -> Heading:
     if tenfold is not None:
         unit = None
     elif unit is None:
-        last = reversed(words[1:] or words)
-        unit = next((_INSIDE[word] for word in last if word in _INSIDE and word != "deg"), None)
+        no_units = {"deg", "c", "f", "k"} if set(words) & (WIND | SPEED | DIRECTION) else {"deg"}  # WS_c: the third
+        last = (word for word in reversed(words[1:] or words) if word in _INSIDE and word not in no_units)
+        unit = next((_INSIDE[word] for word in last), None)
         unit = "deg" if unit is None and "deg" in words[1:] else unit
         words = [word for at, word in enumerate(words) if not (at and _INSIDE.get(word) == unit is not None)]
     known = set(words)
@@ -369,6 +371,8 @@ def _unit(text: str, stated: str) -> tuple[str, str | None]:
                 joined = "".join(part)
                 if count > 1 and not re.search(r"[\d/]|per|m_s|km_h|deg|kilo|m[ _]s", joined, re.IGNORECASE):
                     continue
+                if joined.lower() in ("c", "f") and set(_words("".join(others))) & (WIND | SPEED | DIRECTION):
+                    continue  # WS_c is the third of several
                 for way in (joined, re.sub(r"[_ ]", "/", joined), re.sub(r"[_ ]", "", joined)):
                     inside = _known(way)
                     if inside is not None and inside not in ("m", "s", "Hz", "px", "1", "ft", "cm", "mm", "K", "rad"):

@@ -36,6 +36,8 @@ _TEMPERATURE = frozenset(
     {"temp", "temperature", "temperatur", "température", "temperatura", "tair", "airt", "airtemp", "tmp", "tamb", "ta"}
 )
 _HUMIDITY = frozenset({"rh", "hum", "humidity", "humid", "feuchte", "luftfeuchte", "relhum", "humedad", "humidite"})
+_OF_MASS = frozenset({"specific", "spec", "absolute", "abs", "mixing", "kgkg", "gkg", "gm"})
+"""Words of a humidity that is a mass of vapour in one of air or in a volume, no share of saturation."""
 _PRESSURE = frozenset(
     {"press", "pressure", "baro", "barometer", "druck", "luftdruck", "bp", "barometric", "pression", "presion", "pa"}
 )
@@ -70,7 +72,8 @@ def channel(words: list[str], compact: str, si: str | None) -> tuple[str, bool, 
     no_air = panel or bool(known & _NO_AIR) or any(word.startswith(_OF_GROUND) for word in words)
     if si in (None, "K") and (warm or (si == "K" and not known)) and not no_air and "dew" not in compact:
         return "air_temperature", True, (known & _TEMPERATURE) or (known & {"t"})
-    if si in (None, "1") and (known & _HUMIDITY or re.search(r"humid|^rh", compact)) and not no_air:
+    of_mass = bool(known & _OF_MASS)
+    if si in (None, "1") and (known & _HUMIDITY or re.search(r"humid|^rh", compact)) and not no_air and not of_mass:
         return "relative_humidity", True, known & _HUMIDITY
     pressed = known & _PRESSURE or re.search(r"press|baro|^p$|^p\d+$", compact)
     if si in (None, "Pa") and pressed and not known & _NO_AIR_PRESSURE:

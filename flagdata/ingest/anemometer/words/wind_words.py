@@ -41,7 +41,8 @@ OTHER = frozenset(
         "hub", "pitch", "roll", "yaw", "inclination", "tilt", "count", "counts", "pulse", "pulses", "freq", "frequency",
         "volt", "volts", "voltage", "mv", "battery", "ustar", "friction", "scalar", "beaufort", "bft", "level", "pwm",
         "load", "density", "elevation", *VERTICAL, "gyro", "acc", "accel", "course", "heading", "track", "duration",
-        "id", "unit", "units", "timer", "timers", "rot", "unrot", "rotated", "unrotated",
+        "id", "unit", "units", "timer", "timers", "rot", "unrot", "rotated", "unrotated", "precipitation", "precip",
+        "rainfall", "snowfall", "evaporation", "runoff", "streamflow",
     }
 )  # fmt: skip
 HEIGHTS = frozenset({"height", "heights", "hgt", "höhe", "hoehe", "hauteur", "altura", "altezza"})
@@ -73,7 +74,7 @@ SPREAD = GUSTS | MAXIMA | MINIMA | frozenset(
         "setpoint", "predicted", "prediction", "pred", "modelled", "modeled", "simulated", "synthetic", "expected",
         "target", "nominal", "rated", "alarm", "limit", "bias", "correction", "spikes", "spike", "strg", "storage",
         "rand", "random", "outlier", "outliers", "mask", "nan", "nans", "iqr", "quantile", "quartile", "residual",
-        "anomaly", "skw", "kur", "mx", "qcflag", "itc", "scf", "zcl", "timelag",
+        "anomaly", "skw", "kur", "mx", "qcflag", "itc", "scf", "zcl", "timelag", "avl", "avail",
     }
 )  # fmt: skip
 AXES = frozenset(

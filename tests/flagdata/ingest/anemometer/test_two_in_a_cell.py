@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer import WindOptions, read_log
 
 Write = Callable[[str], Path]
@@ -29,6 +30,30 @@ def test_direction_and_speed_in_one_cell_are_both_read(
     channels = read_log(log_file(f"time,{heading},battery\n{rows}"), WindOptions(**options)).series.channels  # type: ignore[arg-type]
     np.testing.assert_allclose(channels["wind_speed"], speed)
     np.testing.assert_allclose(np.rad2deg(channels["wind_direction"]), direction)
+
+
+@pytest.mark.parametrize(
+    ("heading", "cells", "degrees"),
+    [
+        ("Wiatr", ["zach.pn.-zach. 36 km/h", "pd. 36 km/h", "pn.-wsch. 36 km/h"], [292.5, 180.0, 45.0]),
+        ("viento", ["SO 36 km/h", "SSO 36 km/h", "E 36 km/h"], [225.0, 202.5, 90.0]),
+        ("Wind", ["Nordwest 36 km/h", "SÜD 36 km/h", "Ost 36 km/h"], [315.0, 180.0, 90.0]),
+        ("Vent", ["36 km/h nord", "36 km/h sud-ouest", "36 km/h est"], [0.0, 225.0, 90.0]),
+    ],
+)  # fmt: skip
+def test_points_in_words_of_other_languages_stand_beside_their_speed(
+    log_file: Write, heading: str, cells: list[str], degrees: list[float]
+) -> None:
+    rows = "".join(f"2026-05-01T12:{at:02d}:00Z,{cells[at % 3]},{at}\n" for at in range(12))
+    channels = read_log(log_file(f"time,{heading},battery\n{rows}")).series.channels
+    np.testing.assert_allclose(channels["wind_speed"], 10.0)
+    np.testing.assert_allclose(np.rad2deg(channels["wind_direction"]), degrees * 4, atol=1e-9)
+
+
+def test_points_that_may_be_east_or_west_are_not_split_from_their_speed(log_file: Write) -> None:
+    rows = "".join(f"2026-05-01T12:{at:02d}:00Z,{'O' if at % 2 else 'N'} 36 km/h\n" for at in range(12))
+    with pytest.raises(FlagdataError):
+        read_log(log_file(f"time,Wind\n{rows}"))
 
 
 def test_a_column_of_points_beside_its_speed_is_left_as_it_is(log_file: Write) -> None:

@@ -119,3 +119,18 @@ def test_a_page_on_one_long_line_is_read(log_file: Write) -> None:
 def test_pages_without_a_table_are_refused(log_file: Write, text: str) -> None:
     with pytest.raises(FlagdataError):
         read_log(log_file(text + "\n"))
+
+
+def test_values_with_an_instant_of_their_own_are_none_of_the_reading(log_file: Write) -> None:
+    readings = "".join(
+        f'<period time-utc="2026-05-01T{12 + at}:00:00+00:00"><element units="m/s" type="wind_spd">{3 + at}</element>'
+        f'<element units="deg" type="wind_dir">{210 + at}</element>'
+        f'<element units="m/s" type="maximum_gust_spd" time-utc="2026-05-01T{12 + at}:43:00+00:00">{9 + at}</element>'
+        "</period>"
+        for at in range(6)
+    )
+    path = log_file(f'<?xml version="1.0"?><product><station name="A">{readings}</station></product>', "a.xml")
+    check(path)
+    told = [f.what for f in read_log(path).findings if f.kind == "other-instants"]
+    assert len(told) == 1
+    assert "maximum_gust_spd" in told[0]
