@@ -29,6 +29,9 @@ SYSTEM := python3.11-venv g++ git libegl1 libgl1 libice6 libsm6 libx11-6 libxcb1
 # Two processes of two threads each would wait for each other on two cores: tests take 2.5 times the processor's time.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 
+# Tests start the program many times: without its bytecode each start would compile the package anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test test-oldest blender mujoco system lint docs bench validate clean
 
 demo: $(STAMP)
