@@ -13,7 +13,7 @@ from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
-from functools import reduce
+from functools import lru_cache, reduce
 from operator import xor
 from typing import TypeAlias
 
@@ -116,6 +116,7 @@ class _Gathered:
     last: int = 0
 
 
+@lru_cache(maxsize=2048)
 def split_stamp(line: str) -> tuple[str, str]:
     """The stamp that a computer wrote before a line ("" where there is none), and the line, out of its quotes."""
     match = _STAMP.match(line)

@@ -48,6 +48,8 @@ def _sign(lines: Sequence[str]) -> str | None:
         rows = [row for line in filled if len(row := cut(line, sign)) > 1]
         if len(rows) < max(_LEAST, 0.6 * len(filled)) or len(rows) > _MOST:
             continue
+        if sum(any(letter.isalpha() for letter in row[0]) for row in rows) < _LEAST:
+            continue  # stamps or numbers, as rows begin
         meant = [understand(row[0]) for row in rows]
         speeds = [row for row, heading in zip(rows, meant, strict=True) if heading.channel == "wind_speed"]
         known = sum(bool(heading.quantity) for heading in meant)
