@@ -23,6 +23,7 @@ from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import cut, lay_out
 from flagdata.ingest.anemometer.text.rows import RowReader
 from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.ingest.anemometer.times import given_date
 from flagdata.ingest.anemometer.winds import site_labels
 from flagdata.ingest.anemometer.winds.sites import site_of_all
 from flagdata.ingest.anemometer.winds.sonic import with_horizontal
@@ -117,6 +118,7 @@ class Delimited:
             Finding(kind="heading-doubtful", severity=Severity.WARNING, what=text, fix="check the file's description")
             for text in (*proposal.warnings, *([proposal.afloat] if proposal.afloat and not options.platform else []))
         ]
+        found += _against_date(source, options)
         mixed = devices.check(source, source.head(HEAD_LINES), reading, recipe, options, where)
         of_each = drafted(source, options, devices_by=mixed.column) if mixed is not None else None
         found += _not_read((of_each or proposal).remarks)
@@ -193,6 +195,14 @@ def _is_row(cells: Sequence[str]) -> bool:
     """Whether a line among rows is one, though with fewer cells: it holds a stamp, and numbers in most of them."""
     kinds = [kind for cell in cells if (kind := cell_kind(cell)) != "missing"]
     return "stamp" in kinds and sum(kind != "text" for kind in kinds) > len(kinds) / 2
+
+
+def _against_date(source: TextFile, options: WindOptions) -> tuple[Finding, ...]:
+    """The finding that a column of the file speaks against the date that was given, if one does."""
+    layout = lay_out(source.head(HEAD_LINES), interest=interest) if options.date is not None else None
+    what = given_date.contradiction(layout, options.date) if layout is not None and options.date is not None else ""
+    fix = "give --date with the year of the first row"
+    return (Finding(kind="date-contradicts", severity=Severity.WARNING, what=what, fix=fix),) if what else ()
 
 
 def _not_read(remarks: Sequence[str]) -> tuple[Finding, ...]:

@@ -133,3 +133,14 @@ def test_days_by_month_and_day_alone_are_completed_by_the_first_rows_date(read: 
     log = read(text, unit="mph", zone="UTC", date=days[0])
     assert log.series.time.astype("datetime64[ns]").astype("datetime64[D]").tolist() == days
     assert "dates-alone" in {finding.kind for finding in log.findings}
+
+
+@pytest.mark.parametrize(("given", "told"), [("2024-05-13", 0), ("2020-05-13", 1)])
+@pytest.mark.parametrize("cells", ["2024,12:{at:02d}:00", "2024,13-May 12:{at:02d}:00"], ids=["clock", "day"])
+def test_a_year_in_the_table_speaks_against_the_date_that_was_given(
+    read: Callable[..., WindLog], cells: str, given: str, told: int
+) -> None:
+    rows = "".join(f"{cells.format(at=at)},{3 + at % 4}.5\n" for at in range(20))
+    log = read(f"Year,Time,wind speed (m/s)\n{rows}", zone="UTC", date=dt.date.fromisoformat(given))
+    assert [f.kind for f in log.findings].count("date-contradicts") == told
+    assert str(np.datetime64(int(log.series.time[0]), "ns"))[:16] == f"{given}T12:00"
