@@ -1,8 +1,8 @@
 """Ingesting a day of a 20 Hz sonic (TOA5, 1.7 million rows), and a small log: columns against row by row, in one run.
 
-Each is a process of its own, as a user starts it, and Python keeps the package's bytecode, as where it is installed; both
-ways must give the same samples. Wall time is of a machine that may have other work, processor time and memory are the
-process's.
+Each is a process of its own, as a user starts it, and Python keeps the package's bytecode, as where it is installed;
+both ways must give the same samples. Wall time is of a machine that may have other work, processor time and memory are
+the process's.
 """
 
 from __future__ import annotations

@@ -16,18 +16,17 @@ _DISTINCT = 0.9
 
 @dataclass(frozen=True, kw_only=True)
 class Chosen:
-    """The list of readings that is read, its name, and those of the others."""
+    """The list of readings that is read, its name, those of the others, and why it is this one."""
 
     rows: Sequence[dict[str, Any]]
     name: str
     others: Sequence[str]
+    why: str = "whose readings are the closest in time"
 
     def finding(self) -> Finding:
         """What is said of the lists that are not read."""
         others = ", ".join(map(repr, self.others))
-        what = (
-            f"of the members of one object {self.name!r} is read, whose readings are the closest in time; not {others}"
-        )
+        what = f"of the members of one object {self.name!r} is read, {self.why}; not {others}"
         fix = "save another one as a file of its own to read it"
         return Finding(kind="several-lists", severity=Severity.WARNING, count=len(self.others) + 1, what=what, fix=fix)
 
@@ -59,7 +58,9 @@ def log_of_several(whole: Mapping[str, Any]) -> Chosen | None:
     }  # fmt: skip
     timed = {key: rows for key, rows in lists.items() if _is_log(rows)}
     winds = {key: rows for key, rows in timed.items() if _of_wind(rows)}
-    if len(timed) < 2 or not winds:
+    if not winds:
+        return _with_wind(lists)
+    if len(timed) < 2:
         return None
     name = max(winds, key=lambda key: len(str(_instant(winds[key][0]))))
     if sum(len(str(_instant(rows[0]))) == len(str(_instant(winds[name][0]))) for rows in winds.values()) > 1:
@@ -67,12 +68,21 @@ def log_of_several(whole: Mapping[str, Any]) -> Chosen | None:
     return Chosen(rows=winds[name], name=name, others=[key for key in timed if key != name])
 
 
+def _with_wind(lists: Mapping[str, Sequence[dict[str, Any]]]) -> Chosen | None:
+    """The only one of several lists whose objects hold a wind at an instant, be it the same of several stations."""
+    found = [key for key, rows in lists.items() if _of_wind(rows) and all(map(holds_instant, rows))]
+    if len(found) != 1 or len(lists) < 2:
+        return None
+    others = [key for key in lists if key != found[0]]
+    return Chosen(rows=lists[found[0]], name=found[0], others=others, why="which alone holds a wind")
+
+
 def _is_log(rows: Sequence[dict[str, Any]]) -> bool:
     return all(map(holds_instant, rows)) and len({str(_instant(row)) for row in rows}) > _DISTINCT * len(rows)
 
 
 def _of_wind(rows: Sequence[dict[str, Any]]) -> bool:
-    return any("wind" in understand(key).channel for key in rows[0])
+    return any(understand(key).channel.endswith(("wind_speed", "wind_x")) for key in rows[0])
 
 
 def _instant(item: Mapping[str, Any]) -> Any:

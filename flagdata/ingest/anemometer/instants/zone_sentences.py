@@ -26,10 +26,15 @@ _SENTENCE = re.compile(
     re.IGNORECASE,
 )
 
+_CONVERTED = re.compile(
+    r"(?:converted |transformed )?from (?:UTC|GMT|[A-Z]{3,4})\b[^.;]{0,20}?\b(?:in)?to (?=UTC|GMT|[A-Z]{3,4})"
+)
+"""Of times that were converted from one zone to another, the second is theirs."""
+
 
 def sentences(text: str) -> Iterator[tuple[str, str]]:
     """The words of each such sentence of a line, and the zone as `--zone` takes it."""
-    for match in _SENTENCE.finditer(text):
+    for match in _SENTENCE.finditer(_CONVERTED.sub("in ", text)):
         name = _name(match)
         if name is not None:
             yield " ".join(match[0].split()), name

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.restating.restate import table
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES
-from flagdata.ingest.anemometer.text.kinds import cell_kind
+from flagdata.ingest.anemometer.text.kinds import cell_kind, is_unit
 from flagdata.ingest.anemometer.text.layout import Layout, cut, lay_out
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
@@ -28,6 +28,7 @@ from flagdata.ingest.anemometer.winds.found import SPEEDS
 from flagdata.ingest.anemometer.winds.instruments import find_winds
 from flagdata.ingest.anemometer.winds.sites import sites
 from flagdata.ingest.anemometer.words.headings import interest, understand, words_of
+from flagdata.ingest.anemometer.words.languages import in_english
 from flagdata.units import spelled
 
 _VALUES = frozenset({"value", "val", "state", "payload", "reading", "measurement", "wert", "valor", "valeur", "data"})
@@ -176,7 +177,7 @@ def _shape(lines: Sequence[str]) -> _Shape | None:
         value = _value(layout, rest)
         if time is None or value is None or any(wind.sure for wind in find_winds(layout, time=time.columns)[0]):
             continue
-        unit = next((at for at in rest if set(words_of(layout.names[at])) & _UNITS), None)
+        unit = next((at for at in rest if set(words_of(layout.names[at])) & _UNITS or _spells_units(layout, at)), None)
         stamps = [" ".join(row[at] for at in (*time.columns, column)) for row in layout.rows]
         apart = sites(layout, time=(*time.columns, column, value), stamps=stamps)
         site = apart[0] if apart is not None and apart[0] != unit else None
@@ -226,9 +227,15 @@ def _instants(layout: Layout, index: int) -> bool:
 def _hints(line: str) -> bool:
     """Whether a line may hold the name of a speed, so that most tables are told at once to be none."""
     text = line.lower()
-    return any(
-        word in text for word in ("wind", "speed", "anem", "wspd", "viento", "vent", "vind", "风", "風")
-    ) or bool(_SHORT.search(line))
+    return any(word in text for word in ("wind", "speed", "anem", "wspd", "viento", "vent", "vind")) or bool(
+        _SHORT.search(line) or (not text.isascii() and "wind" in in_english(text))
+    )
+
+
+def _spells_units(layout: Layout, index: int) -> bool:
+    """Whether all cells of a column that are filled are units, of several kinds, whatever its heading."""
+    kinds = set(layout.column(index)) - {""}
+    return len(kinds) > 1 and all(map(is_unit, kinds)) and any(spelled(kind) is not None for kind in kinds)
 
 
 def _measured(layout: Layout, index: int) -> bool:

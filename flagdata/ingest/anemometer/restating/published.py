@@ -94,7 +94,7 @@ def _buoy(row: Row) -> str:
 
 def _knmi(row: Row) -> str:
     """The end of the hour that a row is of; of daily values their day."""
-    day, hour = row.get("YYYYMMDD", "").strip(), row.get("HH", "0").strip()
+    day, hour = row.get("YYYYMMDD", "").strip(), row.get("HH", row.get("H", "0")).strip()
     day = re.sub(r"^(\d{4})-(\d\d)-(\d\d)$", r"\1\2\3", day)  # as tables that were read and written anew have it
     if not re.fullmatch(r"\d{8}", day) or not hour.isdigit() or int(hour) > 24:
         return ""
@@ -189,7 +189,8 @@ _PUBLISHED = (
     ),
     _Published(
         about="KNMI's hourly values",
-        needs=(_need("YYYYMMDD", "HH", "DD", "FF"), _need("YYYYMMDD", "HH", "DD", "FH")),
+        needs=(_need("YYYYMMDD", "HH", "DD", "FF"), _need("YYYYMMDD", "HH", "DD", "FH"),
+               _need("STN", "YYYYMMDD", "H", "FH")),
         columns={
             "STN": "station", "FF": "wind speed [0.1 m/s]", "FH": "hourly mean wind speed [0.1 m/s]",
             "FX": "gust [0.1 m/s]", "DD": "wind direction [deg]",
@@ -275,7 +276,7 @@ _PUBLISHED = (
 )  # fmt: skip
 _DATES = frozenset(
     {
-        "#YY", "YY", "YYYY", "MM", "DD", "hh", "mm", "hhmm", "MESS_DATUM", "YYYYMMDD", "HH", "date", "AAAAMMJJHH",
+        "#YY", "YY", "YYYY", "MM", "DD", "hh", "mm", "hhmm", "MESS_DATUM", "YYYYMMDD", "HH", "H", "date", "AAAAMMJJHH",
         "AAAAMMJJ", "DATE", "eor", "reference_timestamp", "time", "Date",
     }
 )  # fmt: skip

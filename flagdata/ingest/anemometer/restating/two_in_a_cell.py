@@ -23,7 +23,9 @@ from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.words.headings import interest, understand, words_of
 from flagdata.units import UNITS, spelled
 
-_DIRECTION = r"(?P<direction>\d{1,3}(?:\.\d+)?(?=\s?°|\s*[@/])|[A-Za-z]{1,3}(?![A-Za-z/]))\s?°?"
+_SIGN = r"(?:°|degrees?\b|deg\b)"
+_ANGLE = rf"\d{{1,3}}(?:\.\d+)?(?=\s?{_SIGN}|\s*[@/]|\s+at\b)"
+_DIRECTION = rf"(?P<direction>{_ANGLE}|VRB|variable|[A-Za-z]{{1,3}}(?![A-Za-z/]))\s?{_SIGN}?"
 _SPEED = r"(?P<speed>\d{1,3}(?:[.,]\d+)?)\s?(?P<unit>[^\W\d_]{1,5}(?:/[^\W\d_])?)?"
 _FIRST = re.compile(rf"{_DIRECTION}\s*(?:@|/|,|at)?\s*{_SPEED}", re.IGNORECASE)
 _LAST = re.compile(rf"{_SPEED}\s*(?:from|@|/)?\s+{_DIRECTION.replace('(?=', '(?=$|')}", re.IGNORECASE)
@@ -40,8 +42,8 @@ _GALE, _HALF_TURN, _TURN = 60, 180, 360
 """Below a heading that says nothing, speeds [any unit] and directions [deg] that tell a pair of them."""
 _NAMES = frozenset(
     {
-        "wind", "viento", "vent", "vento", "wnd", "wiatr", "vind", "tuuli", "tuul", "szél", "vítr", "vietor", "vjetar",
-        "veter", "rüzgar", "ветер", "вятър", "вітер", "angin", "vânt", "άνεμος",
+        "wind", "winds", "viento", "vent", "vento", "wnd", "wiatr", "vind", "tuuli", "tuul", "szél", "vítr", "vietor",
+        "vjetar", "veter", "rüzgar", "ветер", "вятър", "вітер", "angin", "vânt", "άνεμος",
     }
 )  # fmt: skip
 _SHARE = 0.9
@@ -212,6 +214,8 @@ def _both(cell: str, *, speed_first: bool) -> tuple[str, str, str] | None:
         named = spelled(unit) if unit else None
         if unit and (named is None or UNITS[named].si != "m/s"):
             continue
+        if direction.lower() in CALM:
+            return "", match["speed"].replace(",", "."), unit
         if direction[0].isdigit() or direction.upper() in POINTS:
             return direction, match["speed"].replace(",", "."), unit
     return None

@@ -192,8 +192,10 @@ def sites(source: TextFile, proposal: Draft) -> tuple[str, ...]:
 
 
 def _is_row(cells: Sequence[str]) -> bool:
-    """Whether a line among rows is one, though with fewer cells: it holds a stamp, and numbers in most of them."""
+    """Whether a line among rows is one: a stamp and numbers in most of its cells, or all filled, its stamp damaged."""
     kinds = [kind for cell in cells if (kind := cell_kind(cell)) != "missing"]
+    if len(kinds) == len(cells) and "number" in kinds:
+        return True
     return "stamp" in kinds and sum(kind != "text" for kind in kinds) > len(kinds) / 2
 
 

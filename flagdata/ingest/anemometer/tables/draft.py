@@ -22,6 +22,7 @@ from flagdata.ingest.anemometer.tables import (
     beside_components,
     offered_columns,
     quality_columns,
+    sounding,
     speeds_offered,
     stated_against,
     stated_columns,
@@ -255,7 +256,8 @@ def _doubts(
         fix = f"{offered}; if none is the time and the rows came at a steady rate, add --start TIME --rate HZ"
         above = stated_rate.advice(lines[: layout.preamble])
         fix += f" ({above})" if above else ""
-        what = f"no column is a time in a format that is known; {unread.events(layout)}the columns are {names}"
+        what = f"no column is a time in a format that is known; {sounding.told(layout)}{unread.events(layout)}"
+        what += f"the columns are {names}"
         found.append(Doubt(what=what, fix=fix))
     elif (other := truncated.of_another_century(layout, time, now=time_ns())) is not None:
         found.append(Doubt(what=other[0], fix=other[1]))

@@ -11,7 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from flagdata import compass
-from flagdata.errors import InputError, UnknownNameError
+from flagdata.errors import InputError, NothingMeasuredError, UnknownNameError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.instants import counted, zones
 from flagdata.ingest.anemometer.instants.stamps import DAY, YEARS
@@ -352,7 +352,8 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str)
             fix="name a site as the file writes it, or the wind's column by its heading; ingest --sniff lists them",
         )  # fmt: skip
     if count == 0:
-        raise InputError(
+        refused = InputError if recipe.rows is None else NothingMeasuredError  # of several sites the others are read
+        raise refused(
             f"no row with a readable time stamp{far}",
             where=f"{where}, line {bad[0] if bad else rows.first_line}",
             fix=f"stamps are expected as {form}; check the recipe, or that the logger recorded anything",

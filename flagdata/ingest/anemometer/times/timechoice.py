@@ -67,10 +67,12 @@ def fits(found: Stamps) -> bool:
 
 _OF_OTHERS = frozenset({"gust", "max", "min", "created", "updated", "start"})
 """Words of instants that may be none of the reading's own."""
+_OF_READINGS = frozenset({"obs", "observation", "observed", "measurement", "measured", "sampled"})
+"""Words of when a reading was made, beside which other stamps are of what was done with it."""
 _LATER = frozenset(
     {
-        "receipt", "received", "retrieved", "fetched", "downloaded", "scraped", "processed", "inserted", "modified",
-        "ingested", "uploaded",
+        "requested", "receipt", "received", "retrieved", "fetched", "downloaded", "scraped", "processed", "inserted",
+        "modified", "ingested", "uploaded",
     }
 )  # fmt: skip
 """Words of what was done with a reading after it was made."""
@@ -85,7 +87,12 @@ def time_choice(layout: Layout, columns: tuple[int, ...], form: str, found: Stam
     varied = len(np.unique(ns)) / len(ns) if len(ns) > 1 else 1.0
     words = {word for name in names for word in words_of(name)}
     score += (0.8 if zoned else 0.3 if zones else 0.0) + 0.5 * any(map(names_time, names)) + varied
-    score += 0.1 * bool(words & {"end"}) - 0.4 * bool(words & _OF_OTHERS) - bool(words & _LATER)
+    score += (
+        0.1 * bool(words & {"end"})
+        + 0.9 * bool(words & _OF_READINGS)
+        - 0.4 * bool(words & _OF_OTHERS)
+        - bool(words & _LATER)
+    )
     return TimeChoice(
         columns=columns, form=form, zone=None if zoned or not zones else zones[0], zoned=zoned, score=score
     )

@@ -12,6 +12,7 @@ from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.winds import radiation
 from flagdata.ingest.anemometer.winds.directions import holds_marks
 from flagdata.ingest.anemometer.words.headings import Heading, understand, words_of
+from flagdata.units import UNITS
 
 _DIRECTIONS = frozenset(
     {"dir", "direction", "degrees", "degree", "deg", "bearing", "angle", "wd", "dd", "azimuth", "wa", "dw", "drct"}
@@ -22,7 +23,7 @@ _OTHERS = frozenset(
     {
         "lat", "latitude", "lon", "lng", "long", "longitude", "heading", "hdg", "course", "cog", "roll", "pitch", "yaw",
         "tilt", "sun", "solar", "elevation", "temp", "temperature", "gust", "max", "min", "std", "sd", "sigma", "wave",
-        "swell", "current", "chill", "f", "c", "vessel", "ship", "boat", "track", "platform",
+        "swell", "current", "chill", "f", "c", "vessel", "ship", "boat", "track", "platform", "blade", "rotor", "cable",
     }
 )  # fmt: skip
 """Words of angles and degrees of other quantities."""
@@ -63,6 +64,9 @@ def unit_of(layout: Layout, index: int) -> str:
     points = compass_unit(layout, index)
     if points is not None:
         return points
+    stated = understand(layout.names[index], layout.units[index]).unit
+    if stated not in (None, "deg") and UNITS[stated].si == "rad":
+        return stated
     value = numbers(layout.column(index), decimal=layout.decimal).value
     known = value[np.isfinite(value)]
     turned = len(known) > 0 and float(np.abs(known).max()) <= 2 * np.pi and bool(np.any(known % 1 != 0))

@@ -75,6 +75,9 @@ def _leave_out_combinations(found: Found) -> None:
     speeds = found.of("wind_speed")
     for index, (base, power) in powers.of_others(found.values, speeds).items():
         _leave_out(found, index, f"is the {power} of {found.name(base)!r}, no speed")
+    labels = {at: found.headings[at].label for at in found.of("wind_speed") if found.headings[at].height is None}
+    for index in [at for at in powers.cubes_by_name(labels) if found.headings[at].unit is None]:
+        _leave_out(found, index, "is a mean cube by the number behind its name, unless --wind names it")
     for index, (first, second) in powers.differences(found.values, found.of("wind_speed")).items():
         _leave_out(found, index, f"is {found.name(first)!r} less {found.name(second)!r}, no speed")
 
@@ -344,6 +347,11 @@ def _components(found: Found, told: str | None) -> list[Wind]:
             channel: _column(found, indices[channel], channel, told) for channel in COMPONENTS if channel in indices
         }
         first = indices["wind_x"]
+        if "wind_z" in columns and powers.is_length([found.values[indices[at]] for at in ("wind_x", "wind_y")],
+                                                    found.values[indices["wind_z"]]):  # fmt: skip
+            del columns["wind_z"]
+            name = found.name(indices["wind_z"])
+            found.remarks.append(f"column {name!r} is the length of the other two, no wind upwards: left out")
         own = [
             at for at in found.of("wind_direction") if found.headings[at].height in (None, found.headings[first].height)
         ]

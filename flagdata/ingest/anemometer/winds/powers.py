@@ -44,6 +44,29 @@ def of_others(values: Mapping[int, NDArray[np.float64]], columns: Sequence[int])
     return found
 
 
+def cubes_by_name(labels: Mapping[int, tuple[str, ...]]) -> tuple[int, ...]:
+    """The columns with the number 3 behind the name of a speed beside one without a number, and no other numbers.
+
+    WS3 beside WS is the mean cube; beside WS1 and WS2 it is the third anemometer.
+
+    Args:
+        labels: of columns of speeds the words that tell them apart.
+    """
+    numbered = {label for label in labels.values() if len(label) == 1 and label[0].isdigit()}
+    if () not in labels.values() or numbered != {("3",)}:
+        return ()
+    return tuple(index for index, label in labels.items() if label == ("3",))
+
+
+def is_length(components: Sequence[NDArray[np.float64]], value: NDArray[np.float64]) -> bool:
+    """Whether a column is √(x² + y²) of two components in all rows, to the digits that are written."""
+    x, y = components
+    known = np.isfinite(x) & np.isfinite(y) & np.isfinite(value)
+    length = np.hypot(x[known], y[known])
+    off = np.abs(length - value[known])
+    return len(length) >= _ROWS and bool(np.all(off <= 2 * _ROUNDED)) and float(length.max()) > 2 * _ROUNDED
+
+
 def _possible(columns: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
     """(base, other) pairs of columns that the first rows do not rule out: not too many of them are of no power.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flagdata.ingest.anemometer.text.kinds import is_unit
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.units import spelled
 
@@ -12,4 +13,5 @@ def mixed_units(layout: Layout, index: int) -> tuple[str, ...]:
         return ()
     cells = sorted({cell for cell in layout.column(index + 1) if cell})
     names = {spelled(cell) for cell in cells[:50]}
-    return tuple(cells) if len(names) > 1 and None not in names else ()
+    of_others = all(spelled(cell) is not None or is_unit(cell) for cell in cells[:50])
+    return tuple(cells) if len(names) > 1 and names != {None} and of_others else ()

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.winds import stations_by_place
 from flagdata.ingest.anemometer.winds.angles import compass_unit
 from flagdata.ingest.anemometer.words.headings import understand, words_of
 
@@ -59,7 +60,7 @@ _NUMBERED = frozenset({"code", "number", "no", "nr", "num", "dev", "end"})
 def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tuple[int, tuple[str, ...]] | None:
     """The column that tells sites apart, and the sites in the first rows; `None` where all rows are of one.
 
-    Its heading is that of a site; or the rows of different sites share their stamps.
+    Its heading is that of a site; or the rows of different sites share their stamps, or lie apart at the same time.
     """
     shared = len(set(stamps)) < len(stamps)
     apart_by: list[tuple[int, tuple[str, ...]]] = []
@@ -89,7 +90,9 @@ def sites(layout: Layout, *, time: Sequence[int], stamps: Sequence[str]) -> tupl
             apart_by.append((index, tuple(kinds)))
     if apart_by:  # a number that each row has for itself tells rows apart, too, but no sites
         return min(apart_by, key=lambda column: len(column[1]))
-    return _in_every_stamp(layout, time, stamps) if shared else None
+    if not shared:
+        return None
+    return _in_every_stamp(layout, time, stamps) or stations_by_place.column(layout, time=time, stamps=stamps)
 
 
 def _kinds(cells: Sequence[str], stamps: Sequence[str]) -> list[str]:

@@ -44,8 +44,8 @@ _HEIGHT = re.compile(r"(?<![\d.])(\d{1,3}(?:\.\d+)?)\s*[mM](?![a-z/²³\d])")
 _ABOVE = re.compile(
     r"(?<![^\W_])above[ _](?:the[ _])?(?:ground|surface|sea|deck)(?:[ _](?:level|surface))?(?![^\W_])", re.IGNORECASE
 )
-_PERIOD = re.compile(r"(avg|average|mean)([\W_]*\(\s*\d+\s*)m(?=\s*\))", re.IGNORECASE)
-"""Minutes behind a mean, as "WS_Avg(5m)", which are no height."""
+_PERIOD = re.compile(r"(avg|average|mean|max|min|std|smp)([\W_]*\(\s*\d+\s*)m(?=\s*\))", re.IGNORECASE)
+"""Minutes behind a mean or an extreme, as "WS_Avg(5m)", which are no height."""
 _WIND_VECTOR = re.compile(r"(?:WS|WD|Wind|Anem\w*)(?P<name>.*?)_WVc\((?P<n>[123])\)", re.IGNORECASE)
 _VECTOR = {"1": "wind speed", "2": "wind direction", "3": "wind direction Std"}
 """What Campbell's instruction WindVector writes under one name: mean speed, mean direction, its standard deviation."""

@@ -42,7 +42,7 @@ OTHER = frozenset(
         "volt", "volts", "voltage", "mv", "battery", "ustar", "friction", "scalar", "beaufort", "bft", "level", "pwm",
         "load", "density", "elevation", *VERTICAL, "gyro", "acc", "accel", "course", "heading", "track", "duration",
         "id", "unit", "units", "timer", "timers", "rot", "unrot", "rotated", "unrotated", "precipitation", "precip",
-        "rainfall", "snowfall", "evaporation", "runoff", "streamflow",
+        "rainfall", "snowfall", "evaporation", "runoff", "streamflow", "delta",
     }
 )  # fmt: skip
 HEIGHTS = frozenset({"height", "heights", "hgt", "höhe", "hoehe", "hauteur", "altura", "altezza"})
