@@ -20,6 +20,8 @@ _SECONDS = (1, 300, 600, 900, 1800, 3600)
 """Whole steps [s] of loggers that are no usual step of another unit."""
 _MILLISECONDS = (20, 25, 40, 50, 125, 200, 250)
 """Whole steps [ms] of loggers that are no usual step of another unit."""
+_YEAR_AND_DAY = (10_001, 100_000)
+"""Numbers of five digits that may be a year of two digits and the day of it."""
 _SEVERAL = {
     5: ("s", "min", "ms"), 10: ("s", "min", "ms"), 15: ("s", "min"), 20: ("ms", "s", "min"), 30: ("s", "min"),
     60: ("s", "min"), 100: ("ms", "s", "us"), 500: ("ms", "us"), 1000: ("ms", "us"),
@@ -46,7 +48,7 @@ class Likely:
     """What a count counts.
 
     Attributes:
-        form: as `counted` names it; "" where nothing tells.
+        form: as `counted` names it, or that of a date; "" where nothing tells.
         words: for a message.
     """
 
@@ -81,6 +83,10 @@ def likely(value: NDArray[np.float64], *, digits: int, words: Collection[str] = 
         minutes = any(abs(usual - step) <= max(1.0, _NEAR * step) for step in about)
         tells = _LEAST_MILLISECONDS <= usual < _MOST_MILLISECONDS and not minutes
         return _sure("ms") if tells else _open(())
+    if usual == 1 and bool(
+        np.all((value >= _YEAR_AND_DAY[0]) & (value < _YEAR_AND_DAY[1]) & (value % 1000 >= 1) & (value % 1000 <= 366))
+    ):
+        return Likely(form="%y%j", words="likely %y%j, a year of two digits and the day of it, else s")
     if usual in _SECONDS:
         return _sure("s")
     if usual >= _MOST_MILLISECONDS and usual % 86_400:

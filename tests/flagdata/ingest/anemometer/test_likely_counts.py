@@ -79,3 +79,11 @@ def test_gills_letters_state_the_unit_and_a_growing_first_column_is_a_count(
 def test_a_letter_that_changes_states_no_unit(read: Read) -> None:
     with pytest.raises(InputError, match="unit"):
         read(gill("M").replace(",M,", ",N,", 1))
+
+
+def test_a_year_of_two_digits_and_its_day_are_offered_as_such(read: Read) -> None:
+    text = "".join(f"{96_001 + at}  21.8  {1 + at % 5}.7\n" for at in range(20))
+    fix, line = offered(read, text, columns="time,,wind_speed[m/s]", zone="UTC")
+    assert "%y%j" in fix
+    log = read(text, columns=line, zone="UTC")
+    assert [str(np.datetime64(int(log.series.time[at]), "ns"))[:10] for at in (0, -1)] == ["1996-01-01", "1996-01-20"]
