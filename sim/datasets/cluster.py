@@ -139,11 +139,14 @@ def _lost() -> WorkerError:
     return WorkerError("the scheduler is gone", where="dask", fix=f"start it again, {_AGAIN}")
 
 
-def _next(client: Client, running: as_completed, say: Callable[[str], None]) -> Future:
-    """The next job that is done.
+def _next(client: Client, running: as_completed, say: Callable[[str], None]) -> tuple[Future, Any]:
+    """The next job that is done, and its result.
+
+    A result counts when it is here: that of a worker which died over sending it is made again, by whoever works then.
 
     Raises:
         WorkerError: nobody has worked for `PATIENCE`, or the scheduler is gone.
+        Exception: what the job raised.
     """
     looked = time.monotonic()
     alone: float | None = None
@@ -162,7 +165,7 @@ def _next(client: Client, running: as_completed, say: Callable[[str], None]) -> 
             say(f"all workers are gone; waiting {PATIENCE:g} s for new ones")
         elif now - alone > PATIENCE:
             raise WorkerError(f"no workers for {PATIENCE:g} s", where="dask", fix=f"see that workers run, {_AGAIN}")
-    return next(running)
+    return cast("tuple[Future, Any]", next(running))
 
 
 def results(client: Client, jobs: Iterable[Job], *, say: Callable[[str], None]) -> Iterator[Any]:
@@ -179,7 +182,7 @@ def results(client: Client, jobs: Iterable[Job], *, say: Callable[[str], None]) 
         FlagdataError: a job failed; its own error.
     """
     waiting = iter(jobs)
-    running = as_completed(loop=client.loop)
+    running = as_completed(loop=client.loop, with_results=True)
 
     def fill() -> None:
         """Workers may come and go meanwhile."""
@@ -190,9 +193,8 @@ def results(client: Client, jobs: Iterable[Job], *, say: Callable[[str], None]) 
     try:
         fill()
         while not running.is_empty():
-            future = _next(client, running, say)
             try:
-                result = future.result()
+                future, result = _next(client, running, say)
             except CancelledError:
                 raise _lost() from None
             except KilledWorker as error:

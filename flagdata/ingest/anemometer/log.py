@@ -21,7 +21,7 @@ from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recognition import recognise
 from flagdata.ingest.anemometer.restating import bulletins, spelled_stamps, untimed
 from flagdata.ingest.anemometer.restating.restate import restate
-from flagdata.ingest.anemometer.samples import calm_zeros, future, platform, possible, quality, zero
+from flagdata.ingest.anemometer.samples import calm_zeros, future, platform, possible, quality, steady, zero
 from flagdata.ingest.anemometer.samples.order import in_order
 from flagdata.ingest.anemometer.sniff import unknown
 from flagdata.ingest.anemometer.sniffing import SURE, as_taken
@@ -104,6 +104,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     ):
         reading = _apply(reading, check)
     findings = (*reading.findings, *quality.gaps(reading), *future.report(reading, now=time.time_ns()))
+    findings = (*findings, *steady.report(reading))
     findings = (*findings, *_nothing_measured(reading, where=str(path)))
     series = WindSeries(
         time=reading.time, channels=reading.channels, flags=reading.flags, sensor=reading.sensor,

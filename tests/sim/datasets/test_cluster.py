@@ -1,13 +1,15 @@
-"""What the processes that build a data set find in their environment."""
+"""What the processes that build a data set find in their environment, and what becomes of their results."""
 
 from __future__ import annotations
 
 import os
+import signal
+from typing import Any
 
 import numpy as np
 import pytest
 
-from sim.datasets.cluster import connected, results
+from sim.datasets.cluster import WorkerError, connected, results
 
 
 def test_workers_keep_their_memory_and_take_one_thread_each(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -27,3 +29,26 @@ def test_a_job_may_carry_a_long_mesh_sequence_without_a_word_of_dask() -> None:
     positions = np.zeros(3_000_000)  # 24 MB; Dask warns from 10 MiB on
     with connected(None, workers=1) as client:
         assert list(results(client, [(np.sum, [positions])], say=lambda _: None)) == [0.0]
+
+
+class _Fatal:
+    """A result whose worker dies over sending it."""
+
+    def __reduce__(self) -> tuple[type, tuple[()]]:
+        os.kill(os.getpid(), signal.SIGKILL)
+        return _Fatal, ()
+
+
+def _fatal() -> _Fatal:
+    return _Fatal()
+
+
+@pytest.mark.timeout(120)
+def test_a_worker_that_dies_over_sending_its_result_keeps_nobody_waiting(
+    doomed: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sim.datasets.cluster.PATIENCE", 2.0)
+    said: list[str] = []
+    with connected(doomed.address, workers=1) as client, pytest.raises(WorkerError, match="no workers for 2 s"):
+        list(results(client, [(_fatal, [])], say=said.append))
+    assert said == ["all workers are gone; waiting 2 s for new ones"]

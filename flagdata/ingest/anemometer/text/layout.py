@@ -165,7 +165,8 @@ def _lay_out(
         strange = (*strange, f"line {(at or 0) + 1} names {short} columns, but rows have {width}, and do not fit it")
         names, units, at, by_name, short = ("",) * width, ("",) * width, None, False, 0
     suffixes = tuple(_suffix([row[index] for row in rows]) for index in range(width))
-    beside = tuple(_unit_column(rows, index) if index in typed else None for index in range(width))
+    numbered = frozenset(typed)
+    beside = tuple(_unit_column(rows, index) if index in numbered else None for index in range(width))
     units = tuple(
         unit or suffix or ("" if other is None else _first(rows, other))
         for unit, suffix, other in zip(units, suffixes, beside, strict=True)

@@ -170,7 +170,7 @@ def contradiction(
     # Of the units that are smaller, the first in which the wind is an ordinary one.
     others = [name for name in ("km/h", "mph", "kn") if unit(name).scale < 0.9 * scale]
     others += ["km/day"] if high > FASTEST and span >= 0.9 * DAY * (len(known) - 1) else []
-    if not others:
+    if not others and median <= STORMY:
         return None
     ordinary = next((name for name in others if median * unit(name).scale / scale <= STORMY), None)
     reason = _too_fast(median / scale, high / scale, stated) + _or_angles(known / scale)
