@@ -134,16 +134,13 @@ def _column(lines: Sequence[str]) -> _Both | None:
         both = [found for cell in cells if (found := _both(cell, speed_first=speed_first)) is not None]
         units = {unit for _, _, unit in both}
         if len(both) >= max(_LEAST, _SHARE * len(cells)) and len(units) == 1:
-            return _Both(
-                layout=layout, column=column, unit=units.pop(), speed_first=speed_first, sure=named
-            )  # fmt: skip
+            return _Both(layout=layout, column=column, unit=units.pop(), speed_first=speed_first, sure=named)
         spoken = [found for cell in cells if (found := _in_words(cell)) is not None]
-        units = {unit for _, _, unit in spoken}
+        units = {unit for _, _, unit in spoken if unit}
         points = table_of([direction for direction, _, _ in spoken if direction], heading=name, share=_SHARE)
-        if points is not None and len(spoken) >= max(_LEAST, _SHARE * len(cells)) and len(units - {""}) == 1:
-            return _Both(
-                layout=layout, column=column, unit=(units - {""}).pop(), speed_first=False, sure=named, points=points
-            )  # fmt: skip
+        if points is not None and len(spoken) >= max(_LEAST, _SHARE * len(cells)) and len(units) == 1:
+            unit = units.pop()
+            return _Both(layout=layout, column=column, unit=unit, speed_first=False, sure=named, points=points)
     return None
 
 
