@@ -26,7 +26,7 @@ from flagdata.export.source import FILMED, Entry, Source, label_units
 from flagdata.record import Coding, messages
 from flagdata.record.checksums import ChecksummedWriter
 from flagdata.record.container import Messages, check_parts, open_file, read_exact, read_messages, read_summary
-from flagdata.record.video import is_key
+from flagdata.record.key_frames import is_key
 from flagdata.record.writer import PROFILE
 from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, Kind
 from flagdata.timebase import NANOSECONDS

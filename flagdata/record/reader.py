@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from flagdata.errors import CorruptError, InputError, NotFoundError, UsageError
 from flagdata.record import container, messages
+from flagdata.record.key_frames import is_key
 from flagdata.record.metadata import sensor_of
-from flagdata.record.video import decode, is_key
 from flagdata.record.writer import ATTACHMENT_LIMIT, GZIP_SUFFIX, Coding, encode_jpeg
 from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 from flagdata.signals import WindAverage, WindSeries
@@ -257,6 +257,8 @@ class Record:
                 raise CorruptError(f"no key frame up to frame {first}", where=str(self.path), fix=_VERIFY)
             key -= 1
             pictures[:0] = self._payloads(key, 1)
+        from flagdata.record.video import decode  # FFmpeg, which a wind's record needs nothing of
+
         return np.stack(decode(pictures, where=str(self.path))[first - key :])
 
     def _schema(self, topic: str) -> str:

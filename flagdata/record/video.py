@@ -6,7 +6,6 @@ values are the luma, full range, so that a decoded frame has the range it had.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
@@ -23,7 +22,6 @@ KEY_INTERVAL = 25
 """Frames from one key frame to the next."""
 CONSTANT_RATE_FACTOR = 18
 """x264's quality: 41 to 42 dB on a flag of 352×288 (DynTex 571c110), where JPEG at quality 90 has 45 dB."""
-_KEY_UNIT = re.compile(rb"\x00\x00\x01[\x25\x27\x45\x47\x65\x67]")  # NAL types 5 (IDR slice) and 7 (SPS), any ref_idc
 
 
 class VideoEncoder:
@@ -85,11 +83,6 @@ class VideoEncoder:
             )
         self._count += 1
         return bytes(packets[0])
-
-
-def is_key(picture: bytes | memoryview) -> bool:
-    """Whether decoding can start at this picture."""
-    return _KEY_UNIT.search(picture) is not None
 
 
 def decode(pictures: Iterable[bytes | memoryview], *, where: str) -> list[NDArray[np.uint8]]:

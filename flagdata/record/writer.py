@@ -8,7 +8,7 @@ from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import simplejpeg
@@ -20,14 +20,17 @@ from flagdata.errors import ConflictError, InputError, LimitError, TimeError, Us
 from flagdata.ingest.anemometer.samples.averaging import average
 from flagdata.record import messages, wind_messages
 from flagdata.record.checksums import CHECKSUMS, ChecksummedFile
+from flagdata.record.key_frames import is_key
 from flagdata.record.mcap_file import MessageBlock
 from flagdata.record.metadata import CLOCK, SENSOR, sensor_metadata
 from flagdata.record.output import Output
 from flagdata.record.packing import packed, pieces_of
-from flagdata.record.video import VideoEncoder, is_key
 from flagdata.schema import FORMAT_VERSION, TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 from flagdata.signals import WindSeries
 from flagdata.timebase import NANOSECONDS
+
+if TYPE_CHECKING:
+    from flagdata.record.video import VideoEncoder
 
 JPEG_QUALITY = 90
 FRAME_ID = "camera"
@@ -247,6 +250,8 @@ class RecordWriter:
             return image
         if self._video is None:
             _check_image(image)
+            from flagdata.record.video import VideoEncoder  # FFmpeg, which a wind's record needs nothing of
+
             self._video = VideoEncoder(height=image.shape[0], width=image.shape[1])
         return self._video.encode(image)
 
