@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.restating.restate import table
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES
-from flagdata.ingest.anemometer.text.kinds import cell_kind, is_unit
+from flagdata.ingest.anemometer.text.kinds import are_units, cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout, cut, lay_out
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 from flagdata.ingest.anemometer.times.timechoice import TimeChoice
@@ -235,7 +235,7 @@ def _hints(line: str) -> bool:
 def _spells_units(layout: Layout, index: int) -> bool:
     """Whether all cells of a column that are filled are units, of several kinds, whatever its heading."""
     kinds = set(layout.column(index)) - {""}
-    return len(kinds) > 1 and all(map(is_unit, kinds)) and any(spelled(kind) is not None for kind in kinds)
+    return len(kinds) > 1 and are_units(kinds)
 
 
 def _measured(layout: Layout, index: int) -> bool:

@@ -184,14 +184,18 @@ def _surely_both(layout: Layout, cells: Sequence[str]) -> bool:
     return whole and _highest(first) <= _GALE and _HALF_TURN < _highest(second) <= _TURN
 
 
+def _is_of_speed(unit: str) -> bool:
+    name = spelled(unit)
+    return name is not None and UNITS[name].si == "m/s"
+
+
 def _in_words(cell: str) -> tuple[str, str, str] | None:
     """Direction, speed and unit of a cell whose direction is in letters or words; calm air has none."""
     if cell.strip().lower() in STILL:
         return "", cell.strip(), ""
     for shape in (_WORDS_FIRST, _WORDS_LAST):
         match = shape.fullmatch(cell.strip())
-        named = spelled(match["unit"]) if match is not None and match["unit"] else None
-        if match is not None and named is not None and UNITS[named].si == "m/s":
+        if match is not None and match["unit"] and _is_of_speed(match["unit"]):
             return match["direction"].strip(), match["speed"].replace(",", "."), match["unit"]
     return None
 
@@ -208,8 +212,7 @@ def _both(cell: str, *, speed_first: bool) -> tuple[str, str, str] | None:
         if match is None:
             continue
         direction, unit = match["direction"], match["unit"] or ""
-        named = spelled(unit) if unit else None
-        if unit and (named is None or UNITS[named].si != "m/s"):
+        if unit and not _is_of_speed(unit):
             continue
         if direction.lower() in CALM:
             return "", match["speed"].replace(",", "."), unit

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from typing import Literal
 
 from flagdata.ingest.anemometer.instants import month_names
@@ -76,6 +77,11 @@ def is_unit(text: str) -> bool:
     bare = plain_powers(text.strip().strip("[]()<>").strip())
     known = bare.lower() in _UNITS_OF_OTHERS or spelled(bare) is not None
     return known or _COMPOUND.fullmatch(bare.lower()) is not None
+
+
+def are_units(cells: Collection[str]) -> bool:
+    """Whether all cells of a column spell units, at least one of them one that is read."""
+    return all(map(is_unit, cells)) and any(spelled(cell) is not None for cell in cells)
 
 
 def unit_behind(text: str) -> str:

@@ -28,8 +28,10 @@ from flagdata.ingest.anemometer.times.timechoice import (
 )
 from flagdata.ingest.anemometer.words.headings import words_of
 
+YEAR_HEADINGS = r"year|yyyy|yr|jahr|ann[ée]e|año|ano|anno|vuosi|jaar|år|rok|год"
+"""Headings of years, whatever stands beside them."""
 _WORDS = {
-    "year": r"year|yyyy|yr|yy|y|jahr|ann[ée]e|año|ano|anno|vuosi|jaar|år|rok|год|year month day .* yyyy",
+    "year": rf"{YEAR_HEADINGS}|yy|y|year month day .* yyyy",
     "month": r"month|monat|mois|mes|m[êe]s|mese|kuukausi|maand|måned|miesi[ąa]c|месяц|mon|mo",
     "day": r"day|dom|dy|tag|jour|d[ií]a|giorno|päivä|dag|dzie[ńn]|день",
     "doy": r"doy|jday|julian|day of year|julian day|julian date|yday|jd|j day|dayofyear|year ?day"

@@ -6,10 +6,10 @@ import datetime as dt
 import re
 
 from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.times.dateparts import YEAR_HEADINGS
 from flagdata.ingest.anemometer.times.timechoice import whole_numbers
 from flagdata.ingest.anemometer.words.headings import words_of
 
-_YEAR = re.compile(r"year|yyyy|yr|jahr|ann[ée]e|año|ano|anno|vuosi|jaar|år|rok|год")
 _FIRST, _LAST = 1900, 2100
 
 
@@ -17,7 +17,11 @@ def contradiction(layout: Layout, date: dt.date) -> str:
     """What is said where a column of years does not begin with the year of a date; "" where none does."""
     for index, name in enumerate(layout.names):
         cells = [cell for cell in layout.column(index) if cell]
-        if not _YEAR.fullmatch(" ".join(words_of(name))) or not cells or not whole_numbers(cells, _FIRST, _LAST):
+        if (
+            not re.fullmatch(YEAR_HEADINGS, " ".join(words_of(name)))
+            or not cells
+            or not whole_numbers(cells, _FIRST, _LAST)
+        ):
             continue
         year = round(float(cells[0]))
         if year != date.year:

@@ -17,8 +17,8 @@ from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.ingest.anemometer.words.headings import understand, words_of
 from flagdata.ingest.anemometer.words.wind_words import WIND
 
-_LATITUDE, _LONGITUDE = frozenset({"lat", "latitude"}), frozenset({"lon", "lng", "long", "longitude"})
-_PLACED = _LATITUDE | _LONGITUDE - {"long"}
+LATITUDE, LONGITUDE = frozenset({"lat", "latitude"}), frozenset({"lon", "lng", "long", "longitude"})
+_PLACED = LATITUDE | LONGITUDE - {"long"}
 """Words of a position; "long" is as well of waves and of times."""
 _STILL = 1e-4
 """Change of a coordinate [deg] below which a receiver at rest may show it: some 10 m."""
@@ -108,7 +108,7 @@ def carried(layout: Layout) -> str:
     own = columns(layout)
     if own and (_moving(layout) or _turned(layout)):
         return layout.names[own[0]]
-    places = _LATITUDE | _LONGITUDE
+    places = LATITUDE | LONGITUDE
     return _turned(layout) if any(set(words_of(name)) & places for name in layout.names) else ""
 
 
@@ -174,7 +174,7 @@ def _positions(layout: Layout) -> Sequence[tuple[str, bool]]:
     found: list[tuple[str, bool]] = []
     for index, name in enumerate(layout.names):
         words = set(words_of(name))
-        least = _STILL if words & (_LATITUDE | _LONGITUDE) else _CLIMBS if words & _HEIGHTS else None
+        least = _STILL if words & (LATITUDE | LONGITUDE) else _CLIMBS if words & _HEIGHTS else None
         if least is None:
             continue
         value = numbers(layout.column(index), decimal=layout.decimal).value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flagdata.ingest.anemometer.text.kinds import is_unit
+from flagdata.ingest.anemometer.text.kinds import are_units
 from flagdata.ingest.anemometer.text.layout import Layout
 from flagdata.units import spelled
 
@@ -12,6 +12,6 @@ def mixed_units(layout: Layout, index: int) -> tuple[str, ...]:
     if index + 1 >= layout.number_of_columns():
         return ()
     cells = sorted({cell for cell in layout.column(index + 1) if cell})
-    names = {spelled(cell) for cell in cells[:50]}
-    of_others = all(spelled(cell) is not None or is_unit(cell) for cell in cells[:50])
-    return tuple(cells) if len(names) > 1 and names != {None} and of_others else ()
+    looked_at = cells[:50]
+    several = len({spelled(cell) for cell in looked_at}) > 1
+    return tuple(cells) if several and are_units(looked_at) else ()

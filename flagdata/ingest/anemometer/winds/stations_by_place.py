@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 from flagdata.ingest.anemometer.text.cells import numbers
 from flagdata.ingest.anemometer.text.kinds import cell_kind
 from flagdata.ingest.anemometer.text.layout import Layout
+from flagdata.ingest.anemometer.winds.own_motion import LATITUDE, LONGITUDE
 from flagdata.ingest.anemometer.words.headings import understand, words_of
 
-_LATITUDE = frozenset({"lat", "latitude", "latitud", "breite", "breitengrad", "latitudine", "breddegrad"})
-_LONGITUDE = frozenset(
-    {"lon", "lng", "long", "longitude", "longitud", "länge", "längengrad", "longitudine", "lengdegrad"}
-)
+_LATITUDE = LATITUDE | {"latitud", "breite", "breitengrad", "latitudine", "breddegrad"}
+_LONGITUDE = LONGITUDE | {"longitud", "länge", "längengrad", "longitudine", "lengdegrad"}
 _APART = 0.02
 """Degrees, about 2 km, that no platform moves within a stamp."""
 _SHARE = 0.9

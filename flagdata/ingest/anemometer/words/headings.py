@@ -78,6 +78,7 @@ _INSIDE = {
     "mbar": "hPa", "kpa": "kPa", "pct": "%", "perc": "%", "k": "K",
 }  # fmt: skip
 """Words that are a unit behind the quantity, wherever they stand ("WS_ms_S_WVT", "windSpeedMps")."""
+_OF_WIND = WIND | SPEED | DIRECTION
 _NORTH_BEHIND = re.compile(r"\s*[\[(]\W?(?P<north>t|true|tn|m|mag|mn)[\])]\s*$", re.IGNORECASE)
 """What stands in brackets behind a direction for the north it is from."""
 _TENTHS = re.compile(r"\btenths? of (?:an? )?", re.IGNORECASE)
@@ -171,7 +172,7 @@ def understand(name: str, stated: str = "") -> Heading:
     if tenfold is not None:
         unit = None
     elif unit is None:
-        no_units = {"deg", "c", "f", "k"} if set(words) & (WIND | SPEED | DIRECTION) else {"deg"}  # WS_c: the third
+        no_units = {"deg", "c", "f", "k"} if _OF_WIND & set(words) else {"deg"}  # WS_c: the third
         last = (word for word in reversed(words[1:] or words) if word in _INSIDE and word not in no_units)
         unit = next((_INSIDE[word] for word in last), None)
         unit = "deg" if unit is None and "deg" in words[1:] else unit
@@ -371,7 +372,7 @@ def _unit(text: str, stated: str) -> tuple[str, str | None]:
                 joined = "".join(part)
                 if count > 1 and not re.search(r"[\d/]|per|m_s|km_h|deg|kilo|m[ _]s", joined, re.IGNORECASE):
                     continue
-                if joined.lower() in ("c", "f") and set(_words("".join(others))) & (WIND | SPEED | DIRECTION):
+                if joined.lower() in ("c", "f") and _OF_WIND & set(_words("".join(others))):
                     continue  # WS_c is the third of several
                 for way in (joined, re.sub(r"[_ ]", "/", joined), re.sub(r"[_ ]", "", joined)):
                     inside = _known(way)
