@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 import torch
-from torch.utils.data import DataLoader
+from torch.utils.data import DataLoader, Dataset
 
 from flagdata.dataset.sample import Batch, Sample, collate
 from flagdata.errors import RefusedError, UsageError
 from flagdata.rng import stream
-
-if TYPE_CHECKING:
-    from flagdata.dataset.pairs import Pairs
 
 Order: TypeAlias = Literal["shuffled", "stored"]
 Last: TypeAlias = Literal["keep", "drop"]
@@ -27,6 +25,24 @@ State: TypeAlias = dict[str, str | int | None]
 
 _AHEAD = 2  # batches that each thread reads ahead, as many as torch's worker processes do
 _MOVING = ("epoch", "cursor", "at")  # parts of a state that may differ from the loader that takes it up
+
+
+class Batchable(Dataset[Sample], ABC):
+    """A map-style dataset that a `PairLoader` reads.
+
+    Attributes:
+        at: the ref its query was resolved at, as it was given.
+        seed: of the shuffled orders.
+        fingerprint: hash of its samples, in order; equal means the same data.
+    """
+
+    at: str | None
+    seed: int
+    fingerprint: str
+
+    @abstractmethod
+    def __len__(self) -> int:
+        """How many samples there are."""
 
 
 class PairLoader:
@@ -58,7 +74,7 @@ class PairLoader:
 
     def __init__(
         self,
-        pairs: Pairs,
+        pairs: Batchable,
         *,
         batch_size: int,
         workers: int = 0,

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch.utils.data import Dataset
 
 from flagdata.dataset.cache import DecodedCache
-from flagdata.dataset.loader import Last, Memory, Order, PairLoader, RunIn
+from flagdata.dataset.loader import Batchable, Last, Memory, Order, PairLoader, RunIn
 from flagdata.dataset.sample import Sample
 from flagdata.dataset.table import PairTable
 from flagdata.dataset.tolerance import Refusal
@@ -29,7 +28,7 @@ class _OpenRecords(threading.local):
         self.records: OrderedDict[int, Record] = OrderedDict()
 
 
-class Pairs(Dataset[Sample]):
+class Pairs(Batchable):
     """Pairs of a query, a map-style dataset. Made by `Source.pairs`.
 
     Workers, forked or spawned, get flat arrays and paths; they never touch the catalog. Each opens a record when it
@@ -108,7 +107,7 @@ class Pairs(Dataset[Sample]):
         return {name: value for name, value in self.__dict__.items() if name != "_open"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
+        vars(self).update(state)
         self._open = _OpenRecords()
 
     def __repr__(self) -> str:

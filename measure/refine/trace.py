@@ -13,7 +13,7 @@ class Trace:
     """Evaluations in their order; one is one simulated and filmed clip.
 
     Attributes:
-        method: a name of `measure.refine.peers.registry.PEERS`, or of the project's own procedure.
+        method: name of the optimiser.
         points: (n, d) of [−1, 1]ᵈ.
         distances: (n,) squared distances to the target; infinite where a simulation failed.
         seconds: (n,) from the start to the end of each evaluation, with the optimiser's own time [s].

@@ -34,7 +34,6 @@ from measure.refine import start
 from measure.refine.command import RENDERS, scenes_of, space_of
 from measure.refine.distance import squared
 from measure.refine.evaluator import STAGES, Evaluator
-from measure.refine.peers.registry import PEERS, minimise
 from measure.refine.procedure import Settings, refine
 from measure.refine.refinement import Refinement
 from measure.refine.space import DENSITY, DIMENSION, WIND, Space
@@ -47,6 +46,7 @@ from models.evaluation.handmade import TARGETS, Fitted, fitted
 from models.training.recipe import DataSpec
 from sim.assets import Assets
 from sim.render.prior import named
+from tests.validation.peers.registry import PEERS, minimise
 from tests.validation.transfer import (
     REFERENCE_RUNS,
     by_cycles,

@@ -15,8 +15,8 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.rng import child_seed, stream, torch_draws
-from measure.refine.peers.gaussian import fitted, gains, signed, unit
-from measure.refine.peers.library import library
+from tests.validation.peers.gaussian import fitted, gains, signed, unit
+from tests.validation.peers.library import library
 
 LENGTH, LEAST, MOST = 0.8, 0.5**7, 1.6
 """Length of the region's side in [0, 1]ᵈ: at the start, where it starts anew, and at most."""
@@ -27,7 +27,7 @@ _CANDIDATES = 2000
 
 
 class Turbo:
-    """See `measure.refine.peers.registry.Optimiser`. It begins with the centre and draws of a Sobol sequence."""
+    """See `tests.validation.peers.registry.Optimiser`. It begins with the centre and draws of a Sobol sequence."""
 
     def __init__(self, dimension: int, *, seed: int, batch: int) -> None:
         self._dimension, self._seed, self._batch = dimension, seed, batch

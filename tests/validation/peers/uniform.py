@@ -9,7 +9,7 @@ from flagdata.rng import stream
 
 
 class RandomSearch:
-    """See `measure.refine.peers.registry.Optimiser`."""
+    """See `tests.validation.peers.registry.Optimiser`."""
 
     def __init__(self, dimension: int, *, seed: int, batch: int) -> None:
         self._dimension, self._batch = dimension, batch

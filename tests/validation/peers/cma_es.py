@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.rng import child_seed
-from measure.refine.peers.library import library
+from tests.validation.peers.library import library
 
 _STEP = 0.5  # a quarter of the box, as the library advises
 _FAILED = 1e12  # of a failed simulation: farther than any
 
 
 class CmaEs:
-    """See `measure.refine.peers.registry.Optimiser`.
+    """See `tests.validation.peers.registry.Optimiser`.
 
     It asks for a whole generation at once, 4 + ⌊3 ln d⌋ points, in place of `batch`, after the centre. Of a generation
     that the budget cuts it is told nothing.

@@ -13,15 +13,15 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.rng import child_seed, stream, torch_draws
-from measure.refine.peers.gaussian import fitted, signed
-from measure.refine.peers.library import library
+from tests.validation.peers.gaussian import fitted, signed
+from tests.validation.peers.library import library
 
 _FIRST = 2  # evaluations that a Gaussian process needs to be standardised
 _RESTARTS, _RAW, _STEPS = 4, 128, 100
 
 
 class BayesianOptimisation:
-    """See `measure.refine.peers.registry.Optimiser`. The second point, before there is anything to fit, is drawn."""
+    """See `tests.validation.peers.registry.Optimiser`. The second point, before there is anything to fit, is drawn."""
 
     def __init__(self, dimension: int, *, seed: int, batch: int) -> None:
         self._dimension, self._seed, self._batch = dimension, seed, batch

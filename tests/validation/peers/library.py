@@ -28,5 +28,5 @@ def library(module: str, *, of: str) -> ModuleType:
     except ModuleNotFoundError as error:
         raise InputError(
             f"{error.name} is not installed, which this optimiser needs", where=of,
-            fix='pip install "flagdata[refine]"',
+            fix='pip install "flagdata[dev]"',
         ) from None  # fmt: skip

@@ -15,10 +15,10 @@ from measure.refine.trace import Trace
 PEERS = Registry(
     "optimiser",
     {
-        "random": "measure.refine.peers.uniform:RandomSearch",
-        "bayesian": "measure.refine.peers.bayesian:BayesianOptimisation",
-        "turbo": "measure.refine.peers.turbo:Turbo",
-        "cma-es": "measure.refine.peers.cma_es:CmaEs",
+        "random": "tests.validation.peers.uniform:RandomSearch",
+        "bayesian": "tests.validation.peers.bayesian:BayesianOptimisation",
+        "turbo": "tests.validation.peers.turbo:Turbo",
+        "cma-es": "tests.validation.peers.cma_es:CmaEs",
     },
 )
 """name → class; each is made of `(dimension, *, seed, batch)`."""

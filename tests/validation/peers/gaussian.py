@@ -15,7 +15,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from measure.refine.peers.library import library
+from tests.validation.peers.library import library
 
 _OF = "botorch"
 _STEPS = 100  # of the fit; more change the length scales by little, and a noise-free surface takes them all
