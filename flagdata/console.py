@@ -12,9 +12,20 @@ from typing import Any, TypeVar
 
 import click
 
+from flagdata.addresses import local_path
 from flagdata.errors import FlagdataError, LimitError, UnforeseenError
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+class LocalPath(click.Path):
+    """A path on the command line, a `Path` afterwards; the address of a storage or stream is refused as what it is."""
+
+    def __init__(self, *, exists: bool = False, file_okay: bool = True, dir_okay: bool = True) -> None:
+        super().__init__(exists=exists, file_okay=file_okay, dir_okay=dir_okay, path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        return super().convert(local_path(value), param, ctx)
 
 
 def json_option(command: F) -> F:

@@ -13,6 +13,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from flagdata.addresses import local_path
 from flagdata.errors import InputError, LimitError, NotFoundError, UnknownNameError
 
 _SUFFIX = ".toml"
@@ -88,12 +89,13 @@ class Shelf:
 
         Raises:
             UnknownNameError: no such name; the nearest is suggested.
+            UsageError: an address, not a path.
             NotFoundError: no such file.
             InputError: it cannot be read.
         """
+        path = local_path(source)
         if not source.endswith(_SUFFIX):
             return self.named(source)
-        path = Path(source)
         if not path.is_file():
             raise NotFoundError("no such recipe file", where=source, fix="check the path, or name one of the catalog")
         try:

@@ -19,7 +19,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.console import progress, say
+from flagdata.console import LocalPath, progress, say
 from flagdata.errors import UsageError
 from models.estimator import CLOUD, SHIPPED, Estimator, load
 from models.evaluation.predict import embedded
@@ -118,11 +118,11 @@ def _seedless(recipe: object) -> dict[str, Any]:
 
 @click.command()
 @click.argument("name")
-@click.option("--lake", "lake_path", type=click.Path(path_type=Path, exists=True), required=True,
+@click.option("--lake", "lake_path", type=LocalPath(exists=True), required=True,
               help="Where the networks are.")  # fmt: skip
 @click.option("--at", help="Version of the lake that they were trained at.")
-@click.option("--cache", type=click.Path(path_type=Path), help="Folder of prepared inputs; by default LAKE.inputs.")
-@click.option("--out", type=click.Path(path_type=Path), default=SHIPPED, help="Folder of the models that are shipped.")
+@click.option("--cache", type=LocalPath(), help="Folder of prepared inputs; by default LAKE.inputs.")
+@click.option("--out", type=LocalPath(), default=SHIPPED, help="Folder of the models that are shipped.")
 def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Path) -> None:
     """Make a model that comes with the package of all seeds that the training recipe NAME has in a lake."""
     import flagdata

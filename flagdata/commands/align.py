@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from flagdata.commands.durations import DURATION
-from flagdata.console import document, json_option, lake_option, progress, say
+from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
 from flagdata.timebase import NANOSECONDS
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def _clock_options(command: F) -> F:
             click.option("--branch", default="main", show_default=True, help="Branch to commit on."),
             click.option("--dry-run", is_flag=True, help="Find the clock model, commit nothing."),
             click.option(
-                "--plot", metavar="FILE", type=click.Path(path_type=Path, dir_okay=False),
+                "--plot", metavar="FILE", type=LocalPath(dir_okay=False),
                 help="Picture of motion, wind and the search (--by estimate), drawn even when it is refused.",
             ),
             json_option,

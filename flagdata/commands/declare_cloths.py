@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 
-from flagdata.console import document, json_option, lake_option, progress
+from flagdata.console import LocalPath, document, json_option, lake_option, progress
 
 
 @click.command("declare-cloths")
-@click.argument("table", type=click.Path(path_type=Path))
+@click.argument("table", type=LocalPath())
 @click.option("--crop", default="square", show_default=True, metavar="BOX",
               help="Region of all films: x,y,width,height [px] of upright images; whole, square, or auto.")  # fmt: skip
 @click.option("--branch", default="main", show_default=True, help="Branch to commit on.")

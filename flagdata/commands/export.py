@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from flagdata.console import document, json_option, lake_option, progress, say
+from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
 from flagdata.errors import UsageError
 
 
 @click.command()
 @click.argument("format_name", metavar="FORMAT")
-@click.option("--to", "target", required=True, type=click.Path(path_type=Path), help="New folder to write.")
+@click.option("--to", "target", required=True, type=LocalPath(), help="New folder to write.")
 @click.option("--where", metavar="EXPR", help="SQL condition as in flagdata query; all rows by default.")
 @click.option("--at", metavar="REF", help="Tag, branch, version number or commit; the head of main by default.")
 @click.option("--split", metavar="SIDE", help="Only this side of the leakage-safe split: train, validation or test.")

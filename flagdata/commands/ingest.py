@@ -19,12 +19,12 @@ from flagdata.commands.ingest_options import (
     wind_options,
 )
 from flagdata.commands.ingest_sources import ingest_sources, sniff_sources
-from flagdata.console import json_option, lake_option
+from flagdata.console import LocalPath, json_option, lake_option
 from flagdata.errors import UsageError
 
 
 @click.command()
-@click.argument("sources", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SOURCE...")
+@click.argument("sources", nargs=-1, required=True, type=LocalPath(), metavar="SOURCE...")
 @click.option("--sniff", is_flag=True, help="Only say what each source seems to be, and why; the lake is not touched.")
 @click.option(
     "--as",
@@ -54,7 +54,7 @@ from flagdata.errors import UsageError
     help="Camera: x,y,width,height in px of the upright image; whole, square, or auto (where the motion is).",
 )  # fmt: skip
 @click.option(
-    "--crop-picture", type=click.Path(path_type=Path, dir_okay=False), metavar="PATH",
+    "--crop-picture", type=LocalPath(dir_okay=False), metavar="PATH",
     help="Camera: write the picture that shows --crop auto.",
 )  # fmt: skip
 @click.option("--exposure", type=float, metavar="S", help="Camera: exposure time, to stamp mid-exposure.")

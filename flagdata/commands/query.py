@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flagdata.console import document, json_option, lake_option, say, table
+from flagdata.console import LocalPath, document, json_option, lake_option, say, table
 from flagdata.errors import ConflictError, InputError, UsageError
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ VIEWS: dict[str | None, tuple[str, ...]] = {
 @click.option(
     "--limit", type=click.IntRange(min=0), help=f"Rows at most; {PEOPLE_LIMIT} in the table for people, else all."
 )
-@click.option("--arrow", metavar="FILE", type=click.Path(path_type=Path), help="Write an Arrow IPC file.")
+@click.option("--arrow", metavar="FILE", type=LocalPath(), help="Write an Arrow IPC file.")
 @click.option("--csv", "as_csv", is_flag=True, help="Comma-separated values on stdout.")
 @click.option("--describe", is_flag=True, help="List the columns with their units.")
 @json_option

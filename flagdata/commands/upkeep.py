@@ -10,8 +10,9 @@ from pathlib import Path
 
 import click
 
+from flagdata.addresses import local_path
 from flagdata.commands.lake import counted, size_text
-from flagdata.console import document, json_option, lake_option, progress, say
+from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
 from flagdata.errors import ConflictError, NotFoundError
 from flagdata.findings import Finding
 
@@ -119,7 +120,7 @@ def gc(grace: timedelta, dry_run: bool, as_json: bool, lake_path: str) -> None:
 
 @click.command()
 @click.argument("source")
-@click.argument("target", type=click.Path(path_type=Path))
+@click.argument("target", type=LocalPath())
 @json_option
 @lake_option
 def recover(source: str, target: Path, as_json: bool, lake_path: str) -> None:
@@ -131,7 +132,7 @@ def recover(source: str, target: Path, as_json: bool, lake_path: str) -> None:
     from flagdata.lake.artifact import OBJECT_NAME
     from flagdata.record import salvage
 
-    path = Lake.open(lake_path).object_path(source) if OBJECT_NAME.fullmatch(source) else Path(source)
+    path = Lake.open(lake_path).object_path(source) if OBJECT_NAME.fullmatch(source) else local_path(source)
     if not path.is_file():
         raise NotFoundError(
             "there is no such record", where=source, fix="give an .mcap file, or mcap/<sha256> of the lake"

@@ -20,6 +20,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.addresses import local_path
 from flagdata.errors import FlagdataError, UsageError
 
 _FORMAT = "flagdata.decoded/1"
@@ -54,7 +55,7 @@ class DecodedCache:
     """
 
     def __init__(self, path: Path | str, *, limit: int) -> None:
-        self.path = Path(path).absolute()
+        self.path = local_path(path).absolute()
         self.limit = limit
         if limit < 1:
             raise UsageError(f"a cache of {limit} bytes", fix="give a limit above zero")

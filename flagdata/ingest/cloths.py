@@ -18,6 +18,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from flagdata.addresses import local_path
 from flagdata.errors import InputError, LimitError, NotFoundError
 from flagdata.ingest.headings import check_columns, delimiter_of
 
@@ -111,7 +112,7 @@ def _film(row: Mapping[str, str], folder: Path, where: str) -> ClothFilm:
     for name in COLUMNS:
         if not row[name]:
             raise InputError(f"no {name}", where=where, fix="fill the cell, or leave the row out")
-    film = folder / row["film"]
+    film = folder / local_path(row["film"])
     if not film.exists():
         raise NotFoundError(f"no such film: {row['film']}", where=where, fix="give its path from the table's folder on")
     density = _number(row, "area_weight", where, unit="kg/m²")

@@ -17,6 +17,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from flagdata import provenance
+from flagdata.addresses import local_path
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
@@ -53,7 +54,7 @@ class Lake:
 
         Raises:
             ConflictError: a lake, or anything else, is there.
-            UsageError: a path that the Delta library cannot work in.
+            UsageError: an address, or a path that the Delta library cannot work in.
         """
         lake = cls(_usable(path))
         with disk_errors("creating a lake", lake.path):
@@ -85,7 +86,7 @@ class Lake:
             NotFoundError: no lake there.
             ConflictError: written by a newer format.
             CorruptError: its marker cannot be read.
-            UsageError: a path that the Delta library cannot work in.
+            UsageError: an address, or a path that the Delta library cannot work in.
         """
         lake = cls(_usable(path))
         marker = lake.path / _MARKER
@@ -297,7 +298,7 @@ def _readable(marker: Path) -> Iterator[None]:
 
 def _usable(path: Path | str) -> Path:
     try:
-        whole = Path(path).resolve()
+        whole = local_path(path).resolve()
     except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a null byte
         raise UsageError(f"not a path: {error}", where=repr(str(path)), fix="name another folder") from None
     if _UNUSABLE.search(str(whole)):

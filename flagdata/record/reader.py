@@ -19,6 +19,7 @@ import simplejpeg
 from google.protobuf.message import DecodeError
 from numpy.typing import NDArray
 
+from flagdata.addresses import local_path
 from flagdata.errors import CorruptError, InputError, NotFoundError, UsageError
 from flagdata.record import container, messages
 from flagdata.record.key_frames import is_key
@@ -55,7 +56,7 @@ class Record:
             NotFoundError: no such file.
             CorruptError: not a whole MCAP record.
         """
-        record = cls(Path(path))
+        record = cls(local_path(path))
         record._summary  # noqa: B018  read and checked here, kept for later
         return record
 

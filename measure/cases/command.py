@@ -7,13 +7,13 @@ from pathlib import Path
 
 import click
 
-from flagdata.console import document, json_option, progress, say, table
+from flagdata.console import LocalPath, document, json_option, progress, say, table
 
 
 @click.command()
 @click.argument("name")
-@click.argument("data", type=click.Path(path_type=Path, exists=True, file_okay=False))
-@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder for the report.")
+@click.argument("data", type=LocalPath(exists=True, file_okay=False))
+@click.option("--out", type=LocalPath(), required=True, help="Folder for the report.")
 @json_option
 def case(name: str, data: Path, out: Path, as_json: bool) -> None:
     """Study the case NAME (paper-flag) with the recordings in the folder DATA.

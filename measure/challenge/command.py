@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.console import document, json_option, progress, say
+from flagdata.console import LocalPath, document, json_option, progress, say
 
 if TYPE_CHECKING:
     from measure.challenge.filing import Filing
 
-_FOLDER = click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+_FOLDER = click.argument("folder", metavar="DIR", type=LocalPath())
 _ONLY = click.option("--only", multiple=True, metavar="SET", help="Take this set only; may be repeated.")
 
 
@@ -104,7 +104,7 @@ def bank(folder: Path, recipe: str, seed: int, kinds: int, workers: int, as_json
     show_default=True,
     help="Number of sets that are judged at a time.",
 )
-@click.option("--bank", type=click.Path(path_type=Path), help="Folder of simulated nulls that the sets share.")
+@click.option("--bank", type=LocalPath(), help="Folder of simulated nulls that the sets share.")
 @json_option
 def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path | None, as_json: bool) -> None:
     """Judge the sets that have no verdict yet, and file what is said with its hash."""
@@ -136,11 +136,9 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
 @challenge.command()
 @_FOLDER
 @_ONLY
+@click.option("--out", type=LocalPath(), help="Path to which the sheet is also written, as .json, .md and .png.")
 @click.option(
-    "--out", type=click.Path(path_type=Path), help="Path to which the sheet is also written, as .json, .md and .png."
-)
-@click.option(
-    "--history", type=click.Path(path_type=Path), metavar="FILE.csv",
+    "--history", type=LocalPath(), metavar="FILE.csv",
     help="File of all graded challenges, to which this one is added under its folder's name.",
 )  # fmt: skip
 @click.option(

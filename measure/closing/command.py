@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from flagdata.console import document, json_option, say
+from flagdata.console import LocalPath, document, json_option, say
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.findings import Finding
 from measure.closing.command_line import null_options, refuse, said_of_nulls, stage_bars, told
@@ -34,7 +34,7 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
 
 @click.command("close-loop")
 @click.argument("sources", metavar="SOURCE...", nargs=-1)
-@click.option("--recipe", "recipe_path", type=click.Path(path_type=Path), metavar="FILE.toml",
+@click.option("--recipe", "recipe_path", type=LocalPath(), metavar="FILE.toml",
               help="Recipe of the cloth, pins, wind and test; it may name the recordings as well.")  # fmt: skip
 @click.option(
     "--wind",
@@ -86,11 +86,11 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
     help="Standard deviation of a marker's coordinate [m]; by default it is estimated.",
 )
 @null_options(level="Significance level of the global test; 0.05 by default.")
-@click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",
+@click.option("--lake", "lake_path", type=LocalPath(), envvar="FLAGDATA_LAKE",
               help="Lake that artifacts are read from and results are written to; also FLAGDATA_LAKE.")  # fmt: skip
 @click.option("--branch", default="main", show_default=True, help="Branch of the lake to commit on.")
 @click.option("--name", help="Name of the measurement and its models; by default that of the first source.")
-@click.option("--out", type=click.Path(path_type=Path), default=Path("out/close-loop"), show_default=True,
+@click.option("--out", type=LocalPath(), default=Path("out/close-loop"), show_default=True,
               help="Folder that report.html, verdict.json and the models are written to.")  # fmt: skip
 @json_option
 @click.pass_context

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flagdata.console import say
+from flagdata.console import LocalPath, say
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
 
@@ -31,7 +31,7 @@ def null_options(*, level: str) -> Callable[[_Command], _Command]:
             help="Number of null recordings to simulate: 160 (the default) or more.",
         ),
         click.option(
-            "--bank", type=click.Path(path_type=Path, exists=True),
+            "--bank", type=LocalPath(exists=True),
             help="Folder of null recordings that were simulated before for such recordings.",
         ),
         click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), help=level),

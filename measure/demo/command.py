@@ -15,7 +15,7 @@ from typing import Any
 
 import click
 
-from flagdata.console import progress, say
+from flagdata.console import LocalPath, progress, say
 from flagdata.errors import ConflictError, FlagdataError
 
 _MARK = ".flagdata-demo"
@@ -77,7 +77,7 @@ class Transcript:
 @click.option(
     "--out",
     "out",
-    type=click.Path(path_type=Path),
+    type=LocalPath(),
     default=Path("out/demo"),
     show_default=True,
     help="Folder for the pages and the data; one that an earlier demonstration made is replaced.",

@@ -14,7 +14,7 @@ import click
 
 from flagdata.commands.durations import DURATION
 from flagdata.commands.ranges import RANGE
-from flagdata.console import document, json_option, progress, say
+from flagdata.console import LocalPath, document, json_option, progress, say
 from flagdata.errors import ConflictError, RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 
@@ -46,18 +46,16 @@ if TYPE_CHECKING:
 @click.option("--model", metavar="NAME|FOLDER|ID", help="Network that measures; by default flow, of flags.")
 @click.option("--refine", type=click.IntRange(min=20), metavar="N",
               help="Refine the first window by N simulated clips, 20 or more; 50 take minutes.")  # fmt: skip
-@click.option("--cache", type=click.Path(path_type=Path), metavar="FOLDER",
+@click.option("--cache", type=LocalPath(), metavar="FOLDER",
               help="Where simulated clips are kept, so that an interrupted refinement goes on.")  # fmt: skip
 @click.option("--false-alarm", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.05,
               show_default=True, help="Share of familiar films that the gate may refuse.")  # fmt: skip
 @click.option("--anyway", is_flag=True, help="Show, marked, what the model says of a film that the gate refuses.")
-@click.option(
-    "--report", type=click.Path(path_type=Path), metavar="FILE.html", help="Write a page that needs no other."
-)
-@click.option("--zarr", "zarr_path", type=click.Path(path_type=Path), metavar="FOLDER",
+@click.option("--report", type=LocalPath(), metavar="FILE.html", help="Write a page that needs no other.")
+@click.option("--zarr", "zarr_path", type=LocalPath(), metavar="FOLDER",
               help="Write draws and series as a Zarr data set.")  # fmt: skip
 @click.option("--csv", "as_csv", is_flag=True, help="The windows as comma-separated values on stdout.")
-@click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",
+@click.option("--lake", "lake_path", type=LocalPath(), envvar="FLAGDATA_LAKE",
               help="Where artifacts are, and where measurements go; also FLAGDATA_LAKE.")  # fmt: skip
 @click.option(
     "--at", metavar="REF", help="Tag, branch or version of the lake to look at; by default the branch's head."

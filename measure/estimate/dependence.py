@@ -26,7 +26,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.console import progress, say
+from flagdata.console import LocalPath, progress, say
 from flagdata.errors import CorruptError, InputError
 from flagdata.rng import child_seed, stream
 from measure.estimate.combine import OWN, UNKNOWN, Dependence
@@ -198,7 +198,7 @@ def of_model(model: Estimator) -> Dependence:
 @click.option("--films", type=click.IntRange(10), default=200, show_default=True, help="How many films are simulated.")
 @click.option("--windows", type=click.IntRange(2), default=6, show_default=True, help="How many windows a film has.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the films.")
-@click.option("--out", type=click.Path(path_type=Path), default=SHIPPED, help="Folder of the models that are shipped.")
+@click.option("--out", type=LocalPath(), default=SHIPPED, help="Folder of the models that are shipped.")
 def main(name: str, films: int, windows: int, seed: int, out: Path) -> None:
     """Measure how alike windows of one film are to the shipped model NAME, and write it into its card."""
     from models.estimator import load

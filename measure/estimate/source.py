@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from flagdata.addresses import local_path
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.ingest.camera import CropBox
 from flagdata.lake import Artifact, Lake
@@ -103,8 +104,8 @@ def subjects(
     """
     if (source is None) == (query is None):
         raise UsageError("name a film or give a query over clips, one of them", fix="see flagdata measure --help")
-    if source is not None and Path(source).exists():
-        path = Path(source)
+    path = None if source is None else local_path(source)
+    if path is not None and path.exists():
         film = CameraFilm(path, crop=reading.crop, true_fps=reading.true_fps, sequence_fps=reading.sequence_fps)
         return [Subject(film=film, path=path)]
     if lake is None:
@@ -192,7 +193,7 @@ def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
     """
     shipped = {path.name for path in estimator.SHIPPED.iterdir() if (path / CARD).is_file()}
     chosen = name if name is not None else estimator.DEFAULT
-    if (Path(chosen) / CARD).is_file():
+    if (local_path(chosen) / CARD).is_file():
         return _loaded(Path(chosen), None)
     if chosen in shipped:
         return _loaded(estimator.SHIPPED / chosen, None)

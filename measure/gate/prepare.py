@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.console import progress, say
+from flagdata.console import LocalPath, progress, say
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from measure.gate.distortions import DISTORTIONS, Film
@@ -131,8 +131,8 @@ def data_of(model: Estimator) -> DataSpec:
 
 
 @click.command()
-@click.argument("model", type=click.Path(path_type=Path), default=SHIPPED / "flow")
-@click.option("--lake", "lake_path", type=click.Path(path_type=Path, exists=True), required=True,
+@click.argument("model", type=LocalPath(), default=SHIPPED / "flow")
+@click.option("--lake", "lake_path", type=LocalPath(exists=True), required=True,
               help="Where the films are that the model was trained on and validated by.")  # fmt: skip
 @click.option("--dataset", "datasets", multiple=True,
               help="Name of the films' data set; by default all that it was trained on.")  # fmt: skip

@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata import timebase
+from flagdata.addresses import local_path
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer import WindOptions
@@ -179,7 +180,7 @@ def _setup(top: Table, folder: Path) -> Setup:
     if width is not None and height is not None:
         corners = sheet(width, height)
     elif mesh is not None:
-        shape = read_obj(folder / mesh)
+        shape = read_obj(folder / local_path(mesh))
         corners = outline(shape.rest, shape.faces, where=str(folder / mesh))
     vertices = flat.whole("vertices", VERTICES, least=16)
     flat.done()
@@ -240,7 +241,7 @@ def _material(table: Table, folder: Path) -> Material | None:
         raise UsageError("both name and file are given", where=table.where, fix="keep one of them")
     if name is not None and name not in MATERIALS.names():
         raise UnknownNameError.of("material", name, MATERIALS.names(), where=table.where)
-    base = named(name) if name is not None else _material_file(folder / (file or ""))
+    base = named(name) if name is not None else _material_file(folder / local_path(file or ""))
     thicken = table.number("thicken", 1.0, above=0.0)
     made = base.scaled(
         density=thicken,
@@ -301,7 +302,7 @@ def _wind(table: Table, folder: Path) -> WindSource:
             start=timebase.parse(start, where=f"{table.where} start") if start is not None else None,
         )  # fmt: skip
         sensor = table.text("sensor", None)
-        if sensor is not None and (folder / sensor).is_file():
+        if sensor is not None and (folder / local_path(sensor)).is_file():
             sensor = str(folder / sensor)
         options = WindOptions(recipe=sensor, zone=table.text("zone", None))
         table.done()
@@ -352,7 +353,7 @@ def opened(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Ob
 
 
 def _read(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Observation, ...]:
-    path = folder / source.source
+    path = folder / local_path(source.source)
     if path.is_dir():
         _refuse(source, ("take", "rest_unit"), "a folder of meshes")
         return (meshes.from_folder(path, rate=source.rate, unit=source.unit),)
@@ -394,7 +395,7 @@ def _track(source: WindSource, folder: Path, lake: Lake | None) -> tuple[WindTra
     if source.velocity is not None:
         return WindTrack.constant(source.velocity), ()
     placement = source.placement or LogPlacement()
-    path = folder / source.log
+    path = folder / local_path(source.log)
     if path.is_file():
         return wind.from_log(path, placement, source.options)
     if source.options not in (None, WindOptions()):

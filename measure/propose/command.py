@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.console import document, json_option, say
+from flagdata.console import LocalPath, document, json_option, say
 from measure.closing.command_line import null_options, refuse, said_of_nulls, stage_bars
 
 if TYPE_CHECKING:
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("recipe_path", metavar="RECIPE.toml", type=click.Path(path_type=Path))
+@click.argument("recipe_path", metavar="RECIPE.toml", type=LocalPath())
 @click.option("--effect", metavar="FILE.py:Class", help="Test this effect on the recordings and seek no other.")
 @click.option(
     "--known", multiple=True, metavar="EFFECT.STRENGTH", help="Effect that the model has already; may be repeated."
 )
 @null_options(level="Significance level of the test of every term; 0.05 by default.")
-@click.option("--lake", "lake_path", type=click.Path(path_type=Path), envvar="FLAGDATA_LAKE",
+@click.option("--lake", "lake_path", type=LocalPath(), envvar="FLAGDATA_LAKE",
               help="Lake that artifacts are read from; also FLAGDATA_LAKE.")  # fmt: skip
-@click.option("--out", type=click.Path(path_type=Path), default=Path("out/close-loop"), show_default=True,
+@click.option("--out", type=LocalPath(), default=Path("out/close-loop"), show_default=True,
               help="Folder in which proposal/ is written: the effect file, its tests and ledger.json.")  # fmt: skip
 @json_option
 def propose(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flagdata.commands.ranges import RANGE
-from flagdata.console import document, json_option, lake_option, progress, say
+from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
 from flagdata.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,10 +32,10 @@ if TYPE_CHECKING:
 @click.option("--dataset", default="flagsim-wide", show_default=True, help="Data set whose clips are judged.")
 @click.option("--side", default="test", show_default=True, help="Side of the data set: train, validation or test.")
 @click.option("--at", metavar="REF", help="Tag, branch or version of the lake; by default its head.")
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", default=Path("evaluation"), show_default=True,
+@click.option("--out", type=LocalPath(), metavar="DIR", default=Path("evaluation"), show_default=True,
               help="Where the page, the table in Markdown and the JSON go.")  # fmt: skip
 @click.option("--name", default="evaluation", show_default=True, help="Name of the files, without their endings.")
-@click.option("--cache", type=click.Path(path_type=Path), metavar="DIR",
+@click.option("--cache", type=LocalPath(), metavar="DIR",
               help="Where prepared inputs are kept; by default beside the lake, LAKE.inputs.")  # fmt: skip
 @click.option("--reference", metavar="LABEL", help="Model that the others are compared with; by default the best.")
 @click.option("--tsne", metavar="LABEL", help="Model whose embedding is drawn by t-SNE.")

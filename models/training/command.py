@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flagdata.console import document, json_option, lake_option, progress, say
+from flagdata.addresses import local_path
+from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,9 +24,9 @@ if TYPE_CHECKING:
 @click.option("--at", metavar="REF", help="Tag, branch or version of the lake to learn from; by default its head.")
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of weights, crops and orders, instead of the recipe's.")
 @click.option("--sequences", type=click.IntRange(min=2), metavar="N", help="Simulations to learn from, instead of all.")
-@click.option("--cache", type=click.Path(path_type=Path), metavar="DIR",
+@click.option("--cache", type=LocalPath(), metavar="DIR",
               help="Where prepared inputs are kept, outside the lake; by default beside it, LAKE.inputs.")  # fmt: skip
-@click.option("--run", type=click.Path(path_type=Path), metavar="DIR",
+@click.option("--run", type=LocalPath(), metavar="DIR",
               help="Where the checkpoint is kept while it trains; by default in the cache.")  # fmt: skip
 @click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Threads; by default one a core.")
 @click.option("--device", default="cpu", show_default=True, help="Where the network computes: cpu, cuda.")
@@ -64,9 +65,10 @@ def train(
         loaded = replace(loaded, seed=seed)
     if sequences is not None:
         loaded = replace(loaded, data=replace(loaded.data, sequences=sequences))
+    lake = local_path(lake_path)
     folder = cache if cache is not None else Path(f"{lake_path.rstrip('/')}.inputs")
     report = trained(
-        loaded, Path(lake_path), at=at, cache=folder, run=run, workers=workers or os.cpu_count() or 1, device=device,
+        loaded, lake, at=at, cache=folder, run=run, workers=workers or os.cpu_count() or 1, device=device,
         branch=branch, bars=progress,
     )  # fmt: skip
     if report is None:  # another rank of a torchrun reports

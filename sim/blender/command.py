@@ -6,12 +6,12 @@ from pathlib import Path
 
 import click
 
-from flagdata.console import document, json_option, say
+from flagdata.console import LocalPath, document, json_option, say
 
 
 @click.command("blender-setup")
 @click.option(
-    "--folder", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
+    "--folder", type=LocalPath(file_okay=False), metavar="DIR",
     help="Where the environment is made; by default the folder blender of flagdata's cache.",
 )  # fmt: skip
 @click.option("--python", metavar="PYTHON", help="A Python 3.11 to make it with; by default one that is found.")

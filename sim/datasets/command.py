@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.console import document, json_option, lake_option, progress, say, table
+from flagdata.addresses import local_path
+from flagdata.console import LocalPath, document, json_option, lake_option, progress, say, table
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 @click.option("--renderer", metavar="NAME", help="raster, cycles or workbench, instead of the recipe's.")
 @click.option("--device", default="cpu", show_default=True, help="Where workers compute: cpu, cuda.")
 @click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")
-@click.option("--card", type=click.Path(path_type=Path), metavar="FILE", help="Where the card goes; by default cards/.")
+@click.option("--card", type=LocalPath(), metavar="FILE", help="Where the card goes; by default cards/.")
 @json_option
 @lake_option
 def build(
@@ -105,7 +106,7 @@ def _lake(path: str) -> Lake | None:
     """The lake at a path, None where nothing is there."""
     from flagdata.lake import Lake
 
-    place = Path(path)
+    place = local_path(path)
     if not place.exists() or (place.is_dir() and not any(place.iterdir())):
         return None
     return Lake.open(place)

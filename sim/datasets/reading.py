@@ -20,6 +20,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from flagdata.addresses import local_path
 from flagdata.errors import InputError, LimitError, UnknownNameError, UsageError
 from flagdata.recipes import Shelf, parsed
 from flagdata.record.writer import Coding
@@ -77,7 +78,7 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
         seed=top.whole("seed", 0, least=0, most=SEED_LIMIT), renderer=renderer,
         simulation=_simulation(top.table("simulation"), folder),
         prior=_prior(render), sessions=sessions,
-        photos=None if photos is None else folder / photos, sides=_sides(top.table("sides"), sessions),
+        photos=None if photos is None else folder / local_path(photos), sides=_sides(top.table("sides"), sessions),
         camera=_camera(top.table("camera")), anemometer=_anemometer(top.table("anemometer")),
     )  # fmt: skip
     top.done()
@@ -103,7 +104,7 @@ def _simulation(table: Table, folder: Path) -> Simulation:
     table.done()
     if scene is None:
         raise InputError("no scene is named", where=table.where, fix='add scene = "flag-search-space", or a .toml file')
-    return load_simulation(str(folder / scene) if scene.endswith(".toml") else scene)
+    return load_simulation(str(folder / local_path(scene)) if scene.endswith(".toml") else scene)
 
 
 def _prior(table: Table) -> RenderPrior:

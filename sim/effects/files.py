@@ -7,6 +7,7 @@ import sys
 from dataclasses import is_dataclass
 from pathlib import Path
 
+from flagdata.addresses import local_path
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.provenance import file_hash
 from sim.effects.effect import Effect
@@ -22,7 +23,7 @@ def load(spec: str) -> type[Effect]:
     text, _, attribute = spec.rpartition(":")
     if not text or not attribute.isidentifier():
         raise UsageError(f"{spec!r} names no effect", where="effect file", fix="give FILE.py:Class")
-    path = Path(text)
+    path = local_path(text)
     if not path.is_file():
         raise NotFoundError("no such file", where=text, fix="check the path")
     module = _module(path)

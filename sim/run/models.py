@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from flagdata.addresses import local_path
 from flagdata.errors import CorruptError, NotFoundError, UnknownNameError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
@@ -26,7 +27,7 @@ def load(source: str, lake: Lake, *, branch: str = "main") -> Recipe:
         NotFoundError: several models have it.
         FlagdataError: as `sim.run.reading.load`.
     """
-    if Path(source).suffix in (".toml", ".json") or source in reading.SCENES.names():
+    if local_path(source).suffix in (".toml", ".json") or source in reading.SCENES.names():
         return reading.load(source)
     rows = lake.rows("kind = 'model'", at=branch, columns=["artifact", "name"]).to_pylist()
     found = [row["artifact"] for row in rows if _means(source, row)]

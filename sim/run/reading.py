@@ -30,6 +30,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from flagdata.addresses import local_path
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.provenance import canonical, digest
 from flagdata.recipes import Shelf, parsed
@@ -75,7 +76,7 @@ def load(source: str) -> Recipe:
         InputError: a value that does not fit, or a scene that cannot be simulated.
     """
     if source.endswith(".json"):
-        return _of_scene_file(Path(source))
+        return _of_scene_file(local_path(source))
     found = SCENES.find(source)
     return parse(found.text, name=found.name, folder=found.folder, where=found.where)
 
@@ -130,7 +131,9 @@ def _scene(table: Table, folder: Path) -> SceneSpec:
         table.done()
         if file is None:
             raise InputError("no file is named", where=table.where, fix='add file = "scene.json"')
-        content = read_scene(folder / file, root=None if root is None else folder / root, accept=accept)
+        content = read_scene(
+            folder / local_path(file), root=None if root is None else folder / local_path(root), accept=accept
+        )
         return _arcsim(content, noise=noise, evaluation=evaluation)
     stiffness = _stiffness(table)
     if shape is Shape.MESH:
@@ -228,7 +231,7 @@ def _bases(table: Table, folder: Path, scene: SceneSpec) -> tuple[Material, ...]
     if chosen:
         return tuple(material.named(each, where=table.where) for each in chosen)
     if file is not None:
-        return (_material_file(folder / file),)
+        return (_material_file(folder / local_path(file)),)
     if scene.arcsim is not None:
         return (scene.arcsim.scene.material,)
     raise InputError("no material is named", where=table.where, fix='add name = "camel-ponte-roma", or a file')

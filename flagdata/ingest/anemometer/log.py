@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.addresses import local_path
 from flagdata.errors import InputError, NothingMeasuredError, TimeError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import recipe as recipes
@@ -42,7 +43,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         UsageError: options that do not fit the format, or a format that cannot be told from the file.
         NotFoundError: no such file, or no such recipe.
     """
-    path = Path(path)
+    path = local_path(path)
     options = options or WindOptions()
     recipe = recipes.load(options.recipe) if options.recipe is not None else None
     encoding = options.encoding or (recipe.file.encoding if recipe else None)

@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+from flagdata.addresses import local_path
 from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.ingest.anemometer import foreign
 from flagdata.ingest.anemometer.documents import excel
@@ -35,7 +36,7 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
         NotFoundError: there is no such file.
         InputError: it is empty or cannot be read.
     """
-    path = Path(path)
+    path = local_path(path)
     if not path.exists():
         raise NotFoundError(f"no file {path.name}", where=str(path), fix="check the path")
     if path.is_dir():

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from flagdata.addresses import local_path
 from flagdata.errors import TimeError
 from flagdata.findings import Finding
 from flagdata.ingest.camera.geometry import upright_size
@@ -63,7 +64,7 @@ def probe(path: Path | str, options: CameraOptions | None = None) -> CameraProbe
     Raises:
         NotFoundError, InputError, LimitError, TimeError, UsageError: as `open_camera`, but a missing start is no error.
     """
-    path = Path(path)
+    path = local_path(path)
     options = options or CameraOptions()
     source = open_source(path, options)
     try:

@@ -7,6 +7,7 @@ from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
 
+from flagdata.addresses import local_path
 from flagdata.errors import LimitError, RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.container import check_path
@@ -302,7 +303,7 @@ def open_camera(path: Path | str, options: CameraOptions | None = None) -> Camer
     Raises:
         NotFoundError, InputError, LimitError, TimeError, UsageError: with what to do about it.
     """
-    path = Path(path)
+    path = local_path(path)
     options = options or CameraOptions()
     source = open_source(path, options)
     try:
@@ -325,7 +326,7 @@ def propose_crop(path: Path | str, options: CameraOptions | None = None) -> Crop
         RefusedError: nothing moves, or motion is all over the image.
         NotFoundError, InputError, LimitError, TimeError, UsageError: as `open_camera`.
     """
-    path = Path(path)
+    path = local_path(path)
     options = options or CameraOptions()
     source = open_source(path, options)
     try:

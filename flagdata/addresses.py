@@ -1,0 +1,43 @@
+"""The one place where text becomes a path: an address of a storage, stream or machine is refused as what it is.
+
+A path library takes `s3://bucket/lake` for a folder `s3:` here; whoever gave it meant a service that flagdata does not
+read or write.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from flagdata.errors import UsageError
+
+_ADDRESS = re.compile(r"([\w.-]+@)?(?P<scheme>[A-Za-z][\w.+-]+):(?P<rest>/.*)", re.DOTALL)  # a drive has one letter
+_STORAGE = "object storage", "copy it to a local disk with the storage's own client, and give that path"
+_STREAM = "a live stream", "record it to a file first (ffmpeg -i ADDRESS -c copy film.mkv), and give that file"
+_WEB = "a file on the web", "download it, and give the local file"
+_KINDS = {
+    **dict.fromkeys(("s3", "s3a", "s3n", "gs", "gcs", "oss", "r2", "b2", "minio", "swift", "hdfs"), _STORAGE),
+    **dict.fromkeys(("az", "azure", "abfs", "abfss", "adl", "wasb", "wasbs"), _STORAGE),
+    **dict.fromkeys(("rtsp", "rtsps", "rtp", "srt", "rtmp", "rtmps", "udp", "tcp", "mms", "mmsh", "hls"), _STREAM),
+    **dict.fromkeys(("http", "https", "ftp", "ftps", "dav", "davs"), _WEB),
+}
+_ELSEWHERE = "another machine or service", "copy or mount it, and give the local path"
+
+
+def local_path(text: Path | str) -> Path:
+    """`text` as a path of a file or folder of this machine; nothing is looked up.
+
+    Raises:
+        UsageError: an address: a scheme or machine, a colon and a slash. A local path that looks like one can be given
+            from the root on.
+    """
+    found = _ADDRESS.fullmatch(str(text))
+    if found is None:
+        return Path(text)
+    scheme = found["scheme"].lower()
+    if scheme == "file":
+        what, fix = "a file: address, not a path", f"give the path: /{found['rest'].lstrip('/')}"
+    else:
+        noun, fix = _KINDS.get(scheme, _ELSEWHERE)
+        what = f"the address of {noun}, not a local path"
+    raise UsageError(what, where=str(text), fix=fix)
