@@ -23,7 +23,7 @@ from models.frontend import FrontEnd
 from models.learner import Learner, Loss, build
 from models.outliers import Familiarity
 from models.restriction import MORE, Known, restricted
-from models.storage import WEIGHTS, read_card, read_tensors
+from models.storage import WEIGHTS, check_model, read_card, read_tensors
 from models.targets import Cloth, Target
 
 SHIPPED = Path(__file__).parent / "shipped"
@@ -195,12 +195,13 @@ class Estimator:
 
 
 def load(folder: Path) -> Estimator:
-    """The model in a folder.
+    """The model in a folder, once its files were found to be as they were written.
 
     Raises:
         NotFoundError: there is none.
         CorruptError: it is damaged, or does not fit this code.
     """
+    check_model(folder)
     card = read_card(folder)
     tensors = read_tensors(folder / WEIGHTS)
     try:

@@ -19,6 +19,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from flagdata.checksums import write_sums
 from flagdata.console import LocalPath, progress, say
 from flagdata.errors import UsageError
 from models.estimator import CLOUD, SHIPPED, Estimator, load
@@ -108,6 +109,7 @@ def write(folder: Path, members: Sequence[Path], *, train: Prepared, validation:
     }
     write_tensors(folder / WEIGHTS, tensors)
     write_tensors(folder / CLOUD, {key: torch.from_numpy(value) for key, value in cloud.arrays().items()})
+    write_sums(folder)
     return load(folder)
 
 

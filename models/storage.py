@@ -3,24 +3,52 @@
 card.json            what it is: recipe, data, seeds, scores, limits; "format" is `FORMAT`
 weights.safetensors  the learner's parameters and buffers
 …                    more tensors or pictures, by whoever writes it
+SHA256SUMS           of all of these, checked before any of them is used; see `flagdata.checksums`
 """
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from safetensors import SafetensorError
-from safetensors.torch import load_file, save_file
+from safetensors.torch import load, save
 from torch import Tensor
 
+from flagdata.checksums import SUMS, check_sums, content_hash
 from flagdata.errors import CorruptError, NotFoundError
 
 FORMAT = "flagdata.network/1"
 CARD = "card.json"
 WEIGHTS = "weights.safetensors"
+_OBJECT = re.compile(r"([0-9a-f]{64})\.model")
+
+
+def check_model(folder: Path) -> None:
+    """Make sure that the files of a model are as they were written.
+
+    Models of a lake are checked by the hash in their name; others by their checksums.
+
+    Raises:
+        NotFoundError: there is no model.
+        CorruptError: a file has changed, is missing or was added, or nothing states what the files should hold.
+    """
+    whole = folder.resolve()
+    if not (whole / CARD).is_file():
+        raise NotFoundError("there is no model here", where=str(folder), fix="name a trained model")
+    if named := _OBJECT.fullmatch(whole.name):
+        if content_hash(whole) != named[1]:
+            raise CorruptError("the model's files have changed since it was stored", where=str(folder), fix=_AGAIN)
+    elif not (whole / SUMS).is_file():
+        raise CorruptError(
+            f"the model has no {SUMS}, so that damage to it cannot be found", where=str(folder),
+            fix=f"name it by its lake, or state that its files are whole: (cd FOLDER && sha256sum * > {SUMS})",
+        )  # fmt: skip
+    else:
+        check_sums(whole, fix=_AGAIN)
 
 
 def write_card(folder: Path, card: Mapping[str, Any]) -> None:
@@ -49,8 +77,12 @@ def read_card(folder: Path) -> dict[str, Any]:
 
 
 def write_tensors(path: Path, tensors: Mapping[str, Tensor]) -> None:
-    """Write tensors by name; each is copied, so that views are stored whole."""
-    save_file({name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}, path)
+    """Write tensors by name; each is copied, so that views are stored whole.
+
+    Raises:
+        OSError: what the disk refuses.
+    """
+    path.write_bytes(save({name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}))
 
 
 def read_tensors(path: Path) -> dict[str, Tensor]:
@@ -63,7 +95,7 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
     if not path.is_file():
         raise NotFoundError("there are no weights here", where=str(path), fix="name a trained model")
     try:
-        return load_file(path)
+        return load(path.read_bytes())
     except (SafetensorError, OSError, ValueError) as error:
         raise CorruptError(f"the weights cannot be read: {error}", where=str(path), fix=_AGAIN) from None
 

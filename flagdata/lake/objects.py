@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import hashlib
 import os
 import shutil
 from collections.abc import Iterator
@@ -11,10 +10,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from flagdata.checksums import content_hash, files_of
 from flagdata.errors import CorruptError, InputError, NotFoundError
 from flagdata.lake.artifact import OBJECT_NAME
 from flagdata.lake.durable import flush_file, flush_folder
-from flagdata.provenance import file_hash
 
 STORES = {"mcap": ".mcap", "zarr": ".zarr", "model": ".model"}
 _READ_ONLY = 0o444
@@ -30,39 +29,6 @@ class StoredObject:
     path: Path
     size: int
     modified: float
-
-
-def files_of(path: Path) -> list[Path]:
-    """The regular files of an object, sorted by relative path; the file itself if it is one.
-
-    Raises:
-        InputError: a symbolic link or special file, whose content the hash would not cover.
-    """
-    if path.is_symlink() or not path.exists():
-        raise InputError("not a file or folder", where=str(path), fix="give the object itself, not a link to it")
-    if path.is_file():
-        return [path]
-    found = []
-    for entry in sorted(path.rglob("*"), key=lambda p: p.relative_to(path).as_posix()):
-        if entry.is_symlink() or not (entry.is_dir() or entry.is_file()):
-            raise InputError("a link or special file inside an object", where=str(entry), fix="store plain files only")
-        if entry.is_file():
-            found.append(entry)
-    return found
-
-
-def content_hash(path: Path) -> str:
-    """SHA-256 of a file; of a folder, SHA-256 over the lines "<file sha256>  <relative path>\\n" sorted by path.
-
-    The folder's form is what `sha256sum` prints, so that it can be checked without this package. Empty folders and
-    file modes do not count.
-    """
-    if path.is_file():
-        return file_hash(path)
-    total = hashlib.sha256()
-    for entry in files_of(path):
-        total.update(f"{file_hash(entry)}  {entry.relative_to(path).as_posix()}\n".encode())
-    return total.hexdigest()
 
 
 class Objects:

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
+from flagdata.checksums import files_of
 from flagdata.errors import FlagdataError, NotFoundError, UsageError
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Moved, persist
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.leases import Lease, collecting
-from flagdata.lake.objects import files_of
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
 

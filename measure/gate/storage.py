@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.checksums import write_sums
 from flagdata.errors import CorruptError
 from measure.gate.gate import SCORES, Gate
 from measure.gate.tails import Tails
@@ -38,6 +39,7 @@ def write(folder: Path, gate: Gate, model: Estimator) -> Path:
     tensors["network"] = torch.from_numpy(fingerprint(model).copy())
     path = folder / GATE
     write_tensors(path, tensors)
+    write_sums(folder, renewed=(GATE,))
     return path
 
 

@@ -1,12 +1,14 @@
 """Where a training stands: all that the steps still to come depend on, in one folder that is replaced as a whole.
 
 A checkpoint holds the learner, Adam's moments, the best learner so far, the course of the losses, and the cursor of the
-batches. It is written beside the last one and renamed, so that a kill or a full disk leaves the last good one.
+batches, with the checksums of all files. It is written beside the last one and renamed, so that a kill or a full disk
+leaves the last good one; the one before it is kept, for where the last was damaged later.
 """
 
 from __future__ import annotations
 
 import json
+import logging
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +17,15 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from flagdata.checksums import check_sums, files_of, write_sums
 from flagdata.errors import CorruptError, FlagdataError, RefusedError
+from flagdata.lake.durable import flush_file
 from models.learner import Learner
 from models.storage import WEIGHTS, read_card, read_tensors, write_card, write_tensors
 from models.training.progress import Course
 
+_LOG = logging.getLogger("flagdata")
+_ANEW = "restore the folder from a copy, or delete all checkpoints beside it to train from the beginning"
 _LAST = "last"
 _NEXT = "next"
 _BEFORE = "before"
@@ -48,7 +54,7 @@ class Standing:
 
 
 def save(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> None:
-    """Replace the checkpoint in `folder`.
+    """Take a checkpoint in `folder`; the one before it is kept beside it.
 
     Raises:
         FlagdataError: the disk refuses it; the last checkpoint is as it was.
@@ -66,50 +72,70 @@ def save(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> None:
             "running": list(standing.running),
         }  # fmt: skip
         write_card(fresh, card)
-        shutil.rmtree(before, ignore_errors=True)
+        write_sums(fresh)
+        for file in files_of(fresh):
+            flush_file(file)
         if last.exists():
+            shutil.rmtree(before, ignore_errors=True)
             last.rename(before)
         fresh.rename(last)
-        shutil.rmtree(before, ignore_errors=True)
-    except (OSError, RuntimeError) as error:  # safetensors reports a full disk as its own RuntimeError or OSError
+    except OSError as error:
         raise FlagdataError(
-            f"writing the checkpoint failed: {error}", where=str(folder),
+            f"writing the checkpoint failed: {error.strerror or error}", where=str(error.filename or folder),
             fix="free some space and give the command again: it goes on from the last checkpoint",
         ) from error  # fmt: skip
 
 
 def restore(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> bool:
-    """Bring `standing` to where the checkpoint in `folder` was taken; False where there is none.
+    """Bring `standing` to where the last sound checkpoint in `folder` was taken; False where there is none at all.
+
+    A damaged last one is passed over with a warning for the one before it, from which the same steps are taken again.
 
     Raises:
         RefusedError: it is of another recipe or of other data.
-        CorruptError: it is damaged.
+        CorruptError: all are damaged, or do not fit the recipe.
     """
-    last = folder / _LAST
-    if not last.exists() and (folder / _BEFORE).exists():  # killed between the two renames
-        last = folder / _BEFORE
-    if not last.exists():
-        return False
-    card = read_card(last)
+    found = [path for path in (folder / _LAST, folder / _BEFORE) if path.exists()]
+    damage: CorruptError | None = None
+    for checkpoint in found:
+        try:
+            check_sums(checkpoint, fix=_ANEW)
+        except CorruptError as error:
+            damage = damage or error
+            continue
+        if damage is not None:
+            _LOG.warning(
+                "flagdata: warning: the last checkpoint is damaged: %s; the training goes on from the one before it"
+                "\n  where: %s", damage.what, damage.where,
+            )  # fmt: skip
+        _take(checkpoint, standing, identity)
+        return True
+    if damage is not None:
+        raise damage
+    return False
+
+
+def _take(folder: Path, standing: Standing, identity: dict[str, Any]) -> None:
+    """Bring `standing` to where the checkpoint in `folder` itself, which is sound, was taken."""
+    card = read_card(folder)
     stored = json.loads(json.dumps(identity))
     different = [name for name in stored if card.get("identity", {}).get(name) != stored[name]]
     if different:
         raise RefusedError(
-            f"the checkpoint is of another training: {', '.join(different)} differ", where=str(last),
+            f"the checkpoint is of another training: {', '.join(different)} differ", where=str(folder),
             fix="name another folder by --run, or delete this one",
         )  # fmt: skip
     try:
-        standing.learner.load_state_dict(read_tensors(last / WEIGHTS))
-        _take_moments(standing, read_tensors(last / _MOMENTS))
-        standing.best = read_tensors(last / _BEST) if (last / _BEST).exists() else None
+        standing.learner.load_state_dict(read_tensors(folder / WEIGHTS))
+        _take_moments(standing, read_tensors(folder / _MOMENTS))
+        standing.best = read_tensors(folder / _BEST) if (folder / _BEST).exists() else None
         standing.course = Course.of(card["course"])
         standing.batches = card["batches"]
         standing.running = (float(card["running"][0]), int(card["running"][1]))
     except (KeyError, TypeError, RuntimeError, IndexError) as error:
         raise CorruptError(
-            f"the checkpoint does not fit its recipe: {error}", where=str(last), fix="delete it and train again"
+            f"the checkpoint does not fit its recipe: {error}", where=str(folder), fix="delete it and train again"
         ) from None
-    return True
 
 
 def _moments(standing: Standing) -> dict[str, Tensor]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 from typing import Any
 
+from flagdata.checksums import write_sums
 from flagdata.dataset import Pairs
 from flagdata.lake import Artifact, Lake
 from flagdata.provenance import canonical, code_version
@@ -62,6 +63,7 @@ def publish(
         card = card_of(recipe, data, trained, batches=batches)
         write_card(staged, card)
         (staged / CURVES).write_bytes(trained.course.picture())
+        write_sums(staged)
         best = {"epochs": card["epochs"], "best": card["best"], "parameters": card["parameters"]}
         artifact = replace(artifact, object=transaction.put(staged), parameters=canonical(best))
         transaction.add(artifact)

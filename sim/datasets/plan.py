@@ -12,10 +12,10 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
 
+from flagdata.checksums import files_of
 from flagdata.errors import FlagdataError
 from flagdata.lake import Lake
 from flagdata.lake.meshes import MeshSequence, write_meshes
-from flagdata.lake.objects import files_of
 from flagdata.schema import CLIP_FRAMES
 from sim.datasets import jobs
 from sim.datasets.cast import Cast, Roll, casts

@@ -12,9 +12,9 @@ import pytest
 
 from flagdata.align.methods import ClockOptions, Method, declared
 from flagdata.align.recording import Pair, make_recording
+from flagdata.checksums import content_hash
 from flagdata.errors import CorruptError, FlagdataError
 from flagdata.lake import Artifact, Lake
-from flagdata.lake.objects import content_hash
 from flagdata.record import Record, RecordWriter
 from flagdata.record.container import open_file, read_messages, read_summary
 from flagdata.rng import stream

@@ -15,13 +15,13 @@ import polars as pl
 import pytest
 from deltalake import DeltaTable
 
+from flagdata.checksums import content_hash
 from flagdata.errors import CorruptError, UsageError
 from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.catalog import Moved
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, verify_catalog
-from flagdata.lake.objects import content_hash
 from flagdata.schema import CATALOG, Kind
 
 Put = Callable[..., Artifact]

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.checksums import content_hash
 from flagdata.errors import ConflictError, CorruptError, InputError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, open_meshes, read_meshes, write_meshes
-from flagdata.lake.objects import content_hash
 from flagdata.rng import stream
 from flagdata.schema import Kind
 

@@ -12,6 +12,7 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
+from flagdata.checksums import write_sums
 from flagdata.findings import Finding
 from flagdata.rng import stream, torch_draws
 from models import estimator
@@ -96,12 +97,14 @@ def written(folder: Path, targets: tuple[str, ...]) -> Path:
         },
     })  # fmt: skip
     write_tensors(folder / WEIGHTS, learner.state_dict())
+    write_sums(folder)
     bare = estimator.load(folder)
     clips = np.stack([pictures(FRAMES, seed=seed) for seed in range(48)])
     with torch.no_grad():
         summaries = bare.embeddings(bare.inputs(clips))[0].numpy()
     cloud = Familiarity.of(summaries[:28], summaries[28:])
     write_tensors(folder / CLOUD, {name: torch.from_numpy(value) for name, value in cloud.arrays().items()})
+    write_sums(folder, renewed=(CLOUD,))
     return folder
 
 

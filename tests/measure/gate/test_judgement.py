@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from flagdata.checksums import write_sums
 from flagdata.errors import CorruptError, InputError, NotFoundError
 from measure.gate.checks import CHECKS
 from measure.gate.distortions import DISTORTIONS
@@ -97,6 +98,7 @@ def test_a_gate_is_the_same_after_storing_and_fits_its_own_network_alone(
 ) -> None:
     with pytest.raises(NotFoundError):
         read(tmp_path, model)
+    write_sums(tmp_path)
     write(tmp_path, gate, model)
     again = read(tmp_path, model)
     for seed in range(3):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -173,20 +174,62 @@ def test_a_checkpoint_of_other_data_is_refused(tmp_path: Path) -> None:
         training(tmp_path, recipe(epochs=2), train=prepared(40, seed=9)).complete()
 
 
-@pytest.mark.parametrize("name", ["weights.safetensors", "moments.safetensors"])
-def test_a_checkpoint_that_was_cut_off_is_an_error_with_its_place(tmp_path: Path, name: str) -> None:
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, torch.Tensor], Path]:
+    """The weights of a training that ran through, and the run folder of one that was stopped in its third epoch."""
+    folder = tmp_path_factory.mktemp("stopped")
+    whole = training(folder / "whole", recipe()).complete()
+    with pytest.raises(KeyboardInterrupt):
+        training(folder / "broken", recipe(), bars=stopped_after(90)).complete()
+    return whole.learner.state_dict(), folder / "broken"
+
+
+@pytest.mark.parametrize(
+    ("name", "damage"),
+    [("card.json", "changed"), ("weights.safetensors", "changed"), ("moments.safetensors", "cut"),
+     ("best.safetensors", "changed"), ("SHA256SUMS", "cut")],
+)  # fmt: skip
+def test_a_damaged_checkpoint_is_passed_over_for_the_one_before_and_the_weights_stay_the_same(
+    stopped: tuple[dict[str, torch.Tensor], Path],
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+    name: str,
+    damage: str,
+) -> None:
+    whole, folder = stopped
+    run = tmp_path / "run"
+    shutil.copytree(folder, run)
+    spoil(run / "last" / name, damage)
+    taken_up = training(run, recipe()).complete()
+    assert all(torch.equal(value, taken_up.learner.state_dict()[key]) for key, value in whole.items())
+    (warning,) = caplog.messages
+    assert "the last checkpoint is damaged" in warning
+    assert "goes on from the one before it" in warning
+    assert str(run / "last" / name) in warning
+
+
+def spoil(path: Path, damage: str) -> None:
+    content = bytearray(path.read_bytes())
+    if damage == "changed":
+        content[-40:-36] = b"XXXX"
+    path.write_bytes(content if damage == "changed" else content[:-40])
+
+
+def test_checkpoints_that_are_all_damaged_are_an_error_with_the_file_and_the_fix(tmp_path: Path) -> None:
     training(tmp_path, recipe(epochs=1)).complete()
-    path = tmp_path / "last" / name
-    path.write_bytes(path.read_bytes()[:-40])
-    with pytest.raises(CorruptError) as caught:
+    for kept in ("last", "before"):
+        spoil(tmp_path / kept / "weights.safetensors", "changed")
+    with pytest.raises(CorruptError, match="have changed since it was written") as caught:
         training(tmp_path, recipe(epochs=1)).complete()
-    assert name in str(caught.value.where)
+    assert caught.value.where == str(tmp_path / "last" / "weights.safetensors")
+    assert "delete all checkpoints" in caught.value.fix
 
 
 def test_a_kill_between_the_two_renames_loses_nothing(tmp_path: Path) -> None:
     whole = training(tmp_path / "whole", recipe()).complete()
     with pytest.raises(KeyboardInterrupt):
         training(tmp_path / "broken", recipe(), bars=stopped_after(50)).complete()
+    shutil.rmtree(tmp_path / "broken" / "before")
     (tmp_path / "broken" / "last").rename(tmp_path / "broken" / "before")
     taken_up = training(tmp_path / "broken", recipe()).complete()
     assert all(torch.equal(v, taken_up.learner.state_dict()[n]) for n, v in whole.learner.state_dict().items())

@@ -1,0 +1,121 @@
+"""Whether files are as they were written: SHA-256 of a folder's files beside them, or of one file's bytes at its end.
+
+A folder that something is made from (a model, a checkpoint) holds `SHA256SUMS`, a line a file as `sha256sum` prints it,
+so that `sha256sum -c SHA256SUMS` checks it without this package. A single file of a cache ends with the 32 bytes of the
+SHA-256 of all before them, which numpy does not read.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+from flagdata.errors import CorruptError, InputError
+from flagdata.provenance import file_hash
+
+SUMS = "SHA256SUMS"
+"""Name of the file in a folder that states the SHA-256 of all others."""
+_LINE = re.compile(r"([0-9a-f]{64})  (.+)")
+_DIGEST = 32  # B
+
+
+def files_of(path: Path) -> list[Path]:
+    """The regular files of a folder, sorted by relative path; the file itself if it is one.
+
+    Raises:
+        InputError: a symbolic link or special file, whose content the hash would not cover.
+    """
+    if path.is_symlink() or not path.exists():
+        raise InputError("not a file or folder", where=str(path), fix="give the object itself, not a link to it")
+    if path.is_file():
+        return [path]
+    found = []
+    for entry in sorted(path.rglob("*"), key=lambda p: p.relative_to(path).as_posix()):
+        if entry.is_symlink() or not (entry.is_dir() or entry.is_file()):
+            raise InputError("a link or special file inside an object", where=str(entry), fix="store plain files only")
+        if entry.is_file():
+            found.append(entry)
+    return found
+
+
+def content_hash(path: Path) -> str:
+    """SHA-256 of a file; of a folder, SHA-256 over the lines "<file sha256>  <relative path>\\n" sorted by path.
+
+    The folder's form is what `sha256sum` prints, so that it can be checked without this package. Empty folders and
+    file modes do not count.
+    """
+    if path.is_file():
+        return file_hash(path)
+    return hashlib.sha256(_lines({name: file_hash(file) for name, file in _named(path).items()}).encode()).hexdigest()
+
+
+def write_sums(folder: Path, *, renewed: tuple[str, ...] | None = None) -> None:
+    """State the SHA-256 of a folder's files in its `SHA256SUMS`.
+
+    Args:
+        renewed: names of files that were just written; of the others what is stated already stays, so that damage to
+            them is still found. None states all files.
+
+    Raises:
+        CorruptError: `SHA256SUMS` cannot be read.
+        OSError: what the disk refuses.
+    """
+    files = {name: file for name, file in _named(folder).items() if name != SUMS}
+    stated = {} if renewed is None else _stated(folder, fix="restore the folder from a copy")
+    fresh = files if renewed is None else {name: files[name] for name in renewed}
+    sums = {**stated, **{name: file_hash(file) for name, file in fresh.items()}}
+    (folder / SUMS).write_text(_lines(dict(sorted(sums.items()))), encoding="utf-8")
+
+
+def check_sums(folder: Path, *, fix: str) -> None:
+    """Make sure that a folder holds the files that its `SHA256SUMS` states, each with that content, and no others.
+
+    Raises:
+        CorruptError: it does not; the message names the first file.
+    """
+    stated = _stated(folder, fix=fix)
+    present = {name: file for name, file in _named(folder).items() if name != SUMS}
+    for name in sorted(stated.keys() | present.keys()):
+        if name not in present:
+            raise CorruptError("a file is missing", where=str(folder / name), fix=fix)
+        if name not in stated:
+            raise CorruptError(f"{SUMS} does not state this file", where=str(folder / name), fix=fix)
+        if file_hash(present[name]) != stated[name]:
+            raise CorruptError("its bytes have changed since it was written", where=str(folder / name), fix=fix)
+
+
+def sealed(data: bytes) -> bytes:
+    """The bytes of a file with their SHA-256 behind them."""
+    return data + hashlib.sha256(data).digest()
+
+
+def is_sealed(path: Path) -> bool:
+    """Whether a file ends with the SHA-256 of all bytes before; a damaged, cut or foreign file does not.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    content = path.read_bytes()
+    return len(content) > _DIGEST and hashlib.sha256(memoryview(content)[:-_DIGEST]).digest() == content[-_DIGEST:]
+
+
+def _named(folder: Path) -> dict[str, Path]:
+    return {file.relative_to(folder).as_posix(): file for file in files_of(folder)}
+
+
+def _lines(sums: dict[str, str]) -> str:
+    return "".join(f"{value}  {name}\n" for name, value in sums.items())
+
+
+def _stated(folder: Path, *, fix: str) -> dict[str, str]:
+    path = folder / SUMS
+    try:
+        found = [_LINE.fullmatch(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    except FileNotFoundError:
+        raise CorruptError("there are no checksums of its files", where=str(path), fix=fix) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise CorruptError(f"the checksums cannot be read: {error}", where=str(path), fix=fix) from None
+    if not all(found):
+        raise CorruptError("a line is not what sha256sum prints", where=str(path), fix=fix)
+    return {match[2]: match[1] for match in found if match is not None}

@@ -1,0 +1,62 @@
+"""A model is used only if its files are as they were written; cards that are no cards are refused."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from pathlib import Path
+
+import pytest
+
+from flagdata.checksums import SUMS, content_hash
+from flagdata.errors import CorruptError
+from models import estimator
+from models.estimator import CLOUD, SHIPPED
+from models.storage import CARD, WEIGHTS, check_model
+
+FILES = (CARD, WEIGHTS, CLOUD, "gate.safetensors", SUMS)
+
+
+def flip(path: Path, *, share: float) -> None:
+    """Change one bit of a file, that far into it."""
+    content = bytearray(path.read_bytes())
+    content[int(share * (len(content) - 1))] ^= 1
+    path.write_bytes(content)
+
+
+@pytest.fixture
+def shipped(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(SHIPPED / "wave-cloth", tmp_path / "wave-cloth"))
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("share", [0.3, 0.999])
+def test_one_bit_in_any_file_of_a_model_is_found_before_it_is_used(shipped: Path, name: str, share: float) -> None:
+    assert estimator.load(shipped).name == "wave-cloth"
+    flip(shipped / name, share=share)
+    with pytest.raises(CorruptError):
+        estimator.load(shipped)
+
+
+@pytest.mark.parametrize("name", ["flow", "wave", "wave-cloth"])
+def test_every_model_that_comes_with_the_package_states_its_checksums(name: str) -> None:
+    check_model(SHIPPED / name)
+
+
+def test_a_model_of_a_lake_is_held_to_the_hash_in_its_name(shipped: Path) -> None:
+    """As lakes hold models that were trained before models had checksums of their own."""
+    (shipped / SUMS).unlink()
+    lines = "".join(f"{hashlib.sha256((shipped / n).read_bytes()).hexdigest()}  {n}\n" for n in sorted(FILES[:4]))
+    stored = shipped.rename(shipped.with_name(f"{hashlib.sha256(lines.encode()).hexdigest()}.model"))
+    assert content_hash(stored) == stored.stem
+    assert estimator.load(stored).name == "wave-cloth"
+    flip(stored / WEIGHTS, share=0.5)
+    with pytest.raises(CorruptError, match="have changed since it was stored"):
+        estimator.load(stored)
+
+
+def test_a_model_that_nothing_vouches_for_is_refused_with_how_to_state_it(shipped: Path) -> None:
+    (shipped / SUMS).unlink()
+    with pytest.raises(CorruptError, match="SHA256SUMS") as caught:
+        estimator.load(shipped)
+    assert "sha256sum * > SHA256SUMS" in caught.value.fix
