@@ -46,7 +46,9 @@ def widening(estimator: Estimator, validation: Prepared) -> tuple[float, ...]:
     plain = replace(estimator, widening=torch.ones(len(estimator.targets)))
     logits = plain.logits(plain.embeddings(inputs), seed=0, draws=_DRAWS).double()
     names = estimator.learners[0].scaling.names
-    truth = estimator.learners[0].scaling.learned(torch.from_numpy(validation.truth(names))).double()
+    stated = validation.truth(names)
+    estimator.learners[0].scaling.check(stated, where="the validation side")
+    truth = estimator.learners[0].scaling.learned(torch.from_numpy(stated)).double()
     centre = logits.mean(dim=1)
     factors = np.geomspace(_NARROWEST, _WIDEST, _TRIED)
     return tuple(

@@ -188,8 +188,54 @@ class Scaling:
         margin = (high - low) * _MARGIN
         return low - margin, high + margin
 
+    def beyond(self, values: NDArray[np.float64]) -> tuple[str, ...]:
+        """For each target of which some of the values (n, target) lie beyond its widened range, how many and how far.
+
+        A network of these targets can state no such value; NaN lies nowhere.
+        """
+        low, high = (bound.numpy() for bound in self.bounds)
+        found = []
+        for column, (name, target) in enumerate(zip(self.names, self.targets, strict=True)):
+            own = values[:, column]
+            count = int(((own < low[column]) | (own > high[column])).sum())
+            if count:
+                found.append(
+                    f"{count} of {len(own)} clips lie beyond the range of the target {name}, {target.low:g} to "
+                    f"{target.high:g} {target.unit}: they reach from {np.nanmin(own):.4g} to {np.nanmax(own):.4g}"
+                )
+        return tuple(found)
+
+    def check(self, values: NDArray[np.float64], *, where: str) -> None:
+        """Make sure that all values (n, target) that are to be learned lie within their ranges.
+
+        Raises:
+            InputError: some do not; it names the range, how many they are, and targets whose range is wide enough.
+        """
+        found = self.beyond(values)
+        if not found:
+            return
+        wide = [name for name in TARGETS if self._covers(name, values)]
+        fix = f"name the target {' or '.join(wide)} in [loss] targets" if wide else "leave that target out"
+        raise InputError(
+            "; ".join(found), where=where, fix=f"{fix}, or train on a data set whose values lie within the range"
+        )
+
+    def _covers(self, name: str, values: NDArray[np.float64]) -> bool:
+        """Whether the target of that name is another one of the same quantity and cloth, whose range holds all of the
+        values."""
+        other = TARGETS[name]
+        columns = [
+            column for column, own in enumerate(self.targets)
+            if (own.name, own.cloth) == (other.name, other.cloth) and name not in self.names
+        ]  # fmt: skip
+        ranges = Scaling(names=(name,))
+        return any(not ranges.beyond(values[:, [column]]) for column in columns)
+
     def learned(self, values: Tensor) -> Tensor:
-        """(n, target) logits of values; one outside of its range is taken at its end, less a millionth."""
+        """(n, target) logits of values; one outside of its range is taken at its end, less a millionth.
+
+        What is trained on is refused before it comes to that, see `check`.
+        """
         low, high = self.bounds
         share = (values.double() - low.to(values.device)) / (high - low).to(values.device)
         return torch.logit(share, eps=1e-6).float()

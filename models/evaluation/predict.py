@@ -33,6 +33,7 @@ def predict(
     """Predictions of a model for prepared clips.
 
     Args:
+        note: what tables say beside the model; clips whose truth lies beyond the model's ranges are added to it.
         known: name and range of a quantity of all clips that is known; it restricts what has a distribution.
         fitted_on: clips of the training side, needed by a model without a head, whose embeddings are then read by ridge
             regression.
@@ -46,8 +47,11 @@ def predict(
     else:
         targets, names = learner.scaling.quantities, learner.scaling.names
         samples, mean, embedding = _told(estimator, prepared, seed=seed, known=known)
+    truth = prepared.truth(names)
+    if learner.objective is not Loss.CONTRASTIVE:
+        note = "; ".join([note, *learner.scaling.beyond(truth)])
     return Predictions(
-        label=label, targets=targets, truth=prepared.truth(names), mean=mean, samples=samples, embedding=embedding,
+        label=label, targets=targets, truth=truth, mean=mean, samples=samples, embedding=embedding,
         group=prepared.sequence,
         parameters=sum(w.numel() for one in estimator.learners for w in one.network.parameters()),
         milliseconds=milliseconds, note=note,

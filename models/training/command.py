@@ -104,7 +104,8 @@ def trained(
 
     import flagdata
     from flagdata.provenance import digest
-    from models.training.inputs import film_rows, prepare_clips, prepare_films
+    from models.targets import Scaling
+    from models.training.inputs import film_rows, prepare_clips, prepare_films, stated
     from models.training.publish import data_identity, network_artifact, publish
     from models.training.steps import Training
 
@@ -117,6 +118,12 @@ def trained(
     if known:
         say("this model was trained before")
         return _report(source, wanted, branch)
+    films = film_rows(train_pairs, sequences=recipe.data.sequences, seed=recipe.seed)
+    if names := recipe.loss.targets:
+        for side, table, rows in (
+            ("training", train_pairs.table, films), ("validation", validation_pairs.table, slice(None)),
+        ):  # fmt: skip
+            Scaling(names=names).check(stated(table.parameter_columns(rows), names), where=f"the {side} side")
     torch.set_num_threads(max(1, workers))
     several = "RANK" in os.environ and int(os.environ.get("WORLD_SIZE", "1")) > 1
     if several:
@@ -125,8 +132,7 @@ def trained(
         first = not several or ranks.get_rank() == 0
         if several and not first:
             ranks.barrier()  # the first prepares the inputs for all
-        films = len(film_rows(train_pairs, sequences=recipe.data.sequences, seed=recipe.seed))
-        with bars(films, f"{recipe.name}: prepare", "film") as advance:
+        with bars(len(films), f"{recipe.name}: prepare", "film") as advance:
             train_inputs = prepare_films(
                 train_pairs, recipe.front_end, recipe.cropping, variants=recipe.variants, folder=cache,
                 workers=workers, advance=advance, sequences=recipe.data.sequences, seed=recipe.seed,

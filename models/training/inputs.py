@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -118,18 +118,27 @@ class Prepared:
         Raises:
             InputError: a target that an entry does not state.
         """
-        found = targets.truth(self.parameters, names)
-        if not np.isfinite(found).all():
-            entry, column = (int(k) for k in np.argwhere(~np.isfinite(found))[0])
-            raise InputError(
-                f"entry {entry} does not state its {names[column]}", where="the training data",
-                fix="select recordings that have ground truth, or leave the target out",
-            )  # fmt: skip
-        return found
+        return stated(self.parameters, names)
 
     def batch(self, entries: NDArray[np.int64], variant: NDArray[np.int64]) -> Tensor:
         """(len(entries), *shape) float32."""
         return as_input(torch.from_numpy(self.maps[entries, variant]))
+
+
+def stated(parameters: Mapping[str, NDArray[np.float64]], names: Sequence[str]) -> NDArray[np.float64]:
+    """(n, target), as `models.targets.truth`, where every entry states all of them.
+
+    Raises:
+        InputError: one that does not.
+    """
+    found = targets.truth(parameters, names)
+    if not np.isfinite(found).all():
+        entry, column = (int(k) for k in np.argwhere(~np.isfinite(found))[0])
+        raise InputError(
+            f"entry {entry} does not state its {names[column]}", where="the training data",
+            fix="select recordings that have ground truth, or leave the target out",
+        )  # fmt: skip
+    return found
 
 
 def as_input(stored: Tensor) -> Tensor:

@@ -95,6 +95,8 @@ class Training:
         """
         spec, share, batches = self.recipe.optimiser, _share(), self.batches
         learner = self._fresh()
+        values = self._values(self.train, learner)
+        self._values(self.validation, learner)  # what cannot be learned is refused before the first step
         optimiser = torch.optim.Adam(learner.parameters(), lr=spec.rate, weight_decay=spec.decay)
         standing = Standing(learner=learner, best=None, optimiser=optimiser, course=Course(), batches=batches.state())
         if checkpoint.restore(self.run, standing, identity=self.identity):
@@ -102,7 +104,6 @@ class Training:
         module = _Loss(learner)
         stepped: nn.Module = module if share[1] == 1 else DistributedDataParallel(module)
         course = standing.course
-        values = self._values(self.train, learner)
         while len(course.epochs) < spec.epochs and not course.stalled(spec.patience):
             self._epoch(standing, batches, stepped, values)
         if standing.best is not None:
@@ -126,9 +127,14 @@ class Training:
         return learner.to(self.device)
 
     def _values(self, prepared: Prepared, learner: Learner) -> Tensor:
-        """(n, target) of the entries."""
-        names = learner.scaling.names
-        found = prepared.truth(names) if names else np.empty((len(prepared), 0))
+        """(n, target) of the entries.
+
+        Raises:
+            InputError: some lie beyond the range of their target.
+        """
+        scaling = learner.scaling
+        found = prepared.truth(scaling.names) if scaling.names else np.empty((len(prepared), 0))
+        scaling.check(found, where="the training data")
         return torch.from_numpy(found).to(self.device)
 
     def _epoch(self, standing: Standing, batches: Batches, stepped: nn.Module, values: Tensor) -> None:

@@ -49,14 +49,14 @@ def write_film(path: Path, wind: float, look: int, *, period: int = PERIOD) -> N
         record.truth(truth, log_time=START)
 
 
-def fill(lake: Lake, name: str = "made", *, period: int = PERIOD) -> None:
+def fill(lake: Lake, name: str = "made", *, period: int = PERIOD, strongest: float = 10.0) -> None:
     """The films of all sides, as a build leaves them."""
     rng = np.random.default_rng(1)
     for number, (side, (simulations, films)) in enumerate(SIDES.items()):
         with lake.transaction(f"build {name}: {side}") as transaction:
             for index in range(simulations * films):
                 seed = 1000 * number + index % simulations
-                wind = float(np.random.default_rng(seed).uniform(0, 10))
+                wind = float(np.random.default_rng(seed).uniform(0, strongest))
                 staged = transaction.staging(".mcap")
                 write_film(staged, wind, int(rng.integers(1 << 30)) % 1000, period=period)
                 stored = transaction.put(staged)

@@ -100,3 +100,22 @@ def test_the_ranges_of_hanging_cloth_hold_all_that_its_scene_can_draw() -> None:
         assert target.low <= min(drawn)
         assert max(drawn) <= target.high
         assert (max(drawn) - min(drawn)) / (target.high - target.low) > 0.9  # and hardly more than that
+
+
+def test_values_beyond_a_range_are_counted_with_how_far_they_reach() -> None:
+    """Those within the range, or within the 0.5 % that it is widened by at each end, are learned as they are."""
+    values = np.array([[0.0, 0.12], [10.04, 0.17], [10.06, 0.13], [15.9, np.nan]])
+    (said,) = Scaling(names=("wind_speed", "density")).beyond(values)
+    assert said == "2 of 4 clips lie beyond the range of the target wind_speed, 0 to 10 m/s: they reach from 0 to 15.9"
+    Scaling(names=("wind_speed", "density")).check(values[:2], where="here")
+
+
+def test_a_target_of_the_same_cloth_whose_range_is_wide_enough_is_offered() -> None:
+    heavy = np.array([[0.2], [0.3]])
+    with pytest.raises(InputError, match=r"0\.1 to 0\.17 kg/m²: they reach from 0\.2 to 0\.3") as caught:
+        Scaling(names=("density",)).check(heavy, where="the training side")
+    assert caught.value.where == "the training side"
+    assert caught.value.fix.startswith("name the target fabric_density in [loss] targets")
+    with pytest.raises(InputError) as caught:
+        Scaling(names=("density",)).check(10 * heavy, where="the training side")
+    assert caught.value.fix.startswith("leave that target out, or train on a data set")

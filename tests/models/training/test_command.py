@@ -127,12 +127,34 @@ def test_a_shipped_ensemble_estimates_clips_and_knows_what_is_unlike_them(lake: 
         shipped.inputs(clips[:, :11])
 
 
-def test_a_model_of_hanging_cloth_tells_the_same_quantities_in_its_own_ranges(
-    lake: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_clips_beyond_the_range_of_their_target_are_refused_before_anything_is_prepared(
+    lake: Path, tmp_path: Path
 ) -> None:
-    """Trained, shipped and judged by the commands that are there for flags."""
+    """The range of "cloth_wind" ends at 6 m/s, the winds of the lake at 10."""
     from tests.models.conftest import RECIPE
 
+    path = tmp_path / "small-cloth.toml"
+    path.write_text(RECIPE.replace('["wind_speed"]', '["cloth_wind"]'))
+    strong = [seed for seed in range(10) if np.random.default_rng(seed).uniform(0, 10) > 6.03]
+    arguments = ["train", str(path), "--at", "v1", "--lake", str(lake), "--cache", str(tmp_path / "cache")]
+    done = CliRunner().invoke(root, arguments)
+    assert isinstance(done.exception, InputError)
+    assert done.exception.where == "the training side"
+    assert f"{2 * len(strong)} of 20 clips lie beyond the range of the target cloth_wind, 0 to 6 m/s" in str(
+        done.exception
+    )
+    assert not (tmp_path / "cache").exists()
+
+
+def test_a_model_of_hanging_cloth_tells_the_same_quantities_in_its_own_ranges(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Trained, shipped and judged by the commands that are there for flags."""
+    from tests.models.conftest import RECIPE, fill
+
+    lake = tmp_path / "lake"
+    fill(Lake.create(lake), strongest=6.0)
+    Lake.open(lake).tag("v1")
     path = tmp_path / "small-cloth.toml"
     path.write_text(RECIPE.replace('["wind_speed"]', '["cloth_wind", "cloth_density"]'))
     trained = run("train", str(path), "--at", "v1", "--lake", str(lake), "--workers", "1", "--branch", "main")

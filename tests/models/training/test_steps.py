@@ -17,6 +17,8 @@ import torch
 
 from flagdata.errors import CorruptError, FlagdataError, InputError, RefusedError, UsageError
 from models.crops import Cropping
+from models.estimator import Estimator
+from models.evaluation.predict import predict
 from models.frontend import FrontEnd
 from models.learner import Learner, Loss
 from models.training import checkpoint
@@ -240,6 +242,29 @@ def test_a_target_that_clips_do_not_state_is_an_error(tmp_path: Path) -> None:
     unknown.parameters["wind_speed"][7] = np.nan
     with pytest.raises(InputError, match="entry 7 does not state its wind_speed"):
         training(tmp_path, recipe(), train=unknown).complete()
+
+
+@pytest.mark.parametrize("side", ["train", "validation"])
+def test_a_wind_beyond_the_range_is_refused_and_not_learned_as_its_end(tmp_path: Path, side: str) -> None:
+    strong = prepared(40, seed=1)
+    strong.parameters["wind_speed"][7] = 14.0
+    with pytest.raises(InputError, match="1 of 40 clips lie beyond the range of the target wind_speed, 0 to 10 m/s"):
+        training(tmp_path, recipe(), **{side: strong}).complete()
+    assert not (tmp_path / "last").exists()
+
+
+def test_an_evaluation_says_how_many_truths_the_network_cannot_state() -> None:
+    strong = prepared(40, seed=1)
+    strong.parameters["wind_speed"][7:10] = 14.0
+    own = recipe()
+    judged = Estimator(
+        name="small", learners=(own.learner().eval(),), front_end=own.front_end, cropping=own.cropping,
+        widening=torch.ones(1), cloud=None, card={},
+    )  # fmt: skip
+    found = predict(judged, strong, label="small", note="seed 3", milliseconds=1.0, seed=1)
+    assert found.note.startswith("seed 3; 3 of 40 clips lie beyond the range of the target wind_speed, 0 to 10 m/s")
+    strong.parameters["wind_speed"][7:10] = 10.0
+    assert predict(judged, strong, label="small", note="seed 3", milliseconds=1.0, seed=1).note == "seed 3"
 
 
 def test_rates_fall_by_a_tenth_after_the_epochs_that_were_named() -> None:
