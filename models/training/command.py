@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ import click
 
 from flagdata.addresses import local_path
 from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
+from flagdata.errors import ConflictError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -103,6 +105,7 @@ def trained(
     from torch import distributed as ranks
 
     import flagdata
+    from flagdata.locks import alone_in
     from flagdata.provenance import digest
     from models.targets import Scaling
     from models.training.inputs import film_rows, prepare_clips, prepare_films, stated
@@ -128,8 +131,12 @@ def trained(
     several = "RANK" in os.environ and int(os.environ.get("WORLD_SIZE", "1")) > 1
     if several:
         ranks.init_process_group("gloo" if device == "cpu" else "nccl")
+    folder = run if run is not None else cache / f"run-{recipe.name}-{digest(wanted)[:12]}"
+    held = ExitStack()
     try:
         first = not several or ranks.get_rank() == 0
+        if first:
+            held.enter_context(alone_in(folder, occupied=partial(_refuse, folder)))
         if several and not first:
             ranks.barrier()  # the first prepares the inputs for all
         with bars(len(films), f"{recipe.name}: prepare", "film") as advance:
@@ -146,8 +153,7 @@ def trained(
         identity = {"recipe": recipe.identity(), "train": data["train"], "validation": data["validation"]}
         training = Training(
             recipe=recipe, train=train_inputs.held(), validation=validation_inputs.held(), identity=identity,
-            run=run if run is not None else cache / f"run-{recipe.name}-{digest(wanted)[:12]}",
-            device=torch.device(device), bars=bars,
+            run=folder, device=torch.device(device), bars=bars,
         )  # fmt: skip
         done = training.complete()
         if several:
@@ -156,9 +162,17 @@ def trained(
             return None
         artifact = publish(source.lake, recipe, data, done, batches=training.batches.state(), branch=branch)
     finally:
+        held.close()
         if several:
             ranks.destroy_process_group()
     return _report(source, artifact.id, branch)
+
+
+def _refuse(folder: Path) -> None:
+    raise ConflictError(
+        "another training is under way in this folder", where=str(folder),
+        fix="wait until it has ended, or name another folder by --run",
+    )  # fmt: skip
 
 
 def _report(source: Source, artifact: str, branch: str) -> dict[str, Any]:

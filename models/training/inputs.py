@@ -8,11 +8,14 @@ negatives.
 
 The folder is disposable and outside the lake. A film's file is named by the hash of all that shapes it (the object and
 its frames, the front end, the crops and their seed), so that trainings of other seeds, and on parts of the films, share
-them, and a preparation that was stopped goes on.
+them, and a preparation that was stopped goes on. Each file ends with its SHA-256, which every run compares before it
+uses the file; a damaged one is made anew, with a warning. One process at a time prepares, others wait for it.
 """
 
 from __future__ import annotations
 
+import io
+import logging
 import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -27,8 +30,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from flagdata.checksums import is_sealed, sealed
 from flagdata.dataset.pairs import Pairs
 from flagdata.errors import CorruptError, FlagdataError, InputError
+from flagdata.locks import alone_in
 from flagdata.provenance import canonical, digest
 from flagdata.rng import stream
 from flagdata.timebase import NANOSECONDS
@@ -36,6 +41,7 @@ from models import targets
 from models.crops import Cropping
 from models.frontend import FrontEnd, standardised
 
+_LOG = logging.getLogger("flagdata")
 _RATE_ERROR = 0.01
 Advance = Callable[[int], None]
 
@@ -231,13 +237,20 @@ def _prepared(
     own = folder / f"{front_end.maps}-{front_end.hash}"
     named = [_name(key(row), front_end, str(pairs.table.objects[pairs.table.object[row]])) for row in rows.tolist()]
     paths = tuple(own / name[:2] / f"{name}.npy" for name in named)
-    missing = [(row, path) for row, path in zip(rows.tolist(), paths, strict=True) if not path.exists()]
-    advance(len(rows) - len(missing))
     try:
-        for row, path in missing[:1]:  # what is wrong with all of them is said by the first
-            _write(path, made(row), front_end)
-            advance(1)
-        _fill(missing[1:], made, front_end, workers, advance)
+        missing = _unsound(list(zip(rows.tolist(), paths, strict=True)), workers)
+        advance(len(rows) - len(missing))
+        if missing:
+            with alone_in(
+                own, occupied=lambda: _LOG.warning("flagdata: another process prepares inputs, waiting for it")
+            ):
+                still = _unsound(missing, workers)
+                advance(len(missing) - len(still))
+                _warn_of_damage([path for _, path in still if path.exists()])
+                for row, path in still[:1]:  # what is wrong with all of them is said by the first
+                    _write(path, made(row), front_end)
+                    advance(1)
+                _fill(still[1:], made, front_end, workers, advance)
     except OSError as error:
         raise FlagdataError(
             f"preparing the inputs failed: {error.strerror or error}", where=str(folder),
@@ -270,6 +283,25 @@ def _name(key: dict[str, Any], front_end: FrontEnd, content: str) -> str:
     return digest(canonical({"front_end": front_end.hash, "object": content, **key}))
 
 
+def _unsound(places: Sequence[tuple[int, Path]], workers: int) -> list[tuple[int, Path]]:
+    """Those of the rows and files whose file is not there, or not as it was written."""
+    with ThreadPoolExecutor(workers, thread_name_prefix="inputs") as pool:
+        sound = pool.map(lambda place: place[1].exists() and is_sealed(place[1]), places)
+        return [place for place, good in zip(places, sound, strict=True) if not good]
+
+
+def _say_waiting() -> None:
+    _LOG.warning("flagdata: another process prepares inputs here; this one goes on when it has ended")
+
+
+def _warn_of_damage(paths: Sequence[Path]) -> None:
+    if paths:
+        _LOG.warning(
+            "flagdata: warning: %d prepared inputs are damaged, or of an older version; they are made anew"
+            "\n  where: %s", len(paths), paths[0],
+        )  # fmt: skip
+
+
 def _fill(
     missing: Sequence[tuple[int, Path]],
     made: Callable[[int], list[Tensor]],
@@ -299,8 +331,9 @@ def _write(path: Path, clips: Sequence[Tensor], front_end: FrontEnd) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     scratch = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}.part")
     try:
-        with scratch.open("wb") as stream:
-            np.save(stream, stored)
+        content = io.BytesIO()
+        np.save(content, stored)
+        scratch.write_bytes(sealed(content.getvalue()))
         scratch.rename(path)
     finally:
         scratch.unlink(missing_ok=True)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +16,21 @@ from click.testing import CliRunner
 
 import flagdata
 from flagdata.cli import root
-from flagdata.errors import CorruptError, InputError, NotFoundError, RefusedError, UnknownNameError, UsageError
+from flagdata.errors import (
+    ConflictError,
+    CorruptError,
+    InputError,
+    NotFoundError,
+    RefusedError,
+    UnknownNameError,
+    UsageError,
+)
 from flagdata.lake import Lake
+from flagdata.locks import alone_in
 from models import estimator, shipping
 from models.storage import WEIGHTS, read_card
 from models.targets import Cloth
+from models.training import inputs
 from models.training.command import sides_of
 from models.training.inputs import prepare_clips, prepare_films
 from models.training.recipe import TRAININGS, load, parse
@@ -201,10 +213,76 @@ def test_inputs_that_were_prepared_are_used_again_and_damage_is_found(lake: Path
     entries, variants = np.arange(4), np.ones(4, dtype=np.int64)
     assert torch.equal(first.batch(entries, variants), second.batch(entries, variants))  # pyright: ignore[reportAttributeAccessIssue]
     assert counts == [20]
-    damaged = next(tmp_path.rglob("*.npy"))
-    damaged.write_bytes(damaged.read_bytes()[:50])
+    gone = next(tmp_path.rglob("*.npy"))
+    gone.write_bytes(gone.read_bytes()[:50])
     with pytest.raises(CorruptError, match="prepared input"):
         second.batch(np.arange(20), np.zeros(20, dtype=np.int64))  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_one_bit_in_a_prepared_input_is_found_and_the_input_made_anew(
+    lake: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    recipe = load(str(lake.parent / "small.toml"))
+    pairs = sides_of(flagdata.open(lake), recipe, "validation", at="v1")
+
+    def prepared() -> dict[Path, bytes]:
+        prepare_clips(pairs, recipe.front_end, recipe.cropping, folder=tmp_path, workers=2, advance=lambda count: None)
+        return {path: path.read_bytes() for path in tmp_path.rglob("*.npy")}
+
+    whole = prepared()
+    assert not caplog.messages
+    first, second = list(whole)[:2]
+    changed = bytearray(whole[first])
+    changed[len(changed) // 2] ^= 1
+    first.write_bytes(changed)
+    second.write_bytes(whole[second][:-32])  # as older versions wrote it
+    assert prepared() == whole
+    (warning,) = caplog.messages
+    assert "2 prepared inputs are damaged" in warning
+
+
+def test_a_process_that_prepares_waits_for_another_and_then_makes_nothing_twice(
+    lake: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    recipe = load(str(lake.parent / "small.toml"))
+    pairs = sides_of(flagdata.open(lake), recipe, "validation", at="v1")
+
+    def prepared() -> list[int]:
+        counts: list[int] = []
+        prepare_clips(pairs, recipe.front_end, recipe.cropping, folder=tmp_path, workers=1, advance=counts.append)
+        return counts
+
+    written: list[Path] = []
+    write = inputs._write
+    monkeypatch.setattr(inputs, "_write", lambda path, *rest: (written.append(path), write(path, *rest)))
+    (own,) = {path.parent.parent for path in tmp_path.rglob("*.npy")} if prepared() else ()
+    made = list(written)
+    for path in made:
+        path.rename(path.with_suffix(".kept"))
+
+    def other_process_ends() -> None:
+        for path in made:
+            path.with_suffix(".kept").rename(path)
+
+    with ThreadPoolExecutor(1) as pool, alone_in(own, occupied=pytest.fail):
+        waiting = pool.submit(prepared)
+        while not caplog.messages:
+            time.sleep(0.01)
+        other_process_ends()
+    assert waiting.result() == [0, len(made)]
+    assert written == made
+    assert "another process prepares inputs" in caplog.messages[0]
+
+
+def test_a_second_training_in_a_run_folder_is_refused_before_it_does_anything(lake: Path, tmp_path: Path) -> None:
+    run_folder, cache = tmp_path / "run", tmp_path / "cache"
+    arguments = ["train", str(lake.parent / "small.toml"), "--seed", "7", "--lake", str(lake), "--at", "v1"]
+    with alone_in(run_folder, occupied=pytest.fail):
+        done = CliRunner().invoke(root, [*arguments, "--run", str(run_folder), "--cache", str(cache)])
+    assert isinstance(done.exception, ConflictError)
+    assert done.exception.where == str(run_folder)
+    assert "--run" in done.exception.fix
+    assert not cache.exists()
 
 
 def test_a_part_of_the_sequences_is_the_beginning_of_one_order(lake: Path, tmp_path: Path) -> None:
