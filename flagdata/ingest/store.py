@@ -139,10 +139,14 @@ def ingest_camera(
         ConflictError: the file changed while it was read, or is in the lake under other labels.
     """
     from flagdata.ingest.camera import open_camera  # decoders of video, which a wind's log needs none of
+    from flagdata.ingest.camera.chapters import chapter_of
 
     options, labels = options or CameraIngest(), labels or Labels()
     source = Source.of(path)
     recipe = options.recipe()
+    chapter = chapter_of(path) if options.camera.start is None else None
+    if chapter is not None and chapter.before:
+        recipe["chapter_before"] = chapter.before  # it comes from other files, and shapes the result
     present = find(lake, Kind.CAMERA, source, recipe, labels, branch=branch)
     if present is not None:
         if crop_picture is not None:
@@ -166,6 +170,7 @@ def ingest_camera(
                     if progress:
                         progress(1)
             info, findings = stream.info, stream.findings
+        findings = (*findings, *by_other_options(_present(lake, Kind.CAMERA, branch), source.hash, recipe))
         if not times.count:
             raise InputError("no frame could be read", where=str(path), fix="check the file")
         source.check_unchanged()
@@ -259,11 +264,16 @@ def _read(
         return error
     paired = host_clock(log.series)
     findings = (*log.findings, *(paired.findings if paired is not None else ()))
-    winds = lake.rows(at=branch).filter(pc.field("kind") == Kind.WIND.value).to_pylist()
-    others = [Artifact.from_row(row) for row in winds]
+    others = _present(lake, Kind.WIND, branch)
     findings = (*findings, *_beside(lake, log.series, labels.session, others))
     findings = (*findings, *by_other_options(others, source.hash, options.recipe()))
     return _Read(log=log, options=options, labels=labels, findings=findings, paired=paired)
+
+
+def _present(lake: Lake, kind: Kind, branch: str) -> list[Artifact]:
+    """All artifacts of a kind that are on a branch."""
+    rows = lake.rows(at=branch).filter(pc.field("kind") == kind.value).to_pylist()
+    return [Artifact.from_row(row) for row in rows]
 
 
 def _staged(transaction: Transaction, path: Path, source: Source, one: _Read) -> tuple[Artifact, dict[str, Any]]:

@@ -6,8 +6,9 @@ import struct
 from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 
 import av
@@ -19,6 +20,7 @@ from av.video.stream import VideoStream
 
 from flagdata.errors import InputError, LimitError, NotFoundError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.clock import COUNTERS, Counter, restart, restarted
 from flagdata.ingest.camera.options import CameraOptions, Limits, exact
 from flagdata.ingest.camera.stamps import Timing, survey
 from flagdata.ingest.camera.truncation import cut_off, truncation
@@ -123,6 +125,8 @@ def open_container(path: Path, limits: Limits, *, threads: int) -> tuple[InputCo
                 "protocol_whitelist": "file",
                 "format_whitelist": _FORMATS,
                 "max_pixels": str(2 * limits.frame_pixels),
+                # Counters that pass their end are judged by `Counter`.
+                "correct_ts_overflow": "0",
             },
             metadata_errors="replace",
         )
@@ -160,22 +164,35 @@ def _choose(container: InputContainer, path: Path) -> VideoStream:
     )
 
 
-def packets(container: InputContainer, stream: VideoStream) -> Iterator[av.Packet]:
+def packets(container: InputContainer, stream: VideoStream, *, end: int | None = None) -> Iterator[av.Packet]:
     """Packets of the stream, the empty one that flushes the decoder last; damage of the container ends them.
 
-    `survey_file` reports such damage. PyAV's IndexError comes in place of the flushing packet when a stream appeared in
-    the middle of the file.
+    Their stamps run on where a counter passes its end. `survey_file` reports damage. PyAV's IndexError comes in place
+    of the flushing packet when a stream appeared in the middle of the file.
+
+    Args:
+        end: how many of them belong to the recording; None for all.
     """
+    counter = _counter(container, stream)
     try:
-        yield from container.demux(stream)
+        for packet in islice(container.demux(stream), end):
+            counter.run_on(packet)
+            yield packet
+        if end is None:
+            return
     except (av.error.FFmpegError, IndexError):
-        flush = av.Packet()
-        flush.stream = stream
-        yield flush
+        pass
+    flush = av.Packet()
+    flush.stream = stream
+    yield flush
+
+
+def _counter(container: InputContainer, stream: VideoStream) -> Counter:
+    return Counter(length=COUNTERS.get(container.format.name), tick=_tick(stream))
 
 
 def survey_file(path: Path, options: CameraOptions) -> tuple[Timing, list[Finding]]:
-    """The timing of a file by its packets, without decoding, and whether it is cut off.
+    """The timing of a file by its packets, without decoding, and whether it is cut off or its clock started anew.
 
     Raises:
         InputError: not a video.
@@ -186,31 +203,47 @@ def survey_file(path: Path, options: CameraOptions) -> tuple[Timing, list[Findin
     container, stream = open_container(path, options.limits, threads=1)
     with container:
         tally = _tally(container, stream, path, options.limits)
-        timing = _timing(path, options, container, stream, tally)
-        if tally.problem is not None:
-            return timing, [tally.problem]
-        return timing, truncation(path, container, stream, timing, read=tally.frames + tally.discarded)
+        own = tally if container.format.name in UNTIMED else _before_restart(tally, tick=_tick(stream))
+        timing = replace(_timing(path, options, container, stream, own), end=own.end)
+        found = [tally.problem] if tally.problem is not None else []
+        if own.end is not None:
+            after = timing.duration + 1 / float(timing.rate)
+            found.append(restarted(frame=own.frames, after=after, count=tally.frames - own.frames))
+        return timing, found or truncation(path, container, stream, timing, read=tally.frames + tally.discarded)
 
 
-@dataclass
+@dataclass(kw_only=True)
 class _Tally:
-    """Stamps of a stream's packets in ticks, how many packets have none, and how many an edit list discards."""
+    """What the packets of a stream state.
+
+    Attributes:
+        stamps: of the packets that have one [ticks].
+        places: numbers of these packets in the file, from 0.
+        missing: numbers of the packets without a stamp.
+        discarded: how many packets an edit list discards.
+        end: number of the first packet that was left aside since the clock starts anew there.
+        problem: why the packets could not be read to the end.
+    """
 
     stamps: array[int] = field(default_factory=lambda: array("q"))
-    missing: int = 0
+    places: array[int] = field(default_factory=lambda: array("q"))
+    missing: array[int] = field(default_factory=lambda: array("q"))
     discarded: int = 0
+    end: int | None = None
     problem: Finding | None = None
 
     @property
     def frames(self) -> int:
-        return len(self.stamps) + self.missing
+        return len(self.stamps) + len(self.missing)
 
 
 def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: Limits) -> _Tally:
     tally = _Tally()
     pixels = max(1, stream.codec_context.width * stream.codec_context.height)
+    counter = _counter(container, stream)
     try:
-        for packet in container.demux(stream):
+        for place, packet in enumerate(container.demux(stream)):
+            counter.run_on(packet)
             stamp = packet.pts if packet.pts is not None else packet.dts
             if packet.size == 0 and stamp is None:
                 continue
@@ -218,9 +251,10 @@ def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: L
                 tally.discarded += 1
                 continue
             if stamp is None:
-                tally.missing += 1
+                tally.missing.append(place)
             else:
                 tally.stamps.append(stamp)
+                tally.places.append(place)
             if tally.frames > limits.frames or tally.frames * pixels > limits.total_pixels:
                 raise LimitError(
                     f"{tally.frames} frames of {pixels} px and perhaps more are beyond the limit of {limits.frames} "
@@ -236,6 +270,20 @@ def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: L
             what="another stream appears in the middle of the file, which is damaged or was joined from several",
         )  # fmt: skip
     return tally
+
+
+def _before_restart(tally: _Tally, *, tick: Fraction) -> _Tally:
+    """The packets up to where the clock starts anew; all where it never does."""
+    index = restart(np.frombuffer(tally.stamps, dtype=np.int64), tick=tick)
+    if index is None:
+        return tally
+    end = tally.places[index]
+    missing = array("q", (place for place in tally.missing if place < end))
+    return replace(tally, stamps=tally.stamps[:index], places=tally.places[:index], missing=missing, end=end)
+
+
+def _tick(stream: VideoStream) -> Fraction:
+    return stream.time_base or Fraction(1, 1000)
 
 
 def _timing(
@@ -259,7 +307,6 @@ def _timing(
             "sequence_fps is for image sequences and raw streams; this file has time stamps of its own",
             where=str(path), fix="drop it, or give true_fps if the container lies about a high-speed camera",
         )  # fmt: skip
-    tick = stream.time_base or Fraction(1, 1000)
     rate = stream.average_rate or stream.guessed_rate
     stamps = np.frombuffer(tally.stamps, dtype=np.int64)
-    return survey(stamps, tick=tick, missing=tally.missing, fallback_rate=rate or None, where=str(path))
+    return survey(stamps, tick=_tick(stream), missing=len(tally.missing), fallback_rate=rate or None, where=str(path))

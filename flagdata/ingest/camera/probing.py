@@ -9,6 +9,7 @@ from typing import Any
 from flagdata.addresses import local_path
 from flagdata.errors import TimeError
 from flagdata.findings import Finding
+from flagdata.ingest.camera.chapters import chapter_of
 from flagdata.ingest.camera.geometry import upright_size
 from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.start import Start, find_start
@@ -72,7 +73,7 @@ def probe(path: Path | str, options: CameraOptions | None = None) -> CameraProbe
         try:
             start = find_start(
                 options.start, facts.metadata, recorded=facts.recorded, place=options.zone, duration=timing.duration,
-                where=str(path),
+                where=str(path), chapter=chapter_of(path),
             )  # fmt: skip
         except TimeError:
             start = None

@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.clock import REORDER
 from flagdata.timebase import NANOSECONDS
 
 T = TypeVar("T")
-
-_REORDER = 32  # more than any codec's reordering depth (16 in H.264 and H.265)
-_RESET = 1.0  # s; a step back by more is a clock that started anew, not a slip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +31,7 @@ class Timing:
         shortest, longest: steps between neighbouring stamps [ticks].
         count: frames with a stamp.
         missing: frames without one.
+        end: packets of the file that belong to it, from the first on; None for all. The clock starts anew after them.
     """
 
     tick: Fraction
@@ -44,6 +43,7 @@ class Timing:
     longest: int
     count: int
     missing: int
+    end: int | None = None
 
     @property
     def rate(self) -> Fraction:
@@ -96,7 +96,7 @@ def survey(
     allowed = max(1.0, 0.01 * float(mean))
     variable = bool(np.mean(off > allowed) > 0.01)
     period = Fraction(round(median)) if variable else mean
-    origin, end = int(stamps[:_REORDER].min()), int(stamps[-_REORDER:].max())
+    origin, end = int(stamps[:REORDER].min()), int(stamps[-REORDER:].max())
     return Timing(
         tick=tick,
         origin=origin,
@@ -116,8 +116,6 @@ class StampRepair(Generic[T]):
     - no stamp: one period after its predecessor;
     - the same stamp as before: two frames cannot share an instant, the later is left out;
     - a single stamp out of order: the frame that lies farther from where the period puts it is left out;
-    - a jump back by more than a second: the clock started anew and nothing says when, so what follows is left out until
-      the stamps pass the last good one;
     - a jump forward is a gap, and kept as such.
 
     Holds one frame, to know whether its successor agrees with it.
@@ -153,8 +151,6 @@ class StampRepair(Generic[T]):
             self._held = (stamp, item)
         elif stamp == held:
             self._note("stamps-duplicate", index)
-        elif held - stamp > _RESET * NANOSECONDS and not self._held_is_the_odd_one(stamp):
-            self._note("clock-reset", index)
         elif self._held_is_the_odd_one(stamp):
             self._note("stamps-disordered", index - 1)
             self._held = (stamp, item)
@@ -190,10 +186,6 @@ class StampRepair(Generic[T]):
             "stamps-disordered": (
                 Severity.WARNING,
                 "frames have a time stamp out of order and were left out",
-            ),
-            "clock-reset": (
-                Severity.ERROR,
-                "frames after the camera's clock started anew have no known time and were left out",
             ),
         }  # fmt: skip
         return [

@@ -8,6 +8,7 @@ from datetime import tzinfo
 
 from flagdata.errors import TimeError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.chapters import Chapter
 from flagdata.timebase import NANOSECONDS, iso, parse, zone
 
 
@@ -43,18 +44,21 @@ def find_start(
     place: str | None,
     duration: float,
     where: str,
+    chapter: Chapter | None = None,
 ) -> Start:
     """The start of a recording.
 
     In order: `option`; `com.apple.quicktime.creationdate`, which names its zone and means the start; the wall-clock
     time that AVCHD cameras write into the video itself, with their zone or `place`; `creation_time`, which should be
-    UTC (ISO/IEC 14496-12, 8.2.2) and the start, but some cameras write local time and some phones the recording's end.
+    UTC (ISO/IEC 14496-12, 8.2.2) and the start, but some cameras write local time and some phones the recording's end,
+    and cameras that split a recording into chapters stamp them all with its creation time.
     Neither the file's name nor its modification time is used.
 
     Args:
         recorded: ISO 8601 wall-clock time from within the video stream, with a zone or without.
         place: zone of the camera's clock, for times without one.
-        duration: of the recording [s].
+        duration: of the file [s].
+        chapter: where the file begins within the recording whose creation time it states; None where it is the whole.
 
     Raises:
         TimeError: nothing usable was found.
@@ -79,7 +83,7 @@ def find_start(
             continue
         try:
             if key == "creation_time":
-                found = _from_creation_time(text, default=default, duration=duration, where=where)
+                found = _from_creation_time(text, default=default, duration=duration, where=where, chapter=chapter)
             else:
                 found = _checked(parse(text, default=default, where=where), key, _WHOLE_SECOND)
         except TimeError as error:
@@ -96,22 +100,27 @@ def find_start(
     )
 
 
-def _from_creation_time(text: str, *, default: tzinfo | None, duration: float, where: str) -> Start:
-    instant = parse(text, default=default, where=where)
-    # Uniform from start to end of the recording, and over the second it is cut to.
+def _from_creation_time(
+    text: str, *, default: tzinfo | None, duration: float, where: str, chapter: Chapter | None
+) -> Start:
+    created = _checked(parse(text, default=default, where=where), "creation_time", None)
+    before = chapter.before if chapter is not None else 0.0
+    duration += before
+    # Uniform from start to end of the recording, as far as it is known, and over the second it is cut to.
     sigma = (1 / 12 + duration**2 / 12) ** 0.5
     finding = Finding(
         kind="start-unsure",
         severity=Severity.WARNING,
-        what=f"the start is creation_time {text}, taken as the start of the recording in the zone it names; some "
+        what=f"the start is by creation_time {text}, taken as the start of the recording in the zone it names; some "
         f"cameras write their local time as UTC, and some write the end (then it is {duration:.1f} s late)",
         value=sigma,
         fix="give --start with a zone, or align the recording by its contents",
     )
-    return replace(_checked(instant, "creation_time", sigma), findings=(finding,))
+    findings = (finding,) if chapter is None else (finding, chapter.finding)
+    return replace(created, instant=created.instant + round(before * NANOSECONDS), sigma=sigma, findings=findings)
 
 
-def _checked(instant: int, key: str, sigma: float) -> Start:
+def _checked(instant: int, key: str, sigma: float | None) -> Start:
     if instant < _EARLIEST:
         raise TimeError(f"{iso(instant)} is an unset clock", fix="give --start")
     return Start(instant=instant, source=f"metadata: {key}", sigma=sigma)

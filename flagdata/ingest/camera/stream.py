@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -10,6 +11,7 @@ from types import TracebackType
 from flagdata.addresses import local_path
 from flagdata.errors import LimitError, RefusedError, UsageError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.chapters import chapter_of
 from flagdata.ingest.camera.container import check_path
 from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
 from flagdata.ingest.camera.grid import EveryFrame, GridReport, Pick, Resampler, Sampler
@@ -52,9 +54,12 @@ class CameraStream:
                 f"the time stamps span {duration:.0f} s, beyond the limit of {options.limits.duration:.0f} s",
                 where=str(path), fix="the stamps are damaged; repair the container, or raise the limit",
             )  # fmt: skip
+        chapter = chapter_of(path) if options.start is None else None
+        if chapter is not None:
+            chapter = replace(chapter, before=chapter.before * float(self._scale))
         start = find_start(
             options.start, facts.metadata, recorded=facts.recorded, place=options.zone, duration=duration,
-            where=str(path),
+            where=str(path), chapter=chapter,
         )  # fmt: skip
         self._opening += start.findings
         width, height = upright_size(facts.width, facts.height, facts.aspect, facts.orientation)

@@ -168,10 +168,13 @@ class VideoSource:
         damaged = False
         flagged: set[int | None] = set()
         count = 0
-        for packet in packets(self._container, self._stream):
+        for packet in packets(self._container, self._stream, end=self._timing.end):
             count += 1
             stamp = packet.pts if packet.pts is not None else packet.dts
-            if packet.is_corrupt:
+            # Where another take begins, transport packets are not numbered on, for which FFmpeg marks one of the last
+            # two frames before it.
+            joint = self._timing.end is not None and count >= self._timing.end - 1
+            if packet.is_corrupt and not joint:
                 # It is decoded all the same, since others refer to it; the frame it makes is left out.
                 flagged.add(stamp)
                 damaged = True

@@ -13,7 +13,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flagdata.errors import InputError
-from flagdata.findings import Severity
 from flagdata.ingest import camera
 from flagdata.ingest.camera.stamps import StampRepair, nanoseconds, survey
 
@@ -74,17 +73,6 @@ def test_a_gap_forward_is_believed() -> None:
     kept, found = repair([0, 40, 10_000, 10_040])
     assert [stamp for _, stamp in kept] == [0, 40, 10_000, 10_040]
     assert found == {}
-
-
-def test_after_a_clock_that_starts_anew_nothing_is_kept_and_it_is_an_error() -> None:
-    stamps: list[int | None] = [*range(2000, 4000, 40), *range(0, 1000, 40)]
-    kept, found = repair(stamps)
-    assert [stamp for _, stamp in kept] == list(range(2000, 4000, 40))
-    assert found == {"clock-reset": 25}
-    fix: StampRepair[int] = StampRepair(period=PERIOD)
-    for index, stamp in enumerate(stamps):
-        list(fix.push((stamp or 0) * MS, index))
-    assert fix.findings()[0].severity is Severity.ERROR
 
 
 @given(st.lists(st.one_of(st.none(), st.integers(-10_000, 10_000)), max_size=80))

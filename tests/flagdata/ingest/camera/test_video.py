@@ -300,7 +300,7 @@ def test_a_container_that_breaks_off_still_flushes_the_decoder(cfr60: Path) -> N
     # A stream that appears in the middle of a damaged transport stream makes PyAV raise IndexError at the end.
     class Torn:
         def __init__(self, whole: InputContainer, error: Exception) -> None:
-            self.whole, self.error = whole, error
+            self.whole, self.error, self.format = whole, error, whole.format
 
         def demux(self, stream: VideoStream) -> Iterator[av.Packet]:
             for packet in self.whole.demux(stream):

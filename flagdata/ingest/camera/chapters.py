@@ -1,0 +1,102 @@
+"""Chapters: the files into which a camera splits one recording, each stamped with the creation time of the whole.
+
+A later chapter begins where the earlier ones end. Where the file's name says that it is a later chapter, and all
+earlier ones lie beside it and state the same creation time, its start is that time plus their durations. Names are
+GoPro's: GH010042, GH020042, … (also GX, GL, GS) of the HERO6 and later ones, and GOPR0042, GP010042, … of those before.
+Cameras that stamp each file by itself, as AVCHD camcorders do, need none of it. Of other cameras, two files with
+successive numbers and one creation time are reported, and neither is moved: they may as well be clips of one film.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from flagdata.errors import FlagdataError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.container import open_container
+from flagdata.ingest.camera.options import Limits
+
+_NEW = re.compile(r"(?P<head>G[HXLS])(?P<chapter>\d\d)(?P<file>\d{4}\.\w+)", re.IGNORECASE)
+_OLD = re.compile(r"(?P<head>GP)(?P<chapter>\d\d)(?P<file>\d{4}\.\w+)", re.IGNORECASE)
+# The last number of a name, of as many digits as cameras count with.
+_COUNTED = re.compile(r"(?P<head>.*?)(?P<number>\d{3,})(?P<rest>\D*\.\w+)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chapter:
+    """What the files beside a file say of where it begins within its recording.
+
+    Attributes:
+        before: length of all earlier chapters, by their containers' stamps [s]; 0 where it is not known.
+        finding: what to report where the start is taken from the creation time.
+    """
+
+    before: float
+    finding: Finding
+
+
+def chapter_of(path: Path) -> Chapter | None:
+    """Where a later chapter begins; None for any other file, and for a chapter that states its own creation time."""
+    counted = _COUNTED.fullmatch(path.name)
+    own = _header(path) if counted is not None and not path.is_dir() else None
+    if counted is None or own is None or own[0] is None:
+        return None
+    earlier = _earlier(path.name)
+    if not earlier:
+        number = counted["number"]
+        other = f"{counted['head']}{int(number) - 1:0{len(number)}}{counted['rest']}"
+        found = _header(path.with_name(other))
+        alike = f"{other} beside it states the same creation time: if both are of one recording, this one starts later"
+        return _not_placed(alike, fix="give --start") if found is not None and found[0] == own[0] else None
+    before = Fraction(0)
+    for name in earlier:
+        found = _header(path.with_name(name))
+        if found is None or found[1] is None:
+            what = (
+                f"chapter {len(earlier) + 1} of one recording, stamped with the creation time of the whole: it starts "
+                f"later by the length of the earlier chapters, of which {name} is not beside it or cannot be read"
+            )
+            return _not_placed(what, fix="put the earlier chapters into its folder, or give --start")
+        if found[0] != own[0]:
+            return None
+        before += found[1]
+    placed = Finding(
+        kind="chapter-placed", severity=Severity.NOTE, value=float(before),
+        what=f"chapter {len(earlier) + 1} of one recording, stamped with the creation time of the whole: it was put "
+        f"{float(before):.3f} s later, by the length of {', '.join(earlier)}",
+    )  # fmt: skip
+    return Chapter(before=float(before), finding=placed)
+
+
+def _not_placed(what: str, *, fix: str) -> Chapter:
+    return Chapter(
+        before=0.0, finding=Finding(kind="chapter-not-placed", severity=Severity.WARNING, what=what, fix=fix)
+    )
+
+
+def _earlier(name: str) -> list[str]:
+    """Names of the chapters before a file; empty where its name does not say that it is a later chapter."""
+    if match := _NEW.fullmatch(name):
+        return [f"{match['head']}{k:02}{match['file']}" for k in range(1, int(match["chapter"]))]
+    if match := _OLD.fullmatch(name):
+        first = "GOPR" if match["head"].isupper() else "gopr"
+        later = [f"{match['head']}{k:02}{match['file']}" for k in range(1, int(match["chapter"]))]
+        return [f"{first}{match['file']}", *later]
+    return []
+
+
+def _header(path: Path) -> tuple[str | None, Fraction | None] | None:
+    """Creation time and length [s] by the header of a file; None where there is none that can be read."""
+    if not path.is_file():
+        return None
+    try:
+        container, stream = open_container(path, Limits(), threads=1)
+    except FlagdataError:
+        return None
+    with container:
+        metadata = {key.lower(): value for key, value in {**container.metadata, **stream.metadata}.items()}
+        length = None if stream.duration is None or stream.time_base is None else stream.duration * stream.time_base
+        return metadata.get("creation_time"), length

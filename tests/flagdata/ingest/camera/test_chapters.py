@@ -1,0 +1,99 @@
+"""Later chapters of one recording begin where the earlier ones end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from flagdata.findings import Severity
+from flagdata.ingest.camera import CameraOptions, open_camera, probe
+from flagdata.ingest.store import CameraIngest, ingest_camera
+from flagdata.lake import Lake
+from flagdata.timebase import parse
+
+CREATED = "2026-05-01T10:00:00.000000Z"
+TEN = parse(CREATED)
+SECOND = 1_000_000_000
+
+
+@pytest.fixture
+def film(tmp_path: Path, write_video: Callable[..., Path]) -> Callable[..., Path]:
+    """Writes a film at 25 Hz of some frames and creation time under a name."""
+
+    def write(name: str, frames: int, created: str = CREATED) -> Path:
+        return write_video(
+            tmp_path / name, range(frames), tick=Fraction(1, 25), container="mp4", metadata={"creation_time": created}
+        )
+
+    return write
+
+
+def started(path: Path, options: CameraOptions | None = None) -> tuple[float, dict[str, Severity]]:
+    """Seconds from the creation time to the start of a file, and its findings about chapters."""
+    with open_camera(path, options or CameraOptions(size=96)) as stream:
+        found = {f.kind: f.severity for f in stream.findings if f.kind.startswith("chapter")}
+        return (stream.info.start - TEN) / SECOND, found
+
+
+# 10 and 20 frames at 25 Hz are 0.4 and 0.8 s.
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("GH010042.MP4", "GH020042.MP4", "GH030042.MP4"),
+        ("GX010042.mp4", "GX020042.mp4", "GX030042.mp4"),
+        ("GOPR0042.MP4", "GP010042.MP4", "GP020042.MP4"),
+    ],
+)
+def test_each_chapter_begins_where_the_earlier_ones_end(names: tuple[str, ...], film: Callable[..., Path]) -> None:
+    first, second, third = (film(name, frames) for name, frames in zip(names, (10, 20, 5), strict=True))
+    assert started(first) == (0.0, {})
+    assert started(second) == (pytest.approx(0.4), {"chapter-placed": Severity.NOTE})
+    assert started(third) == (pytest.approx(1.2), {"chapter-placed": Severity.NOTE})
+    looked = probe(third).start
+    assert looked is not None
+    assert looked.instant - TEN == 1_200_000_000
+    # Uniform from the start of the recording to the end of the chapter, 1.36 s, and over a second.
+    assert looked.sigma == pytest.approx(((1 + 1.36**2) / 12) ** 0.5, rel=0.01)
+    # At twice the rate that the container states, all chapters are half as long.
+    assert started(third, CameraOptions(size=96, true_fps=50.0))[0] == pytest.approx(0.6)
+
+
+def test_a_chapter_whose_earlier_ones_are_not_there_is_reported_and_not_moved(film: Callable[..., Path]) -> None:
+    film("GH010042.MP4", 10)
+    assert started(film("GH030042.MP4", 5)) == (0.0, {"chapter-not-placed": Severity.WARNING})
+    film("GH020042.MP4", 1).write_bytes(b"no film")
+    assert started(film("GH030042.MP4", 5)) == (0.0, {"chapter-not-placed": Severity.WARNING})
+
+
+def test_a_file_with_a_time_of_its_own_is_not_moved(film: Callable[..., Path]) -> None:
+    film("GH010042.MP4", 10, "2026-05-01T09:59:00.000000Z")
+    second = film("GH020042.MP4", 5)
+    assert started(second) == (0.0, {})
+    given = CameraOptions(size=96, start=TEN + 7 * SECOND)
+    assert started(film("GH020042.MP4", 5, "2026-05-01T09:59:00.000000Z"), given) == (7.0, {})
+
+
+def test_successive_numbers_of_one_creation_time_are_reported_and_none_is_moved(film: Callable[..., Path]) -> None:
+    assert started(film("DJI_0009.MP4", 10)) == (0.0, {})
+    assert started(film("DJI_0010.MP4", 10)) == (0.0, {"chapter-not-placed": Severity.WARNING})
+    # Cameras that record side by side.
+    film("left1.mp4", 10)
+    assert started(film("left2.mp4", 10)) == (0.0, {})
+
+
+def test_a_chapter_is_another_artifact_once_the_earlier_one_is_there(tmp_path: Path, film: Callable[..., Path]) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    options = CameraIngest(camera=CameraOptions(size=96))
+    second = film("GH020042.MP4", 5)
+    alone = ingest_camera(lake, second, options)
+    film("GH010042.MP4", 10)
+    beside = ingest_camera(lake, second, options)
+    assert (alone.artifact.start, beside.artifact.start) == (TEN, TEN + 400_000_000)
+    assert "chapter-not-placed" in alone.artifact.quality
+    assert "chapter-not-placed" not in beside.artifact.quality
+    before = next(f for f in beside.report["findings"] if f["kind"] == "ingested-before")
+    assert alone.artifact.id[:12] in before["what"]
+    assert not ingest_camera(lake, second, options).created
