@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,14 +151,38 @@ class FrameStream(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
+class LogRow:
+    """A row of a log's text beside what was read of it.
+
+    Attributes:
+        line: its number in the text, from 1.
+        text: as it is written.
+        time: UTC nanoseconds.
+        wind: for people, in m/s and degrees.
+    """
+
+    line: int
+    text: str
+    time: int
+    wind: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class WindLog:
     """What an anemometer reader returns: the series, what it found, and why it thinks the file is of this format.
 
-    `drafted` is the recipe (TOML) that was drafted from the file's own heading, "" where it was read by another.
+    Attributes:
+        plan: what was understood of the file, see `ingest.anemometer.plan`.
+        drafted: the recipe (TOML) that was drafted from the file's own text, "" where it was read by another.
+        stated: whether the file itself states all that a draft says, so that nothing of it is a guess.
+        rows: of a draft that is one, some rows to judge it by.
     """
 
     series: WindSeries
     format: str
     findings: tuple[Finding, ...] = ()
     reasons: tuple[str, ...] = field(default=())
+    plan: Mapping[str, Any] = field(default_factory=dict)
     drafted: str = ""
+    stated: bool = False
+    rows: tuple[LogRow, ...] = ()

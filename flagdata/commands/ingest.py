@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
+from flagdata.commands.confirm import on_command_line
 from flagdata.commands.ingest_options import (
     SNIFF,
     Given,
@@ -100,6 +101,10 @@ from flagdata.errors import UsageError
     "apparent_wind_speed, apparent_wind_direction, air_temperature, relative_humidity, air_pressure, site. What is "
     "measured has its unit in brackets. A name that is not known is refused with the list of all.",
 )  # fmt: skip
+@click.option(
+    "--accept", metavar="HASH",
+    help="Wind: confirms what was drafted from a table that no recipe describes, by the hash that the refusal shows.",
+)  # fmt: skip
 @json_option
 @lake_option
 @click.pass_context
@@ -132,6 +137,7 @@ def ingest(
     unit: str | None,
     wind: str | None,
     columns: str | None,
+    accept: str | None,
     as_json: bool,
     lake_path: str,
 ) -> None:
@@ -139,7 +145,8 @@ def ingest(
 
     Whether a SOURCE is a camera's, an anemometer's, a folder of meshes or a table of markers is decided by its content,
     and an option goes to the sources of its kind. Each is one commit: what fails leaves the lake as it was, and the
-    others go on.
+    others go on. How a table without a recipe is to be read is drafted from its own text; such a draft is shown, and
+    enters only when it is confirmed at the terminal or by --accept.
 
     \b
       flagdata ingest --sniff DSC_0001.MP4 TOA5_1234.dat
@@ -176,6 +183,7 @@ def ingest(
         crop_picture=crop_picture,
         zoned_start=start is not None and names_zone(start),
         unit=unit,
+        confirm=on_command_line(accept, as_json=as_json),
     )  # fmt: skip
     if sniff:
         for parameter in sorted(given - {*SNIFF, "as_json", "lake_path"}):

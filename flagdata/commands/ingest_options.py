@@ -12,6 +12,7 @@ from flagdata.commands.durations import written_seconds
 from flagdata.errors import TimeError, UsageError
 
 if TYPE_CHECKING:
+    from flagdata.commands.confirm import OnCommandLine
     from flagdata.ingest.markers import MarkerOptions
     from flagdata.ingest.meshes.store import MeshIngest
     from flagdata.ingest.store import CameraIngest, Labels, WindIngest
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 CAMERA_ONLY = ("true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
 WIND_ONLY = (
     "sensor", "date", "date_order", "platform", "talker", "azimuth", "clock", "zero_offset", "encoding", "wind",
-    "columns",
+    "columns", "accept",
 )  # fmt: skip
 LENGTHS = ("unit",)
 """Options that meshes and markers share with the wind's speed."""
@@ -35,7 +36,7 @@ SNIFF = (
     "sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture", "unit", "wind",
     "date_order", "columns",
 )  # fmt: skip
-ONE_SOURCE = ("start", "date", "name", "crop_picture")
+ONE_SOURCE = ("start", "date", "name", "crop_picture", "accept")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +51,7 @@ class Given:
     branch: str
     crop_picture: Path | None
     zoned_start: bool
+    confirm: OnCommandLine
     unit: str | None = None
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
+from flagdata.commands.confirm import with_zone
 from flagdata.commands.ingest_options import Given, check_applies
 from flagdata.commands.ingest_report import print_results, print_sniffed
 from flagdata.console import document, fail, progress, say
@@ -179,10 +180,11 @@ def _failures(failures: Sequence[tuple[Path, FlagdataError]]) -> list[dict[str, 
 
 
 def _exit_on(failures: Sequence[tuple[Path, FlagdataError]], sources: Sequence[Path]) -> None:
-    """Exit with 1, naming what failed, if anything did."""
+    """Exit naming what failed, if anything did: with the code of the failures where they agree, else with 1."""
     if failures:
         say(f"flagdata: {len(failures)} of {len(sources)} sources failed: {', '.join(str(s) for s, _ in failures)}")
-        sys.exit(1)
+        codes = {error.exit_code for _, error in failures}
+        sys.exit(codes.pop() if len(codes) == 1 else 1)
 
 
 def _one(lake: Lake, source: Path, kind: Guess, options: Given) -> tuple[IngestResult, ...]:
@@ -197,13 +199,20 @@ def _one(lake: Lake, source: Path, kind: Guess, options: Given) -> tuple[IngestR
     if kind.kind == "meshes":
         return (_meshes(lake, source, kind, options),)
     if kind.kind != "camera":
-        return _winds(lake, source, options)
+        return with_zone(lambda zone: _winds(lake, source, _in_zone(options, zone)), asks=options.confirm.asks)
     with progress(None, label=source.name, unit="frame") as advance, _CropPicture(options.crop_picture) as picture:
         result = ingest_camera(
             lake, source, options.camera, labels=options.labels, branch=options.branch, reasons=kind.reasons,
             progress=advance, crop_picture=picture.write if options.crop_picture else None,
         )  # fmt: skip
     return (result,)
+
+
+def _in_zone(options: Given, zone: str | None) -> Given:
+    """The options with the zone that was typed, if one was."""
+    if zone is None:
+        return options
+    return replace(options, wind=replace(options.wind, wind=replace(options.wind.wind, zone=zone)))
 
 
 def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]:
@@ -223,7 +232,7 @@ def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]
         one, labels = options.wind.wind.wind, options.labels
         if one is not None and len(anemometers(source, replace(options.wind.wind, wind=None))) > 1:
             labels = replace(labels, name=f"{stem}:{one}")
-        return (ingest_wind(lake, source, options.wind, labels=labels, branch=options.branch),)
+        return (ingest_wind(lake, source, options.wind, labels=labels, branch=options.branch, confirm=options.confirm),)
     each = [
         (
             replace(options.wind, wind=replace(options.wind.wind, wind=label)),
@@ -231,7 +240,7 @@ def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]
         )
         for label in found
     ]
-    done = ingest_winds(lake, source, each, branch=options.branch)
+    done = ingest_winds(lake, source, each, branch=options.branch, confirm=options.confirm)
     results = [one for one in done if isinstance(one, IngestResult)]
     dead = [(label, one) for label, one in zip(found, done, strict=True) if not isinstance(one, IngestResult)]
     if not results:

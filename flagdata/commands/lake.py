@@ -75,20 +75,27 @@ def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
 @lake_option
 def show(artifact: str, at: str | None, as_json: bool, lake_path: str) -> None:
     """Show one artifact: all it says, what it was made from and what was made from it."""
+    from flagdata.ingest.before import unconfirmed
     from flagdata.lake import Lake
 
     lake = Lake.open(lake_path)
-    row = _plain(lake.artifact(artifact, at=at).row())
+    found = lake.artifact(artifact, at=at)
+    row = _plain(found.row())
     for column in ("recipe", "parameters", "clock_model", "report"):
         row[column] = json.loads(row[column]) if row[column] else None
     others = lake.rows(at=at, columns=["artifact", "kind", "name", "parents"]).to_pylist()
     parents = [_relative(other) for other in others if other["artifact"] in row["parents"]]
     children = [_relative(other) for other in others if row["artifact"] in other["parents"]]
     path = lake.objects.path(row["object"]) if row["object"] else None
+    doubts = unconfirmed([found])
     if as_json:
         document(
-            "show", {"artifact": row, "path": str(path) if path else None, "parents": parents, "children": children}
-        )
+            "show",
+            {
+                "artifact": row, "path": str(path) if path else None, "parents": parents, "children": children,
+                "findings": [finding.as_dict() for finding in doubts],
+            },
+        )  # fmt: skip
         return
     for column, value in row.items():
         if value is not None and value != [] and column not in ("parents", "report"):
@@ -98,7 +105,7 @@ def show(artifact: str, at: str | None, as_json: bool, lake_path: str) -> None:
     for label, relatives in (("made from", parents), ("made into", children)):
         for relative in relatives:
             click.echo(f"{label:<15} {relative['artifact'][:_SHORT]} {relative['kind']} {relative['name']}")
-    for finding in (row["report"] or {}).get("findings", []):
+    for finding in (*(row["report"] or {}).get("findings", []), *(finding.as_dict() for finding in doubts)):
         click.echo(f"{finding.get('severity', 'note'):<15} {finding.get('kind')}: {finding.get('what')}")
 
 

@@ -71,13 +71,15 @@ def verify(sample: int | None, as_json: bool, lake_path: str) -> None:
 @lake_option
 def doctor(deep: bool, grace: timedelta, as_json: bool, lake_path: str) -> None:
     """Find and explain what is wrong; exits with 3 when there is something to act on."""
-    from flagdata.lake import Lake
+    from flagdata.ingest.before import unconfirmed
+    from flagdata.lake import Artifact, Lake
     from flagdata.lake.health import catalog_files
     from flagdata.lake.health import doctor as examined
     from flagdata.lake.health import verify as verified
 
     lake = Lake.open(lake_path)
-    findings = examined(lake, grace=grace)
+    winds = lake.rows("kind = 'wind'").to_pylist()
+    findings = (*examined(lake, grace=grace), *unconfirmed(Artifact.from_row(row) for row in winds))
     checked = "structure checked, contents not (flagdata verify)"
     if deep:
         findings += tuple(f for f in catalog_files(lake) if f.kind not in {known.kind for known in findings})

@@ -1,32 +1,38 @@
-"""Whether a file is in the lake already, by other options than those it is ingested by now.
+"""Artifacts that were made before from the bytes of a log: read alike, read otherwise, or never confirmed.
 
-The identity of an artifact holds the options that shaped it, so that a file that was ingested in a wrong zone and then
-in the right one is in the lake twice, and the wrong one would go on being taken for the truth unless somebody says so.
+The identity of a log's artifact holds the options that shaped it and what was understood of its file, so that a file
+that was ingested in a wrong zone and then in the right one is in the lake twice, and the wrong one would go on being
+taken for the truth unless somebody says so.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
-from flagdata.lake import Artifact
+from flagdata.lake import Artifact, Lake
+from flagdata.record import Record
+from flagdata.schema import Kind
+from flagdata.signals import WindSeries
 
 _CHOOSES = ("wind", "talker")
 """Options that choose one of several anemometers of a file: another choice is another log, no other reading of it."""
 _ID = 12
-"""Letters of an artifact's identity that are told."""
+"""Letters of an artifact's identity that messages name."""
 
 
-def by_other_options(
-    others: Sequence[Artifact], source_hash: str, recipe: Mapping[str, Any]
-) -> tuple[Finding, ...]:  # fmt: skip
+def other_readings(others: Sequence[Artifact], source_hash: str, recipe: Mapping[str, Any]) -> tuple[Finding, ...]:
     """A note for each of some artifacts that was read from the same bytes otherwise.
 
     Args:
         others: artifacts of the same kind that are in the lake.
         source_hash: of the file's bytes.
-        recipe: all options that shape the result now.
+        recipe: all that shapes the result now.
     """
     now = _options(recipe)
     found: list[Finding] = []
@@ -37,19 +43,76 @@ def by_other_options(
         names = sorted(name for name in before.keys() | now.keys() if before.get(name) != now.get(name))
         changed = ", ".join(f"{name} {before.get(name)!s}, now {now.get(name)!s}" for name in names)
         if changed:
-            found.append(
-                Finding(
-                    kind="ingested-before", severity=Severity.NOTE,
-                    what=f"the same file is in the lake by other options as {artifact.id[:_ID]} ({changed}); both stay",
-                    fix=f"if that one is wrong, take it off: flagdata withdraw {artifact.id[:_ID]}",
-                )
-            )  # fmt: skip
+            what = f"the same file is in the lake by other options as {artifact.id[:_ID]} ({changed}); both stay"
+        elif artifact.recipe.get("plan") != recipe.get("plan"):
+            mean = json.loads(artifact.report or "{}").get("mean_speed")
+            said = "" if mean is None else f", mean speed {mean:.4g} m/s"
+            what = f"the same file was understood otherwise before, as {artifact.id[:_ID]}{said}; both stay"
+        else:
+            continue
+        fix = f"if that one is wrong, take it off: flagdata withdraw {artifact.id[:_ID]}"
+        found.append(Finding(kind="ingested-before", severity=Severity.NOTE, what=what, fix=fix))
     return tuple(found)
 
 
+def earlier(
+    lake: Lake, others: Sequence[Artifact], source_hash: str, recipe: Mapping[str, Any], series: WindSeries
+) -> Artifact | None:
+    """The artifact that an older version made of the same bytes and options, and whose wind is the same to the bit.
+
+    Args:
+        lake: that holds the artifacts.
+        others: artifacts of the same kind that are in the lake.
+        source_hash: of the file's bytes.
+        recipe: all that shapes the result now.
+        series: as it is read now, by no draft.
+    """
+    for artifact in others:
+        if artifact.source_hash == source_hash and _options(artifact.recipe) == _options(recipe):
+            try:
+                before = Record.open(lake.object_path(str(artifact.object))).wind()
+            except FlagdataError:
+                continue  # damage of another artifact is found by verify; it does not keep this log out
+            if before is not None and _same(before, series):
+                return artifact
+    return None
+
+
+def unconfirmed(artifacts: Iterable[Artifact]) -> tuple[Finding, ...]:
+    """A warning for each artifact of a log that an older version read by a draft of its own, which nobody confirmed."""
+    return tuple(
+        Finding(
+            kind="draft-unconfirmed", severity=Severity.WARNING, where=f"artifact {artifact.id} {artifact.name!r}",
+            what="an older version drafted how to read this log, and nobody confirmed it",
+            fix="ingest the file again, confirm what is shown, and withdraw this artifact",
+        )
+        for artifact in artifacts
+        if _was_drafted(artifact)
+    )  # fmt: skip
+
+
+def _was_drafted(artifact: Artifact) -> bool:
+    """Whether a table was read by no recipe of the user's, before plans were a part of the identity."""
+    wind = artifact.recipe.get("wind")
+    if artifact.kind is not Kind.WIND or not isinstance(wind, Mapping) or "plan" in artifact.recipe:
+        return False
+    return wind.get("recipe") is None and json.loads(artifact.report or "{}").get("format") == "delimited"
+
+
+def _same(one: WindSeries, other: WindSeries) -> bool:
+    names = one.channels.keys()
+    return (
+        names == other.channels.keys()
+        and np.array_equal(one.time, other.time)
+        and np.array_equal(one.flags, other.flags)
+        and all(np.array_equal(one.channels[name], other.channels[name], equal_nan=True) for name in names)
+    )
+
+
 def _options(recipe: Mapping[str, Any]) -> dict[str, Any]:
-    """The options of a recipe, those of the anemometer's own among them."""
+    """The options of a recipe, those of the anemometer's own among them; what was understood of the file is none."""
     flat: dict[str, Any] = {}
     for name, value in recipe.items():
-        flat |= _options(value) if isinstance(value, Mapping) else {name: value}
+        if name != "plan":
+            flat |= _options(value) if isinstance(value, Mapping) else {name: value}
     return flat

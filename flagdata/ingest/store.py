@@ -1,7 +1,8 @@
 """From a vendor's file to an artifact of the lake: read, written as a record on the device's own clock, published.
 
-The identity of an artifact is its source's bytes and the options that shaped it, so that ingesting a file again finds
-it. One source is one transaction: an error, Ctrl-C or a crash leaves the lake as it was.
+The identity of an artifact is its source's bytes, the options that shaped it, and of a log what was understood of it,
+so that ingesting a file again finds it. One source is one transaction: an error, Ctrl-C or a crash leaves the lake as
+it was.
 """
 
 from __future__ import annotations
@@ -19,10 +20,11 @@ from flagdata.align.paired import PairedClocks, host_clock
 from flagdata.errors import ConflictError, FlagdataError, InputError, NothingMeasuredError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest.anemometer.confirm import UNASKED, Confirm, confirmed
 from flagdata.ingest.anemometer.reading import streams
 from flagdata.ingest.anemometer.recipe import SENSORS
 from flagdata.ingest.anemometer.samples.neighbours import hours_off
-from flagdata.ingest.before import by_other_options
+from flagdata.ingest.before import earlier, other_readings
 from flagdata.ingest.camera import CameraOptions
 from flagdata.ingest.source import Source
 from flagdata.lake import Artifact, Lake, Transaction
@@ -190,40 +192,53 @@ def ingest_wind(
     *,
     labels: Labels | None = None,
     branch: str = "main",
+    confirm: Confirm = UNASKED,
 ) -> IngestResult:
     """Ingest an anemometer's log. The vendor's file, and the sensor recipe that was named, are attached.
 
+    Args:
+        confirm: asks whether a drafted reading is right; without it a draft is refused.
+
     Raises:
         FlagdataError: as `read_log`; the lake is unchanged.
+        UnconfirmedError: nobody confirmed what the program drafted; the lake is unchanged.
         ConflictError: the file changed while it was read, or is in the lake under other labels.
     """
-    (result,) = ingest_winds(lake, path, [(options or WindIngest(), labels or Labels())], branch=branch)
+    each = [(options or WindIngest(), labels or Labels())]
+    (result,) = ingest_winds(lake, path, each, branch=branch, confirm=confirm)
     if isinstance(result, NothingMeasuredError):
         raise result
     return result
 
 
 def ingest_winds(
-    lake: Lake, path: Path, each: Sequence[tuple[WindIngest, Labels]], *, branch: str = "main"
+    lake: Lake,
+    path: Path,
+    each: Sequence[tuple[WindIngest, Labels]],
+    *,
+    branch: str = "main",
+    confirm: Confirm = UNASKED,
 ) -> tuple[IngestResult | NothingMeasuredError, ...]:
     """Ingest the anemometers of one log, in one transaction: all that can be used, or none where one cannot be read.
 
     Args:
         each: the options that read one of them, and its labels.
+        confirm: asks once whether the drafted ones among them are right; without it drafts are refused.
 
     Returns:
         for each what became of it, or why none of its values can be used.
 
     Raises:
-        FlagdataError, ConflictError: as `ingest_wind`, of any of them; the lake is unchanged.
+        FlagdataError, UnconfirmedError, ConflictError: as `ingest_wind`, of any of them; the lake is unchanged.
     """
     source = Source.of(path)
     read = [_read(lake, path, source, options, labels, branch=branch) for options, labels in each]
     new = [one for one in read if isinstance(one, _Read)]
     if not new:
         return tuple(one for one in read if not isinstance(one, _Read))
+    how = confirmed(path, source.hash, [(one.log, one.options.wind) for one in new], confirm)
     with lake.transaction(f"ingest wind {source.name}", branch=branch) as transaction:
-        staged = [_staged(transaction, path, source, one) for one in new]
+        staged = [_staged(transaction, path, source, one, how) for one in new]
         for artifact, _ in staged:
             transaction.add(artifact)
     done = (
@@ -240,6 +255,7 @@ class _Read:
     Attributes:
         log: what was read.
         options, labels: of it.
+        recipe: of its artifact.
         findings: of the log, of its clocks and of other logs beside it.
         paired: the logging computer's clock against the instrument's; `None` where the log has one alone.
     """
@@ -247,6 +263,7 @@ class _Read:
     log: WindLog
     options: WindIngest
     labels: Labels
+    recipe: Mapping[str, Any]
     findings: tuple[Finding, ...]
     paired: PairedClocks | None
 
@@ -255,19 +272,24 @@ def _read(
     lake: Lake, path: Path, source: Source, options: WindIngest, labels: Labels, *, branch: str
 ) -> _Read | IngestResult | NothingMeasuredError:
     """A log as it is to be written; what is in the lake already; or why none of its values can be used."""
-    present = find(lake, Kind.WIND, source, options.recipe(), labels, branch=branch)
-    if present is not None:
-        return present
     try:
         log = read_log(path, options.wind)
     except NothingMeasuredError as error:
         return error
+    recipe = {**options.recipe(), "plan": dict(log.plan)}
+    present = find(lake, Kind.WIND, source, recipe, labels, branch=branch)
+    if present is not None:
+        return present
     paired = host_clock(log.series)
     findings = (*log.findings, *(paired.findings if paired is not None else ()))
     others = _present(lake, Kind.WIND, branch)
+    same = None if log.drafted else earlier(lake, others, source.hash, recipe, log.series)
+    if same is not None:
+        _check_labels(same, labels)
+        return IngestResult(artifact=same, created=False, report=json.loads(same.report or "{}"))
     findings = (*findings, *_beside(lake, log.series, labels.session, others))
-    findings = (*findings, *by_other_options(others, source.hash, options.recipe()))
-    return _Read(log=log, options=options, labels=labels, findings=findings, paired=paired)
+    findings = (*findings, *other_readings(others, source.hash, recipe))
+    return _Read(log=log, options=options, labels=labels, recipe=recipe, findings=findings, paired=paired)
 
 
 def _present(lake: Lake, kind: Kind, branch: str) -> list[Artifact]:
@@ -276,13 +298,18 @@ def _present(lake: Lake, kind: Kind, branch: str) -> list[Artifact]:
     return [Artifact.from_row(row) for row in rows]
 
 
-def _staged(transaction: Transaction, path: Path, source: Source, one: _Read) -> tuple[Artifact, dict[str, Any]]:
+def _staged(
+    transaction: Transaction, path: Path, source: Source, one: _Read, how: str | None
+) -> tuple[Artifact, dict[str, Any]]:
     """The artifact of a log, whose record is written for a transaction, and its report.
+
+    Args:
+        how: the drafted readings of its file were confirmed; `None` where there are none.
 
     Raises:
         ConflictError: the file changed while it was read.
     """
-    log, findings, recipe = one.log, one.findings, one.options.recipe()
+    log, findings, recipe = one.log, one.findings, one.recipe
     time = log.series.time
     staged = transaction.staging(".mcap")
     with RecordWriter(staged, metadata={PROVENANCE: source.provenance(recipe)}) as record:
@@ -300,6 +327,8 @@ def _staged(transaction: Transaction, path: Path, source: Source, one: _Read) ->
             record.attach("drafted.recipe.toml", drafted, media_type="application/toml", log_time=int(time[0]))
     source.check_unchanged()
     report = _wind_report(log, findings, named=one.options.wind.recipe)
+    if how is not None:
+        report["confirmed"] = how
     if one.paired is not None:
         report["host_clock"] = json.loads(one.paired.model.to_json())
     artifact = _artifact(

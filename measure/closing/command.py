@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
+from flagdata.commands.confirm import on_command_line
 from flagdata.console import LocalPath, document, json_option, say
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.findings import Finding
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from measure.observe.recipe import ExperimentRecipe
     from measure.verdict.record import Verdict
 
-_OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "rate", "unit", "noise", "up")
+_OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "accept", "rate", "unit", "noise", "up")
 """Options that say how sources of the command line are read."""
 
 
@@ -61,6 +62,9 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
     "--sensor", metavar="NAME|FILE.toml", help="Recipe that says how to read a log that does not say so itself."
 )
 @click.option("--zone", help="Time zone of the stamps of a log: +02:00, or an IANA name.")
+@click.option(
+    "--accept", metavar="HASH", help="Confirms how a log without a recipe is read, by the hash of its refusal."
+)
 @click.option("--material", help="Nominal material, a name of the catalog; by default the one that the source states.")
 @click.option(
     "--density-uncertainty",
@@ -104,6 +108,7 @@ def close_loop(
     offset: float | None,
     sensor: str | None,
     zone: str | None,
+    accept: str | None,
     material: str | None,
     density_uncertainty: float | None,
     size: str | None,
@@ -159,7 +164,7 @@ def close_loop(
         reading = Reading(
             rate=rate, unit=unit, noise=noise, offset=offset, up=_up(context, up, recipe),
             sensor=sensor, zone=zone, axis=_axis(context, axis, north),
-            north=None if north is None else math.radians(north),
+            confirm=on_command_line(accept, as_json=as_json), north=None if north is None else math.radians(north),
         )  # fmt: skip
         observed = observe(read(sources, winds, reading, lake), setup)
     refuse(observed.findings)

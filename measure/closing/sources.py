@@ -10,6 +10,7 @@ import numpy as np
 
 from flagdata.errors import UsageError
 from flagdata.ingest.anemometer import WindOptions
+from flagdata.ingest.anemometer.confirm import UNASKED, Confirm
 from flagdata.lake import Lake
 from measure.observe import Observation, Up
 from measure.observe.recipe import RecordingSource, WindSource, blown, opened
@@ -31,6 +32,7 @@ class Reading:
         north: where north lies, from +x towards +y [rad].
         offset: from a log's first sample to the first frame [s]; None if nothing is said.
         sensor, zone: how a log's file is read, where it does not say so itself: see `WindOptions`.
+        confirm: asks whether a drafted reading of a log is right.
     """
 
     rate: float | None = None
@@ -42,6 +44,7 @@ class Reading:
     offset: float | None = None
     sensor: str | None = None
     zone: str | None = None
+    confirm: Confirm = UNASKED
 
 
 def read(sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: Lake | None) -> list[Observation]:
@@ -68,8 +71,11 @@ def read(sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: L
             f"{len(winds)} winds for {len(found)} recordings", where="--wind", fix="give one, or one for each recording"
         )
     if not any(map(_is_log, winds)):
-        for name in ("offset", "sensor", "zone"):
-            if getattr(reading, name) is not None:
+        given = {
+            "offset": reading.offset, "sensor": reading.sensor, "zone": reading.zone, "accept": reading.confirm.accept
+        }  # fmt: skip
+        for name in given:
+            if given[name] is not None:
                 raise UsageError("no wind is a log", where=f"--{name}", fix="leave it out, or name a log by --wind")
     each = [_wind(wind, reading) for wind in (winds if len(winds) == len(found) else [*winds[:1]] * len(found))]
     return _distinct(
@@ -90,7 +96,7 @@ def _wind(text: str, reading: Reading) -> WindSource:
     if _is_log(text):
         placement = LogPlacement(axis=reading.axis, north=reading.north, offset=reading.offset)
         options = WindOptions(recipe=reading.sensor, zone=reading.zone)
-        return WindSource(log=text, placement=placement, options=options)
+        return WindSource(log=text, placement=placement, options=options, confirm=reading.confirm)
     speed = float(text)
     if reading.axis is None:
         raise UsageError("a speed without a direction", where=f"--wind {text}", fix="give --axis, not --north")

@@ -12,7 +12,8 @@
                         that holds several), name, rate, unit, rest-unit, noise
     [recording.wind]    velocity = [x, y, z], where the air goes to; or speed and toward (from +x towards +y); or log
                         (an artifact's id or an anemometer's file) with axis or north, and offset or start (ISO 8601);
-                        sensor (a recipe of catalogs/sensors or a file) and zone, where the log does not say them
+                        sensor (a recipe of catalogs/sensors or a file) and zone, where the log does not state them;
+                        accept (the hash that confirms a drafted reading, as a refusal shows it)
 
 All values are SI and radians. What a recording's own description says may be left out. Paths are relative to the file.
 """
@@ -29,6 +30,7 @@ from flagdata.addresses import local_path
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.findings import Finding
 from flagdata.ingest.anemometer import WindOptions
+from flagdata.ingest.anemometer.confirm import UNASKED, Accepting, Confirm
 from flagdata.ingest.markers import MarkerOptions
 from flagdata.ingest.meshes import read_obj
 from flagdata.lake import Lake
@@ -52,6 +54,7 @@ class WindSource:
     """A constant velocity [m/s], or a log, how it is read if it is a file, and how it lies beside the recording.
 
     Attributes:
+        confirm: of a file, asks whether a drafted reading is right.
         gain, direction, clock: standard deviations of what it may be off by, see `WindTrack`; None for the usual ones.
     """
 
@@ -59,6 +62,7 @@ class WindSource:
     log: str = ""
     placement: LogPlacement | None = None
     options: WindOptions | None = None
+    confirm: Confirm = UNASKED
     gain: float | None = None
     direction: float | None = None
     clock: float | None = None
@@ -305,8 +309,11 @@ def _wind(table: Table, folder: Path) -> WindSource:
         if sensor is not None and (folder / local_path(sensor)).is_file():
             sensor = str(folder / sensor)
         options = WindOptions(recipe=sensor, zone=table.text("zone", None))
+        confirm = Accepting(table.text("accept", None))
         table.done()
-        return WindSource(log=log, placement=placement, options=options, gain=gain, direction=direction, clock=clock)
+        return WindSource(
+            log=log, placement=placement, options=options, confirm=confirm, gain=gain, direction=direction, clock=clock
+        )
     if not velocity:
         speed, toward = table.number("speed", 0.0, least=0.0), table.number("toward", 0.0)
         velocity = (speed * math.cos(toward), speed * math.sin(toward), 0.0)
@@ -397,7 +404,7 @@ def _track(source: WindSource, folder: Path, lake: Lake | None) -> tuple[WindTra
     placement = source.placement or LogPlacement()
     path = folder / local_path(source.log)
     if path.is_file():
-        return wind.from_log(path, placement, source.options)
+        return wind.from_log(path, placement, source.options, confirm=source.confirm)
     if source.options not in (None, WindOptions()):
         raise UsageError(
             "an artifact's wind was read before", where=source.log, fix="leave the sensor and the zone out"

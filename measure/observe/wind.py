@@ -15,7 +15,9 @@ import numpy as np
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest.anemometer.confirm import UNASKED, Confirm, confirmed
 from flagdata.lake import Artifact, Lake
+from flagdata.provenance import file_hash
 from flagdata.record.parent import open_parent
 from flagdata.schema import UNUSABLE, Kind
 from flagdata.signals import WindSeries
@@ -96,14 +98,20 @@ def track(series: WindSeries, placement: LogPlacement, *, where: str) -> tuple[W
 
 
 def from_log(
-    path: Path, placement: LogPlacement, options: WindOptions | None = None
+    path: Path, placement: LogPlacement, options: WindOptions | None = None, *, confirm: Confirm = UNASKED
 ) -> tuple[WindTrack, tuple[Finding, ...]]:
     """The wind of an anemometer's file, of any format that can be ingested.
 
+    Args:
+        confirm: asks whether a drafted reading is right; without it a draft is refused.
+
     Raises:
+        UnconfirmedError: nobody confirmed what the program drafted.
         FlagdataError: as `read_log` and `track`.
     """
+    options = options or WindOptions()
     log = read_log(path, options)
+    confirmed(path, file_hash(path), [(log, options)], confirm)
     wind, found = track(log.series, placement, where=f"wind log {path.name}")
     return wind, (*log.findings, *found)
 

@@ -13,7 +13,7 @@ HOUSE = Path(__file__).resolve().parents[2] / "flagdata" / "ingest" / "anemomete
 PACKAGE = "flagdata.ingest.anemometer"
 ROOMS = (
     "sniffing", "foreign", "instants", "options", "words", "recipe", "reading", "text", "documents", "winds", "samples",
-    "times", "tables", "formats", "recognition", "restating", "sniff", "several", "log",
+    "times", "tables", "formats", "recognition", "restating", "sniff", "several", "plan", "preview", "log", "confirm",
 )  # fmt: skip
 """Folders and single modules; each may import those before it. `__init__` is what others see."""
 MODULES = [path for path in sorted(HOUSE.rglob("*.py")) if path != HOUSE / "__init__.py"]

@@ -12,6 +12,9 @@ import av
 import numpy as np
 import pytest
 
+from flagdata.commands.confirm import OnCommandLine
+from tests.confirming import CONFIRMED
+
 VIDEO_START = "2026-05-01T10:00:00Z"
 
 
@@ -55,6 +58,12 @@ def wind_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("wind") / "mast.csv"
     path.write_text("\n".join(rows) + "\n")
     return path
+
+
+@pytest.fixture
+def confirmed_drafts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drafts that the command line shows are confirmed."""
+    monkeypatch.setattr(OnCommandLine, "__call__", lambda self, drafted: CONFIRMED(drafted))
 
 
 @pytest.fixture

@@ -18,6 +18,8 @@ from flagdata.ingest.anemometer.documents.opening import open_text
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
 from flagdata.ingest.anemometer.instants import zones
 from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.plan import understood
+from flagdata.ingest.anemometer.preview import shown_rows
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recognition import recognise
 from flagdata.ingest.anemometer.restating import bulletins, spelled_stamps, untimed
@@ -29,6 +31,9 @@ from flagdata.ingest.anemometer.sniffing import SURE, as_taken
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import CHANNELS, UNUSABLE
 from flagdata.signals import WindLog, WindSeries
+
+_DOUBTS = frozenset({"heading-doubtful", "unit-doubtful"})
+"""Findings that speak against what a file states."""
 
 
 def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
@@ -112,7 +117,18 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         host_time=reading.host_time,
     )  # fmt: skip
     reasons = reading.understood or reasons
-    return WindLog(series=series, format=name, findings=findings, reasons=reasons, drafted=reading.drafted)
+    text = reading.drafted or (_text(options.recipe) if options.recipe is not None else None)
+    stated = reading.stated and _DOUBTS.isdisjoint(finding.kind for finding in findings)
+    rows = shown_rows(source, reading) if reading.drafted and not stated else ()
+    return WindLog(
+        series=series, format=name, findings=findings, reasons=reasons, plan=understood(name, text),
+        drafted=reading.drafted, stated=stated, rows=rows,
+    )  # fmt: skip
+
+
+def _text(recipe: str) -> str:
+    """What a recipe says, in TOML; its file may be damaged where nothing of it was read."""
+    return recipes.SENSORS.find(recipe).data.decode(errors="replace")
 
 
 def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:

@@ -38,6 +38,7 @@ class Reading:
         findings: of the format.
         stamped: whether each row has a stamp of its own; the lines of a stream have not, and cannot be sorted.
         drafted: the recipe (TOML) that was drafted from the file, "" where it was read by another.
+        stated: whether the file itself states all that the draft says.
         understood: what in the file spoke for that draft, completed by what the user said.
     """
 
@@ -52,6 +53,7 @@ class Reading:
     findings: tuple[Finding, ...] = ()
     stamped: bool = True
     drafted: str = ""
+    stated: bool = False
     understood: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

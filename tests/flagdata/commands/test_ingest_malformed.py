@@ -18,6 +18,7 @@ from flagdata.ingest.classify import classify
 from flagdata.ingest.store import ingest_camera, ingest_wind
 from flagdata.lake import Lake
 from flagdata.record import Record
+from tests.confirming import CONFIRMED
 
 
 def _state(lake: Lake) -> list[tuple[str, int]]:
@@ -31,7 +32,7 @@ def _ingest(lake: Lake, path: Path) -> bool:
     refusal: FlagdataError | None = None
     try:
         kind = classify(path)
-        result = ingest_camera(lake, path) if kind.kind == "camera" else ingest_wind(lake, path)
+        result = ingest_camera(lake, path) if kind.kind == "camera" else ingest_wind(lake, path, confirm=CONFIRMED)
     except FlagdataError as error:
         refusal = error
     else:

@@ -12,6 +12,7 @@ from flagdata.cli import main
 from flagdata.lake import Lake
 
 Run = Callable[..., tuple[int, str, str]]
+pytestmark = pytest.mark.usefixtures("confirmed_drafts")
 ROWS = [f"2026-05-13T12:00:{k:02d}Z,{4 + k % 7 / 10:.1f},{3 + k % 5 / 10:.1f}" for k in range(30)]
 
 

@@ -22,6 +22,7 @@ from flagdata.commands.ingest_options import wind_options
 from flagdata.ingest.anemometer import anemometers, read_log
 from flagdata.lake import Lake
 
+pytestmark = pytest.mark.usefixtures("confirmed_drafts")
 MOST = 4
 """Refusals on the way to a log that is ingested."""
 Run = Callable[..., tuple[int, str, str]]

@@ -127,7 +127,11 @@ class Delimited:
             found += unknown_words.told([speed.column] if speed is not None and isinstance(speed.column, str) else [])
         found += [] if mixed is None else [mixed.finding]
         return replace(
-            reading, findings=(*reading.findings, *found), drafted=proposal.toml, understood=proposal.understood
+            reading,
+            findings=(*reading.findings, *found),
+            drafted=proposal.toml,
+            stated=proposal.stated,
+            understood=proposal.understood,
         )
 
 

@@ -22,6 +22,7 @@ from flagdata.ingest.anemometer.tables import (
     beside_components,
     offered_columns,
     quality_columns,
+    self_described,
     sounding,
     speeds_offered,
     stated_against,
@@ -91,6 +92,7 @@ class Draft:
         delimiter: of the cells.
         of_earth: whether the components of the wind are towards east (x) and north (y).
         first: line of its first row, counted from 0.
+        stated: whether the file itself states all that the draft says, so that nothing of it is a guess.
         afloat: what is odd unless the user says what the platform does; "" where nothing shows that it moves.
         stretches: whether its sites follow one another, each with a count of time and a start of its own.
     """
@@ -110,6 +112,7 @@ class Draft:
     stretches: bool = False
     first: int = 0
     afloat: str = ""
+    stated: bool = False
 
 
 @lru_cache(maxsize=4)
@@ -220,7 +223,8 @@ def draft(
     remarks = (*remarks, *unread_rest.remark(layout, time, winds, (*layout.strange, *remarks, *warnings)))
     if given_clock.index(layout) is not None and any("--columns" in text for text in remarks):
         remarks = (*remarks, given_clock.AS_GIVEN)
-    toml = recipe_of(layout, time, chosen)
+    stated = columns is None and len(winds) == 1 and not doubts and self_described.of(layout, time, chosen)
+    toml = recipe_of(layout, time, chosen, missing=() if stated else missing_codes.of(layout, chosen))
     needs = (*needs_of(lines, layout, time), *(over_ground(layout, chosen) if by_user is None else ()))
     return Draft(
         toml=toml, understood=_as_written(_understood(layout, time, winds), unit, written),
@@ -230,7 +234,7 @@ def draft(
         unsure=tuple(one.label for one in winds if not one.sure),
         winds=labels, parts=parts, site=mixed[0] if mixed else None, delimiter=layout.delimiter,
         of_earth=chosen is not None and chosen.of_earth, stretches=bool(anew),
-        first=layout.lines[0] - 1,
+        first=layout.lines[0] - 1, stated=stated,
     )  # fmt: skip
 
 

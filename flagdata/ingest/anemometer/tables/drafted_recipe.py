@@ -48,18 +48,18 @@ def skeleton(lines: Sequence[str]) -> tuple[str, str, str] | None:
     )
     others = line_kinds(lines, layout.delimiter) or rows_above(lines, layout)
     fix = "; ".join(filter(None, [offered_columns.offer(layout, None, ()), others]))
-    return what, fix, recipe_of(layout, None, None)
+    return what, fix, recipe_of(layout, None, None, missing=missing_codes.of(layout, None))
 
 
-def recipe_of(layout: Layout, time: TimeChoice | None, wind: Wind | None) -> str:
-    """The recipe of a table; "?" stands where it is to be completed."""
+def recipe_of(layout: Layout, time: TimeChoice | None, wind: Wind | None, *, missing: Sequence[str]) -> str:
+    """The recipe of a table, with the texts that stand for no value; "?" stands where it is to be completed."""
     preamble = layout.preamble if layout.by_name else layout.preamble + layout.header
     label = wind.label if wind is not None else "anemometer"
     lines = [
         'name = "drafted"', 'about = "drafted from the first lines of the file"', 'source = "the file"', "",
         "[file]", f"delimiter = {quoted(delimiter_name(layout.delimiter))}", f"decimal = {quoted(layout.decimal)}",
         f"preamble = {preamble}", f"header = {layout.header if layout.by_name else 0}",
-        f"missing = [{', '.join(map(quoted, missing_codes.of(layout, wind)))}]", "",
+        f"missing = [{', '.join(map(quoted, missing))}]", "",
         "[time]",
     ]  # fmt: skip
     if time is None:

@@ -169,6 +169,7 @@ def test_a_pressure_called_sp_is_no_speed_beside_a_wind(log_file: Write) -> None
     assert anemometers(log_file("\n".join(["time,WS10m,WD10m,SP", *rows]) + "\n"), WindOptions(unit="m/s")) == ()
 
 
+@pytest.mark.usefixtures("confirmed_drafts")
 def test_several_anemometers_of_a_log_come_in_whole_or_not_at_all(log_file: Write, tmp_path: Path) -> None:
     """The rows of the second station are out of order, which its user must explain: nothing of the first is kept."""
     seconds = (100, 140, 180, 330, 370, 540, 550, 570, 220, 260, 410, 450, 490, 530, 590, 780, 30, 830, 70, 110)
