@@ -172,7 +172,7 @@ def ingest_camera(
                     if progress:
                         progress(1)
             info, findings = stream.info, stream.findings
-        findings = (*findings, *by_other_options(_present(lake, Kind.CAMERA, branch), source.hash, recipe))
+        findings = (*findings, *other_readings(_present(lake, Kind.CAMERA, branch), source.hash, recipe))
         if not times.count:
             raise InputError("no frame could be read", where=str(path), fix="check the file")
         source.check_unchanged()
