@@ -113,11 +113,13 @@ class Table:
         """Whether the value is this text."""
         return self._take(key, None) == word
 
-    def number(self, key: str, default: float, *, least: float = -math.inf, above: float = -math.inf) -> float:
+    def number(
+        self, key: str, default: float, *, least: float = -math.inf, above: float = -math.inf, most: float = math.inf
+    ) -> float:
         value = self._take(key, default)
         if not _finite(value):
             raise self._wrong(key, value, "a finite number")
-        self._bound(key, float(value), least=least, above=above)
+        self._bound(key, float(value), least=least, above=above, most=most)
         return float(value)
 
     def whole(self, key: str, default: int, *, least: int, most: int = WHOLE_LIMIT) -> int:
@@ -220,9 +222,7 @@ class Table:
             for end in ends(value):
                 self._bound(key, end, least=least, above=above, most=most)
             return value
-        number = self.number(key, default, least=least, above=above)
-        self._bound(key, number, least=least, above=above, most=most)
-        return number
+        return self.number(key, default, least=least, above=above, most=most)
 
     def angle(self, key: str, default: float) -> Quantity:
         """An angle [rad]: a quantity in radians under `key`, or in degrees under `key-deg`.

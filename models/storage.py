@@ -19,11 +19,14 @@ from safetensors.torch import load, save
 from torch import Tensor
 
 from flagdata.checksums import SUMS, check_sums, content_hash
-from flagdata.errors import CorruptError, NotFoundError
+from flagdata.documents import SIZE_LIMIT, from_json
+from flagdata.errors import CorruptError, LimitError, NotFoundError
 
 FORMAT = "flagdata.network/1"
 CARD = "card.json"
 WEIGHTS = "weights.safetensors"
+TENSORS_LIMIT = 1 << 32
+"""Largest file of tensors that is read [B]."""
 _OBJECT = re.compile(r"([0-9a-f]{64})\.model")
 
 
@@ -63,10 +66,12 @@ def read_card(folder: Path) -> dict[str, Any]:
     Raises:
         NotFoundError: there is none.
         CorruptError: it is damaged, or of another format.
+        LimitError: it is larger than any card.
     """
     path = folder / CARD
     try:
-        card = json.loads(path.read_text())
+        _check_size(path, SIZE_LIMIT)
+        card = from_json(path.read_bytes())
     except FileNotFoundError:
         raise NotFoundError("there is no model here", where=str(folder), fix="name a trained model") from None
     except (ValueError, OSError) as error:
@@ -90,14 +95,26 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
 
     Raises:
         NotFoundError: no such file.
-        CorruptError: it is cut off or damaged.
+        CorruptError: it is cut off or damaged, or holds numbers that are not finite.
+        LimitError: larger than `TENSORS_LIMIT`.
     """
     if not path.is_file():
         raise NotFoundError("there are no weights here", where=str(path), fix="name a trained model")
     try:
-        return load(path.read_bytes())
+        _check_size(path, TENSORS_LIMIT)
+        tensors = load(path.read_bytes())
     except (SafetensorError, OSError, ValueError) as error:
         raise CorruptError(f"the weights cannot be read: {error}", where=str(path), fix=_AGAIN) from None
+    for name, tensor in tensors.items():
+        if not bool(tensor.isfinite().all()):
+            raise CorruptError(f"{name} holds numbers that are not finite", where=str(path), fix=_AGAIN)
+    return tensors
+
+
+def _check_size(path: Path, most: int) -> None:
+    size = path.stat().st_size
+    if size > most:
+        raise LimitError(f"a file of {size} bytes", where=str(path), fix=f"at most {most} are read")
 
 
 _AGAIN = "restore it from a copy, or train again"
