@@ -16,6 +16,7 @@ import duckdb
 import pyarrow as pa
 
 from flagdata.errors import UnknownNameError, UsageError
+from flagdata.lake.matching import Where, matching
 from flagdata.lake.refs import View
 from flagdata.schema import CATALOG, Field, Kind, catalog_schema
 
@@ -61,7 +62,8 @@ class Request:
     """What to select.
 
     Attributes:
-        where: an SQL boolean expression over the columns of `COLUMNS`; `None` is every row.
+        where: an SQL boolean expression over the columns of `COLUMNS`, or the values that columns of the catalog must
+            have; `None` is every row.
         columns: names in the order wanted; `None` is every stored column.
         order: SQL order terms ("wind DESC, start"); `None` is by kind, start and identity.
         sql: one SELECT over `catalog` instead of all of the above.
@@ -72,7 +74,7 @@ class Request:
         UnknownNameError: a column that is not in the catalog.
     """
 
-    where: str | None = None
+    where: Where | None = None
     columns: tuple[str, ...] | None = None
     order: str | None = None
     sql: str | None = None
@@ -106,6 +108,8 @@ class Selection:
 
     def __init__(self, catalog: pa.Table, request: Request) -> None:
         self.request = request
+        if request.where is not None and not isinstance(request.where, str):
+            catalog = matching(catalog, request.where)
         self._connection = duckdb.connect(":memory:", config=_SEALED)
         with _explained(request):
             self._connection.register("stored", catalog)
@@ -127,7 +131,7 @@ class Selection:
 
     def _filtered(self, request: Request) -> duckdb.DuckDBPyRelation:
         relation = self._connection.view("catalog")
-        if request.where is not None:
+        if isinstance(request.where, str):
             relation = relation.filter(request.where)
         relation = relation.order(request.order or DEFAULT_ORDER)
         return relation.project(", ".join(f'"{name}"' for name in request.columns or CATALOG))
@@ -190,7 +194,7 @@ def _view_columns() -> str:
 
 def select(
     lake: Catalogued,
-    where: str | None = None,
+    where: Where | None = None,
     *,
     at: str | None = None,
     columns: Sequence[str] | None = None,
@@ -217,7 +221,8 @@ def _explained(request: Request) -> Iterator[None]:
         yield
     except duckdb.Error as error:
         given = (request.sql, request.where, request.order)
-        raise explain(error, where="; ".join(text for text in given if text) or None) from None
+        said = [text for text in given if isinstance(text, str) and text]
+        raise explain(error, where="; ".join(said) or None) from None
 
 
 def explain(error: duckdb.Error, *, where: str | None) -> UsageError:

@@ -16,6 +16,8 @@ from flagdata.documents import SIZE_LIMIT, LimitsError, from_toml
 from flagdata.errors import InputError, LimitError, NotFoundError, UnknownNameError
 
 _SUFFIX = ".toml"
+NAME_LIMIT = 100
+"""Longest name of a recipe [characters]: files and artifacts are called after it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,12 +88,17 @@ class Shelf:
             UnknownNameError: no such name; the nearest is suggested.
             UsageError: an address, not a path.
             NotFoundError: no such file.
-            InputError: it cannot be read.
+            InputError: it cannot be read, or its name cannot be that of an artifact.
             LimitError: it is larger than any recipe.
         """
         path = local_path(source)
         if not source.endswith(_SUFFIX):
             return self.named(source)
+        if not is_name(path.stem):
+            raise InputError(
+                f"a {self.noun} cannot be called {path.stem!r}", where=source,
+                fix=f"rename the file: 1 to {NAME_LIMIT} printable characters",
+            )  # fmt: skip
         if not path.is_file():
             raise NotFoundError("no such recipe file", where=source, fix="check the path, or name one of the catalog")
         try:
@@ -101,6 +108,11 @@ class Shelf:
         except OSError as error:
             raise InputError(f"the recipe cannot be read: {error.strerror}", where=source, fix="check it") from None
         return Found(name=path.stem, data=data, folder=path.parent, where=source)
+
+
+def is_name(value: object) -> bool:
+    """Whether a recipe, and what is made by it, can be called so: text of printable characters, not too long."""
+    return isinstance(value, str) and bool(value.strip()) and value.isprintable() and len(value) <= NAME_LIMIT
 
 
 def parsed(text: str, *, where: str) -> dict[str, Any]:

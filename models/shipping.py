@@ -22,6 +22,7 @@ from torch import Tensor
 from flagdata.checksums import write_sums
 from flagdata.console import LocalPath, progress, say
 from flagdata.errors import UsageError
+from flagdata.schema import Kind
 from models.estimator import CLOUD, SHIPPED, Estimator, load
 from models.evaluation.predict import embedded
 from models.outliers import Familiarity
@@ -136,7 +137,8 @@ def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Pa
 
     recipe = recipe_of(name)
     source = flagdata.open(lake_path)
-    rows = source.lake.rows(f"kind = 'network' and name = '{recipe.name}'", columns=["object", "recipe"]).to_pylist()
+    networks = {"kind": Kind.NETWORK, "name": recipe.name}
+    rows = source.lake.rows(networks, columns=["object", "recipe"]).to_pylist()
     wanted = _seedless(recipe.identity())
     members = [
         source.lake.object_path(row["object"])

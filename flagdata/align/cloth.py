@@ -83,7 +83,7 @@ def _without_wind(
         lake, Kind.RECORDING, parents, recipe, what="recording", name=camera.name, session=cloth.fabric, branch=branch
     )
     if there is not None:
-        rows = lake.rows(f"kind = 'clip' and recording = '{there.id}'", at=branch, columns=["artifact"])
+        rows = lake.rows({"kind": Kind.CLIP, "recording": there.id}, at=branch, columns=["artifact"])
         return RecordingResult(recording=there, clips=tuple(rows["artifact"].to_pylist()), created=False)
     source = open_parent(lake, str(camera.object))
     times = source.device_frame_times

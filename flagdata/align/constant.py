@@ -76,7 +76,7 @@ def declared_wind(lake: Lake, camera: Artifact, wind: ConstantWind, *, session: 
             fix="flagdata declare CAMERA takes a camera artifact; see flagdata ls",
         )  # fmt: skip
     recipe = wind.recipe()
-    for row in lake.rows(f"kind = 'wind' and recipe_hash = '{recipe_hash(recipe)}'", at=branch).to_pylist():
+    for row in lake.rows({"kind": Kind.WIND, "recipe_hash": recipe_hash(recipe)}, at=branch).to_pylist():
         if list(row["parents"]) == [camera.id]:
             return Artifact.from_row(row)
     before, after = round(MARGIN_BEFORE * NANOSECONDS), round(MARGIN_AFTER * NANOSECONDS)

@@ -364,7 +364,7 @@ def _artifact(
 
 
 def _clips_of(lake: Lake, recording: Artifact, branch: str) -> tuple[str, ...]:
-    rows = lake.rows(f"kind = 'clip' and recording = '{recording.id}'", at=branch, columns=["artifact"])
+    rows = lake.rows({"kind": Kind.CLIP, "recording": recording.id}, at=branch, columns=["artifact"])
     return tuple(rows["artifact"].to_pylist())
 
 

@@ -55,7 +55,7 @@ def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
 
     if kind is not None and kind not in list(Kind):
         raise UnknownNameError.of("kind", kind, [k.value for k in Kind])
-    found = Lake.open(lake_path).rows(None if kind is None else f"kind = '{kind}'", at=at).to_pylist()
+    found = Lake.open(lake_path).rows(None if kind is None else {"kind": kind}, at=at).to_pylist()
     rows = [row for row in found if kind is not None or row["kind"] != Kind.CLIP]
     clips = len(found) - len(rows)
     if as_json:

@@ -37,6 +37,7 @@ from deltalake.transaction import AddAction, RemoveAction
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder
 from flagdata.lake.log import FILE_HASH, PREVIOUS_HASH, Log
+from flagdata.lake.older_rows import with_data_sets
 from flagdata.provenance import file_hash
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
 
@@ -152,7 +153,8 @@ class Catalog:
 
     @_one_at_a_time
     def rows(self, version: int) -> pa.Table:
-        """All rows of one version, of all branches, in the catalog's schema; absent columns of old rows are null.
+        """All rows of one version, of all branches, in the catalog's schema. Columns that old rows lack are null, but
+        for those that `flagdata.lake.older_rows` fills.
 
         Args:
             version: at most `head()`.
@@ -166,7 +168,7 @@ class Catalog:
         known = self._files
         self._files = {name: known[name] if name in known else self._read(name) for name in self._names(version)}
         parts = list(self._files.values())
-        rows = pa.concat_tables(parts) if parts else catalog_schema().empty_table()
+        rows = with_data_sets(pa.concat_tables(parts) if parts else catalog_schema().empty_table())
         rows = rows.sort_by([(name, "ascending") for name in ROW_ORDER])
         self._rows = (version, rows)
         return rows

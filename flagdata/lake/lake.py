@@ -24,6 +24,7 @@ from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import ROW_ORDER, Catalog, newer, persist
 from flagdata.lake.durable import disk_errors, put_if_absent
 from flagdata.lake.leases import collecting, keeping_collectors_out
+from flagdata.lake.matching import Where, matching
 from flagdata.lake.objects import STORES, Objects
 from flagdata.lake.refs import MAIN, Refs, View
 from flagdata.lake.transaction import CommitResult, Transaction
@@ -32,6 +33,7 @@ from flagdata.schema import CATALOG, FORMAT_VERSION
 
 _MARKER = "lake.json"
 _MARKER_SCHEMA = "flagdata.lake/1"
+_ORDER = ", ".join(ROW_ORDER)
 _UNUSABLE = re.compile("[\\\\\ud800-\udfff]")  # the Delta library takes a backslash for a separator; no UTF-8
 
 
@@ -130,13 +132,14 @@ class Lake:
         return Transaction(self, message, branch=branch)
 
     def rows(
-        self, where: str | None = None, *, at: str | None = None, columns: Sequence[str] | None = None
+        self, where: Where | None = None, *, at: str | None = None, columns: Sequence[str] | None = None
     ) -> pa.Table:
         """Rows of the catalog in the order of commit, then start, then frame.
 
         Args:
-            where: an SQL expression as in `flagdata.query` ("kind = 'clip' and wind between 3 and 6"; the column "end"
-                needs its quotes, `end_time` does not).
+            where: the values that columns must have, {"kind": Kind.CLIP, "recording": identity}, see
+                `flagdata.lake.matching`; or an SQL expression as in `flagdata.query` ("kind = 'clip' and wind between
+                3 and 6"; the column "end" needs its quotes, `end_time` does not).
             at: tag, branch, version number or commit id; the head of main if `None`.
             columns: which to return, in this order; all if `None`.
 
@@ -146,8 +149,10 @@ class Lake:
             UnknownNameError: no such column.
         """
         table = self.table(self.view(at))
-        if where is not None:
+        if isinstance(where, str):
             table = _filter(table, where)
+        elif where is not None:
+            table = matching(table, where)
         if columns is None:
             return table
         for column in columns:
@@ -319,4 +324,4 @@ def _usable(path: Path | str) -> Path:
 def _filter(table: pa.Table, where: str) -> pa.Table:
     from flagdata.query import Request, Selection  # it knows what a view is, so it imports this package
 
-    return Selection(table, Request(where=where, order=", ".join(ROW_ORDER))).table()
+    return Selection(table, Request(where=where, order=_ORDER)).table()

@@ -117,7 +117,7 @@ def trained(
     train_pairs, validation_pairs = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))
     data = data_identity(source.lake, train_pairs, validation_pairs, at=at)
     wanted = network_artifact(recipe, data).id
-    known = source.lake.rows(f"artifact = '{wanted}'", at=branch, columns=["artifact"]).num_rows
+    known = source.lake.rows({"artifact": wanted}, at=branch, columns=["artifact"]).num_rows
     if known:
         say("this model was trained before")
         return _report(source, wanted, branch)
@@ -188,7 +188,9 @@ def sides_of(source: Source, recipe: TrainingRecipe, side: str, *, at: str | Non
     """The pairs of one side of a recipe's data set.
 
     Raises:
+        UnknownNameError: the lake has no such data set.
         NotFoundError, RefusedError: there are none, or the sides leak.
     """
+    recipe.data.check(source.lake, at=at)
     split = recipe.data.split("train", "validation", "test")
     return source.pairs(at=at, split=side, split_by=split, seed=recipe.seed)

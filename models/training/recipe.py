@@ -1,8 +1,7 @@
 """What is trained on what, as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is named.
 
 title, seed
-[data]       dataset: a data set's name, or a list of them, whose sides are told by names; sequences: of the training
-             side, all by default
+[data]       dataset: a data set's name, or a list of them; sequences: of the training side, all by default
 [input]      maps: "frames", "spectral-maps", "wave-maps", "flow-maps" or "flow-maps-3"; size [px], frames; scales,
              mirror: of crops; variants: crops of each film that are prepared
 [network]    name: of `models.registry.NETWORKS`; its other keys are the network's own
@@ -25,8 +24,11 @@ import torch
 
 from flagdata.dataset.splits import ExplicitSplit
 from flagdata.errors import InputError, LimitError, UnknownNameError, UsageError
+from flagdata.lake import Lake
+from flagdata.lake.matching import Values
 from flagdata.provenance import recipe_hash
-from flagdata.recipes import Shelf, parsed
+from flagdata.recipes import Shelf, is_name, parsed
+from flagdata.schema import Kind
 from flagdata.tables import Table
 from models.crops import Cropping
 from models.frontend import RATE_LIMIT, FrontEnd, Maps
@@ -63,7 +65,7 @@ class Precision(StrEnum):
 @dataclass(frozen=True, kw_only=True)
 class DataSpec:
     """Attributes:
-    datasets: names of the data sets that are learned from together; their sides are told by names.
+    datasets: names of the data sets that are learned from together.
     sequences: of the training side that are used; None for all.
     """
 
@@ -76,13 +78,24 @@ class DataSpec:
         named = entry["dataset"]
         return cls(datasets=(named,) if isinstance(named, str) else tuple(named), sequences=entry["sequences"])
 
-    def where(self, side: str) -> str:
-        """SQL over the catalog that takes a side."""
-        return "(" + " or ".join(f"name like '{dataset}-{side}-%'" for dataset in self.datasets) + ")"
+    def where(self, side: str) -> Values:
+        """What rows of the catalog that are of a side have in their columns."""
+        return {"dataset": self.datasets, "side": side}
 
     def split(self, *sides: str) -> ExplicitSplit:
         """These sides of the data sets, by which pairs are read."""
         return ExplicitSplit(where={side: self.where(side) for side in sides})
+
+    def check(self, lake: Lake, *, at: str | None) -> None:
+        """Make sure that a lake has all of these data sets.
+
+        Raises:
+            UnknownNameError: one that it has not; the nearest is named.
+        """
+        known = set(lake.rows({"kind": Kind.CLIP}, at=at, columns=["dataset"])["dataset"].drop_null().to_pylist())
+        for dataset in self.datasets:
+            if dataset not in known:
+                raise UnknownNameError.of("data set", dataset, known, where=str(lake.path))
 
     def identity(self) -> dict[str, Any]:
         """JSON values; one data set is named by itself."""
@@ -237,7 +250,7 @@ def parse(text: str, *, name: str, where: str, folder: Path = Path()) -> Trainin
 def _data(table: Table) -> DataSpec:
     named = table.value("dataset")
     datasets = [named] if isinstance(named, str) else named
-    if not isinstance(datasets, list) or not datasets or not all(_is_name(dataset) for dataset in datasets):
+    if not isinstance(datasets, list) or not datasets or not all(is_name(dataset) for dataset in datasets):
         raise InputError(
             f"the data set is {named!r}", where=table.where,
             fix='name one, or several in a list: dataset = "flagsim-wide"',
@@ -245,10 +258,6 @@ def _data(table: Table) -> DataSpec:
     sequences = table.whole("sequences", 1, least=1) if "sequences" in table else None
     table.done()
     return DataSpec(datasets=tuple(datasets), sequences=sequences)
-
-
-def _is_name(value: object) -> bool:
-    return isinstance(value, str) and all(part.isalnum() for part in value.split("-"))
 
 
 def _input(table: Table) -> tuple[FrontEnd, Cropping, int]:

@@ -21,7 +21,8 @@ from flagdata.lake import Lake
 from flagdata.provenance import canonical, code_version
 from flagdata.record import Record
 from flagdata.rng import stream
-from sim.datasets.recipe import DatasetRecipe, side_filter
+from flagdata.schema import Kind
+from sim.datasets.recipe import DatasetRecipe
 
 _SHOWN = 24  # pictures of the contact sheet
 _COLUMNS = 6
@@ -69,7 +70,7 @@ def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path:
         frames=recipe.simulation.time.frames, rate=recipe.simulation.time.rate, bar=_BAR,
         theta=distributions(parameters, rendered=False), zeta=distributions(parameters, rendered=True),
         names=_names(parameters), recipe_text=json.dumps(json.loads(canonical(recipe.identity())), indent=1),
-        filters={side.name: side_filter(recipe, side.name) for side in recipe.sides},
+        dataset=json.dumps(recipe.name, ensure_ascii=False),
     )  # fmt: skip
     target.write_text(text, encoding="utf-8")
     return target
@@ -81,9 +82,9 @@ def _sides(lake: Lake, recipe: DatasetRecipe, branch: str) -> tuple[list[dict[st
     every: list[dict[str, Any]] = []
     columns = ["artifact", "name", "seed", "session", "parameters", "object", "object_bytes"]
     for side in recipe.sides:
-        where = side_filter(recipe, side.name)
-        rows = lake.rows(f"kind = 'recording' and {where}", at=branch, columns=columns).to_pylist()
-        clips = lake.rows(f"kind = 'clip' and {where}", at=branch, columns=["wind"])["wind"].drop_null().to_numpy()
+        own = {"dataset": recipe.name, "side": side.name}
+        rows = lake.rows({**own, "kind": Kind.RECORDING}, at=branch, columns=columns).to_pylist()
+        clips = lake.rows({**own, "kind": Kind.CLIP}, at=branch, columns=["wind"])["wind"].drop_null().to_numpy()
         sides.append(
             {
                 "name": side.name, "sequences": len({row["seed"] for row in rows}), "films": len(rows),

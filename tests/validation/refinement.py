@@ -150,7 +150,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 def _targets(lake: Path, space: Space, *, at: str, count: int, seed: int) -> list[Target]:
     """Clips of the test side, each of another simulation."""
     source = Source.open(lake)
-    pairs = source.pairs("name like '%-test-%'", at=at)
+    pairs = source.pairs("side = 'test'", at=at)
     otherwise = DrawnView(prior=named(RENDERS), assets=Assets())
     order = stream(seed, "refinement", "targets").permutation(len(pairs)).tolist()
     taken: set[int] = set()

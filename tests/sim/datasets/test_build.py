@@ -20,7 +20,7 @@ from flagdata.lake.health import doctor, object_names, verify
 from flagdata.record import Record
 from sim.datasets.recipe import DatasetRecipe
 
-SIDES = {"train": "name like 'tiny-train-%'", "test": "name like 'tiny-test-%'"}
+SIDES = {side: {"dataset": "tiny", "side": side} for side in ("train", "test")}
 SEQUENCES, FILMS = 6, 15
 
 
