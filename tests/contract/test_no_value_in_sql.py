@@ -21,7 +21,10 @@ COMPARED = r"\s+(?:like|between)\s+'?%?|\s+in\s*\('?|\s*(?:=|<>|!=|<=|>=|<|>)\s*
 AMONG_OTHERS = rf"\b(?:and|or|where|not)\s+{COLUMN}\s*(?:=|<>|!=|<=|>=|<|>)\s*"
 BEFORE_A_VALUE = re.compile(rf"(?:{COLUMN}(?:{COMPARED})|{AMONG_OTHERS})$", re.IGNORECASE)
 """A column and an operator at the end of a piece of text, behind which a value is pasted."""
-SUSPECT = re.compile(rf"\b(?:{'|'.join(TAKES_SQL)})\(|{COLUMN}(?:{COMPARED})|{AMONG_OTHERS}", re.IGNORECASE)
+OPERATOR = r"(?:\s+(?:like|between|in)\s*|\s*(?:=|<>|!=|<=|>=|<|>)\s*)"
+SUSPECT = re.compile(
+    rf"\b(?:{'|'.join(TAKES_SQL)})\(|\b(?:{'|'.join(COLUMNS)})\b\\?\"?{OPERATOR}\(?\\?['{{%]", re.IGNORECASE
+)
 """What is in each module that has anything to do with SQL; parsing the others takes a second."""
 NAMES_ALONE = {
     "flagdata/query.py": "names of the schema's columns",

@@ -21,7 +21,6 @@ from flagdata.errors import (
     CorruptError,
     InputError,
     NotFoundError,
-    RefusedError,
     UnknownNameError,
     UsageError,
 )
