@@ -91,6 +91,8 @@ def align(
 
     options = _options(by, offset, offset_sigma, centre, search, response, response_sigma, max_sigma)
     lake = Lake.open(lake_path)
+    if not dry_run:
+        lake.check_writable()
     if {lake.artifact(which, at=branch).kind for which in (first, second)} == {Kind.WIND}:
         from flagdata.commands.align_logs import align_logs
 
@@ -127,6 +129,8 @@ def realign(
 
     options = _options(by, offset, offset_sigma, centre, search, response, response_sigma, max_sigma)
     lake = Lake.open(lake_path)
+    if not dry_run:
+        lake.check_writable()
     old, parents = parents_of(lake, recording, at=branch)
     pair = Pair.of(lake, *parents, at=branch)
     kept = truth_window(old.recipe) if window is None else window

@@ -35,6 +35,7 @@ def declare(
 
     wind = ConstantWind(speed=speed, sigma=sigma)
     lake = Lake.open(lake_path)
+    lake.check_writable()
     film = lake.artifact(camera, at=branch)
     stated = declared_wind(lake, film, wind, session=session, branch=branch)
     pair = Pair.of(lake, film.id, stated.id, at=branch)

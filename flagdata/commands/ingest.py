@@ -192,4 +192,6 @@ def ingest(
         return
     from flagdata.lake import Lake
 
-    ingest_sources(Lake.open(lake_path), sources, options, given=given, format_name=format_name, as_json=as_json)
+    lake = Lake.open(lake_path)
+    lake.check_writable()
+    ingest_sources(lake, sources, options, given=given, format_name=format_name, as_json=as_json)

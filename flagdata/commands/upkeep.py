@@ -82,10 +82,11 @@ def doctor(deep: bool, grace: timedelta, as_json: bool, lake_path: str) -> None:
     findings = (*examined(lake, grace=grace), *unconfirmed(Artifact.from_row(row) for row in winds))
     checked = "structure checked, contents not (flagdata verify)"
     if deep:
-        findings += tuple(f for f in catalog_files(lake) if f.kind not in {known.kind for known in findings})
+        findings += tuple(f for f in catalog_files(lake) if f.kind not in {found.kind for found in findings})
         names = [stored.name for stored in lake.objects]
         with progress(len(names), label="re-hash", unit="object") as advance:
-            findings += verified(lake, names, advance=advance)
+            known = {(f.kind, f.where) for f in findings}
+            findings += tuple(f for f in verified(lake, names, advance=advance) if (f.kind, f.where) not in known)
         checked = f"structure checked, {counted(len(names), 'object')} re-hashed"
     _conclude("doctor", findings, checked, as_json=as_json)
 

@@ -35,6 +35,7 @@ from deltalake.exceptions import CommitFailedError, DeltaError
 from deltalake.transaction import AddAction, RemoveAction
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
+from flagdata.files import open_regular
 from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder
 from flagdata.lake.log import FILE_HASH, PREVIOUS_HASH, Log
 from flagdata.lake.older_rows import with_data_sets
@@ -322,7 +323,7 @@ class Catalog:
                 self._table.update_incremental()
             if self._table is None or self._table.version() != version:
                 self._table = DeltaTable(self.path.as_uri(), version=version)
-        except DeltaError as error:
+        except (DeltaError, OSError) as error:
             if _SYSTEM_ERROR in str(error):
                 with disk_errors("reading the catalog", self._log):
                     raise OSError(str(error).splitlines()[0]) from error
@@ -357,7 +358,8 @@ class Catalog:
 
     def _read(self, name: str) -> pa.Table:
         try:
-            table = self._conform(pq.read_table(self.path / name))
+            with open_regular(self.path / name) as stream:
+                table = self._conform(pq.read_table(pa.BufferReader(stream.read())))
             table.validate(full=True)  # text that is not UTF-8, for one
         except (OSError, pa.ArrowException) as error:
             raise CorruptError(

@@ -17,6 +17,8 @@ from pathlib import Path
 
 from flagdata.errors import FlagdataError
 
+SCRATCH = re.compile(r"\.[0-9a-f]{32}")
+"""Names of files that are written before they are linked under their own."""
 _LOG = logging.getLogger("flagdata")
 
 

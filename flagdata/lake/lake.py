@@ -19,13 +19,15 @@ import pyarrow.compute as pc
 from flagdata import provenance
 from flagdata.addresses import local_path
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
+from flagdata.files import open_regular
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import ROW_ORDER, Catalog, newer, persist
 from flagdata.lake.durable import disk_errors, put_if_absent
+from flagdata.lake.layout import STAGING, STORES, check_writable, scratch_files
 from flagdata.lake.leases import collecting, keeping_collectors_out
 from flagdata.lake.matching import Where, matching
-from flagdata.lake.objects import STORES, Objects
+from flagdata.lake.objects import Objects
 from flagdata.lake.refs import MAIN, Refs, View
 from flagdata.lake.transaction import CommitResult, Transaction
 from flagdata.lake.withdrawal import Withdrawal, check_leaving, clips_of, descendants
@@ -48,7 +50,7 @@ class Lake:
         self.catalog = Catalog(path / "catalog", path / "refs" / "newest")
         self.objects = Objects(path)
         self.refs = Refs(path / "refs")
-        self.staging = path / "staging"
+        self.staging = path / STAGING
 
     @classmethod
     def create(cls, path: Path | str) -> Lake:
@@ -93,8 +95,8 @@ class Lake:
         lake = cls(_usable(path))
         marker = lake.path / _MARKER
         try:
-            with _readable(marker):
-                content = json.loads(marker.read_text())
+            with _readable(marker), open_regular(marker) as stream:
+                content = json.load(stream)
             version = int(content["format_version"])
         except (FileNotFoundError, NotADirectoryError):
             raise NotFoundError(
@@ -120,6 +122,15 @@ class Lake:
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
         }
         put_if_absent(self.path / _MARKER, (json.dumps(marker, indent=2) + "\n").encode())
+
+    def check_writable(self) -> None:
+        """Whether this process may write here: called before the first second of work that ends in a commit.
+
+        Raises:
+            LinkError: a folder of the lake is a link, so that what is written would lie elsewhere.
+            FlagdataError: the lake can only be read.
+        """
+        check_writable(self.path)
 
     def transaction(self, message: str, *, branch: str = MAIN) -> Transaction:
         """A context manager: collects objects and rows, publishes all when its block ends, nothing when that raises.
@@ -202,6 +213,7 @@ class Lake:
             UsageError: a name that cannot be one.
             ConflictError: the name is taken.
         """
+        self.check_writable()
         with collecting(self.staging):  # one ref at a time, so that no name is both a tag and a branch
             self.refs.put("tags", name, self.view(at))
 
@@ -212,6 +224,7 @@ class Lake:
             UsageError: a name that cannot be one.
             ConflictError: the name is taken.
         """
+        self.check_writable()
         with collecting(self.staging):  # one ref at a time, so that no name is both a tag and a branch
             self.refs.put("branches", name, self.view(at))
 
@@ -224,6 +237,7 @@ class Lake:
             NotFoundError: no such branch.
             NotFoundError: a row was made from one that `into` does not show: merge the branch it is on first.
         """
+        self.check_writable()
         own = self.refs.view(branch, self.catalog.head())[0]
         if own.branch != branch or branch == into:
             raise UsageError(f"{branch!r} cannot be merged into {into!r}", fix="name two branches")
@@ -260,6 +274,7 @@ class Lake:
             version = self.catalog.replace(self.catalog.rows(head).filter(~drop), base=head, info=info)
             return Withdrawal(version=version, asked=tuple(sorted(asked)), clips=tuple(sorted(clips)))
 
+        self.check_writable()
         with disk_errors("withdrawing", self.path), keeping_collectors_out(self.staging):
             return persist(attempt, where=self.catalog.path)
 
@@ -268,8 +283,8 @@ class Lake:
         return descendants(self.table(self.view(at)), artifacts)
 
     def unpublished_files(self) -> list[Path]:
-        """Files that a process left which died while it wrote to the catalog or the refs."""
-        return [*self.catalog.unpublished_files(), *self.refs.scratch_files()]
+        """Files that a process left which died while it wrote to the catalog or the refs, or made the lake."""
+        return [*self.catalog.unpublished_files(), *scratch_files(self.path)]
 
     def view(self, at: str | None) -> View:
         """What a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""

@@ -73,9 +73,16 @@ def catalog_files(lake: Lake) -> tuple[Finding, ...]:
         )
     findings = [_damaged("log-damaged", "an entry of the catalog's log has changed", path) for path in changed]
     for path, noted in sorted(hashes.items()):
-        if not path.exists():
+        try:
+            found = file_hash(path)
+        except FileNotFoundError:
             findings.append(_damaged("catalog-file-missing", "a file of the catalog is missing", path))
-        elif noted is not None and file_hash(path) != noted:
+            continue
+        except OSError as error:
+            what = f"a file of the catalog cannot be read: {error.strerror}"
+            findings.append(_damaged("catalog-file-unreadable", what, path))
+            continue
+        if noted is not None and found != noted:
             findings.append(_damaged("catalog-file-changed", "a file of the catalog has changed", path))
     unchecked = list(hashes.values()).count(None)
     if unchecked:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
+from flagdata.files import open_regular
 from flagdata.lake.durable import disk_errors, put_if_absent
 
 MAIN = "main"
@@ -120,19 +121,22 @@ class Refs:
             raise _not_there("branch", branch, [MAIN, *known])
         return (Slice(branch=branch, version=head), *known[branch].view)
 
-    def scratch_files(self) -> list[Path]:
-        """What a process left that died while it made a ref."""
-        return sorted(self.root.glob("*/.*"))
-
     def _all(self, kind: str) -> dict[str, Ref]:
         return {path.stem: self._read(path) for path in sorted((self.root / kind).glob("[!.]*.json"))}
 
     @staticmethod
     def _read(path: Path) -> Ref:
         try:
-            content: dict[str, Any] = json.loads(path.read_text())
+            with open_regular(path) as stream:
+                content: dict[str, Any] = json.load(stream)
             view = tuple(Slice(branch=s["branch"], version=int(s["version"])) for s in content["view"])
             return Ref(name=content["name"], created=content["created"], view=view)
+        except OSError as error:
+            raise CorruptError(
+                f"the ref cannot be read: {error.strerror}",
+                where=str(path),
+                fix="give yourself read permission on it, or restore it from a copy",
+            ) from None
         except (ValueError, KeyError, TypeError):
             raise CorruptError("the ref cannot be read", where=str(path), fix="restore it from a copy") from None
 

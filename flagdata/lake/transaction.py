@@ -75,6 +75,7 @@ class Transaction:
         self._held: Lease | None = None
 
     def __enter__(self) -> Transaction:
+        self._lake.check_writable()
         self._known = self._look()[1]
         with disk_errors("starting a transaction", self._lake.staging):
             self._held = Lease(self._lake.staging)

@@ -155,6 +155,8 @@ def close_loop(
     elif not sources:
         raise UsageError("no recordings", where="SOURCE", fix="name them, or a recipe that does")
     lake = None if lake_path is None else Lake.open(lake_path)
+    if lake is not None:
+        lake.check_writable()
     said = said_of_nulls(recipe, level=level, nulls=nulls, bank=bank)
     options = Options(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)), **said)
     setup = _setup(Setup() if recipe is None else recipe.setup, material, density_uncertainty, size, pins)

@@ -125,6 +125,8 @@ def measure(
         false_alarm=false_alarm, seed=seed, refine=refine, area_weight=area_weight,
     )  # fmt: skip
     lake = None if lake_path is None else Lake.open(lake_path)
+    if lake is not None and not read_only:
+        lake.check_writable()
     seen = at if at is not None else branch
     found = subjects(source, query=query, lake=lake, at=seen, reading=reading)
     job = _Job(

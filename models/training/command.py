@@ -114,6 +114,7 @@ def trained(
 
     recipe.check()
     source = flagdata.open(lake_path)
+    source.lake.check_writable()
     train_pairs, validation_pairs = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))
     data = data_identity(source.lake, train_pairs, validation_pairs, at=at)
     wanted = network_artifact(recipe, data).id

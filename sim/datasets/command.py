@@ -78,6 +78,7 @@ def build(
     from sim.datasets.cluster import connected
 
     lake = _lake(lake_path) or _made(lake_path)
+    lake.check_writable()
     with connected(scheduler, workers=workers or _cores()) as client:
         report = Build(
             lake=lake, recipe=loaded, client=client, bars=progress, say=_beside_bar, branch=branch, device=device
