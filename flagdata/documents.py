@@ -7,7 +7,10 @@ import math
 import re
 import tomllib
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
+
+from flagdata.errors import CorruptError
 
 SIZE_LIMIT = 64 << 20
 """Longest text that is parsed [characters]; a cloth model's mesh is in its recipe. Lists within a list take most memory
@@ -55,6 +58,26 @@ def from_json(text: str | bytes) -> Any:
     except RecursionError:
         raise _deep() from None
     _check(content)
+    return content
+
+
+def read_json(path: Path, *, noun: str, fix: str = "restore it from a copy") -> dict[str, Any]:
+    """The object in a JSON file that flagdata wrote.
+
+    Args:
+        noun: what the file is called in the error message.
+
+    Raises:
+        CorruptError: it is no JSON object within the limits.
+    """
+    try:
+        if path.stat().st_size > SIZE_LIMIT:
+            raise LimitsError(f"a file of {path.stat().st_size} bytes, at most {SIZE_LIMIT} are read")
+        content = from_json(path.read_bytes())
+    except (OSError, ValueError) as error:
+        raise CorruptError(f"the {noun} cannot be read: {error}", where=str(path), fix=fix) from None
+    if not isinstance(content, dict):
+        raise CorruptError(f"the {noun} is no JSON object", where=str(path), fix=fix)
     return content
 
 

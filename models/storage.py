@@ -19,7 +19,7 @@ from safetensors.torch import load, save
 from torch import Tensor
 
 from flagdata.checksums import SUMS, check_sums, content_hash
-from flagdata.documents import SIZE_LIMIT, from_json
+from flagdata.documents import read_json
 from flagdata.errors import CorruptError, LimitError, NotFoundError
 
 FORMAT = "flagdata.network/1"
@@ -65,18 +65,13 @@ def read_card(folder: Path) -> dict[str, Any]:
 
     Raises:
         NotFoundError: there is none.
-        CorruptError: it is damaged, or of another format.
-        LimitError: it is larger than any card.
+        CorruptError: it is damaged, larger than any card, or of another format.
     """
     path = folder / CARD
-    try:
-        _check_size(path, SIZE_LIMIT)
-        card = from_json(path.read_bytes())
-    except FileNotFoundError:
-        raise NotFoundError("there is no model here", where=str(folder), fix="name a trained model") from None
-    except (ValueError, OSError) as error:
-        raise CorruptError(f"the model's card cannot be read: {error}", where=str(path), fix=_AGAIN) from None
-    if not isinstance(card, dict) or card.get("format") != FORMAT:
+    if not path.is_file():
+        raise NotFoundError("there is no model here", where=str(folder), fix="name a trained model")
+    card = read_json(path, noun="model's card", fix=_AGAIN)
+    if card.get("format") != FORMAT:
         raise CorruptError("the card is of another format", where=str(path), fix=_AGAIN)
     return card
 
@@ -101,7 +96,8 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
     if not path.is_file():
         raise NotFoundError("there are no weights here", where=str(path), fix="name a trained model")
     try:
-        _check_size(path, TENSORS_LIMIT)
+        if (size := path.stat().st_size) > TENSORS_LIMIT:
+            raise LimitError(f"a file of {size} bytes", where=str(path), fix=f"at most {TENSORS_LIMIT} are read")
         tensors = load(path.read_bytes())
     except (SafetensorError, OSError, ValueError) as error:
         raise CorruptError(f"the weights cannot be read: {error}", where=str(path), fix=_AGAIN) from None
@@ -109,12 +105,6 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
         if not bool(tensor.isfinite().all()):
             raise CorruptError(f"{name} holds numbers that are not finite", where=str(path), fix=_AGAIN)
     return tensors
-
-
-def _check_size(path: Path, most: int) -> None:
-    size = path.stat().st_size
-    if size > most:
-        raise LimitError(f"a file of {size} bytes", where=str(path), fix=f"at most {most} are read")
 
 
 _AGAIN = "restore it from a copy, or train again"

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.addresses import local_path
+from flagdata.documents import from_json
 from flagdata.errors import FlagdataError, UsageError
 
 _FORMAT = "flagdata.decoded/1"
@@ -91,7 +92,7 @@ class DecodedCache:
         try:
             with path.open("rb") as stream:
                 line = stream.readline(_MAX_HEADER)
-                header = json.loads(line)
+                header = from_json(line)
                 shape = tuple(header["shape"])
                 data = np.fromfile(stream, dtype=np.uint8)
                 with contextlib.suppress(PermissionError):  # a cache that may be read only keeps its order of eviction

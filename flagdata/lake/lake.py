@@ -18,6 +18,7 @@ import pyarrow.compute as pc
 
 from flagdata import provenance
 from flagdata.addresses import local_path
+from flagdata.documents import from_json
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
 from flagdata.files import open_regular
 from flagdata.lake import refs as references
@@ -96,7 +97,7 @@ class Lake:
         marker = lake.path / _MARKER
         try:
             with _readable(marker), open_regular(marker) as stream:
-                content = json.load(stream)
+                content = from_json(stream.read())
             version = int(content["format_version"])
         except (FileNotFoundError, NotADirectoryError):
             raise NotFoundError(

@@ -26,6 +26,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO
 
+from flagdata.documents import from_json
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.layout import LinkError
 
@@ -139,7 +140,7 @@ def _is_folder(path: Path) -> bool:
 
 def _owner(line: str) -> str:
     try:
-        owner = json.loads(line)
+        owner = from_json(line)
         return f"process {owner['pid']} on {owner['host']} since {owner['since']}"
     except (ValueError, KeyError, TypeError):  # it died, or the disk was full, before the line was whole
         return "owner unknown"

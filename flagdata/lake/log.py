@@ -10,11 +10,11 @@ Each entry notes the SHA-256 of the one before it, and the mark that of the newe
 
 from __future__ import annotations
 
-import json
 import re
 from contextlib import suppress
 from pathlib import Path
 
+from flagdata.documents import from_json
 from flagdata.errors import CorruptError
 from flagdata.files import open_regular
 from flagdata.lake.durable import put_if_absent
@@ -112,7 +112,7 @@ class Log:
     def _content(self, version: int) -> tuple[list[str], dict[str, str]]:
         """Names of the files that an entry adds, and its commit info."""
         try:
-            actions = [json.loads(line) for line in self._text(version).splitlines()]
+            actions = [from_json(line) for line in self._text(version).splitlines()]
             if not actions or not all(_ACTIONS.issuperset(action.keys()) for action in actions):
                 raise self._damaged(version)
             info = next((action["commitInfo"] for action in actions if "commitInfo" in action), {})

@@ -15,6 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from flagdata.documents import from_json
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
 from flagdata.files import open_regular
 from flagdata.lake.durable import disk_errors, put_if_absent
@@ -128,7 +129,7 @@ class Refs:
     def _read(path: Path) -> Ref:
         try:
             with open_regular(path) as stream:
-                content: dict[str, Any] = json.load(stream)
+                content: dict[str, Any] = from_json(stream.read())
             view = tuple(Slice(branch=s["branch"], version=int(s["version"])) for s in content["view"])
             return Ref(name=content["name"], created=content["created"], view=view)
         except OSError as error:

@@ -10,7 +10,6 @@ opened.json               once the keys were opened: hashes of the verdicts that
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.documents import read_json
 from flagdata.errors import ConflictError, CorruptError, InputError, NotFoundError, UnknownNameError
 from flagdata.files import write_text
 from flagdata.provenance import canonical, digest, file_hash
@@ -76,6 +76,7 @@ class ChallengeFolder:
 
         Raises:
             NotFoundError: no challenge there.
+            CorruptError: it is no JSON.
         """
         if not self.public.is_file():
             raise NotFoundError(
@@ -83,7 +84,7 @@ class ChallengeFolder:
                 where=str(self.path),
                 fix="check the path, or make one: `flagdata challenge make`",
             )
-        return json.loads(self.public.read_text(encoding="utf-8"))
+        return read_json(self.public, noun="challenge")
 
     def names(self) -> list[str]:
         """Names of the sets, sorted."""
@@ -111,10 +112,7 @@ class ChallengeFolder:
         path = self.sealed(name)
         if not path.is_file():
             raise NotFoundError("no sealed key", where=str(path), fix="bring it from where the challenge was made")
-        try:
-            return json.loads(path.read_text(encoding="utf-8"))
-        except ValueError as error:
-            raise CorruptError(f"not a sealed key: {error}", where=str(path), fix="restore the file") from error
+        return read_json(path, noun="sealed key")
 
     def checked(self, name: str) -> None:
         """Make sure that a set's data are those that were published.
@@ -186,7 +184,7 @@ def read_set(folder: Path) -> Experiment:
     if not (folder / "set.json").is_file():
         raise NotFoundError("no set.json", where=str(folder), fix="name the folder of a set")
     try:
-        about = json.loads((folder / "set.json").read_text(encoding="utf-8"))
+        about = read_json(folder / "set.json", noun="set")
         flag = about["flag"]
         mesh = grid(width=flag["width"], height=flag["height"], columns=MODEL_COLUMNS, rows=MODEL_ROWS)
         markers = np.load(folder / "markers.npy")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
+from flagdata.documents import read_json
 from flagdata.errors import ConflictError, InputError
 from flagdata.provenance import code_version, recipe_hash
 from flagdata.rng import child_seed, stream
@@ -74,7 +74,7 @@ def claim(folder: Path, recipe: ChallengeRecipe, *, seed: int) -> None:
     if not path.exists():
         write_json(path, {**made, "code": code_version()})
         return
-    noted = json.loads(path.read_text(encoding="utf-8"))
+    noted = read_json(path, noun="note of what the nulls are made from")
     for key in ("title", "recipe", "seed"):
         if noted.get(key) != made[key]:
             raise ConflictError(

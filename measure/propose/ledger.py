@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from flagdata.documents import read_json
 from flagdata.errors import CorruptError
 from flagdata.files import write_text
 from measure.propose.outcome import Outcome
@@ -21,11 +22,8 @@ def entries(path: Path) -> list[dict[str, Any]]:
     """
     if not path.exists():
         return []
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise CorruptError(f"not JSON: {error}", where=str(path), fix="move it away") from error
-    if not isinstance(content, dict) or content.get("schema") != SCHEMA or not isinstance(content.get("entries"), list):
+    content = read_json(path, noun="ledger", fix="move it away")
+    if content.get("schema") != SCHEMA or not isinstance(content.get("entries"), list):
         raise CorruptError(f"not a ledger of schema {SCHEMA}", where=str(path), fix="move it away")
     return content["entries"]
 

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from flagdata import documents
-from flagdata.documents import NESTING_LIMIT, LimitsError, from_json, from_toml
+from flagdata.dataset.cache import DecodedCache
+from flagdata.documents import NESTING_LIMIT, LimitsError, from_json, from_toml, read_json
+from flagdata.errors import CorruptError
+from flagdata.lake import Lake
 
 MANY = 200_000
 
@@ -58,3 +65,52 @@ def test_a_text_beyond_the_limit_is_not_parsed(monkeypatch: pytest.MonkeyPatch) 
     for read in (from_toml, from_json):
         with pytest.raises(LimitsError, match="11 characters, at most 10"):
             read("a = 1234567")
+
+
+def test_a_file_of_json_that_cannot_be_read_is_named_with_the_fix(tmp_path: Path) -> None:
+    path = tmp_path / "note.json"
+    for content in ("[" * MANY, "[1]", '{"a": NaN}', "\udcff", ""):
+        path.write_bytes(content.encode(errors="surrogateescape"))
+        with pytest.raises(CorruptError, match="the note") as caught:
+            read_json(path, noun="note")
+        assert caught.value.where == str(path)
+        assert caught.value.fix == "restore it from a copy"
+    path.write_text('{"a": 1}')
+    assert read_json(path, noun="note") == {"a": 1}
+
+
+def test_a_lake_whose_marker_is_nested_without_end_is_refused(tmp_path: Path) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    lake.tag("v1")
+    (lake.path / "refs" / "tags" / "v1.json").write_text('{"view":' + "[" * MANY)
+    with pytest.raises(CorruptError, match="the ref cannot be read"):
+        lake.rows(at="v1")
+    (lake.path / "lake.json").write_text("[" * MANY)
+    with pytest.raises(CorruptError, match="marker"):
+        Lake.open(lake.path)
+
+
+def test_every_bit_of_a_decoded_clip_counts(tmp_path: Path) -> None:
+    frames = np.arange(24, dtype=np.uint8).reshape(2, 3, 4)
+
+    def read() -> list[bool]:
+        made: list[bool] = []
+
+        def decode() -> NDArray[np.uint8]:
+            made.append(True)
+            return frames
+
+        cache = DecodedCache(tmp_path / "cache", limit=1 << 20)  # as a new process opens it
+        assert np.array_equal(cache.frames("mcap/x", 0, 2, decode=decode), frames)
+        return made
+
+    read()
+    (path,) = (tmp_path / "cache").glob("*.clip")
+    whole = path.read_bytes()
+    assert read() == []
+    for place in range(len(whole)):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :])
+        read()
+        path.write_bytes(whole)
+    path.write_bytes(b"[" * 4000 + b"\n")
+    assert read() == [True]

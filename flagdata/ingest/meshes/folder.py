@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from flagdata.documents import from_json
 from flagdata.errors import ConflictError, InputError, LimitError, NotFoundError
 from flagdata.ingest.meshes.obj import Obj, read_obj, write_obj
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
@@ -34,9 +35,7 @@ def read_json(path: Path) -> dict[str, Any]:
     # A string, kept, or a comment up to the end of its line, dropped.
     bare = re.sub(r'"(?:[^"\\]|\\.)*"|//[^\n]*', lambda m: m[0] if m[0].startswith('"') else "", text)
     try:
-        content = json.loads(bare)
-    except RecursionError:
-        raise InputError("lists or objects nested too deep", where=str(path), fix="correct the file") from None
+        content = from_json(bare)
     except ValueError as error:
         raise InputError(f"not JSON: {error}", where=str(path), fix="correct the file") from None
     if not isinstance(content, dict):
