@@ -1,4 +1,4 @@
-"""Files: text that a reader sees whole or not at all, and opening what is a file for certain."""
+"""Opening what is a file for certain."""
 
 from __future__ import annotations
 
@@ -7,15 +7,6 @@ import os
 import stat
 from io import BufferedReader
 from pathlib import Path
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write `text` as UTF-8 beside `path`, then rename it, so that `path` holds the old text or all of the new one. The
-    folder is made where it is missing."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(text, encoding="utf-8", newline="")
-    partial.replace(path)
 
 
 def open_regular(path: Path) -> BufferedReader:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import math
 import sys
-import uuid
 from collections.abc import Iterable, Sequence
 from datetime import date, datetime, time
 from decimal import Decimal
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flagdata.console import LocalPath, document, json_option, lake_option, say, table
-from flagdata.errors import ConflictError, InputError, UsageError
+from flagdata.errors import UsageError
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -86,8 +85,11 @@ def query(
         _describe(as_json=as_json)
         return
     from flagdata.lake import Lake
+    from flagdata.outputs import check_file
     from flagdata.query import Request, Selection
 
+    if arrow is not None:
+        check_file(arrow)
     lake = Lake.open(lake_path)
     view = lake.view(at)
     version = view[0].version
@@ -115,24 +117,15 @@ def write_arrow(selection: Selection, path: Path) -> int:
     """
     import pyarrow as pa
 
-    from flagdata.lake.durable import disk_errors
+    from flagdata.outputs import fresh_file
 
-    if path.exists():
-        raise ConflictError(f"{path} exists", fix="choose another name or remove it")
-    if not path.absolute().parent.is_dir():
-        raise InputError("no such folder", where=str(path.parent), fix="create it first")
-    partial = path.with_name(f".{path.name}.{uuid.uuid4().hex}.partial")
     count = 0
-    with disk_errors("writing an Arrow file", path):
-        try:
-            batches = selection.batches()
-            with pa.OSFile(str(partial), "wb") as sink, pa.ipc.new_file(sink, batches.schema) as writer:
-                for batch in batches:
-                    writer.write_batch(batch)
-                    count += batch.num_rows
-            partial.rename(path)
-        finally:
-            partial.unlink(missing_ok=True)
+    with fresh_file(path) as scratch:
+        batches = selection.batches()
+        with pa.OSFile(str(scratch), "wb") as sink, pa.ipc.new_file(sink, batches.schema) as writer:
+            for batch in batches:
+                writer.write_batch(batch)
+                count += batch.num_rows
     return count
 
 

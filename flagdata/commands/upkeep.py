@@ -13,7 +13,7 @@ import click
 from flagdata.addresses import local_path
 from flagdata.commands.lake import counted, size_text
 from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
-from flagdata.errors import ConflictError, NotFoundError
+from flagdata.errors import NotFoundError
 from flagdata.findings import Finding
 
 _GATE_NOT_MET = 3
@@ -133,6 +133,7 @@ def recover(source: str, target: Path, as_json: bool, lake_path: str) -> None:
     """
     from flagdata.lake import Lake
     from flagdata.lake.artifact import OBJECT_NAME
+    from flagdata.outputs import fresh_file
     from flagdata.record import salvage
 
     path = Lake.open(lake_path).object_path(source) if OBJECT_NAME.fullmatch(source) else local_path(source)
@@ -140,9 +141,8 @@ def recover(source: str, target: Path, as_json: bool, lake_path: str) -> None:
         raise NotFoundError(
             "there is no such record", where=source, fix="give an .mcap file, or mcap/<sha256> of the lake"
         )
-    if target.exists():
-        raise ConflictError("there is a file already", where=str(target), fix="choose a new name")
-    findings = salvage(path, target)
+    with fresh_file(target) as scratch:
+        findings = salvage(path, scratch)
     if as_json:
         document("recover", {"source": str(path), "target": str(target), "findings": [f.as_dict() for f in findings]})
         return

@@ -11,6 +11,7 @@ import fcntl
 import hashlib
 import json
 import os
+import re
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ from flagdata.errors import FlagdataError, UsageError
 
 _FORMAT = "flagdata.decoded/1"
 _SUFFIX = ".clip"
+_NAME = re.compile(r"[0-9a-f]{64}" + re.escape(_SUFFIX))  # of a clip; other files in the folder are a user's
 _WRITING = "writing.part"  # the one file being written; only under the lock
 _TALLY = "tally"  # the lock, and in it the bytes of all clips
 _MAX_HEADER = 4096  # B
@@ -156,7 +158,7 @@ class DecodedCache:
         entries: list[_Entry] = []
         with os.scandir(self.path) as found:
             for entry in found:
-                if entry.name.endswith(_SUFFIX):
+                if _NAME.fullmatch(entry.name):
                     with contextlib.suppress(FileNotFoundError):
                         status = entry.stat()
                         entries.append(_Entry(path=Path(entry.path), size=status.st_size, read=status.st_mtime_ns))

@@ -7,7 +7,6 @@ ends with its checksum; a damaged one is computed anew, with a warning.
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Callable, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.checksums import is_sealed, sealed
+from flagdata.outputs import rewrite
 from flagdata.provenance import file_hash, recipe_hash
 
 _LOG = logging.getLogger("flagdata")
@@ -49,10 +49,7 @@ def cached(
             "\n  where: %s", target,
         )  # fmt: skip
     arrays = make()
-    folder.mkdir(parents=True, exist_ok=True)
-    unfinished = target.with_suffix(f".{os.getpid()}.partial")
-    content = BytesIO()
-    np.savez_compressed(content, **arrays)  # pyright: ignore[reportArgumentType]
-    unfinished.write_bytes(sealed(content.getvalue()))
-    unfinished.replace(target)
+    buffer = BytesIO()
+    np.savez_compressed(buffer, **arrays)  # pyright: ignore[reportArgumentType]
+    rewrite(target, sealed(buffer.getvalue()))
     return arrays

@@ -9,6 +9,7 @@ from typing import Any
 
 from flagdata.documents import read_json
 from flagdata.errors import ConflictError, CorruptError, RefusedError
+from flagdata.outputs import rewrite
 from flagdata.provenance import file_hash
 from measure.challenge.folder import ChallengeFolder, write_json
 from measure.verdict.record import Verdict
@@ -62,7 +63,7 @@ def file(folder: ChallengeFolder, filing: Filing) -> None:
             fix="make a new challenge: a verdict is given once",
         )  # fmt: skip
     digest = write_json(folder.verdict(filing.name), filing.as_dict())
-    folder.verdict_hash(filing.name).write_text(digest + "\n", encoding="utf-8")
+    rewrite(folder.verdict_hash(filing.name), digest + "\n")
 
 
 def filed(folder: ChallengeFolder, name: str) -> bool:

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.documents import read_json
-from flagdata.errors import ConflictError, CorruptError, InputError, NotFoundError, UnknownNameError
-from flagdata.files import write_text
+from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownNameError
+from flagdata.outputs import rewrite
 from flagdata.provenance import canonical, digest, file_hash
 from measure.observe.anchors import as_seen
 from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
@@ -144,20 +144,8 @@ def data_hash(folder: Path) -> str:
 def write_json(path: Path, content: Mapping[str, Any]) -> str:
     """Write canonical JSON so that a reader sees all of it or nothing; its SHA-256."""
     text = canonical(content) + "\n"
-    write_text(path, text)
+    rewrite(path, text)
     return digest(text)
-
-
-def fresh(path: Path) -> ChallengeFolder:
-    """An empty folder for a new challenge.
-
-    Raises:
-        ConflictError: something is there.
-    """
-    if path.exists() and (not path.is_dir() or any(path.iterdir())):
-        raise ConflictError("the folder is not empty", where=str(path), fix="name one that is not there yet")
-    path.mkdir(parents=True, exist_ok=True)
-    return ChallengeFolder(path)
 
 
 def write_set(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -10,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flagdata.outputs import check_files, write_files
 from flagdata.provenance import code_version
 from measure.challenge.classes import class_of
-from measure.challenge.folder import write_json
 from measure.challenge.rates import Power
 from measure.challenge.recipe import Kind
 from measure.challenge.score import ENOUGH, Sheet
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
     from measure.challenge.outcome import Outcome
 
 _MILLI = 1e3
+_FILES = ("challenge-score.json", "challenge-score.md", "challenge-score.png")
+_COMMAND = "challenge score"
 
 
 def as_dict(sheet: Sheet) -> dict[str, Any]:
@@ -116,17 +120,25 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
 
 
 def write(sheet: Sheet, folder: Path) -> tuple[Path, ...]:
-    """challenge-score.json, .md and .png into a folder; their paths."""
-    folder.mkdir(parents=True, exist_ok=True)
-    document, page, picture = (folder / f"challenge-score.{ending}" for ending in ("json", "md", "png"))
-    write_json(document, as_dict(sheet))
-    plot(sheet, picture)
-    page.write_text(markdown(sheet, picture=picture.name), encoding="utf-8")
-    return document, page, picture
+    """challenge-score.json, .md and .png into a folder, which is made; their paths.
+
+    Raises:
+        ConflictError: one of them is there and was not written by a score, or was changed since.
+    """
+    document, page, picture = _FILES
+    content = json.dumps(as_dict(sheet), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False) + "\n"
+    files = {document: content, page: markdown(sheet, picture=picture), picture: plot(sheet)}
+    write_files(folder, files, command=_COMMAND)
+    return tuple(folder / name for name in _FILES)
 
 
-def plot(sheet: Sheet, path: Path) -> None:
-    """Power curves by class, noise and frame rate; cases above (detected) and below (not)."""
+def check(folder: Path) -> None:
+    """Refuse a folder in which `write` cannot write, before any key is opened; raises as `write`."""
+    check_files(folder, *_FILES, command=_COMMAND)
+
+
+def plot(sheet: Sheet) -> bytes:
+    """PNG of power curves by class, noise and frame rate; cases above (detected) and below (not)."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13, 5.0), layout="constrained")
@@ -139,7 +151,9 @@ def plot(sheet: Sheet, path: Path) -> None:
     )
     _panel(panels[2], "any effect, by frames a second", sheet.by_rate, [(str(o.key.rate), o) for o in acted])
     panels[0].set_ylabel("chance of detection")
-    figure.savefig(path, dpi=110, metadata={"Software": None})
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png", dpi=110, metadata={"Software": None})
+    return picture.getvalue()
 
 
 def _panel(axes: Axes, title: str, power: Power | None, cases: Sequence[tuple[str, Outcome]]) -> None:

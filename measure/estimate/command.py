@@ -15,7 +15,7 @@ import click
 from flagdata.commands.durations import DURATION
 from flagdata.commands.ranges import RANGE
 from flagdata.console import LocalPath, document, json_option, progress, say
-from flagdata.errors import ConflictError, RefusedError, UsageError
+from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 
 if TYPE_CHECKING:
@@ -105,17 +105,17 @@ def measure(
         raise UsageError("more than one form of output", fix="choose one of --json and --csv")
     if cache is not None and refine is None:
         raise UsageError("--cache without --refine", fix="give --refine N, or leave --cache out")
-    for path in (report, zarr_path):
-        if path is not None and not path.absolute().parent.is_dir():
-            raise UsageError("no such folder", where=str(path.parent), fix="create it first")
-    if zarr_path is not None and zarr_path.exists():
-        raise ConflictError(f"{zarr_path} exists", fix="choose another name or remove it")
     from flagdata.ingest.camera import CropBox, parse_crop
     from flagdata.lake import Lake
+    from flagdata.outputs import check_file, check_folder
     from measure.estimate.measuring import Options
     from measure.estimate.similarity import parse_size
     from measure.estimate.source import Reading, network, subjects
 
+    if report is not None:
+        check_file(report, command="measure")
+    if zarr_path is not None:
+        check_folder(zarr_path)
     box = None if crop is None else parse_crop(crop)
     if not (box is None or isinstance(box, CropBox)):
         raise UsageError(f"the crop {crop!r} is not a box", where="--crop", fix="give x,y,width,height in pixels")
@@ -187,6 +187,7 @@ class _Job:
 
     def do(self, subject: Subject) -> _Done:
         """Measure one film; commit and write what is to be shown."""
+        from flagdata.outputs import fresh_folder
         from measure.estimate.artifact import keep, write
         from measure.estimate.dependence import of_model
         from measure.estimate.measuring import measure as measured_of
@@ -220,7 +221,8 @@ class _Job:
             )
             say(f"{artifact[:12]}  measurement, {'there already' if existing else 'committed'}")
         if self.zarr is not None and shown:
-            write(self.zarr, measured, series, told)
+            with fresh_folder(self.zarr) as scratch:
+                write(scratch, measured, series, told)
         if self.report is not None:
             self._write_page(self.report, measured, series, subject, artifact, refinement)
         return _Done(measured=measured, series=series, artifact=artifact, subject=subject, refinement=refinement)
@@ -241,7 +243,7 @@ class _Job:
         self, path: Path, measured: Measurement, series: Beside, subject: Subject, artifact: str | None,
         refinement: Refinement | None,
     ) -> None:  # fmt: skip
-        from flagdata.lake.durable import disk_errors
+        from flagdata.outputs import write_file
         from measure.estimate.nearest import nearest
         from measure.estimate.page import Context, Section, page
         from measure.refine.section import section
@@ -267,8 +269,7 @@ class _Job:
         if refinement is not None:
             sections = (Section(anchor="refinement", title="Refined by simulation", body=section(refinement)),)
         text = page(measured, series, context, anyway=self.anyway, sections=sections)
-        with disk_errors("writing the report", path):
-            path.write_text(text, encoding="utf-8")
+        write_file(path, text, command="measure")
         say(f"report: {path}")
 
     def _provenance(self, subject: Subject, artifact: str | None) -> Mapping[str, str]:

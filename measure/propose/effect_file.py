@@ -10,8 +10,12 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from flagdata.errors import UsageError
+from flagdata.outputs import check_files, write_files
 from measure.propose.outcome import Outcome, Strength
 from measure.propose.terms import MASS, Term, TermColumn
+
+_PROJECT = "pyproject.toml"
+_COMMAND = "propose"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +41,7 @@ def write(outcome: Outcome, folder: Path) -> EffectFile:
 
     Raises:
         UsageError: an outcome without terms of the dictionary.
+        ConflictError: one of the files is there and was not written by a proposal, or was changed since.
     """
     parts = [_part(strength) for strength in outcome.strengths]
     if not parts:
@@ -56,13 +61,23 @@ def write(outcome: Outcome, folder: Path) -> EffectFile:
         loader=PackageLoader("measure.propose", "templates"), undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True, keep_trailing_newline=True, autoescape=False,
     )  # fmt: skip
-    folder.mkdir(parents=True, exist_ok=True)
-    for template, name in (
-        ("effect.py.j2", f"{module}.py"), ("test_effect.py.j2", f"test_{module}.py"),
-        ("pyproject.toml.j2", "pyproject.toml"),
-    ):  # fmt: skip
-        (folder / name).write_text(environment.get_template(template).render(**values), encoding="utf-8")
+    templates = {
+        f"{module}.py": "effect.py.j2",
+        f"test_{module}.py": "test_effect.py.j2",
+        _PROJECT: "pyproject.toml.j2",
+    }
+    texts = {name: environment.get_template(template).render(**values) for name, template in templates.items()}
+    write_files(folder, texts, command=_COMMAND)
     return EffectFile(path=folder / f"{module}.py", class_name=class_name)
+
+
+def check(folder: Path) -> None:
+    """Refuse a folder in which `write` may be unable to write, before any term is sought: a proposal in it was changed.
+
+    Raises:
+        ConflictError: a file of a proposal was not written by one, or was changed since.
+    """
+    check_files(folder, _PROJECT, *(path.name for path in sorted(folder.glob("*proposed_*.py"))), command=_COMMAND)
 
 
 def _part(strength: Strength) -> dict[str, Any]:

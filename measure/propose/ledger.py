@@ -8,7 +8,7 @@ from typing import Any
 
 from flagdata.documents import read_json
 from flagdata.errors import CorruptError
-from flagdata.files import write_text
+from flagdata.outputs import check_rewrite, rewrite
 from measure.propose.outcome import Outcome
 
 SCHEMA = "flagdata.ledger/1"
@@ -28,6 +28,17 @@ def entries(path: Path) -> list[dict[str, Any]]:
     return content["entries"]
 
 
+def check(path: Path) -> None:
+    """Refuse a path at which no entry can be added, before any term is sought.
+
+    Raises:
+        ConflictError, CorruptError: a file that is no ledger.
+        InputError: the folder cannot be written.
+    """
+    check_rewrite(path)
+    entries(path)
+
+
 def add(path: Path, outcome: Outcome, *, effect: str) -> None:
     """One more entry, after those that are there. Entries are never changed.
 
@@ -39,4 +50,4 @@ def add(path: Path, outcome: Outcome, *, effect: str) -> None:
     """
     made = [*entries(path), {"effect": effect, **outcome.as_dict()}]
     text = json.dumps({"schema": SCHEMA, "entries": made}, indent=1, allow_nan=False, ensure_ascii=False)
-    write_text(path, text + "\n")
+    rewrite(path, text + "\n")

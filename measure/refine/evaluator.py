@@ -6,8 +6,6 @@ identity alone, not on who asked, when, or beside what: an interrupted run is re
 
 from __future__ import annotations
 
-import os
-import tempfile
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
@@ -20,6 +18,7 @@ from numpy.typing import NDArray
 
 from flagdata.checksums import is_sealed, sealed
 from flagdata.errors import CorruptError
+from flagdata.outputs import rewrite
 from flagdata.provenance import canonical, digest
 from flagdata.rng import child_seed
 from measure.refine.simulator import Request, Simulator
@@ -164,17 +163,12 @@ def _together(found: list[Evaluated | None]) -> Evaluated:
 
 
 def _write(path: Path, made: Evaluated) -> None:
-    """Whole or not at all: written beside it with its checksum, then renamed."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     frame = np.zeros((0, 0), np.uint8) if made.frame is None else made.frame
-    content = BytesIO()
+    buffer = BytesIO()
     np.savez_compressed(
-        content, embedding=made.embedding, frame=frame, seconds=np.array([made.seconds[stage] for stage in STAGES])
+        buffer, embedding=made.embedding, frame=frame, seconds=np.array([made.seconds[stage] for stage in STAGES])
     )
-    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    with os.fdopen(handle, "wb") as file:
-        file.write(sealed(content.getvalue()))
-    Path(name).replace(path)
+    rewrite(path, sealed(buffer.getvalue()))
 
 
 def _read(path: Path) -> Evaluated:

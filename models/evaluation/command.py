@@ -94,6 +94,7 @@ def evaluate(
     from models.evaluation import report
     from models.evaluation.evaluation import as_document
 
+    report.check(out, name=name)
     source = flagdata.open(lake_path)
     folder = cache if cache is not None else Path(f"{lake_path.rstrip('/')}.inputs")
     desk = _Desk(source, dataset, at, folder, workers or os.cpu_count() or 1, seed, area_weight)

@@ -73,17 +73,18 @@ def build(
             _print_plan(planned)
         return
 
+    from sim.datasets import card as cards
     from sim.datasets.build import Build
-    from sim.datasets.card import write_card
     from sim.datasets.cluster import connected
 
+    cards.check(card)
     lake = _lake(lake_path) or _made(lake_path)
     lake.check_writable()
     with connected(scheduler, workers=workers or _cores()) as client:
         report = Build(
             lake=lake, recipe=loaded, client=client, bars=progress, say=_beside_bar, branch=branch, device=device
         ).run()
-    written = write_card(lake, loaded, branch=branch, path=card)
+    written = cards.write_card(lake, loaded, branch=branch, path=card)
     if as_json:
         document("build", {"lake": str(lake.path), "recipe": loaded.name, "card": str(written), **vars(report)})
         return

@@ -206,7 +206,14 @@ def _assembled(
 
 
 def write_obj(path: Path, mesh: Obj) -> None:
-    """Write a mesh as ArcSim does: all `vt`, each `v` with its `nv` where there are velocities, `f` as v/vt.
+    """Write a mesh into a new file, see `obj_text`; raises as `flagdata.outputs.write_file`."""
+    from flagdata.outputs import write_file
+
+    write_file(path, obj_text(mesh))
+
+
+def obj_text(mesh: Obj) -> str:
+    """A mesh as ArcSim writes it: all `vt`, each `v` with its `nv` where there are velocities, `f` as v/vt.
 
     Nine significant digits: float32 values come back exactly.
     """
@@ -217,4 +224,4 @@ def write_obj(path: Path, mesh: Obj) -> None:
             vx, vy, vz = mesh.velocities[index]
             lines.append(f"nv {vx:.9g} {vy:.9g} {vz:.9g}")
     lines += [f"f {a}/{a} {b}/{b} {c}/{c}" for a, b, c in mesh.faces + 1]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return "\n".join(lines) + "\n"
