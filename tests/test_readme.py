@@ -76,6 +76,7 @@ def test_the_demonstration_ends_in_a_page_that_needs_no_other_file(folder: Path)
     assert "A field recording, end to end" in page
     assert page.count("data:image/webp;base64,") == 6
     assert not re.findall(r"(?:src|href)=\"(?!data:)", page)
+    assert ".partial" not in page
 
 
 def test_the_demonstration_recovers_the_offset_it_hid(folder: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
 import subprocess
 import sys
@@ -60,8 +61,11 @@ class Transcript:
             raise FlagdataError(
                 f"`{typed}` ended with {done.returncode}", where="the demonstration", fix="see its message above"
             )
-        self.entries.append((typed, done.stdout))
-        return done.stdout
+        printed = done.stdout.replace(
+            f"{self.folder.absolute()}{os.sep}", ""
+        )  # a folder that is named when it is whole
+        self.entries.append((typed, printed))
+        return printed
 
     def show(self, *arguments: str) -> str:
         """`run`, and its stdout printed for the person who watches."""

@@ -11,6 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from flagdata.errors import UsageError
+from flagdata.markdown import plain
 from flagdata.outputs import check_files, write_files
 from flagdata.provenance import code_version
 from models.evaluation import figures, paper, table
@@ -96,14 +97,15 @@ def page(found: Evaluation) -> str:
 
 
 def markdown(found: Evaluation) -> str:
-    """The tables and their warnings as Markdown; the charts are the page's."""
-    parts = [f"# Models compared on {found.data}", _counts(found)]
+    """The tables and their warnings as Markdown, names of models and data sets as text; the charts are the page's."""
+    parts = [f"# Models compared on {plain(found.data)}", _counts(found)]
     parts += [
-        f"**Warning:** {f'{finding.where}: ' if finding.where else ''}{finding.what}." for finding in found.findings
+        f"**Warning:** {plain(f'{finding.where}: {finding.what}' if finding.where else finding.what)}."
+        for finding in found.findings
     ]
     parts += [_grid(_models(found)), table.LEGEND, "## What the paper printed", paper.WARNING, _grid(_paper(found))]
     for title, made in (
-        (f"## Against {found.reference}, pair by pair", _differences(found)),
+        (f"## Against {plain(found.reference or '')}, pair by pair", _differences(found)),
         ("## Every target", _targets(found)),
         ("## Linear readout of the embedding", _linear(found)),
         ("## Learning curve", _learning(found)),
@@ -117,7 +119,7 @@ def markdown(found: Evaluation) -> str:
 
 def _grid(made: Grid) -> str:
     def text(cell: Sequence[str]) -> str:
-        return "<br>".join(cell).replace("|", "\\|").replace("\n", " ")
+        return "<br>".join(plain(line) for line in cell)
 
     lines = [made.head, ["---"] * len(made.head), *([text(cell) for cell in line.cells] for line in made.body)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
