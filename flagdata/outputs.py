@@ -6,8 +6,8 @@ One policy for all commands:
 - What is written goes under a scratch name beside it, `.flagdata-<hex>.partial`, is flushed to the disk, and takes its
   name in one step. What fails is removed; what a killed process leaves behind does not hinder the next one.
 - A name that is taken is refused, with two exceptions that are replaced: a file that the same command wrote and that is
-  unchanged since, as its seal shows (`flagdata.seal`), and a folder that holds only what its manifest lists, unchanged
-  (`flagdata.manifest`). An empty folder is free.
+  unchanged since, as its signature shows (`flagdata.signature`), and a folder that holds only what its manifest lists,
+  unchanged (`flagdata.manifest`). An empty folder is free.
 - Links are never followed, and nothing but a regular file is ever replaced.
 """
 
@@ -24,7 +24,7 @@ from pathlib import Path
 from flagdata.errors import ConflictError, InputError
 from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder
 from flagdata.manifest import remove_listed, unlisted, write_manifest
-from flagdata.seal import is_sealed, sealed
+from flagdata.signature import is_signed, signed
 
 _NAMED = 3  # files that a refusal names
 _NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EMLINK)
@@ -102,7 +102,7 @@ def check_rewrite(path: Path) -> None:
 
 
 def write_file(path: Path, content: str | bytes, *, command: str | None = None) -> None:
-    """Write a file: new, or in place of the command's own; sealed where a command is named.
+    """Write a file: new, or in place of the command's own; signed where a command is named.
 
     Raises:
         ConflictError: something else is there.
@@ -210,7 +210,7 @@ def fresh_folder(path: Path, *, schema: str | None = None) -> Iterator[Path]:
 def _check_free(path: Path, command: str | None) -> None:
     if not path.is_symlink() and not path.exists():
         return
-    if not path.is_symlink() and path.is_file() and command is not None and is_sealed(path, command=command):
+    if not path.is_symlink() and path.is_file() and command is not None and is_signed(path, command=command):
         return
     raise _taken(path, "" if command is None else f", and flagdata {command} did not write it, or it was changed since")
 
@@ -252,7 +252,7 @@ def _removed() -> Iterator[dict[str, Path]]:
 
 def _bytes(name: str, content: str | bytes, command: str | None) -> bytes:
     data = content.encode() if isinstance(content, str) else content
-    return data if command is None else sealed(data, name=name, command=command)
+    return data if command is None else signed(data, name=name, command=command)
 
 
 def _publish(scratch: Path, path: Path, command: str | None) -> None:

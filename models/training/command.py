@@ -108,11 +108,14 @@ def trained(
     from flagdata.locks import alone_in
     from flagdata.provenance import digest
     from models.targets import Scaling
+    from models.training.checkpoint import check_folder
     from models.training.inputs import film_rows, prepare_clips, prepare_films, stated
     from models.training.publish import data_identity, network_artifact, publish
     from models.training.steps import Training
 
     recipe.check()
+    if run is not None:
+        check_folder(run)
     source = flagdata.open(lake_path)
     source.lake.check_writable()
     train_pairs, validation_pairs = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))

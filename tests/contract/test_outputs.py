@@ -34,6 +34,8 @@ ALLOWED = {
     "measure/estimate/artifact.py": LAKE + "; or into a scratch folder (--zarr)",
     "models/training/publish.py": LAKE,
     "sim/datasets/build.py": LAKE,
+    "flagdata/checksums.py": "states the checksums inside a folder that its caller made",
+    "flagdata/locks.py": "the lock in a run folder or a cache",
     "flagdata/record/output.py": "writes a record into staging or to a scratch path, and only where nothing is",
     "flagdata/record/salvage.py": "removes the record that it has itself just made",
     "flagdata/commands/ingest_sources.py": "removes the crop picture that it has itself just written",

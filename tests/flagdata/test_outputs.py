@@ -26,7 +26,7 @@ from flagdata.outputs import (
     write_file,
     write_files,
 )
-from flagdata.seal import is_sealed, sealed
+from flagdata.signature import is_signed, signed
 
 SCHEMA = "made.demo/1"
 
@@ -94,8 +94,8 @@ def test_a_format_without_a_place_for_the_seal_is_never_replaced(tmp_path: Path)
 @pytest.mark.parametrize("size", [0, 1, 40, 150])
 def test_short_files_are_not_taken_for_sealed_ones(size: int, tmp_path: Path) -> None:
     (tmp_path / "a.html").write_bytes((b"written by flagdata " * 20)[:size])
-    assert not is_sealed(tmp_path / "a.html", command="x")
-    assert sealed(b"", name="a.html", command="x") != b""
+    assert not is_signed(tmp_path / "a.html", command="x")
+    assert signed(b"", name="a.html", command="x") != b""
 
 
 def occupied_by_a_folder(path: Path) -> None:

@@ -21,7 +21,7 @@ _TAIL = 512  # bytes at the end of a file that hold its statement
 _PNG, _PNG_END = b"\x89PNG\r\n\x1a\n", 12  # signature; bytes of the last chunk
 
 
-def sealed(data: bytes, *, name: str, command: str) -> bytes:
+def signed(data: bytes, *, name: str, command: str) -> bytes:
     """The bytes of a file `name` with the statement that `flagdata COMMAND` wrote them.
 
     A format that has no place for it leaves them as they are."""
@@ -30,7 +30,7 @@ def sealed(data: bytes, *, name: str, command: str) -> bytes:
     return data[:at] + block + data[at:]
 
 
-def is_sealed(path: Path, *, command: str) -> bool:
+def is_signed(path: Path, *, command: str) -> bool:
     """Whether `flagdata COMMAND` wrote the file and nobody has changed it since.
 
     Raises:
@@ -44,7 +44,7 @@ def is_sealed(path: Path, *, command: str) -> bool:
     block, end = _block(data, path.name, command, "0" * 64)
     at = len(data) - end
     rest = data[: at - len(block)] + data[at:]
-    return len(rest) < len(data) and sealed(rest, name=path.name, command=command) == data
+    return len(rest) < len(data) and signed(rest, name=path.name, command=command) == data
 
 
 def _block(data: bytes, name: str, command: str, digest: str) -> tuple[bytes, int]:
