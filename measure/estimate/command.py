@@ -50,7 +50,8 @@ if TYPE_CHECKING:
               help="Where simulated clips are kept, so that an interrupted refinement goes on.")  # fmt: skip
 @click.option("--false-alarm", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.05,
               show_default=True, help="Share of familiar films that the gate may refuse.")  # fmt: skip
-@click.option("--anyway", is_flag=True, help="Show, marked, what the model says of a film that the gate refuses.")
+@click.option("--anyway", is_flag=True, help="Show, marked, what the model says of a film that the gate refuses, if "
+              "anything moves in it.")  # fmt: skip
 @click.option("--report", type=LocalPath(), metavar="FILE.html", help="Write a page that needs no other.")
 @click.option("--zarr", "zarr_path", type=LocalPath(), metavar="FOLDER",
               help="Write draws and series as a Zarr data set.")  # fmt: skip
@@ -159,7 +160,7 @@ class _Done:
     refinement: Refinement | None
 
     def as_dict(self, *, anyway: bool) -> dict[str, Any]:
-        shown = anyway or not self.measured.verdict.refused
+        shown = self.measured.shown(anyway=anyway)
         known = self.subject.known or {}
         return {
             **self.measured.as_dict(anyway=anyway), "series": self.series.as_dict() if shown else None,
@@ -204,8 +205,8 @@ class _Job:
             )  # fmt: skip
         wind = None if subject.record is None else subject.record.wind()
         series = beside(measured, start=subject.film.start, wind=wind)
-        _warn(measured.findings)
-        shown = self.anyway or not measured.verdict.refused
+        _warn(measured.noticed(anyway=self.anyway))
+        shown = measured.shown(anyway=self.anyway)
         refinement = None
         if self.options.refine is not None and shown:
             refinement = refined(
@@ -229,10 +230,10 @@ class _Job:
 
     def refuse(self, done: _Done) -> None:
         """Raises:
-        RefusedError: the gate refused the film, and it is not to be shown anyway.
+        RefusedError: the gate refused the film, and it is not to be shown anyway or there is nothing to measure.
         """
         verdict = done.measured.verdict
-        if verdict.refused and not self.anyway:
+        if not done.measured.shown(anyway=self.anyway):
             where = done.measured.film + (f", see {self.report}" if self.report is not None else "")
             raise RefusedError(
                 verdict.sentence, where=where,
@@ -291,7 +292,7 @@ def _given(options: Options, reading: Reading) -> Mapping[str, Any]:
 
 def _several(job: _Job, found: Sequence[Subject], *, as_json: bool) -> None:
     done = [job.do(subject) for subject in found]
-    told = [one for one in done if job.anyway or not one.measured.verdict.refused]
+    told = [one for one in done if one.measured.shown(anyway=job.anyway)]
     if as_json:
         document("measurements", {"measurements": [one.as_dict(anyway=job.anyway) for one in done]})
     else:
@@ -316,18 +317,18 @@ def _tell(done: _Done, *, series: bool) -> None:
     measured = done.measured
     mark = "refused by the gate, not to be relied on: " if measured.verdict.refused else ""
     click.echo(mark + measured.sentence)
-    say(f"  {measured.verdict.sentence}; {measured.combined} of {len(measured.windows)} windows")
+    say(f"  {measured.verdict.sentence}; {measured.combined} of {len(measured.verdict.window_p)} windows in the answer")
     if done.refinement is not None:
         click.echo(f"{mark}refined: {done.refinement.sentence}")
     if not series:
         return
-    wind = [window.quantity("wind_speed") for window in measured.windows]
-    for window, quantity in zip(measured.windows, wind, strict=True):
-        click.echo(f"{window.start:9.2f} s  {quantity.value:6.2f} m/s [{quantity.low:.2f}, {quantity.high:.2f}]")
+    for window in measured.windows:
+        wind = window.quantity("wind_speed")
+        value = f"{wind.value:6.2f} m/s " if wind.span.bound is None else ""
+        click.echo(f"{window.start:9.2f} s  {value}{wind.span.phrase(2, ' m/s')}")
     for title, agreement in (("window", done.series.window), ("minute", done.series.of_minute)):
         if agreement is not None:
-            say(f"  against the anemometer's {title} means: bias {agreement.bias:+.2f} m/s, RMSE {agreement.rmse:.2f} "
-                f"[{agreement.interval[0]:.2f}, {agreement.interval[1]:.2f}] 90 %, n = {agreement.count}")  # fmt: skip
+            say(f"  against the anemometer's {title} means: {agreement.sentence}")
 
 
 @contextmanager

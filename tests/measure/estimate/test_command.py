@@ -138,6 +138,15 @@ def test_a_refused_film_ends_with_3_and_shows_no_estimate(strange: Path, tmp_pat
     assert marked.stdout.startswith("refused by the gate, not to be relied on: ")
 
 
+@pytest.mark.parametrize("form", [(), ("--json",), ("--csv",)])
+def test_a_still_film_is_given_no_number_even_anyway(tmp_path: Path, form: tuple[str, ...]) -> None:
+    still = write_video(tmp_path / "still.mkv", pictures(1, height=40, width=56).repeat(40, axis=0))
+    done = run(still, *SIZED, "--anyway", *form, code=3)
+    assert "nothing moves in the picture" in done.stdout + done.stderr
+    assert "m/s" not in done.stdout + done.stderr
+    assert not form or "quantities" not in done.stdout
+
+
 def test_the_report_is_one_file_that_refers_to_no_other(film: Path, model_folder: Path, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
     run(film, *SIZED, "--model", model_folder, "--anyway", "--report", page)
