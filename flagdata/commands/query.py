@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from flagdata.query import Request, Selection
 
 PEOPLE_LIMIT = 20
+_TIME_LIMIT = 60.0  # s; that of `flagdata.query`, which is not imported for --help
 _SHORT = 12  # characters of an identity; look-ups take unique prefixes
 
 # What people see without --columns, by the one kind that was selected.
@@ -52,6 +53,10 @@ VIEWS: dict[str | None, tuple[str, ...]] = {
 @click.option(
     "--limit", type=click.IntRange(min=0), help=f"Rows at most; {PEOPLE_LIMIT} in the table for people, else all."
 )
+@click.option(
+    "--time-limit", type=click.FloatRange(min=0, min_open=True), default=_TIME_LIMIT, show_default=True,
+    metavar="SECONDS", help="What the query may take, before it is stopped.",
+)  # fmt: skip
 @click.option("--arrow", metavar="FILE", type=LocalPath(), help="Write an Arrow IPC file.")
 @click.option("--csv", "as_csv", is_flag=True, help="Comma-separated values on stdout.")
 @click.option("--describe", is_flag=True, help="List the columns with their units.")
@@ -64,6 +69,7 @@ def query(
     columns: str | None,
     order: str | None,
     limit: int | None,
+    time_limit: float,
     arrow: Path | None,
     as_csv: bool,
     describe: bool,
@@ -94,7 +100,7 @@ def query(
     view = lake.view(at)
     version = view[0].version
     names = None if columns is None else tuple(name.strip() for name in columns.split(","))
-    request = Request(where=where, sql=sql, columns=names, order=order, limit=limit)
+    request = Request(where=where, sql=sql, columns=names, order=order, limit=limit, time_limit=time_limit)
     catalog = lake.table(view)
     if arrow is not None:
         count = write_arrow(Selection(catalog, request), arrow)
