@@ -91,7 +91,7 @@ def disk_errors(doing: str, where: Path) -> Iterator[None]:
         raise FlagdataError(
             f"{doing} failed: {text}",
             where=str(error.filename or where),
-            fix=f"{_FIXES.get(number, 'check the disk that holds the lake')}, then do it again",
+            fix=f"{_FIXES.get(number, 'check the disk')}, then do it again",
         ) from error
 
 
@@ -101,7 +101,7 @@ _FIXES = {
     errno.ENOSPC: "free some space, or move the lake to a larger disk",
     errno.EDQUOT: "free some space, or ask for a larger quota",
     errno.EFBIG: "raise the file size limit (ulimit -f)",
-    errno.EACCES: "give yourself read and write permission on the lake's folder",
-    errno.EPERM: "give yourself read and write permission on the lake's folder",
+    errno.EACCES: "give yourself read and write permission on the folder",
+    errno.EPERM: "give yourself read and write permission on the folder",
     errno.EROFS: "mount the disk writable",
 }
