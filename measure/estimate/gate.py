@@ -165,6 +165,9 @@ class Verdict:
             if count == 1
             else f"windows with p at {self.level:.2g} or below: {strange} of {count}, refused from {self.refusing} on"
         )
+        if not self.measurable:
+            what = self.reasons[0].what
+            return f"there is nothing to measure, so that no number is given, not even with --anyway: {what}"
         if self.refused:
             return f"this is not like what the model was trained on: {self.reasons[0].what}; {windows} ({rate})"
         return f"like what the model was trained on; {windows} ({rate})"
