@@ -77,16 +77,15 @@ class Quantity:
         other = "more" if self.span.bound is Bound.LEAST else "less"
         return Finding(
             kind=f"{self.name.replace('_', '-')}-at-end", severity=Severity.WARNING,
-            what=f"{PILED:.0%} of the draws of the {SHORT[self.name]} or more lie within {WITHIN:.0%} of an end of the "
-            f"range that the model learned: {self._beyond}, so that {other} than that would look the same, and only "
-            "a bound is given",
+            what=f"{SHORT[self.name]}: {self._beyond}, and {PILED:.0%} of the draws or more lie within {WITHIN:.0%} of "
+            f"that end; {other} would look the same, so that only a bound is given",
             fix="check --flag-size, with which the range grows",
         )  # fmt: skip
 
     @property
     def _beyond(self) -> str:
-        side, end = ("above", self.assumed[1]) if self.span.bound is Bound.LEAST else ("below", self.assumed[0])
-        return f"the model knows none {side} {self._number(end)}{self._suffix}"
+        what, end = ("ends", self.assumed[1]) if self.span.bound is Bound.LEAST else ("begins", self.assumed[0])
+        return f"the model's range {what} at {self._number(end)}{self._suffix}"
 
     @property
     def _digits(self) -> int:

@@ -52,14 +52,14 @@ def test_what_the_film_did_not_tell_is_said_so() -> None:
 
 def test_a_wind_at_the_end_of_what_the_model_knows_is_bounded_on_one_side_with_the_reason() -> None:
     assert sentence([STRONG, WEIGHT]) == (
-        "wind at least 9.4 m/s, 95 % (the model knows none above 10.0 m/s), "
+        "wind at least 9.4 m/s, 95 % (the model's range ends at 10.0 m/s), "
         "area weight 0.13 kg/m² [0.11, 0.16] 90 %"
     )  # fmt: skip
     assert sentence([CALM, UNTOLD]).startswith("wind at most 0.5 m/s, 95 %; area weight: not told")
     finding = STRONG.finding()
     assert finding is not None
     assert finding.kind == "wind-speed-at-end"
-    assert "none above 10.0 m/s" in finding.what
+    assert "ends at 10.0 m/s" in finding.what
     assert CALM.finding() is WIND.finding() is None
 
 
