@@ -56,12 +56,10 @@ ALLOWED = {
     "sim/datasets/plan.py": SCRATCH,
     "measure/nulls/supply.py": SCRATCH,
     "flagdata/dataset/cache.py": "a cache: files named by 64 hex digits and its own two, whichever folder it is in",
-    "models/training/inputs.py": "a cache: files named by hashes, renamed when they are whole",
     "measure/nulls/bank.py": "makes the folder of a bank that `challenge bank` has claimed; batches by put_if_absent",
     "sim/kernel/build.py": "flagdata's own cache folder",
     "models/training/checkpoint.py": "the run folder of a training",
     "models/storage.py": "writes into folders that its callers make: staging, a run folder, shipped models",
-    "models/shipping.py": "a maintainer's program: the folder of the models that are shipped",
     "models/evaluation/predictions.py": "an interface in Python: the caller names a file of arrays",
 }
 
