@@ -27,7 +27,7 @@ from flagdata.errors import FlagdataError, UsageError
 
 _FORMAT = "flagdata.decoded/1"
 _SUFFIX = ".clip"
-_NAME = re.compile(r"[0-9a-f]{64}" + re.escape(_SUFFIX))  # of a clip; other files in the folder are a user's
+_NAME = re.compile(r"[0-9a-f]{64}" + re.escape(_SUFFIX))  # of a clip
 _WRITING = "writing.part"  # the one file being written; only under the lock
 _TALLY = "tally"  # the lock, and in it the bytes of all clips
 _MAX_HEADER = 4096  # B
@@ -50,11 +50,11 @@ class DecodedCache:
     folder is full, the clips that were read least recently go.
 
     Args:
-        path: the folder; made if it is not there. Not inside a lake.
+        path: the folder, for the cache alone; made if it is not there. Not inside a lake.
         limit: [B].
 
     Raises:
-        UsageError: no room for anything, or a folder inside a lake.
+        UsageError: no room for anything, a folder inside a lake, or one that holds other files.
     """
 
     def __init__(self, path: Path | str, *, limit: int) -> None:
@@ -68,6 +68,12 @@ class DecodedCache:
                     "a cache inside a lake", where=str(self.path), fix="choose a folder outside it: it is disposable"
                 )
         self.path.mkdir(parents=True, exist_ok=True)
+        with os.scandir(self.path) as found:
+            for entry in found:
+                if not _NAME.fullmatch(entry.name) and entry.name not in (_TALLY, _WRITING):
+                    raise UsageError(
+                        "a cache among other files", where=entry.path, fix="give it a new or empty folder of its own"
+                    )
         self._verified: set[str] = set()
 
     def __getstate__(self) -> dict[str, Any]:
