@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Mapping
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
@@ -147,11 +147,10 @@ def tag(name: str | None, at: str | None, as_json: bool, lake_path: str) -> None
     from flagdata.lake import Lake
 
     lake = Lake.open(lake_path)
-    if name is not None:
-        lake.tag(name, at=at)
-    elif at is not None:
+    if name is None and at is not None:
         raise UsageError("--at without a NAME", fix="give the tag a NAME")
-    _print_refs("tags", lake.refs.tags(), name, as_json=as_json)
+    refs = lake.refs.tags().values() if name is None else [lake.tag(name, at=at)]
+    _print_refs("tags", refs, as_json=as_json)
 
 
 @click.command()
@@ -164,11 +163,10 @@ def branch(name: str | None, at: str | None, as_json: bool, lake_path: str) -> N
     from flagdata.lake import Lake
 
     lake = Lake.open(lake_path)
-    if name is not None:
-        lake.branch(name, at=at)
-    elif at is not None:
+    if name is None and at is not None:
         raise UsageError("--at without a NAME", fix="give the branch a NAME")
-    _print_refs("branches", lake.refs.branches(), name, as_json=as_json)
+    refs = lake.refs.branches().values() if name is None else [lake.branch(name, at=at)]
+    _print_refs("branches", refs, as_json=as_json)
 
 
 @click.command()
@@ -314,22 +312,21 @@ def _plain(row: Mapping[str, Any]) -> dict[str, Any]:
     return {column: value.isoformat() if isinstance(value, datetime) else value for column, value in row.items()}
 
 
-def _print_refs(noun: str, refs: Mapping[str, Ref], name: str | None, *, as_json: bool) -> None:
-    shown: Iterable[Ref] = refs.values() if name is None else [refs[name]]
+def _print_refs(noun: str, refs: Collection[Ref], *, as_json: bool) -> None:
     entries = [
         {
             "name": ref.name,
             "created": ref.created,
             "view": [{"branch": part.branch, "version": part.version} for part in ref.view],
         }
-        for ref in shown
+        for ref in refs
     ]
     if as_json:
         document(noun, {noun: entries})
     elif entries:
         table(
             ("name", "created", "shows" if noun == "tags" else "begins at"),
-            [[ref.name, ref.created, " + ".join(f"{p.branch}@{p.version}" for p in ref.view)] for ref in shown],
+            [[ref.name, ref.created, " + ".join(f"{p.branch}@{p.version}" for p in ref.view)] for ref in refs],
         )
     else:
         say(f"no {noun}")

@@ -30,9 +30,8 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import deltalake
 import pyarrow as pa
 import pyarrow.parquet as pq
-from deltalake import CommitProperties, DeltaTable, PostCommitHookProperties
+from deltalake import CommitProperties, DeltaTable
 from deltalake.exceptions import CommitFailedError, DeltaError
-from deltalake.transaction import AddAction, RemoveAction
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.files import open_regular
@@ -274,41 +273,31 @@ class Catalog:
         self, table: DeltaTable, rows: pa.Table, *, removed: Sequence[str], rows_change: bool, info: Mapping[str, str]
     ) -> None:
         version = table.version() + 1
+        if (protocol := table.protocol()).min_writer_version > _WRITER:
+            raise newer(f"writing to it takes version {protocol.min_writer_version} of Delta's protocol", self.path)
         path = self.path / f"{uuid.uuid4().hex}.parquet"
         # The Arrow schema is schema.py's, and most values occur once: without both, a row's file has 6 kB, not 15.
         pq.write_table(rows, path, compression="zstd", store_schema=False, use_dictionary=False)
         flush_file(path)
         flush_folder(self.path)
         now = time.time_ns() // 1_000_000
-        added = AddAction(
-            path=path.name,
-            size=path.stat().st_size,
-            partition_values={},
-            modification_time=now,
-            data_change=rows_change,
-            stats=json.dumps({"numRecords": rows.num_rows}),
-        )
-        dropped = [RemoveAction(path=name, data_change=rows_change, deletion_timestamp=now) for name in removed]
-        try:
-            table.create_write_transaction(
-                [added, *dropped],
-                "append",
-                table.schema(),
-                commit_properties=_properties({**info, **self._hashes(version, path)}),
-                post_commithook_properties=_HOOKS,
-            )
-        except DeltaError as error:  # which may come after the entry was put
-            if not self._entries.adds(version, path.name):
-                if isinstance(error, CommitFailedError):
-                    path.unlink()
-                    raise Moved from None
-                raise OSError(str(error)) from error
+        written = {
+            "timestamp": now, "operation": "WRITE", "operationParameters": {"mode": "Append", "partitionBy": "[]"},
+            "engineInfo": "flagdata", **{f"{_INFO_PREFIX}{key}": value for key, value in info.items()},
+            FILE_HASH: file_hash(path), PREVIOUS_HASH: file_hash(self._entries.path(version - 1)),
+        }  # fmt: skip
+        added = {
+            "path": path.name, "partitionValues": {}, "size": path.stat().st_size, "modificationTime": now,
+            "dataChange": rows_change, "stats": json.dumps({"numRecords": rows.num_rows}),
+        }  # fmt: skip
+        dropped = [{"path": name, "dataChange": rows_change, "deletionTimestamp": now} for name in removed]
+        # Not by the Delta library, which reads the log again after it has put the entry, and may fail then.
+        actions = [{"commitInfo": written}, {"add": added}, *({"remove": action} for action in dropped)]
+        if not self._entries.put(version, actions):
+            path.unlink()
+            raise Moved
         with confirming(f"version {version}", self._entries.path(version)):
-            self._flush_log(version)
-
-    def _hashes(self, version: int, path: Path) -> dict[str, str]:
-        hashes = {FILE_HASH: file_hash(path), PREVIOUS_HASH: file_hash(self._entries.path(version - 1))}
-        return {key.removeprefix(_INFO_PREFIX): digest for key, digest in hashes.items()}
+            self._entries.acknowledge(version)
 
     def _checkpoint(self) -> int:
         """The version of the newest, by the files' names: a process may die before `_last_checkpoint` is written."""
@@ -400,7 +389,8 @@ class Catalog:
 _CHECKPOINT = ".checkpoint.parquet"
 _HINT = "_last_checkpoint"
 _SYSTEM_ERROR = "(os error "  # as the Delta library writes it
-_HOOKS = PostCommitHookProperties(create_checkpoint=False, cleanup_expired_logs=False)
+_WRITER = 2
+"""Version of Delta's protocol that tables of this package ask of writers; a later one has duties unknown here."""
 
 
 def _properties(info: Mapping[str, str]) -> CommitProperties:

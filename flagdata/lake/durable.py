@@ -36,10 +36,13 @@ def flush_folder(path: Path) -> None:
     flush_file(path)
 
 
-def put_if_absent(path: Path, data: bytes) -> bool:
+def put_if_absent(path: Path, data: bytes, *, what: str | None = None) -> bool:
     """Create `path` with all of `data`, or leave what is there; False when the name was taken.
 
     The bytes are written and flushed beside it under another name, then linked: the name appears whole or not at all.
+
+    Args:
+        what: is published by it, for a warning; the file by its name if `None`.
 
     Raises:
         OSError: what the disk refused; the name was not taken.
@@ -56,9 +59,10 @@ def put_if_absent(path: Path, data: bytes) -> bool:
         with suppress(OSError):  # what is left is a collection's
             scratch.unlink(missing_ok=True)
         raise
-    with confirming(f"the file {path.name}", path):
+    what = what or f"the file {path.name}"
+    with confirming(what, path):
         flush_folder(path.parent)
-    with confirming(f"the file {path.name}", path):
+    with confirming(what, path):
         scratch.unlink(missing_ok=True)
     return True
 

@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from graphlib import TopologicalSorter
 from pathlib import Path
-from typing import cast
 from urllib.parse import unquote
 
 import pyarrow as pa
@@ -29,7 +28,7 @@ from flagdata.lake.layout import STAGING, STORES, check_writable, scratch_files
 from flagdata.lake.leases import collecting, keeping_collectors_out
 from flagdata.lake.matching import Where, matching
 from flagdata.lake.objects import Objects
-from flagdata.lake.refs import MAIN, Refs, View
+from flagdata.lake.refs import MAIN, Ref, Refs, View
 from flagdata.lake.transaction import CommitResult, Transaction
 from flagdata.lake.withdrawal import Withdrawal, check_leaving, clips_of, descendants
 from flagdata.schema import CATALOG, FORMAT_VERSION
@@ -207,7 +206,7 @@ class Lake:
         """
         return self.view(at)[0].version
 
-    def tag(self, name: str, *, at: str | None = None) -> None:
+    def tag(self, name: str, *, at: str | None = None) -> Ref:
         """Name what `at` shows, for good.
 
         Raises:
@@ -216,9 +215,9 @@ class Lake:
         """
         self.check_writable()
         with collecting(self.staging):  # one ref at a time, so that no name is both a tag and a branch
-            self.refs.put("tags", name, self.view(at))
+            return self.refs.put("tags", name, self.view(at))
 
-    def branch(self, name: str, *, at: str | None = None) -> None:
+    def branch(self, name: str, *, at: str | None = None) -> Ref:
         """Begin a branch from what `at` shows.
 
         Raises:
@@ -227,7 +226,7 @@ class Lake:
         """
         self.check_writable()
         with collecting(self.staging):  # one ref at a time, so that no name is both a tag and a branch
-            self.refs.put("branches", name, self.view(at))
+            return self.refs.put("branches", name, self.view(at))
 
     def merge(self, branch: str, message: str, *, into: str = MAIN) -> CommitResult:
         """Commit on `into` what was committed on `branch` itself; rows that are there already stay as they are.
@@ -247,7 +246,7 @@ class Lake:
         with self.transaction(message, branch=into) as transaction:
             for artifact in TopologicalSorter(parents).static_order():  # the table's order is by time, not by descent
                 transaction.add(Artifact.from_row(rows[artifact]))
-        return cast(CommitResult, transaction.result)
+        return transaction.result
 
     def withdraw(self, artifacts: Sequence[str], message: str, *, branch: str = MAIN) -> Withdrawal:
         """Take rows off a branch, in one commit; clips that are slices of a withdrawn recording go along with it.

@@ -10,9 +10,12 @@ Each entry notes the SHA-256 of the one before it, and the mark that of the newe
 
 from __future__ import annotations
 
+import json
 import re
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from flagdata.documents import from_json
 from flagdata.errors import CorruptError
@@ -102,12 +105,16 @@ class Log:
                 noted[version - 1] = previous
         return [self.path(v) for v in sorted(present & noted.keys()) if file_hash(self.path(v)) != noted[v]]
 
-    def adds(self, version: int, name: str) -> bool:
-        """Whether there is an entry of `version` and it adds the file `name`."""
-        try:
-            return name in self._content(version)[0]
-        except CorruptError:
-            return False
+    def put(self, version: int, actions: Sequence[Mapping[str, Any]]) -> bool:
+        """Publish the entry of `version`, one action a line; False when another writer has published it.
+
+        This is a commit's point of no return: one link, after the entry's bytes are on the disk.
+
+        Raises:
+            OSError: what the disk refused; there is no such entry.
+        """
+        text = "\n".join(json.dumps(action, ensure_ascii=False, separators=(",", ":")) for action in actions)
+        return put_if_absent(self.path(version), text.encode(), what=f"version {version}")
 
     def _content(self, version: int) -> tuple[list[str], dict[str, str]]:
         """Names of the files that an entry adds, and its commit info."""

@@ -82,8 +82,8 @@ class Refs:
         """All branches but `main`, by name."""
         return self._all("branches")
 
-    def put(self, kind: str, name: str, view: View) -> None:
-        """Create a tag or branch.
+    def put(self, kind: str, name: str, view: View) -> Ref:
+        """Create a tag or branch, and return it.
 
         Args:
             kind: "tags" or "branches".
@@ -93,10 +93,11 @@ class Refs:
         """
         check_name(name, noun=_NOUNS[kind])
         other = "branches" if kind == "tags" else "tags"
+        ref = Ref(name=name, created=datetime.now(UTC).isoformat(timespec="seconds"), view=view)
         content = {
             "schema": "flagdata.ref/1",
-            "name": name,
-            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "name": ref.name,
+            "created": ref.created,
             "view": [{"branch": s.branch, "version": s.version} for s in view],
         }
         path = self.root / kind / f"{name}.json"
@@ -108,6 +109,7 @@ class Refs:
                     where=str(path),
                     fix="choose another name; a tag never moves" if kind == "tags" else "choose another name",
                 )
+        return ref
 
     def view(self, branch: str, head: int) -> View:
         """What a branch shows when the table is at version `head`.

@@ -68,8 +68,8 @@ def report(measured: Measurement) -> Mapping[str, Any]:
 def keep(
     lake: Lake, measured: Measurement, subject: Subject, network: Network, reading: Reading, series: Beside, *,
     branch: str, refinement: Mapping[str, Any] | None = None,
-) -> tuple[str, bool]:  # fmt: skip
-    """Commit a measurement; the same one again adds nothing. Returns its id and whether it was there already.
+) -> bool:  # fmt: skip
+    """Commit a measurement and return whether it is new; the same one again adds nothing.
 
     Args:
         refinement: what a refinement found, as JSON values.
@@ -80,11 +80,11 @@ def keep(
     wanted = artifact(measured, subject, network, reading)
     with lake.transaction(f"measure {measured.film}", branch=branch) as transaction:
         if transaction.find(wanted.id) is not None:
-            return wanted.id, True
+            return False
         staged = transaction.staging(".zarr")
         write(staged, measured, series, refinement)
         transaction.add(artifact(measured, subject, network, reading, stored=transaction.put(staged)))
-    return wanted.id, False
+    return wanted.id in transaction.result.added
 
 
 def write(path: Path, measured: Measurement, series: Beside, refinement: Mapping[str, Any] | None = None) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ import click
 
 from flagdata.commands.durations import DURATION
 from flagdata.commands.ranges import RANGE
-from flagdata.console import LocalPath, document, json_option, progress, say
+from flagdata.console import LocalPath, document, following, json_option, progress, say
 from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 
@@ -188,7 +188,8 @@ class _Job:
 
     def do(self, subject: Subject) -> _Done:
         """Measure one film; commit and write what is to be shown."""
-        from flagdata.outputs import fresh_folder
+        from flagdata.outputs import fresh_folder, write_file
+        from measure.estimate.artifact import artifact as artifact_of
         from measure.estimate.artifact import keep, write
         from measure.estimate.dependence import of_model
         from measure.estimate.measuring import measure as measured_of
@@ -215,17 +216,27 @@ class _Job:
             )  # fmt: skip
             _warn(refinement.findings)
         told = None if refinement is None else refinement.as_dict()
-        artifact = None
-        if self.lake is not None and self.commit and shown:
-            artifact, existing = keep(
-                self.lake, measured, subject, self.network, self.reading, series, branch=self.branch, refinement=told
-            )
-            say(f"{artifact[:12]}  measurement, {'there already' if existing else 'committed'}")
-        if self.zarr is not None and shown:
-            with fresh_folder(self.zarr) as scratch:
-                write(scratch, measured, series, told)
+        lake = self.lake if self.commit and shown else None
+        artifact = None if lake is None else artifact_of(measured, subject, self.network, self.reading).id
+        text = None
         if self.report is not None:
-            self._write_page(self.report, measured, series, subject, artifact, refinement)
+            text = self._page(measured, series, subject, artifact, refinement)
+        published = lake is not None and keep(
+            lake, measured, subject, self.network, self.reading, series, branch=self.branch, refinement=told
+        )
+        if artifact is not None:
+            say(f"{artifact[:12]}  measurement, {'committed' if published else 'there already'}")
+
+        def writing(what: str) -> AbstractContextManager[None]:
+            return following(f"the measurement {artifact}", f"writing {what}") if published else nullcontext()
+
+        if self.zarr is not None and shown:
+            with writing("its Zarr folder"), fresh_folder(self.zarr) as scratch:
+                write(scratch, measured, series, told)
+        if self.report is not None and text is not None:
+            with writing("its report"):
+                write_file(self.report, text, command="measure")
+                say(f"report: {self.report}")
         return _Done(measured=measured, series=series, artifact=artifact, subject=subject, refinement=refinement)
 
     def refuse(self, done: _Done) -> None:
@@ -240,11 +251,15 @@ class _Job:
                 fix=verdict.reasons[0].fix,
             )  # fmt: skip
 
-    def _write_page(
-        self, path: Path, measured: Measurement, series: Beside, subject: Subject, artifact: str | None,
+    def _page(
+        self, measured: Measurement, series: Beside, subject: Subject, artifact: str | None,
         refinement: Refinement | None,
-    ) -> None:  # fmt: skip
-        from flagdata.outputs import write_file
+    ) -> str:  # fmt: skip
+        """The page of a report.
+
+        Args:
+            artifact: id of the measurement in the lake; None where it is not to be there.
+        """
         from measure.estimate.nearest import nearest
         from measure.estimate.page import Context, Section, page
         from measure.refine.section import section
@@ -269,9 +284,7 @@ class _Job:
         sections = ()
         if refinement is not None:
             sections = (Section(anchor="refinement", title="Refined by simulation", body=section(refinement)),)
-        text = page(measured, series, context, anyway=self.anyway, sections=sections)
-        write_file(path, text, command="measure")
-        say(f"report: {path}")
+        return page(measured, series, context, anyway=self.anyway, sections=sections)
 
     def _provenance(self, subject: Subject, artifact: str | None) -> Mapping[str, str]:
         film = subject.film

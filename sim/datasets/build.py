@@ -79,6 +79,7 @@ class Build:
     device: str = "cpu"
     _new_sequences: int = field(default=0, init=False)
     _new_films: int = field(default=0, init=False)
+    _clips: int = field(default=0, init=False)
 
     def run(self) -> BuildReport:
         """Make what is missing.
@@ -96,7 +97,7 @@ class Build:
         failed = [f"{roll.cast.simulation.name} {index}: {why}" for roll in rolls for index, why in roll.failed.items()]
         return BuildReport(
             sequences=sum(roll.cast.simulation.count for roll in rolls), films=len(films),
-            new_sequences=self._new_sequences, new_films=self._new_films, clips=self._clips(films),
+            new_sequences=self._new_sequences, new_films=self._new_films, clips=self._clips,
             failed=tuple(failed), seconds=time.perf_counter() - begun,
         )  # fmt: skip
 
@@ -159,9 +160,12 @@ class Build:
         films = self.films(rolls)
         frames = self.recipe.simulation.time.frames
         self._refuse_other_names(films)
-        self._refuse_mixture({film.artifact(frames=frames).id for film in films})
+        own = {film.artifact(frames=frames).id for film in films}
+        self._refuse_mixture(own)
         known = self._known()
         missing = [film for film in films if film.artifact(frames=frames).id not in known]
+        clips = self.lake.rows({"kind": Kind.CLIP}, at=self.branch, columns=["recording"])["recording"].to_pylist()
+        self._clips = sum(recording in own for recording in clips)
         with self.bars(len(films), f"{self.recipe.name}: render", "film") as advance:
             advance(len(films) - len(missing))
             waiting: list[Filmed] = []
@@ -222,15 +226,9 @@ class Build:
                 recording = _recording(done, record, stored=stored)
                 transaction.add(replace(recording, branch=self.branch))
                 for clip in clip_rows(record, recording):
-                    transaction.add(clip)
+                    self._clips += transaction.add(clip)
         self._new_films += len(filmed)
         return len(filmed)
-
-    def _clips(self, films: Sequence[Film]) -> int:
-        frames = self.recipe.simulation.time.frames
-        own = {film.artifact(frames=frames).id for film in films}
-        clips = self.lake.rows("kind = 'clip'", at=self.branch, columns=["recording"])["recording"].to_pylist()
-        return sum(recording in own for recording in clips)
 
 
 def _recording(done: Filmed, record: Record, *, stored: str) -> Artifact:

@@ -106,7 +106,7 @@ def ingest_meshes(
             report=json.dumps(report, allow_nan=False, ensure_ascii=False),
         )
         transaction.add(artifact)
-    return result_of(lake, transaction, artifact, report, labels, branch=branch)
+    return result_of(transaction, artifact, report, labels)
 
 
 def scene_wind(scene: Any) -> dict[str, float] | None:
