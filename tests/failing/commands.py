@@ -108,13 +108,13 @@ def artifacts(folder: Path) -> object:
 
 
 def files(*places: str) -> Callable[[Path], object]:
-    """Files at these places of the folder, or under them, with their hashes; without scratch files."""
+    """What is at these places of the folder and under them: folders, and files with their hashes; no scratch files."""
 
     def found(folder: Path) -> object:
         every = [entry for place in places for entry in ((folder / place), *(folder / place).rglob("*"))]
         return frozenset(
-            (str(path.relative_to(folder)), hashlib.sha256(path.read_bytes()).hexdigest())
-            for path in every if path.is_file() and not path.name.startswith(".")
+            (str(path.relative_to(folder)), path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest())
+            for path in every if path.exists() and not path.name.startswith(".")
         )  # fmt: skip
 
     return found
