@@ -72,10 +72,12 @@ def confirming(what: str, where: Path) -> Iterator[None]:
     """Work on `what` after it was published: what the disk refuses is a warning, since it stays published."""
     try:
         yield
-    except OSError as error:
+    except (OSError, FlagdataError) as error:
+        refused = isinstance(error, OSError)
+        said = (error.strerror or str(error)) if refused else error.what
         _LOG.warning(
             "flagdata: warning: %s is published, but the disk did not confirm it (%s)\n  where: %s\n  fix:   %s",
-            what, " ".join((error.strerror or str(error)).split()), error.filename or where,
+            what, " ".join(said.split()), (error.filename if refused else error.where) or where,
             "check the disk, then run flagdata doctor: until it confirms, a power cut may lose it",
         )  # fmt: skip
 

@@ -120,7 +120,7 @@ class Transaction:
         with disk_errors("committing", self._lake.catalog.path):
             try:
                 self._result = self._publish()
-            except OSError:
+            except (OSError, FlagdataError):
                 if self._result is None:
                     raise
 
