@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import json
 import re
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 import pytest
@@ -296,3 +297,31 @@ def test_a_hanging_cloth_is_measured_by_a_model_of_it(film: Path, cloth_folder: 
 def test_a_hanging_cloth_is_not_refined_by_simulating_flags(film: Path, cloth_folder: Path) -> None:
     said = run(film, "--model", cloth_folder, "--flag-size", "1.0x1.0", "--anyway", "--refine", "28", "--json", code=2)
     assert "hanging-cloth" in said.stdout + said.stderr
+
+
+def refused_by_the_disk(*_: object, **__: object) -> NoReturn:
+    raise OSError(errno.EIO, "Input/output error")
+
+
+def test_a_measurement_that_is_committed_is_reported_whatever_becomes_of_its_files(
+    lake: Path, model_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each file that the disk refuses is a warning of its own; without a commit it is an error."""
+    monkeypatch.setattr("flagdata.outputs.fresh_folder", refused_by_the_disk)
+    monkeypatch.setattr("flagdata.outputs.write_file", refused_by_the_disk)
+    files = ("--report", tmp_path / "report.html", "--zarr", tmp_path / "series.zarr")
+    options = ("made-1", "--lake", lake, *SIZED, "--model", model_folder, "--anyway", *files, "--json")
+    done = run(*options)
+    assert json.loads(done.stdout)["artifact"] == measurements(lake)[0]["artifact"]
+    for what in ("its Zarr folder", "its report"):
+        assert f"is published, but writing {what} failed: the system refused: Input/output error" in done.stderr
+    run(*options, "--read-only", code=1)
+
+
+def test_what_a_report_shows_is_read_before_the_commit(
+    lake: Path, model_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("measure.estimate.nearest.nearest", refused_by_the_disk)
+    options = ("made-1", "--lake", lake, *SIZED, "--model", model_folder, "--anyway")
+    run(*options, "--report", tmp_path / "report.html", code=1)
+    assert measurements(lake) == []

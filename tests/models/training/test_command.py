@@ -7,7 +7,7 @@ import shutil
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
@@ -25,6 +25,7 @@ from flagdata.errors import (
     UsageError,
 )
 from flagdata.lake import Lake
+from flagdata.lake.catalog import Catalog
 from flagdata.locks import alone_in
 from models import estimator, shipping
 from models.storage import WEIGHTS, read_card
@@ -74,6 +75,29 @@ def test_training_again_changes_nothing(lake: Path) -> None:
     report = run("train", str(lake.parent / "small.toml"), "--at", "v1", "--lake", str(lake))
     assert report["seed"] == 1
     assert Lake.open(lake).rows().num_rows == before
+
+
+def test_a_model_that_is_committed_is_reported_without_reading_the_lake_again(
+    lake: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A catalog that cannot be read once the model is in it."""
+    append = Catalog.append
+
+    def then_unreadable(*arguments: Any, **options: Any) -> int:
+        version = append(*arguments, **options)
+        for name in ("head", "rows"):
+            monkeypatch.setattr(Catalog, name, unreadable)
+        return version
+
+    def unreadable(*_: object) -> NoReturn:
+        raise CorruptError("the catalog cannot be read", fix="check the disk")
+
+    monkeypatch.setattr(Catalog, "append", then_unreadable)
+    report = run("train", str(lake.parent / "small.toml"), "--at", "v1", "--seed", "3", "--lake", str(lake))
+    monkeypatch.undo()
+    row = Lake.open(lake).artifact(report["artifact"])
+    assert (row.seed, row.object) == (3, report["object"])
+    Lake.open(lake).withdraw([row.id], "of another test")
 
 
 def test_models_are_judged_with_intervals_over_simulations(lake: Path, tmp_path: Path) -> None:
