@@ -119,6 +119,7 @@ class Catalog:
         self._table: DeltaTable | None = None
         self._files: dict[str, pa.Table] = {}
         self._rows: tuple[int, pa.Table] | None = None
+        self._history: tuple[int, list[dict[str, Any]]] | None = None
 
     def __reduce__(self) -> tuple[type[Catalog], tuple[Path, Path]]:
         return (Catalog, (self.path, self._marks))
@@ -259,15 +260,19 @@ class Catalog:
         Args:
             limit: the newest so many; all if `None`.
         """
-        return [
-            {
-                "version": entry["version"],
-                "timestamp": entry["timestamp"],
-                "operation": entry["operation"],
-                **{k.removeprefix(_INFO_PREFIX): v for k, v in entry.items() if k.startswith(_INFO_PREFIX)},
-            }
-            for entry in self._open(self.head()).history(limit)
-        ]
+        head = self.head()
+        if self._history is None or self._history[0] != head:
+            entries = [
+                {
+                    "version": entry["version"],
+                    "timestamp": entry["timestamp"],
+                    "operation": entry["operation"],
+                    **{k.removeprefix(_INFO_PREFIX): v for k, v in entry.items() if k.startswith(_INFO_PREFIX)},
+                }
+                for entry in self._open(head).history()
+            ]
+            self._history = (head, entries)
+        return self._history[1][:limit]
 
     def _commit(
         self, table: DeltaTable, rows: pa.Table, *, removed: Sequence[str], rows_change: bool, info: Mapping[str, str]

@@ -18,6 +18,7 @@ from flagdata.lake.leases import LeaseState, collecting, last_written, leases, u
 from flagdata.lake.log import LogGapError
 from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import StoredObject
+from flagdata.lake.removals import removals
 from flagdata.schema import FORMAT_VERSION
 
 GRACE = timedelta(hours=24)
@@ -46,6 +47,7 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
         return tuple(findings)  # what follows would call the files of the missing entries' commits leftovers
     if not marked.findings:
         held = {name for state in states if state.alive for name in state.objects}
+        findings += _collected(lake, marked, {found.name for found in stored})
         needed = marked.objects | held
         findings += [_orphan(found, grace) for found in stored if found.name not in needed]
     findings += _strays(lake, foreign)
@@ -177,6 +179,30 @@ def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign:
                 error("object-size", what, f"{again}; flagdata recover saves what a cut-off record still has")
             )
     return findings
+
+
+def _collected(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
+    """A note where gc has deleted what was withdrawn, so that older versions show rows without data."""
+    needed = {name for table in marked.refs.values() for name in table["object"].drop_null().to_pylist()}
+    gone = {
+        removal.version: sum(name not in needed and name not in stored for name in removal.objects.values())
+        for removal in removals(lake)
+    }
+    versions = [version for version, count in gone.items() if count]
+    if not versions:
+        return []
+    told = ", ".join(str(version) for version in sorted(versions)[-3:])
+    return [
+        Finding(
+            kind="withdrawn-collected",
+            severity=Severity.NOTE,
+            what=f"{sum(gone.values())} artifacts that were withdrawn have no data any more: gc deleted it (see"
+            f" version {told}{' and others' if len(versions) > 3 else ''})",
+            where=f"versions before {max(versions)}",
+            count=sum(gone.values()),
+            fix=f"none needed; all tags, and versions from {max(versions)} on, are whole without them",
+        )
+    ]
 
 
 def _orphan(stored: StoredObject, grace: timedelta) -> Finding:

@@ -8,7 +8,6 @@ import uuid
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
-from graphlib import TopologicalSorter
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -22,15 +21,19 @@ from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownN
 from flagdata.files import open_regular
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
-from flagdata.lake.catalog import ROW_ORDER, Catalog, newer, persist
+from flagdata.lake.catalog import ROW_ORDER, Catalog, newer
+from flagdata.lake.deletion import check_reuse, delete
 from flagdata.lake.durable import disk_errors, put_if_absent
 from flagdata.lake.layout import STAGING, STORES, check_writable, scratch_files
-from flagdata.lake.leases import collecting, keeping_collectors_out
+from flagdata.lake.leases import collecting
+from flagdata.lake.lineage import Lineage
 from flagdata.lake.matching import Where, matching
+from flagdata.lake.merging import MergeResult, merge
 from flagdata.lake.objects import Objects
-from flagdata.lake.refs import MAIN, Ref, Refs, View
-from flagdata.lake.transaction import CommitResult, Transaction
-from flagdata.lake.withdrawal import Withdrawal, check_leaving, clips_of, descendants
+from flagdata.lake.refs import MAIN, Ref, Refs, Slice, View
+from flagdata.lake.removals import explained
+from flagdata.lake.transaction import Transaction
+from flagdata.lake.withdrawal import Withdrawal, descendants, withdraw
 from flagdata.schema import CATALOG, FORMAT_VERSION
 
 _MARKER = "lake.json"
@@ -194,9 +197,12 @@ class Lake:
 
         Raises:
             InputError: not an object's name.
-            NotFoundError: it is not there.
+            NotFoundError: it is not there; if gc deleted it, after which version.
         """
-        return self.objects.existing(object)
+        try:
+            return self.objects.existing(object)
+        except NotFoundError as error:
+            raise explained(self, object, error) from None
 
     def resolve(self, at: str | None) -> int:
         """The Delta version a ref stands for (for a tag of a branch, the branch's).
@@ -211,11 +217,13 @@ class Lake:
 
         Raises:
             UsageError: a name that cannot be one.
-            ConflictError: the name is taken.
+            ConflictError: the name is taken, or was that of a tag that showed other artifacts.
         """
         self.check_writable()
         with collecting(self.staging):  # one ref at a time, so that no name is both a tag and a branch
-            return self.refs.put("tags", name, self.view(at))
+            view = self.view(at)
+            check_reuse(self, name, view)
+            return self.refs.put("tags", name, view)
 
     def branch(self, name: str, *, at: str | None = None) -> Ref:
         """Begin a branch from what `at` shows.
@@ -228,55 +236,58 @@ class Lake:
         with collecting(self.staging):  # one ref at a time, so that no name is both a tag and a branch
             return self.refs.put("branches", name, self.view(at))
 
-    def merge(self, branch: str, message: str, *, into: str = MAIN) -> CommitResult:
-        """Commit on `into` what was committed on `branch` itself; rows that are there already stay as they are.
+    def delete_tag(self, name: str, message: str | None = None, *, discard: bool = False) -> int:
+        """Delete a tag; the version that notes it. Its name never shows another version.
 
-        Rows are only ever added, so nothing can conflict; what `branch` withdrew is not withdrawn from `into`.
+        Objects that only it showed stay for the grace period of garbage collection.
+
+        Args:
+            discard: also where it alone shows some rows.
+
+        Raises:
+            NotFoundError: no such tag.
+            ConflictError: it alone shows some rows.
+        """
+        return delete(self, "tags", name, message, discard=discard)
+
+    def delete_branch(self, name: str, message: str | None = None, *, discard: bool = False) -> int:
+        """Delete a branch; the version that takes its rows off. Tags, commits and branches made from it stay.
+
+        Args:
+            discard: also where it alone shows some rows.
 
         Raises:
             NotFoundError: no such branch.
-            NotFoundError: a row was made from one that `into` does not show: merge the branch it is on first.
+            ConflictError: it alone shows some rows.
+            UsageError: main.
         """
-        self.check_writable()
-        own = self.refs.view(branch, self.catalog.head())[0]
-        if own.branch != branch or branch == into:
-            raise UsageError(f"{branch!r} cannot be merged into {into!r}", fix="name two branches")
-        rows = {row["artifact"]: row for row in self.table((own,)).to_pylist()}
-        parents = {artifact: [p for p in row["parents"] if p in rows] for artifact, row in rows.items()}
-        with self.transaction(message, branch=into) as transaction:
-            for artifact in TopologicalSorter(parents).static_order():  # the table's order is by time, not by descent
-                transaction.add(Artifact.from_row(rows[artifact]))
-        return transaction.result
+        return delete(self, "branches", name, message, discard=discard)
+
+    def merge(self, branch: str, message: str, *, into: str = MAIN) -> MergeResult:
+        """Commit on `into` what `branch` changed since the two last had the same: its new rows come, rows that it
+        withdrew go. Rows that `into` withdrew meanwhile stay withdrawn. See `flagdata.lake.merging`.
+
+        Raises:
+            NotFoundError: no such branch, or an object of a new row is missing.
+            ConflictError: a row would lack what it was made from, which was withdrawn on the other branch.
+            UsageError: no message, or a branch into itself.
+        """
+        return merge(self, branch, message, into=into)
 
     def withdraw(self, artifacts: Sequence[str], message: str, *, branch: str = MAIN) -> Withdrawal:
         """Take rows off a branch, in one commit; clips that are slices of a withdrawn recording go along with it.
 
-        Tags made before keep showing them. Their objects stay for as long as a tag or another branch needs them, and
-        then for the grace period of garbage collection.
+        The branch that this one began from keeps showing its own; tags made before keep showing them. Their objects
+        stay for as long as a tag or another branch needs them, and then for the grace period of garbage collection.
 
         Args:
             artifacts: full ids.
 
         Raises:
-            NotFoundError: one that was not committed on this branch itself (but maybe on its parent).
+            NotFoundError: one that the branch does not show.
             ConflictError: a row that stays on the branch was made from one of them; see `descendants`.
         """
-        asked = frozenset(artifacts)
-
-        def attempt() -> Withdrawal:
-            head = self.catalog.head()
-            shown = self.table(self.refs.view(branch, head))
-            clips = clips_of(shown, asked)
-            leaving = asked | clips
-            check_leaving(shown, leaving, branch=branch, where=str(self.path))
-            info = {"message": message, "branch": branch, "withdrawn": str(len(leaving))}
-            drop = (pc.field("branch") == branch) & pc.field("artifact").isin(sorted(leaving))
-            version = self.catalog.replace(self.catalog.rows(head).filter(~drop), base=head, info=info)
-            return Withdrawal(version=version, asked=tuple(sorted(asked)), clips=tuple(sorted(clips)))
-
-        self.check_writable()
-        with disk_errors("withdrawing", self.path), keeping_collectors_out(self.staging):
-            return persist(attempt, where=self.catalog.path)
+        return withdraw(self, artifacts, message, branch=branch)
 
     def descendants(self, artifacts: Collection[str], *, at: str | None = None) -> frozenset[str]:
         """Ids of all rows at a ref that were made from `artifacts` (full ids), directly or not; without these."""
@@ -292,16 +303,31 @@ class Lake:
 
     def table(self, view: View) -> pa.Table:
         """All rows of a view, its base first. An identity is on one branch of a view only."""
-        parts = []
-        for part in view:
-            rows = self.catalog.rows(part.version)
-            parts.append(rows.filter(pc.field("branch") == part.branch))
-        if len(parts) == 1:
-            return parts[0]
-        return pa.concat_tables(reversed(parts))
+        *later, first = view
+        rows = self._own(first)
+        for part in reversed(later):
+            hidden = self.lineage().hidden(part)
+            if hidden:
+                rows = rows.filter(~pc.field("artifact").isin(sorted(hidden)))
+            rows = pa.concat_tables([rows, self._own(part)])
+        return rows
 
-    def _commits(self) -> dict[str, tuple[int, str]]:
-        return {e["commit"]: (e["version"], e["branch"]) for e in self.catalog.history() if "commit" in e}
+    def lineage(self) -> Lineage:
+        """How branches came to be, as known at the head."""
+        return Lineage(self.catalog.history(), {name: ref.view for name, ref in self.refs.branches().items()})
+
+    def _own(self, part: Slice) -> pa.Table:
+        """The rows of one branch at one version."""
+        return self.catalog.rows(part.version).filter(pc.field("branch") == part.branch)
+
+    def _commits(self) -> dict[str, View]:
+        lineage = self.lineage()
+        parts = {
+            entry["commit"]: Slice(branch=entry["branch"], version=entry["version"])
+            for entry in self.catalog.history()
+            if "commit" in entry
+        }
+        return {commit: lineage.view(part) for commit, part in parts.items() if lineage.fork(part) is not None}
 
 
 @contextmanager
