@@ -143,9 +143,7 @@ def _deletion_options(command: F) -> F:
     """Adds --delete, --discard and --message to the command of tags or of branches."""
     for option in (
         click.option("--message", "-m", help="--delete: why."),
-        click.option(
-            "--discard", is_flag=True, help="--delete: also where it alone shows artifacts; gc deletes these."
-        ),
+        click.option("--discard", is_flag=True, help="--delete: also if it alone shows artifacts, which gc deletes."),
         click.option("--delete", is_flag=True, help="Delete NAME; the log notes what it showed."),
     ):
         command = option(command)

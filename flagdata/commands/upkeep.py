@@ -14,7 +14,7 @@ from flagdata.addresses import local_path
 from flagdata.commands.lake import counted, size_text
 from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
 from flagdata.errors import NotFoundError
-from flagdata.findings import Finding
+from flagdata.findings import Finding, Severity
 
 _GATE_NOT_MET = 3
 _CENTURY = 36_525 * 86_400  # s
@@ -76,10 +76,13 @@ def doctor(deep: bool, grace: timedelta, as_json: bool, lake_path: str) -> None:
     from flagdata.lake.health import catalog_files
     from flagdata.lake.health import doctor as examined
     from flagdata.lake.health import verify as verified
+    from flagdata.schema import Kind
 
     lake = Lake.open(lake_path)
-    winds = lake.rows("kind = 'wind'").to_pylist()
-    findings = (*examined(lake, grace=grace), *unconfirmed(Artifact.from_row(row) for row in winds))
+    findings = examined(lake, grace=grace)
+    if all(f.severity is not Severity.ERROR for f in findings):  # else rows may not be readable
+        winds = lake.rows({"kind": Kind.WIND}).to_pylist()
+        findings += unconfirmed(Artifact.from_row(row) for row in winds)
     checked = "structure checked, contents not (flagdata verify)"
     if deep:
         findings += tuple(f for f in catalog_files(lake) if f.kind not in {found.kind for found in findings})

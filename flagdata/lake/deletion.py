@@ -11,7 +11,8 @@ from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, Usag
 from flagdata.lake.catalog import persist
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.leases import collecting
-from flagdata.lake.refs import MAIN, View, as_json, view_from
+from flagdata.lake.lineage import noted_view
+from flagdata.lake.refs import MAIN, View, as_json
 from flagdata.lake.withdrawal import take_off
 
 if TYPE_CHECKING:
@@ -78,9 +79,8 @@ def check_reuse(lake: Lake, name: str, view: View) -> None:
     Raises:
         ConflictError: a deleted tag of that name showed other artifacts.
     """
-    showed = [json.loads(e["view"]) for e in lake.catalog.history() if e.get("deleted") == f"tag {name}"]
-    for old in showed:
-        if _shown(lake, view_from(old)) != _shown(lake, view):
+    for entry in lake.catalog.history():
+        if entry.get("deleted") == f"tag {name}" and _shown(lake, noted_view(entry)) != _shown(lake, view):
             raise ConflictError(
                 f"a tag {name!r} showed other artifacts until it was deleted",
                 where=str(lake.path),

@@ -56,9 +56,10 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
     try:
         findings += [_unpublished(path, grace) for path in lake.unpublished_files()]
     except FlagdataError as error:
-        found = Finding(kind="log-damaged", severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
-        findings += [found] if found not in findings else []
-    return tuple(findings)
+        findings.append(
+            Finding(kind="log-damaged", severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
+        )
+    return tuple(dict.fromkeys(findings))  # an entry that cannot be read stops more than one check
 
 
 def verify(lake: Lake, names: Sequence[str], *, advance: Callable[[int], None] = lambda _: None) -> tuple[Finding, ...]:
@@ -84,7 +85,8 @@ def verify_catalog(lake: Lake) -> tuple[Finding, ...]:
     """Re-hash the catalog's files and read every ref; a finding for what is missing, damaged, a link, or cannot be
     checked."""
     foreign = [path for path in _foreign(lake) if path.parent.name not in STORES]  # objects are `verify`'s
-    return (*map(_linked, foreign), *mark(lake, grace=timedelta(0)).findings, *catalog_files(lake))
+    found = (*map(_linked, foreign), *mark(lake, grace=timedelta(0)).findings, *catalog_files(lake))
+    return tuple(dict.fromkeys(found))  # an entry that cannot be read stops both
 
 
 def object_names(lake: Lake) -> list[str]:
@@ -196,8 +198,8 @@ def _collected(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Find
         Finding(
             kind="withdrawn-collected",
             severity=Severity.NOTE,
-            what=f"{sum(gone.values())} artifacts that were withdrawn have no data any more: gc deleted it (see"
-            f" version {told}{' and others' if len(versions) > 3 else ''})",
+            what=f"gc deleted the data of withdrawn artifacts: {sum(gone.values())} in all, withdrawn by version {told}"
+            f"{' and others' if len(versions) > 3 else ''}",
             where=f"versions before {max(versions)}",
             count=sum(gone.values()),
             fix=f"none needed; all tags, and versions from {max(versions)} on, are whole without them",

@@ -8,16 +8,54 @@ told by the version that deleted the one before it.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
-from flagdata.errors import NotFoundError
+from flagdata.documents import from_json
+from flagdata.errors import CorruptError, NotFoundError
 from flagdata.lake.refs import MAIN, Slice, View, view_from
 
 Entry = Mapping[str, Any]
 Life = tuple[str, int]
 """A branch, and the version that deleted the last one of its name; -1 for the first."""
+
+
+def noted_hidden(entry: Entry) -> frozenset[str]:
+    """Ids of the rows of its base that a commit hides on its branch.
+
+    Raises:
+        CorruptError: the note cannot be read.
+    """
+    with _reading(entry):
+        return frozenset(str(artifact) for artifact in from_json(entry.get("hidden", "[]")))
+
+
+def noted_view(entry: Entry) -> View:
+    """What the tag showed that a commit deleted, or what the branch began from.
+
+    Raises:
+        CorruptError: the note cannot be read.
+    """
+    with _reading(entry):
+        return view_from(from_json(entry["view"]))
+
+
+def _noted_merge(entry: Entry) -> Slice:
+    with _reading(entry):
+        return Slice(branch=entry["merged"], version=int(entry["merged_version"]))
+
+
+@contextmanager
+def _reading(entry: Entry) -> Iterator[None]:
+    try:
+        yield
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise CorruptError(
+            f"what version {entry['version']} notes of branches cannot be read",
+            where="the catalog's log",
+            fix="run flagdata verify; restore the log entry from a copy",
+        ) from None
 
 
 class Lineage:
@@ -41,7 +79,7 @@ class Lineage:
         later = (entry for entry in self._entries.get(part.branch, ()) if entry["version"] > part.version)
         for entry in later:
             if "deleted" in entry:
-                return view_from(json.loads(entry["view"]))
+                return noted_view(entry)
         return self._forks.get(part.branch)
 
     def view(self, part: Slice) -> View:
@@ -67,8 +105,7 @@ class Lineage:
 
     def hidden(self, part: Slice) -> frozenset[str]:
         """Ids of rows of its base that a branch does not show, since they were withdrawn from it."""
-        notes = (json.loads(entry["hidden"]) for entry in self.commits(part) if "hidden" in entry)
-        return frozenset(artifact for note in notes for artifact in note)
+        return frozenset(artifact for entry in self.commits(part) for artifact in noted_hidden(entry))
 
     def knows(self, part: Slice, other: Slice) -> bool:
         """Whether all commits that went into `other` went into `part` too."""
@@ -97,7 +134,7 @@ class Lineage:
             part = parts.pop()
             life = self.life(part)
             fresh = [e for e in self.commits(part) if e["version"] > newest.get(life, -1)]
-            parts += [Slice(branch=e["merged"], version=int(e["merged_version"])) for e in fresh if "merged" in e]
+            parts += [_noted_merge(entry) for entry in fresh if "merged" in entry]
             if fresh:
                 newest[life] = fresh[-1]["version"]
             if life not in begun:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,8 +13,9 @@ import pyarrow as pa
 
 from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
+from flagdata.lake.lineage import noted_hidden, noted_view
 from flagdata.lake.log import LogGapError
-from flagdata.lake.refs import MAIN, Slice, view_from
+from flagdata.lake.refs import MAIN, Slice
 from flagdata.provenance import file_hash
 
 if TYPE_CHECKING:
@@ -132,10 +132,10 @@ def _withdrawn(lake: Lake, *, since: datetime) -> Iterator[pa.Table]:
             continue
         if "withdrawn" in entry:
             yield lake.catalog.rows(entry["version"] - 1)
-        if json.loads(entry.get("hidden", "[]")):  # rows of a base, which may have left the table long ago
+        if noted_hidden(entry):  # rows of a base, which may have left the table long ago
             yield lake.table(lake.lineage().view(Slice(branch=entry["branch"], version=entry["version"] - 1)))
         if "deleted" in entry:
-            yield lake.table(view_from(json.loads(entry["view"])))
+            yield lake.table(noted_view(entry))
 
 
 def _unreadable(error: FlagdataError, where: str) -> Finding:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
 from flagdata.errors import FlagdataError, NotFoundError
+from flagdata.lake.lineage import noted_hidden
 from flagdata.lake.marking import mark
+from flagdata.lake.refs import MAIN
 
 if TYPE_CHECKING:
     from flagdata.lake.lake import Lake
@@ -42,9 +43,9 @@ def removals(lake: Lake, *, since: int = -1) -> Iterator[Removal]:
             left = {row["artifact"]: row["object"] for row in rows if (row["artifact"], row["branch"]) not in stayed}
             yield Removal(
                 version=entry["version"],
-                branch=entry["branch"],
-                message=entry["message"],
-                artifacts=frozenset(left) | frozenset(json.loads(entry.get("hidden", "[]"))),
+                branch=entry.get("branch", MAIN),
+                message=entry.get("message", ""),
+                artifacts=frozenset(left) | noted_hidden(entry),
                 objects={artifact: name for artifact, name in left.items() if name is not None},
             )
 
