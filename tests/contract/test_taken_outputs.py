@@ -22,7 +22,7 @@ CASES: dict[str, tuple[tuple[str, ...], str]] = {
     "close-loop --out": (("close-loop", "nowhere.csv", "--lake", "nowhere", "--out", "{out}"), "model.toml"),
     "case --out": (("case", "paper-flag", ".", "--out", "{out}"), "plane.png"),
     "propose --out, ledger": (("propose", "nowhere.toml", "--out", "{out}"), "proposal/ledger.json"),
-    "propose --out, effect": (("propose", "nowhere.toml", "--out", "{out}"), "proposal/proposed_0123456789ab.py"),
+    "propose --out, effect": (("propose", "nowhere.toml", "--out", "{out}"), "proposal/pyproject.toml"),
     "challenge make": (("challenge", "make", "{out}", "--seed", "1"), "mine"),
     "challenge bank": (("challenge", "bank", "{out}", "--seed", "1"), "mine"),
     "challenge score --out": (("challenge", "score", "nowhere", "--out", "{out}"), "challenge-score.png"),
