@@ -154,7 +154,7 @@ class Source:
                 if name is None:
                     raise CorruptError("a row without an object", where=row["artifact"], fix="run flagdata doctor")
                 if name not in checked:
-                    self.lake.objects.check(name)
+                    self.lake.whole_object(name)
                     checked.add(name)
                 if opened is None or opened[0] != name:
                     opened = (name, Record.open(self.lake.object_path(name)))

@@ -204,6 +204,18 @@ class Lake:
         except NotFoundError as error:
             raise explained(self, object, error) from None
 
+    def whole_object(self, object: str) -> Path:  # noqa: A002 — the catalog's name for it
+        """Where an object lies, once its bytes have been compared with its name.
+
+        Raises:
+            NotFoundError: as `object_path`.
+            LinkError: it is, or holds, a link or special file.
+            CorruptError: its bytes are not what its name says.
+        """
+        path = self.object_path(object)
+        self.objects.check(object)
+        return path
+
     def resolve(self, at: str | None) -> int:
         """The Delta version a ref stands for (for a tag of a branch, the branch's).
 

@@ -208,8 +208,7 @@ class Build:
         rows = self.lake.rows("kind = 'meshes'", at=self.branch, columns=["artifact", "object"]).to_pylist()
         objects = {row["artifact"]: row["object"] for row in rows}
         for film in films:
-            self.lake.objects.check(objects[film.sequence])  # damage must not be filmed
-            sequence = read_meshes(self.lake.object_path(objects[film.sequence]))
+            sequence = read_meshes(self.lake.whole_object(objects[film.sequence]))  # damage must not be filmed
             yield jobs.film, (self.recipe, film, sequence, self.device)
 
     def _commit(self, filmed: Sequence[Filmed]) -> int:

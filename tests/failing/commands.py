@@ -41,11 +41,12 @@ class Scene:
 
 
 def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callable[..., Path]) -> Scene:
-    """A lake with a film, a log, a branch and garbage; films, logs, meshes, a cut record and recipes beside it."""
+    """A lake with a film, a log, a branch, a tag and garbage; films, logs, meshes, a cut record and recipes beside it."""
     lake = Lake.create(folder / "lake")
     camera = ingest_camera(lake, write_video(folder / "first.mp4", frames=30)).artifact
     wind = ingest_wind(lake, wind_log).artifact
     lake.branch("side")
+    lake.tag("v0")
     (folder / "second.mp4").write_bytes(video.read_bytes())
     (folder / "second.csv").write_text(wind_log.read_text().replace("+02:00,5.", "+02:00,6."))
     third = ingest_camera(lake, write_video(folder / "third.mp4", frames=28), branch="side").artifact
@@ -134,8 +135,15 @@ COMMANDS = {
     "merge": Command(arguments=("merge", "side", *_LAKE), state=rows),
     "withdraw": Command(arguments=("withdraw", "{camera}", "-m", "wrong", *_LAKE), state=rows),
     "tag": Command(arguments=("tag", "v1", *_LAKE), state=lambda folder: {*Lake.open(folder / "lake").refs.tags()}),
+    "tag --delete": Command(
+        arguments=("tag", "v0", "--delete", *_LAKE), state=lambda folder: {*Lake.open(folder / "lake").refs.tags()}
+    ),
     "branch": Command(
         arguments=("branch", "more", *_LAKE), state=lambda folder: {*Lake.open(folder / "lake").refs.branches()}
+    ),
+    "branch --delete": Command(
+        arguments=("branch", "side", "--delete", "--discard", *_LAKE),
+        state=lambda folder: {*Lake.open(folder / "lake").refs.branches()},
     ),
     "init": Command(
         arguments=("init", "{folder}/new"), state=lambda folder: (folder / "new" / "lake.json").exists(), lake="new"

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from datetime import timedelta
+from pathlib import Path
 
 import pytest
 
 from flagdata.cli import main
 from flagdata.errors import ConflictError, NotFoundError, UsageError
+from flagdata.export import Export, prepare
 from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.collect import collect
@@ -208,8 +210,9 @@ def test_a_process_that_dies_between_the_commit_and_the_ref_leaves_a_whole_lake(
 
 
 def test_versions_whose_data_gc_deleted_are_named_by_doctor_and_by_what_needs_the_data(
-    lake: Lake, put_text: Put
+    lake: Lake, put_text: Put, tmp_path: Path
 ) -> None:
+    request = Export(format="mcap", where="name = 'gone'", at="2", options={})
     kept, gone = put_text(lake, "kept"), put_text(lake, "gone")
     lake.withdraw([gone.id], "faces of people in it")
     assert doctor(lake, grace=DAY) == ()
@@ -217,10 +220,11 @@ def test_versions_whose_data_gc_deleted_are_named_by_doctor_and_by_what_needs_th
     (finding,) = doctor(lake, grace=DAY)
     assert (finding.kind, finding.severity, finding.count) == ("withdrawn-collected", Severity.NOTE, 1)
     assert finding.where == "versions before 3"
-    with pytest.raises(NotFoundError, match=r"withdrawn by version 3 \(faces of people in it\).*gc") as told:
-        lake.object_path(str(gone.object))
-    assert "from 3 on" in told.value.fix
-    assert "doctor" not in told.value.fix
+    for use in (lake.object_path, lake.whole_object, lambda _: prepare(lake, request).write(tmp_path / "out")):
+        with pytest.raises(NotFoundError, match=r"withdrawn by version 3 \(faces of people in it\).*gc") as told:
+            use(str(gone.object))
+        assert "from 3 on" in told.value.fix
+        assert "doctor" not in told.value.fix
     lake.object_path(str(kept.object)).unlink()  # nobody withdrew this one
     with pytest.raises(NotFoundError, match="run flagdata doctor"):
         lake.object_path(str(kept.object))
