@@ -41,7 +41,7 @@ class Scene:
 
 
 def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callable[..., Path]) -> Scene:
-    """A lake with a film, a log, a branch, a tag and garbage; films, logs, meshes, a cut record and recipes beside it."""
+    """A lake with a film, a log, a branch, a tag and garbage; beside it films, logs, meshes, a cut record, recipes."""
     lake = Lake.create(folder / "lake")
     camera = ingest_camera(lake, write_video(folder / "first.mp4", frames=30)).artifact
     wind = ingest_wind(lake, wind_log).artifact
