@@ -106,7 +106,9 @@ def main(arguments: list[str] | None = None) -> None:
             document("error", {"kind": UsageError.kind, "what": error.format_message(), "where": None, "fix": _HELP})
         error.show()
         sys.exit(error.exit_code)
-    except (click.Abort, KeyboardInterrupt):
+    except (click.Abort, KeyboardInterrupt) as error:
+        if isinstance(error.__cause__, EOFError):  # of a file, which click takes for the end of the user's input
+            sys.exit(fail(foreseen(error.__cause__), as_json="--json" in given))
         click.echo("flagdata: interrupted", err=True)
         sys.exit(1)
     except Exception as error:  # noqa: BLE001  whatever it is, a user is told in one form

@@ -13,7 +13,8 @@ from typing import Any
 
 from flagdata.addresses import local_path
 from flagdata.documents import SIZE_LIMIT, LimitsError, from_toml
-from flagdata.errors import InputError, LimitError, NotFoundError, UnknownNameError
+from flagdata.errors import InputError, LimitError, UnknownNameError
+from flagdata.files import check_input
 
 _SUFFIX = ".toml"
 NAME_LIMIT = 100
@@ -99,15 +100,23 @@ class Shelf:
                 f"a {self.noun} cannot be called {path.stem!r}", where=source,
                 fix=f"rename the file: 1 to {NAME_LIMIT} printable characters",
             )  # fmt: skip
-        if not path.is_file():
-            raise NotFoundError("no such recipe file", where=source, fix="check the path, or name one of the catalog")
-        try:
-            if (size := path.stat().st_size) > 4 * SIZE_LIMIT:  # bytes of a character of UTF-8
-                raise LimitError(f"a recipe of {size} bytes", where=source, fix=f"at most {4 * SIZE_LIMIT} are read")
-            data = path.read_bytes()
-        except OSError as error:
-            raise InputError(f"the recipe cannot be read: {error.strerror}", where=source, fix="check it") from None
-        return Found(name=path.stem, data=data, folder=path.parent, where=source)
+        return read_recipe(path)
+
+
+def read_recipe(path: Path) -> Found:
+    """The recipe in a file.
+
+    Raises:
+        NotFoundError: no such file.
+        InputError: it cannot be read, or is empty.
+        LimitError: larger than `SIZE_LIMIT` characters can be.
+    """
+    check_input(path, noun="recipe file", limit=4 * SIZE_LIMIT)  # bytes of a character of UTF-8
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"the recipe cannot be read: {error.strerror}", where=str(path), fix="check it") from None
+    return Found(name=path.stem, data=data, folder=path.parent, where=str(path))
 
 
 def is_name(value: object) -> bool:

@@ -13,7 +13,7 @@ import click
 from flagdata.addresses import local_path
 from flagdata.commands.lake import counted, size_text
 from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
-from flagdata.errors import NotFoundError
+from flagdata.files import check_input
 from flagdata.findings import Finding, Severity
 
 _GATE_NOT_MET = 3
@@ -140,10 +140,7 @@ def recover(source: str, target: Path, as_json: bool, lake_path: str) -> None:
     from flagdata.record import salvage
 
     path = Lake.open(lake_path).object_path(source) if OBJECT_NAME.fullmatch(source) else local_path(source)
-    if not path.is_file():
-        raise NotFoundError(
-            "there is no such record", where=source, fix="give an .mcap file, or mcap/<sha256> of the lake"
-        )
+    check_input(path, noun="record")
     with fresh_file(target) as scratch:
         findings = salvage(path, scratch)
     if as_json:

@@ -189,6 +189,6 @@ def read_set(folder: Path) -> Experiment:
             )
             for entry in about["recordings"]
         )  # fmt: skip
-    except (KeyError, ValueError, OSError) as error:
+    except (KeyError, ValueError, OSError, EOFError) as error:
         raise InputError(f"not a set: {error!r}", where=str(folder), fix="restore the folder as it was made") from error
     return Experiment(specimen=as_seen(specimen, recordings), recordings=recordings)

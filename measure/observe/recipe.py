@@ -36,7 +36,7 @@ from flagdata.ingest.anemometer.confirm import UNASKED, Accepting, Confirm
 from flagdata.ingest.markers import MarkerOptions
 from flagdata.ingest.meshes import read_obj
 from flagdata.lake import Lake
-from flagdata.recipes import Found, parsed
+from flagdata.recipes import parsed, read_recipe
 from flagdata.schema import Kind
 from flagdata.tables import DEGREES, Table
 from measure.observe import markers, meshes, wind
@@ -144,8 +144,6 @@ def parse(path: Path) -> ExperimentRecipe:
         InputError: a value that does not fit.
         UsageError: values that do not fit together.
     """
-    if not path.is_file():
-        raise NotFoundError("no such recipe file", where=str(path), fix="check the path")
     top = Table(_parsed_file(path), where=str(path))
     folder = path.parent
     test = top.table("test")
@@ -265,14 +263,11 @@ def _material(table: Table, folder: Path) -> Material | None:
 def _material_file(path: Path) -> Material:
     if path.suffix == ".json":
         return read_material(path)
-    if not path.is_file():
-        raise NotFoundError("no such material file", where=str(path), fix="check the path")
     return Material.from_mapping(_parsed_file(path), name=path.stem)
 
 
 def _parsed_file(path: Path) -> dict[str, Any]:
-    found = Found(name=path.stem, data=path.read_bytes(), folder=path.parent, where=str(path))
-    return parsed(found.text, where=str(path))
+    return parsed(read_recipe(path).text, where=str(path))
 
 
 def _recording(table: Table, folder: Path) -> RecordingSource:

@@ -71,7 +71,7 @@ class Files:
             path = self.paths[entry]
             try:
                 found.append(np.load(path, mmap_mode="r")[variant])
-            except (OSError, ValueError) as error:
+            except (OSError, ValueError, EOFError) as error:
                 raise CorruptError(
                     f"a prepared input cannot be read: {error}", where=str(path),
                     fix="delete the file and give the command again: it is made anew",

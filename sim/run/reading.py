@@ -32,9 +32,9 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.addresses import local_path
-from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.provenance import canonical, digest
-from flagdata.recipes import Shelf, parsed
+from flagdata.recipes import Shelf, parsed, read_recipe
 from flagdata.tables import SEED_LIMIT, Quantity, Range, Table
 from sim import material
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal, Stokes
@@ -241,9 +241,7 @@ def _bases(table: Table, folder: Path, scene: SceneSpec) -> tuple[Material, ...]
 def _material_file(path: Path) -> Material:
     if path.suffix == ".json":
         return read_material(path)
-    if not path.is_file():
-        raise NotFoundError("no such material file", where=str(path), fix="check the path")
-    return Material.from_mapping(parsed(path.read_text(encoding="utf-8"), where=str(path)), name=path.stem)
+    return Material.from_mapping(parsed(read_recipe(path).text, where=str(path)), name=path.stem)
 
 
 def _wind(table: Table, scene: SceneSpec) -> WindSpec:

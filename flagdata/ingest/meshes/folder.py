@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.documents import from_json
+from flagdata.documents import SIZE_LIMIT, from_json
 from flagdata.errors import InputError, LimitError, NotFoundError
+from flagdata.files import check_input
 from flagdata.ingest.meshes.obj import Obj, obj_text, read_obj
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
 from flagdata.timebase import NANOSECONDS
@@ -28,9 +29,9 @@ def read_json(path: Path) -> dict[str, Any]:
     Raises:
         NotFoundError: no such file.
         InputError: not such a file.
+        LimitError: larger than any scene.
     """
-    if not path.is_file():
-        raise NotFoundError("no such file", where=str(path), fix="check the path")
+    check_input(path, limit=SIZE_LIMIT)
     text = path.read_text(encoding="utf-8", errors="replace")
     # A string, kept, or a comment up to the end of its line, dropped.
     bare = re.sub(r'"(?:[^"\\]|\\.)*"|//[^\n]*', lambda m: m[0] if m[0].startswith('"') else "", text)

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, LimitError, NotFoundError
+from flagdata.errors import InputError
+from flagdata.files import check_input
 from flagdata.ingest.meshes.polygons import convex, ears, fans, in_plane
 
 SIZE_LIMIT = 1 << 30
@@ -51,12 +52,7 @@ def read_obj(path: Path) -> Obj:
         InputError: a malformed line, indices that do not exist, no faces, a vertex with two material coordinates (a
             seam), or a polygon without area or with edges that cross in the material, each with its line.
     """
-    if not path.is_file():
-        raise NotFoundError("no such mesh file", where=str(path), fix="check the path")
-    if path.stat().st_size > SIZE_LIMIT:
-        raise LimitError(
-            f"a mesh file of {path.stat().st_size} bytes", where=str(path), fix=f"at most {SIZE_LIMIT} are read"
-        )
+    check_input(path, noun="mesh file", limit=SIZE_LIMIT)
     positions: list[list[float]] = []
     texture: list[list[float]] = []
     velocities: dict[int, list[float]] = {}

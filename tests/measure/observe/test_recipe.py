@@ -151,7 +151,7 @@ def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tm
 @pytest.mark.parametrize(
     ("text", "kind", "what"),
     [
-        ("", InputError, "no recording"),
+        ("title = 'none'", InputError, "no recording"),
         ("[[recording]]\nsorce = 'a'", InputError, "no source"),
         ("[[recording]]\nsource = 'a'\nnoize = 1", UnknownNameError, "did you mean 'noise'"),
         ("[[recording]]\nsource = 'a'\nwind = { speed = 1, velocity = [1, 0, 0] }", UsageError, "2 winds"),
