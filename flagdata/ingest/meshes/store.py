@@ -64,6 +64,8 @@ def ingest_meshes(
 ) -> IngestResult:
     """Ingest a folder of OBJ meshes, one a frame; ArcSim's output folders with the scene that made them.
 
+    Vertices that are the same in the texture and in every frame are merged, see `welded`; what stays in pieces is found.
+
     Args:
         reasons: why the folder is taken to be meshes, for the report.
         progress: called with 1 for each frame read.
