@@ -64,7 +64,7 @@ def ingest_meshes(
 ) -> IngestResult:
     """Ingest a folder of OBJ meshes, one a frame; ArcSim's output folders with the scene that made them.
 
-    Vertices that are the same in the texture and in every frame are merged, see `welded`; what stays in pieces is found.
+    Vertices that are the same in the texture and in every frame are merged, see `welded`; other pieces are reported.
 
     Args:
         reasons: why the folder is taken to be meshes, for the report.
