@@ -93,7 +93,7 @@ def training(run: Path, own: TrainingRecipe, **changes: object) -> Training:
     return replace(given, **changes)  # pyright: ignore[reportArgumentType]
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture(scope="module", autouse=True)  # weights are compared between tests, and depend on the threads
 def one_thread() -> Iterator[None]:
     before = torch.get_num_threads()
     torch.set_num_threads(1)
