@@ -22,7 +22,8 @@ import random
 import threading
 import time
 import uuid
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -56,6 +57,7 @@ _SMALL = 4 << 20  # B
 _PATIENCE = 120.0  # s, how long a commit competes with other writers before it gives up
 _FIRST_WAIT = 0.01  # s
 _LONGEST_WAIT = 0.5  # s
+_LATEST = 253_402_300_800_000  # ms since 1970: the year 10000
 _user_pid: int | None = None
 
 
@@ -269,20 +271,27 @@ class Catalog:
 
         Args:
             limit: the newest so many; all if `None`.
+
+        Raises:
+            CorruptError: an entry of the log that cannot be read, or that no writer of a catalog writes.
         """
         head = self.head()
         if self._history is None or self._history[0] != head:
-            entries = [
-                {
-                    "version": entry["version"],
-                    "timestamp": entry["timestamp"],
-                    "operation": entry["operation"],
-                    **{k.removeprefix(_INFO_PREFIX): v for k, v in entry.items() if k.startswith(_INFO_PREFIX)},
-                }
-                for entry in self._open(head).history()
-            ]
+            table = self._open(head)
+            with self._log_errors():
+                entries = [self._stated(entry) for entry in table.history()]
             self._history = (head, entries)
         return self._history[1][:limit]
+
+    def _stated(self, entry: Mapping[str, Any]) -> dict[str, Any]:
+        """What the log says of a version."""
+        own = {k.removeprefix(_INFO_PREFIX): v for k, v in entry.items() if k.startswith(_INFO_PREFIX)}
+        when, operation = entry.get("timestamp"), entry.get("operation")
+        if not isinstance(when, int) or not 0 <= when < _LATEST or not isinstance(operation, str):
+            raise self._entries.damaged(entry["version"])
+        if not all(isinstance(value, str) for value in own.values()) or ("commit" in own and "branch" not in own):
+            raise self._entries.damaged(entry["version"])
+        return {"version": entry["version"], "timestamp": when, "operation": operation, **own}
 
     def _commit(
         self, table: DeltaTable, rows: pa.Table, *, removed: Sequence[str], rows_change: bool, info: Mapping[str, str]
@@ -322,11 +331,21 @@ class Catalog:
         return list(self._log.glob(f"*{_CHECKPOINT}"))
 
     def _open(self, version: int) -> DeltaTable:
-        try:
+        with self._log_errors():
             if self._table is not None and self._table.version() < version:
                 self._table.update_incremental()
             if self._table is None or self._table.version() != version:
                 self._table = DeltaTable(self.path.as_uri(), version=version)
+        unknown = [f.name for f in self._table.schema().fields if f.name not in CATALOG]
+        if unknown:
+            raise newer(f"the catalog has the columns {', '.join(unknown)}", self.path)
+        return self._table
+
+    @contextmanager
+    def _log_errors(self) -> Iterator[None]:
+        """What the Delta library cannot read of the log, as an error that names the entry to blame, if one is."""
+        try:
+            yield
         except (DeltaError, OSError) as error:
             if _SYSTEM_ERROR in str(error):
                 with disk_errors("reading the catalog", self._log):
@@ -342,13 +361,11 @@ class Catalog:
                 if self._checkpoints()
                 else restore,
             ) from None
-        unknown = [f.name for f in self._table.schema().fields if f.name not in CATALOG]
-        if unknown:
-            raise newer(f"the catalog has the columns {', '.join(unknown)}", self.path)
-        return self._table
 
     def _names(self, version: int) -> list[str]:
-        return [Path(uri).name for uri in self._open(version).file_uris()]
+        table = self._open(version)
+        with self._log_errors():
+            return [Path(uri).name for uri in table.file_uris()]
 
     def _writable(self, version: int) -> DeltaTable:
         """The table at `version`, if it has all columns of this format; else they are added, and `Moved` is raised."""

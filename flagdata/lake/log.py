@@ -121,11 +121,11 @@ class Log:
         try:
             actions = [from_json(line) for line in self._text(version).splitlines()]
             if not actions or not all(_ACTIONS.issuperset(action.keys()) for action in actions):
-                raise self._damaged(version)
+                raise self.damaged(version)
             info = next((action["commitInfo"] for action in actions if "commitInfo" in action), {})
             return [action["add"]["path"] for action in actions if "add" in action], dict(info)
         except (ValueError, KeyError, TypeError, AttributeError):
-            raise self._damaged(version) from None
+            raise self.damaged(version) from None
 
     def _text(self, version: int) -> str:
         """What an entry holds; the Delta library would take an empty one for a commit of nothing."""
@@ -134,10 +134,11 @@ class Log:
         except FileNotFoundError as error:  # a link that leads nowhere
             raise _unreadable(self.path(version), error) from None
         if not text:
-            raise self._damaged(version)
+            raise self.damaged(version)
         return text
 
-    def _damaged(self, version: int) -> CorruptError:
+    def damaged(self, version: int) -> CorruptError:
+        """The error of a reader to whom the entry of `version` makes no sense."""
         path = self.path(version)
         fix = "restore it from a copy"
         if version == max(self._present()) and version - 1 == self.acknowledged():  # as a power cut may leave it

@@ -292,9 +292,13 @@ class _Pass:
             return
         self._copy.attachment(parse(Attachment.read, content, where=self._where))
 
+    def _rest(self) -> bytes:
+        """What follows in the file, up to what a chunk may hold; a read of more would take the memory first."""
+        return self._stream.read(min(CHUNK_LIMIT, self._size - self._stream.tell()))
+
     def _partial(self, start: int) -> None:
         """Keep the whole messages of a plain chunk whose end is missing, or whose length is wrong."""
-        content = self._stream.read(CHUNK_LIMIT)
+        content = self._rest()
         if len(content) <= CHUNK_HEAD - RECORD_HEAD:
             return
         first, last, _, _, name_length = _CHUNK_FIELDS.unpack_from(content)
@@ -332,7 +336,7 @@ class _Pass:
     def _end(self) -> None:
         """All data was read. The summary is written anew; what is left of the old one says how much there was."""
         held: int | None = None
-        for opcode, record in _whole_records(self._stream.read(CHUNK_LIMIT), among=frozenset(Opcode)):
+        for opcode, record in _whole_records(self._rest(), among=frozenset(Opcode)):
             if opcode == Opcode.STATISTICS and len(record) >= 8:
                 held = int.from_bytes(record[:8], "little")
         if held is not None and held > self._copy.counts.total():

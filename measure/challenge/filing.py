@@ -88,7 +88,10 @@ def read(folder: ChallengeFolder, name: str) -> Filing:
     if folder.verdict_hash(name).read_text(encoding="utf-8").strip() != found or kept != found:
         raise CorruptError("the verdict is not as it was filed", where=str(path), fix="restore it; nothing is scored")
     content = read_json(path, noun="verdict")
-    filing = Filing(**{key: value for key, value in content.items() if key != "schema"})
+    try:
+        filing = Filing(**{key: value for key, value in content.items() if key != "schema"})
+    except TypeError as error:
+        raise CorruptError(f"not a filed verdict: {error}", where=str(path), fix="restore it") from None
     if filing.name != name or filing.data != folder.manifest()["sets"][name]["data"]:
         raise CorruptError("the verdict is about other data", where=str(path), fix="restore it; nothing is scored")
     return filing
@@ -98,7 +101,10 @@ def opened(folder: ChallengeFolder) -> Mapping[str, str]:
     """Set → hash of its verdict when its key was opened."""
     if not folder.opened.is_file():
         return {}
-    return read_json(folder.opened, noun="record of openings")["verdicts"]
+    verdicts = read_json(folder.opened, noun="record of openings").get("verdicts")
+    if not isinstance(verdicts, dict):
+        raise CorruptError("the record of openings states no verdicts", where=str(folder.opened), fix="restore it")
+    return verdicts
 
 
 def note_opening(folder: ChallengeFolder, names: list[str]) -> None:

@@ -10,6 +10,7 @@ opened.json               once the keys were opened: hashes of the verdicts that
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -76,7 +77,7 @@ class ChallengeFolder:
 
         Raises:
             NotFoundError: no challenge there.
-            CorruptError: it is no JSON.
+            CorruptError: it is no JSON, or does not state its sets.
         """
         if not self.public.is_file():
             raise NotFoundError(
@@ -84,7 +85,19 @@ class ChallengeFolder:
                 where=str(self.path),
                 fix="check the path, or make one: `flagdata challenge make`",
             )
-        return read_json(self.public, noun="challenge")
+        content = read_json(self.public, noun="challenge")
+        sets, hashes = content.get("sets"), ("data", "commitment")
+        stated = isinstance(content.get("title"), str) and isinstance(sets, dict) and all(
+            isinstance(entry, dict) and all(isinstance(entry.get(key), str) for key in hashes)
+            and Path(name).name == name
+            for name, entry in sets.items()
+        )  # fmt: skip
+        if not stated:
+            raise CorruptError(
+                "the challenge does not state its title and its sets", where=str(self.public),
+                fix="restore the file as it was made",
+            )  # fmt: skip
+        return content
 
     def names(self) -> list[str]:
         """Names of the sets, sorted."""
@@ -175,7 +188,8 @@ def read_set(folder: Path) -> Experiment:
         about = read_json(folder / "set.json", noun="set")
         flag = about["flag"]
         mesh = grid(width=flag["width"], height=flag["height"], columns=MODEL_COLUMNS, rows=MODEL_ROWS)
-        markers = np.load(folder / "markers.npy")
+        beside = {path.name: path for path in folder.iterdir()}
+        markers = _array(beside["markers.npy"])
         specimen = Specimen(
             mesh=mesh, material=named(flag["material"]), held=held.corners(mesh.rest), anchors=np.array(flag["pins"]),
             stiffness=flag["pin_stiffness"], gravity=tuple(flag["gravity"]), anchors_told=False,
@@ -183,12 +197,28 @@ def read_set(folder: Path) -> Experiment:
         recordings = tuple(
             Trajectory(
                 name=entry["name"], markers=markers,
-                positions=np.load(folder / f"{entry['name']}.npy").astype(np.float64),
+                positions=_array(beside[f"{entry['name']}.npy"]),
                 rate=about["rate"], noise=about["noise"],
                 wind=WindTrack(times=np.array(entry["wind"]["times"]), velocity=np.array(entry["wind"]["velocity"])),
             )
             for entry in about["recordings"]
         )  # fmt: skip
-    except (KeyError, ValueError, OSError, EOFError) as error:
+    except (KeyError, IndexError, TypeError, ValueError, OverflowError, AttributeError, EOFError, OSError) as error:
         raise InputError(f"not a set: {error!r}", where=str(folder), fix="restore the folder as it was made") from error
     return Experiment(specimen=as_seen(specimen, recordings), recordings=recordings)
+
+
+def _array(path: Path) -> Floats:
+    """The numbers of a file of NumPy.
+
+    Raises:
+        ValueError: its header states no numbers, or another count of them than the file holds.
+    """
+    with path.open("rb") as stream:
+        first = np.lib.format.read_magic(stream) == (1, 0)
+        header = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
+        shape, _, kind = header(stream)
+        held = path.stat().st_size - stream.tell()
+    if kind.kind not in "fiu" or min(shape, default=0) < 0 or math.prod(shape) * kind.itemsize != held:
+        raise ValueError(f"{path.name} states {shape} of {kind}, and holds {held} bytes")
+    return np.load(path, allow_pickle=False).astype(np.float64)

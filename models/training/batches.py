@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from flagdata.errors import RefusedError, UsageError
+from flagdata.errors import CorruptError, RefusedError, UsageError
 from flagdata.rng import stream
 from models.training.inputs import Prepared
 
@@ -109,6 +109,7 @@ class Batches:
 
         Raises:
             RefusedError: it is of other data or other batches.
+            CorruptError: it names a batch that no epoch has.
         """
         own = self.state()
         different = [name for name in own if name not in ("epoch", "cursor") and state.get(name) != own[name]]
@@ -118,4 +119,10 @@ class Batches:
                 f"the checkpoint is of other batches: {named}", where="the training data",
                 fix="train at the same tag with the same recipe, or begin anew in another folder",
             )  # fmt: skip
-        self.epoch, self.cursor = int(state["epoch"]), int(state["cursor"])
+        epoch, cursor = state.get("epoch"), state.get("cursor")
+        if not (isinstance(epoch, int) and epoch >= 0 and isinstance(cursor, int) and 0 <= cursor < len(self)):
+            raise CorruptError(
+                f"the checkpoint goes on at batch {cursor!r} of {len(self)} in epoch {epoch!r}",
+                where="the training data", fix="delete the checkpoint and train again",
+            )  # fmt: skip
+        self.epoch, self.cursor = epoch, cursor

@@ -7,6 +7,7 @@ leaves the last good one; the one before it is kept, for where the last was dama
 
 from __future__ import annotations
 
+import copy
 import json
 import logging
 import shutil
@@ -138,7 +139,10 @@ def _take(folder: Path, standing: Standing, identity: dict[str, Any]) -> None:
     """Bring `standing` to where the checkpoint in `folder` itself, which is sound, was taken."""
     card = read_card(folder)
     stored = json.loads(json.dumps(identity))
-    different = [name for name in stored if card.get("identity", {}).get(name) != stored[name]]
+    kept = card.get("identity")
+    if not isinstance(kept, dict):
+        raise CorruptError("the checkpoint does not state its training", where=str(folder), fix=_ANEW)
+    different = [name for name in stored if kept.get(name) != stored[name]]
     if different:
         raise RefusedError(
             f"the checkpoint is of another training: {', '.join(different)} differ", where=str(folder),
@@ -148,10 +152,12 @@ def _take(folder: Path, standing: Standing, identity: dict[str, Any]) -> None:
         standing.learner.load_state_dict(read_tensors(folder / WEIGHTS))
         _take_moments(standing, read_tensors(folder / _MOMENTS))
         standing.best = read_tensors(folder / _BEST) if (folder / _BEST).exists() else None
+        if standing.best is not None:
+            copy.deepcopy(standing.learner).load_state_dict(standing.best)  # it is needed at the training's end
         standing.course = Course.of(card["course"])
-        standing.batches = card["batches"]
+        standing.batches = dict(card["batches"])
         standing.running = (float(card["running"][0]), int(card["running"][1]))
-    except (KeyError, TypeError, RuntimeError, IndexError) as error:
+    except (KeyError, TypeError, ValueError, RuntimeError, IndexError, OverflowError, AttributeError) as error:
         raise CorruptError(
             f"the checkpoint does not fit its recipe: {error}", where=str(folder), fix="delete it and train again"
         ) from None
@@ -165,9 +171,14 @@ def _moments(standing: Standing) -> dict[str, Tensor]:
 
 def _take_moments(standing: Standing, tensors: dict[str, Tensor]) -> None:
     state = standing.optimiser.state_dict()
+    shapes = {place: tuple(weights.shape) for place, weights in enumerate(standing.learner.parameters())}
     found: dict[int, dict[str, Tensor]] = {}
     for name, tensor in tensors.items():
         index, _, kind = name.partition(".")
         found.setdefault(int(index), {})[kind] = tensor
+    for index, values in found.items():
+        wanted = {kind: () if kind == "step" else shapes[index] for kind in _KINDS}
+        if {kind: tuple(tensor.shape) for kind, tensor in values.items()} != wanted:
+            raise ValueError(f"the moments of parameter {index} are of other kinds or shapes")
     state["state"] = found
     standing.optimiser.load_state_dict(state)

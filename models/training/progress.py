@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -23,6 +24,11 @@ class Epoch:
     rate: float
     seconds: float
     clips: int
+
+
+_KINDS: dict[str, Callable[[Any], Any]] = {
+    "number": int, "train": float, "validation": float, "rate": float, "seconds": float, "clips": int,
+}  # fmt: skip
 
 
 @dataclass(kw_only=True)
@@ -48,7 +54,12 @@ class Course:
 
     @classmethod
     def of(cls, content: list[dict[str, Any]]) -> Course:
-        return cls(epochs=[Epoch(**entry) for entry in content])
+        """From `as_list`.
+
+        Raises:
+            AttributeError, KeyError, OverflowError, TypeError, ValueError: it is not from there.
+        """
+        return cls(epochs=[Epoch(**{name: _KINDS[name](value) for name, value in entry.items()}) for entry in content])
 
     def picture(self) -> bytes:
         """The losses and the learning rate against the epoch: a PNG."""

@@ -11,6 +11,7 @@ from weakref import WeakKeyDictionary
 import torch
 from torch import Tensor
 
+from flagdata.errors import InputError
 from sim import bending, membrane
 from sim.cloth import gather_sum
 from sim.state import State
@@ -28,6 +29,7 @@ _STRETCH = 1.15
 _DAMPED, _TURNED = 0.5, 1.0
 _OUTER_ITERATIONS = 12
 
+_LONGEST = 1e100  # s; the square of a longer damping overflows
 _LIMITS: WeakKeyDictionary[System, float] = WeakKeyDictionary()
 
 
@@ -93,12 +95,22 @@ def stable_step(system: System) -> float:
 
     The amplification matrix of one mode has determinant 1 − d ω² h and trace 2 − d ω² h − ω² h²; the Jury criterion
     gives ω² h² + 2 d ω² h < 4, that is h < −d + √(d² + 4/ω²).
+
+    Raises:
+        InputError: no positive, finite number is.
     """
     if system not in _LIMITS:
         with torch.no_grad():
             worst = float(stiffest(system).max())
         damping = float(system.cloth.damping.max())
-        _LIMITS[system] = -damping + math.sqrt(damping**2 + 4 / worst)
+        sound = 0 < worst < math.inf and damping < _LONGEST
+        limit = -damping + math.sqrt(damping**2 + 4 / worst) if sound else math.nan
+        if not 0 < limit < math.inf:
+            raise InputError(
+                f"no step is stable: the largest eigenvalue is {worst:.3g} 1/s², the damping {damping:.3g} s",
+                where="material", fix="give a density, stiffnesses and a damping that a cloth can have",
+            )  # fmt: skip
+        _LIMITS[system] = limit
     return _LIMITS[system]
 
 

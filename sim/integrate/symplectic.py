@@ -72,6 +72,7 @@ class Symplectic:
 
         Raises:
             UsageError: a forced step beyond the stability limit.
+            InputError: see `stable_step`.
         """
         limit = stable_step(system)
         if self.step is None:

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from flagdata.errors import LimitError
 from flagdata.lake.meshes import MeshSequence
 from flagdata.timebase import NANOSECONDS
 from sim.integrate import Integrator
@@ -22,6 +23,9 @@ from sim.run.members import Crew, Member, Parameter
 from sim.run.recipe import Recipe
 from sim.state import State
 from sim.system import System
+
+STEPS_LIMIT = 100_000
+"""Most steps of a frame."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,12 +58,21 @@ class Stepper:
     method: Integrator | None
     steps: int
 
+    def __post_init__(self) -> None:
+        if self.steps > STEPS_LIMIT:
+            raise LimitError(
+                f"{self.steps:.3g} steps a frame", where="recipe [integrator]",
+                fix=f"at most {STEPS_LIMIT} are taken: let the cells be larger, or the cloth softer or heavier",
+            )  # fmt: skip
+
     @classmethod
     def of(cls, crew: Crew, base: int = 0) -> Stepper:
         """The method and the steps of a recipe for the members of one of its materials, by its place among them.
 
         Raises:
             UsageError: a forced step beyond the stability limit of a member at the ends of the recipe's ranges.
+            InputError: no step is stable.
+            LimitError: more than `STEPS_LIMIT` steps a frame.
         """
         recipe, spec = crew.recipe, crew.recipe.integrator
         frame = 1 / recipe.time.rate

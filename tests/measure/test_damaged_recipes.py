@@ -4,7 +4,6 @@ and nothing takes long."""
 from __future__ import annotations
 
 import json
-import sys
 import time
 import tomllib
 from collections.abc import Callable
@@ -19,109 +18,15 @@ from hypothesis import strategies as st
 
 from flagdata.documents import NESTING_LIMIT
 from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError
-from flagdata.ingest.anemometer.recipe import parse as parse_sensor
 from flagdata.recipes import parsed
-from measure.cases.recipe import parse_case
-from measure.challenge.recipe import parse as parse_challenge
-from measure.closing.toml import dumps
 from measure.nulls import bank
-from measure.observe.recipe import load as load_experiment
-from models.training.recipe import parse as parse_training
 from sim.arcsim import read_material, read_scene
-from sim.datasets.reading import parse as parse_dataset
-from sim.material import Material
-from sim.render.prior import read as read_prior
-from sim.run.reading import parse as parse_scene
+from tests.damage import QUICK, as_toml, changed, damaged, damages, paths, wild
+from tests.hostile.models import arrays
+from tests.hostile.recipes import FORMS, MATERIAL_FILE, SCENE_FILE
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from damage import QUICK, changed, damaged, damages, paths, wild
-
-CATALOGS = Path(__file__).parents[2] / "catalogs"
 SECONDS = 5.0
 """Within which a recipe is read or refused: none takes more than a tenth of one alone."""
-
-EXPERIMENT = """
-title = "Flags"
-[cloth]
-width = 1.5
-height = 1.0
-vertices = 200
-[pins]
-at = "hoist-corners"
-[air]
-density = 1.2
-gravity = 9.81
-[material]
-name = "camel-ponte-roma"
-[test]
-level = 0.03
-nulls = 20
-[[recording]]
-source = "one"
-rate = 25.0
-wind = { speed = 4.0 }
-"""
-
-TRAINING = """
-title = "small"
-seed = 1
-[data]
-dataset = ["made", "other"]
-sequences = 4
-[input]
-maps = "wave-maps"
-size = 24
-frames = 12
-scales = [1.0, 0.9]
-mirror = true
-variants = 2
-[network]
-name = "wave"
-dimension = 4
-widths = [6, 6, 6]
-strides = [2, 2, 2]
-[loss]
-name = "posterior"
-targets = ["wind_speed"]
-components = 2
-[optimiser]
-rate = 1e-2
-decay = 1e-4
-batch = 4
-epochs = 3
-schedule = "cosine"
-clip-norm = 5.0
-patience = 9
-"""
-
-
-def experiment(text: str, folder: Path) -> object:
-    path = folder / "experiment.toml"
-    path.write_text(text)
-    return load_experiment(path)
-
-
-def first(folder: str) -> str:
-    return min((CATALOGS / folder).glob("*.toml")).read_text()
-
-
-FORMS: dict[str, tuple[str, Callable[[str, Path], object]]] = {
-    "sensor": (first("sensors"), lambda text, _: parse_sensor(text, where="recipe")),
-    "scene": (
-        first("scenes"), lambda text, folder: parse_scene(text, name="recipe", folder=folder, where="recipe")
-    ),
-    "data set": (
-        first("datasets"), lambda text, folder: parse_dataset(text, name="recipe", folder=folder, where="recipe")
-    ),
-    "challenge": (first("challenges"), lambda text, _: parse_challenge(text, where="recipe")),
-    "case": (first("cases"), lambda text, _: parse_case(text, where="recipe")),
-    "material": (
-        first("materials"), lambda text, _: Material.from_mapping(parsed(text, where="recipe"), name="recipe")
-    ),
-    "render prior": (first("renders"), lambda text, _: read_prior(parsed(text, where="recipe"), name="recipe")),
-    "experiment": (EXPERIMENT, experiment),
-    "training": (TRAINING, lambda text, _: parse_training(text, name="recipe", where="recipe").check()),
-}  # fmt: skip
 
 
 def within(seconds: float, work: Callable[[], object]) -> None:
@@ -150,30 +55,15 @@ def test_a_recipe_with_changed_bytes_is_read_or_refused(form: str, tmp_path: Pat
 def test_a_recipe_with_a_value_no_one_meant_is_read_or_refused(form: str, tmp_path: Path) -> None:
     text, read = FORMS[form]
     content = tomllib.loads(text)
-    read(dumps_nested(content), tmp_path)  # sound before it is changed
+    read(as_toml(content), tmp_path)  # sound before it is changed
     known = paths(content)
 
     @QUICK
     @given(path=st.sampled_from(known), value=wild)
     def law(path: tuple[Any, ...], value: Any) -> None:
-        with suppress(InputError):  # a value that TOML has no form for
-            other = dumps_nested(changed(content, path, value))
-            within(SECONDS, lambda: read(other, tmp_path))
+        within(SECONDS, lambda: read(as_toml(changed(content, path, value)), tmp_path))
 
     law()
-
-
-def dumps_nested(content: dict[str, Any]) -> str:
-    """TOML with all tables in line, so that they may lie in lists."""
-    return "".join(f"{json.dumps(key)} = {inline_value(value)}\n" for key, value in content.items())
-
-
-def inline_value(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(key)} = {inline_value(inner)}" for key, inner in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(inline_value(inner) for inner in value) + "]"
-    return dumps({"x": value}).removeprefix("x = ").strip()
 
 
 @pytest.mark.parametrize("deep", [NESTING_LIMIT + 1, 1000, 100_000])
@@ -226,15 +116,25 @@ def test_what_no_machine_can_simulate_is_refused_with_the_limit_that_was_passed(
         read(text, tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("line", "error"),
+    [
+        ("density-factor = 1e29", InputError), ("stretching-factor = 1e300", InputError),
+        ("damping = 1e300", InputError),
+        ("density-factor = 1e-8", LimitError), ("stretching-factor = 1e9", LimitError),
+    ],
+)  # fmt: skip
+def test_a_material_that_no_number_of_steps_can_simulate_is_refused_before_the_first(
+    line: str, error: type[FlagdataError], tmp_path: Path
+) -> None:
+    text, read = FORMS["scene made ready"]
+    with pytest.raises(error):
+        read(text.replace("density-factor = { low = 0.9, high = 1.1 }", line), tmp_path)
+
+
 @pytest.mark.parametrize("name", ["scene.json", "material.json"])
 def test_a_damaged_arcsim_file_is_read_or_refused(name: str, tmp_path: Path) -> None:
-    documents: dict[str, Any] = {
-        "scene.json": {
-            "frame_time": 0.04, "frame_steps": 8, "end_time": 1, "cloths": [{"mesh": "m.obj", "materials": [{}]}],
-            "gravity": [0, 0, -9.8], "wind": {"velocity": [1, 0, 0]}, "magic": {"repulsion_thickness": 5e-3},
-        },
-        "material.json": {"density": 0.2, "stretching": [[1, 0, 1, 1]] * 6, "bending": [[1e-5] * 5] * 3},
-    }  # fmt: skip
+    documents: dict[str, Any] = {"scene.json": SCENE_FILE, "material.json": MATERIAL_FILE}
     content = documents[name]
 
     @QUICK
@@ -252,16 +152,6 @@ def test_a_json_file_nested_without_end_is_refused(tmp_path: Path) -> None:
     (tmp_path / "scene.json").write_text("[" * 200_000)
     with pytest.raises(FlagdataError):
         read_scene(tmp_path / "scene.json")
-
-
-def arrays() -> dict[str, np.ndarray]:
-    """The arrays of a batch of two segments, by their names; of other columns than this version's."""
-    rows = np.zeros((2, 3))
-    return {
-        **dict.fromkeys(bank._SEGMENTS, rows), "recording": np.arange(2), "columns": np.array(["a", "b"]),
-        "cloth": np.array(["x", "y"]), "duration": np.array(1.0), "anchors_told": np.array(True),
-        "version": np.array(bank._VERSION),
-    }  # fmt: skip
 
 
 def test_a_damaged_bank_of_nulls_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

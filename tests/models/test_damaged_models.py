@@ -5,14 +5,11 @@ from __future__ import annotations
 
 import json
 import shutil
-import sys
 import time
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import torch
 from hypothesis import given
@@ -21,43 +18,23 @@ from hypothesis import strategies as st
 from flagdata.checksums import write_sums
 from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError
 from models import estimator
-from models.crops import Cropping
 from models.estimator import CLOUD
-from models.frontend import FrontEnd
-from models.learner import Loss, build
-from models.outliers import Familiarity
-from models.storage import CARD, WEIGHTS, write_card, write_tensors
+from models.storage import CARD, read_tensors, write_tensors
+from models.training import checkpoint
 from models.training.recipe import TrainingRecipe, parse
+from tests.damage import QUICK, changed, paths, wild
+from tests.hostile.models import IDENTITY, WORDS, standing, write_checkpoint, write_model
 from tests.models.conftest import RECIPE
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from damage import QUICK, changed, paths, wild
 
 SECONDS = 5.0
 """Within which a card is read or refused: none takes more than a tenth of one alone."""
-OPTIONS = {"dimension": 4, "widths": [4, 4, 4]}
-WORDS: Any = {
-    "name": "small", "seed": 1, "members": 1, "widening": [1.0],
-    "front_end": asdict(FrontEnd(maps="wave-maps", size=24, frames=12)),
-    "cropping": asdict(Cropping(frames=12, size=24)),
-    "recipe": {
-        "network": {"name": "wave", "options": OPTIONS},
-        "loss": {"name": "posterior", "targets": ["wind_speed"], "components": 2, "margin": 1.0},
-        "data": {"dataset": "made", "sequences": None},
-    },
-}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A model of one member and its cloud, without checksums."""
     made = tmp_path_factory.mktemp("damaged") / "small"
-    made.mkdir()
-    learner = build("wave", OPTIONS, loss=Loss.POSTERIOR, targets=("wind_speed",), components=2, margin=1.0)
-    write_card(made, WORDS)
-    write_tensors(made / WEIGHTS, {f"0.{name}": value for name, value in learner.state_dict().items()})
-    cloud = Familiarity(centre=np.zeros(4), whitening=np.eye(4), reference=np.array([1.0, 2.0]))
-    write_tensors(made / CLOUD, {name: torch.from_numpy(value) for name, value in cloud.arrays().items()})
+    write_model(made)
     return made
 
 
@@ -158,3 +135,47 @@ def test_weights_that_are_not_finite_are_refused(folder: Path, tmp_path: Path, v
     write_sums(copy)
     with pytest.raises(CorruptError, match="not finite"):
         estimator.load(copy)
+
+
+def checkpoint_with(folder: Path, path: tuple[Any, ...], value: Any) -> Path:
+    """A checkpoint with another value in its card, its checksums made anew."""
+    write_checkpoint(folder / "run")
+    card = folder / "run" / "last" / CARD
+    card.write_text(json.dumps(changed(json.loads(card.read_text()), path, value)))
+    write_sums(card.parent)
+    return folder / "run"
+
+
+EPOCH = {"number": 0, "train": 1.0, "validation": 1.0, "rate": 0.1, "seconds": 1.0, "clips": 4}
+
+
+def test_the_checkpoint_is_whole(tmp_path: Path) -> None:
+    taken = standing()
+    assert checkpoint.restore(checkpoint_with(tmp_path, ("course",), [EPOCH]), taken, identity=IDENTITY)
+    assert taken.course.as_list() == [EPOCH]
+    assert taken.optimiser.state_dict()["state"]
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        (("identity",), ["small"]), (("running",), "aa"), (("running",), []), (("batches",), 3), (("course",), [1]),
+        (("course",), [{**EPOCH, "validation": "low"}]), (("course",), [{**EPOCH, "train": 10**400}]),
+        (("course",), [{**EPOCH, "more": 1}]),
+    ],
+)  # fmt: skip
+def test_absurd_values_of_a_checkpoint_are_refused(tmp_path: Path, path: tuple[Any, ...], value: Any) -> None:
+    run = checkpoint_with(tmp_path, path, value)
+    with pytest.raises(CorruptError):
+        checkpoint.restore(run, standing(), identity=IDENTITY)
+
+
+@pytest.mark.parametrize("file", ["weights.safetensors", "moments.safetensors", "best.safetensors"])
+def test_tensors_of_another_shape_are_refused_when_the_checkpoint_is_read(tmp_path: Path, file: str) -> None:
+    write_checkpoint(tmp_path)
+    path = tmp_path / "last" / file
+    tensors = read_tensors(path)
+    write_tensors(path, {**tensors, next(name for name in tensors if tensors[name].ndim): torch.zeros(1, 2, 3)})
+    write_sums(path.parent)
+    with pytest.raises(CorruptError, match="does not fit its recipe"):
+        checkpoint.restore(tmp_path, standing(), identity=IDENTITY)

@@ -19,6 +19,7 @@ VALIDATIONS = {
     "foreign": "tests.validation.foreign",
     "gate": "tests.validation.gate",
     "hanging-cloth": "tests.validation.hanging_cloth",
+    "hostile": "tests.validation.hostile",
     "measure-windows": "tests.validation.measure_windows",
     "paper-flag": "tests.validation.paper_flag",
     "pictures": "tests.validation.pictures",

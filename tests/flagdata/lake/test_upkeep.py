@@ -14,7 +14,7 @@ import pytest
 
 from flagdata.errors import ConflictError, CorruptError, NotFoundError
 from flagdata.findings import Finding, Severity
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, catalog
 from flagdata.lake.collect import collect, garbage
 from flagdata.lake.difference import difference
 from flagdata.lake.health import doctor, is_healthy, object_names, sampled, verify, verify_catalog
@@ -442,3 +442,40 @@ def test_a_sample_is_of_the_size_asked_for_and_never_larger_than_all() -> None:
     assert len(set(drawn)) == 4
     assert set(drawn) <= set(names)
     assert sampled(names, 99) == names
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("timestamp", "now"), ("timestamp", 10**18), ("timestamp", -1), ("timestamp", None), ("operation", 3),
+        ("flagdata.branch", None), ("flagdata.message", [1]),
+    ],
+)  # fmt: skip
+def test_values_in_the_log_that_no_writer_writes_are_refused(
+    lake: Lake, put_text: Put, key: str, value: object
+) -> None:
+    put_text(lake, "a")
+    entry = max((lake.path / "catalog" / "_delta_log").glob("*.json"))
+    lines = [json.loads(line) for line in entry.read_text().splitlines()]
+    (holder,) = (line["commitInfo"] for line in lines if "commitInfo" in line)
+    if value is None:
+        del holder[key]
+    else:
+        holder[key] = value
+    entry.write_text("\n".join(map(json.dumps, lines)))
+    with pytest.raises(CorruptError, match="log"):
+        Lake.open(lake.path).catalog.history()
+
+
+def test_an_entry_before_the_checkpoint_that_is_cut_off_is_named(
+    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(catalog, "_TIDY_EVERY", 3)
+    for text in "abcde":
+        put_text(lake, text)
+    log = lake.path / "catalog" / "_delta_log"
+    assert list(log.glob("*.checkpoint.parquet"))
+    entry = log / f"{1:020d}.json"
+    entry.write_bytes(entry.read_bytes()[: len(entry.read_bytes()) // 2])
+    with pytest.raises(CorruptError, match=entry.name):
+        Lake.open(lake.path).catalog.history()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import tracemalloc
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -232,3 +233,14 @@ def test_what_cannot_be_salvaged_leaves_no_target(tmp_path: Path, sample: Path) 
     with pytest.raises(ConflictError):
         salvage(sample, target)
     assert target.read_bytes() == b"precious"
+
+
+@pytest.mark.parametrize("cut", [0.3, 0.6, 1.0])
+def test_a_small_record_takes_little_memory_to_be_salvaged(tmp_path: Path, live: Path, cut: float) -> None:
+    data = live.read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[: int(cut * len(data))])
+    tracemalloc.start()
+    salvage(tmp_path / "cut.mcap", tmp_path / "out.mcap")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 64 << 20  # a chunk may hold 1 GiB, the file has less than a megabyte
