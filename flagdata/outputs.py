@@ -245,9 +245,11 @@ def _removed() -> Iterator[dict[str, Path]]:
         yield scratch
     finally:
         for path in scratch.values():
-            shutil.rmtree(path, ignore_errors=True)
             with suppress(OSError):  # gone, since it has its name; or a disk that refuses everything
-                path.unlink()
+                if path.is_dir():
+                    shutil.rmtree(path, ignore_errors=True)
+                else:
+                    path.unlink()
 
 
 def _bytes(name: str, content: str | bytes, command: str | None) -> bytes:

@@ -16,13 +16,16 @@ from pathlib import Path
 from typing import Any
 
 from tests.evidence import circumstances
+from tests.failing import slow
 from tests.failing.commands import COMMANDS, Scene, made_scene
 from tests.failing.injector import Fault, Injector, injecting
 from tests.failing.trial import Command, Trials
 
 REPEATED = 4
 """Of so many commands that failed one is given once more, without the fault."""
-SCENES: Mapping[str, tuple[Callable[[Path], Scene], Mapping[str, Command]]] = {"core": (made_scene, COMMANDS)}
+SCENES: Mapping[str, tuple[Callable[[Path], Scene], Mapping[str, Command]]] = {
+    "core": (made_scene, COMMANDS), **slow.SCENES,
+}  # fmt: skip
 """Scenes, each with its commands."""
 
 

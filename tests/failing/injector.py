@@ -65,6 +65,12 @@ class Injector:
         self._tasks = tasks
         self._answers = answers
 
+    def prepare(self, function: str, argument: str) -> None:
+        """Call "module:function" in the process that commands are forked from."""
+        self._tasks.write(json.dumps({"prepare": function, "argument": argument}) + "\n")
+        self._tasks.flush()
+        assert json.loads(self._answers.readline()) == {}
+
     def run(
         self, folder: Path, arguments: Sequence[str], fault: Fault | None = None, *, kinds: Kinds = Kinds.ALL,
         traced: bool = False,

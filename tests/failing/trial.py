@@ -25,12 +25,15 @@ class Command:
         arguments: {folder} stands for the folder that it works in, other names in braces for the scene's ids.
         state: what it changes in that folder; equal states have equal content.
         lake: the lake that must stay healthy, in that folder; it may be absent.
+        stand_in: "module:function" that puts something in the place of its computing, called with the scene's id "kept"
+            in the process that it is forked from.
         one_step: whether it changes all or nothing; else what it has done before an error stays, and a repeat goes on.
     """
 
     arguments: tuple[str, ...]
     state: Callable[[Path], object]
     lake: str = "lake"
+    stand_in: str | None = None
     one_step: bool = True
 
     def given(self, folder: Path, ids: Mapping[str, str]) -> list[str]:
@@ -64,6 +67,8 @@ class Trials:
         self._command, self._scene, self._ids = command, scene, ids
         self._injector, self._scratch = injector, scratch
         self._count = 0
+        if command.stand_in is not None:
+            injector.prepare(command.stand_in, ids["kept"])
         folder = self._copy()
         before = command.state(folder)
         done = injector.run(folder, command.given(folder, ids), traced=True)

@@ -1,6 +1,7 @@
 """Runs commands of flagdata in children of its own, one failing call each; started with failing_calls.c preloaded.
 
-Each line on standard input is a JSON object: `arguments` of the command, `call` that fails (negative for none), `error`
+Each line on standard input is a JSON object: `prepare`, a "module:function" that is called here with `argument`, or
+`arguments` of the command, `call` that fails (negative for none), `error`
 (errno), `stays` (whether later calls fail too), `kinds` that are counted, `traced` (whether calls are noted), `folder`
 whose files are counted and which is worked in. The answer is one too: exit `code`, `calls` that there were, `trace` (a
 line for each: number, function, path), and what the command said on `stdout` and `stderr`.
@@ -18,16 +19,15 @@ import traceback
 from importlib import import_module
 from pathlib import Path
 
-from flagdata.cli import main, root
+from flagdata.cli import main
 
 _STATE = struct.Struct("@qqiiii1024s")  # as failing_calls.c has it
 _LONGEST = 900.0  # s, of a command
-_IMPORTED = {
-    "ingest": ("flagdata.ingest.store", "flagdata.ingest.camera"),
-    "align": ("flagdata.align.methods", "flagdata.align.recording", "flagdata.lake"),
-    "simulate": ("sim.run",),
-}
-"""Verb → modules that its function imports; all are imported once, before the first fork."""
+_SHARED = {
+    "flagdata", "sim", "models", "measure", "torch", "zarr", "scipy", "av", "jinja2", "duckdb", "safetensors", "PIL",
+    "matplotlib",
+}  # fmt: skip
+"""Packages whose modules, once a child has imported them, are imported before later forks."""
 
 
 class Calls:
@@ -65,17 +65,21 @@ def run(arguments: list[str], folder: Path) -> int:
         traceback.print_exc()
     sys.stdout.flush()
     sys.stderr.flush()
+    imported = [name for name in sys.modules if name.partition(".")[0] in _SHARED]
+    (folder / "modules").write_text("\n".join(imported))
     return code
 
 
 def serve() -> None:
-    for verb, modules in _IMPORTED.items():
-        root.get_command(None, verb)  # type: ignore[arg-type]
-        for module in modules:
-            import_module(module)
     calls = Calls(Path(os.environ["FAILING_CALLS"]))
     for line in sys.stdin:
         task = json.loads(line)
+        if "prepare" in task:
+            module, _, function = task["prepare"].partition(":")
+            getattr(import_module(module), function)(task["argument"])
+            sys.stdout.write("{}\n")
+            sys.stdout.flush()
+            continue
         folder = Path(task["folder"])
         output = folder.with_name(f"{folder.name}.output")
         output.mkdir()
@@ -85,6 +89,9 @@ def serve() -> None:
             os._exit(run(task["arguments"], output))
         code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         total, trace = calls.end()
+        if (output / "modules").exists():
+            for module in (output / "modules").read_text().split():
+                import_module(module)
         said = {name: (output / name).read_text(errors="replace") for name in ("stdout", "stderr")}
         sys.stdout.write(json.dumps({"code": code, "calls": total, "trace": trace, **said}) + "\n")
         sys.stdout.flush()

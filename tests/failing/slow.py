@@ -1,0 +1,270 @@
+"""The commands that take long: each with a small scene, and what stands in for its computing once it was done.
+
+What is tried is what they read and write: for close-loop and propose a result that was computed once is taken, after
+the bank was read as it is; for build the jobs that workers do are done once and their results kept. Killed commands
+(`tests.failing.killed`) compute all themselves.
+"""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import nullcontext
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.lake import Lake
+from measure.closing.close import close_loop
+from measure.forecasting.calibration import Calibration
+from measure.forecasting.setting import Setting
+from measure.loop.run import Options
+from measure.nulls import bank as banks
+from measure.nulls import supply
+from measure.nulls.simulation import NullBatch
+from measure.observe import recipe as recipes
+from measure.observe.trajectory import Specimen
+from measure.propose.propose import propose
+from measure.propose.terms import dictionary
+from sim import handles
+from sim.datasets.cluster import Job
+from sim.effects import EFFECTS
+from sim.material import named
+from sim.mesh import grid
+from tests.failing.commands import Scene, artifacts, files, rows
+from tests.failing.trial import Command
+
+WIDTH, HEIGHT, RATE, SECONDS, NOISE = 0.75, 0.5, 25.0, 4.6, 5e-4
+SPEEDS = (3.5, 4.3, 5.1, 6.0)
+KINDS, LEVEL = 12, 0.1
+"""Kinds of numerics of the bank, by which this level can be tested."""
+EXPERIMENT = """
+title = "tracks"
+[cloth]
+width = {width}
+height = {height}
+[material]
+name = "camel-ponte-roma"
+[pins]
+at = "hoist-corners"
+"""
+RECORDING = """
+[[recording]]
+source = "tracks.csv"
+take = "wind-{number}"
+noise = {noise}
+[recording.wind]
+velocity = [{speed}, 0.0, 0.0]
+"""
+DATA_SET = """
+title = "A tiny data set"
+licence = "CC0-1.0"
+seed = 1
+[simulation]
+scene = "scene.toml"
+[render]
+prior = "flags"
+width = 32
+height = 32
+raster-samples = 2
+[sides.train]
+sequences = 2
+renders = 2
+[sides.test]
+sequences = 1
+renders = 1
+[camera]
+frame-slot = 2048
+"""
+SIMULATED = """
+batch = 2
+[scene]
+columns = 6
+[material]
+name = "camel-ponte-roma"
+[wind]
+speed = { low = 2.0, high = 6.0 }
+[time]
+settle = 0.1
+frames = 30
+"""
+_LAKE = ("--lake", "{folder}/lake")
+
+
+def loop_scene(folder: Path) -> Scene:
+    """Recordings with a drag that the base model lacks, a bank of nulls, a lake; beside the folder, results."""
+    Lake.create(folder / "lake")
+    mesh = grid(width=WIDTH, height=HEIGHT, columns=8, rows=6)
+    cloth = Specimen(
+        mesh=mesh, material=named("camel-ponte-roma"), held=handles.corners(mesh.rest),
+        anchors=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, HEIGHT]]),
+    )  # fmt: skip
+    recordings = NullBatch(
+        specimen=cloth, markers=mesh.rest, rate=RATE, duration=SECONDS, noise=NOISE, speeds=SPEEDS, seed=77,
+        calibrations=(Calibration(density=1.1, bending=0.7, damping=2e-3),) * len(SPEEDS),
+        effects=(EFFECTS["tangential-linear-drag"](coefficient=0.8),),
+    ).simulate()  # fmt: skip
+    _tracks(folder / "tracks.csv", mesh.rest, [recording.positions for recording in recordings])
+    parts = [RECORDING.format(number=n, noise=NOISE, speed=speed) for n, speed in enumerate(SPEEDS)]
+    text = EXPERIMENT.format(width=WIDTH, height=HEIGHT) + "".join(parts)
+    (folder / "tracks.toml").write_text(text)
+    experiment = recipes.read(recipes.load(folder / "tracks.toml")).experiment
+    banks.build(folder / "bank", supply.batches(Setting.of(experiment), kinds=KINDS, seed=0), workers=2)
+    kept = folder.with_name(f"{folder.name}.kept")
+    kept.mkdir()
+    verdict = close_loop(experiment, Options(bank=folder / "bank", level=LEVEL))
+    (kept / "verdict").write_bytes(pickle.dumps(verdict))
+    options = supply.NullOptions(bank=folder / "bank", level=LEVEL)
+    (kept / "outcome").write_bytes(pickle.dumps(propose(experiment, dictionary(), options=options)))
+    return Scene(folder=folder, ids={"kept": str(kept)})
+
+
+def _tracks(path: Path, markers: NDArray[np.float64], recordings: Sequence[NDArray[np.float64]]) -> None:
+    lines = ["recording,time,marker,u,v,x,y,z"]
+    for number, positions in enumerate(recordings):
+        for frame, at in enumerate(positions):
+            for marker, ((u, v), (x, y, z)) in enumerate(zip(markers, at, strict=True)):
+                lines.append(f"wind-{number},{frame / RATE:.3f},m{marker},{u:.6f},{v:.6f},{x:.7f},{y:.7f},{z:.7f}")
+    path.write_text("\n".join(lines) + "\n")
+
+
+def build_scene(folder: Path) -> Scene:
+    """The recipe of a tiny data set; beside the folder, what workers make of its jobs."""
+    (folder / "scene.toml").write_text(SIMULATED)
+    (folder / "tiny.toml").write_text(DATA_SET)
+    kept = folder.with_name(f"{folder.name}.kept")
+    kept.mkdir()
+    return Scene(folder=folder, ids={"kept": str(kept)})
+
+
+def train_scene(folder: Path) -> Scene:
+    """A lake of small films, and a recipe that learns from them."""
+    from tests.models.conftest import RECIPE, fill
+
+    lake = Lake.create(folder / "lake")
+    fill(lake)
+    (folder / "small.toml").write_text(RECIPE.replace("epochs = 3", "epochs = 1"))
+    return Scene(folder=folder)
+
+
+def measure_scene(folder: Path) -> Scene:
+    """A small model, a film and a lake."""
+    from tests.measure.estimate.conftest import FRAMES, TARGETS, pictures, write_video, written
+
+    Lake.create(folder / "lake")
+    written(folder / "model", TARGETS)
+    write_video(folder / "flag.mkv", pictures(2 * FRAMES, height=40, width=56))
+    return Scene(folder=folder)
+
+
+# What stands in for the computing. Each is called in the process from which commands are forked, with the folder of
+# what was kept.
+
+
+def kept_verdict(kept: str) -> None:
+    """Closing the loop gives the verdict that was kept, once the bank is read."""
+    import measure.closing.close
+
+    verdict = _kept(f"{kept}/verdict")
+
+    def closed(experiment: Any, options: Any, *, stage: Any = None) -> object:
+        banks.load(options.bank, words="kept")
+        return verdict
+
+    measure.closing.close.close_loop = closed
+
+
+def kept_outcome(kept: str) -> None:
+    """Proposing gives the outcome that was kept, once the bank is read."""
+    import measure.propose.propose
+
+    outcome = _kept(f"{kept}/outcome")
+
+    def proposed(experiment: Any, candidates: Any, *, options: Any, **others: Any) -> object:
+        banks.load(options.bank, words="kept")
+        return outcome
+
+    measure.propose.propose.propose = proposed
+
+
+def kept_jobs(kept: str) -> None:
+    """Jobs of a build are done here, and their results kept by the jobs' arguments."""
+    import sim.datasets.build
+    import sim.datasets.cluster
+
+    def done(client: object, jobs: Iterable[Job], *, say: Callable[[str], None]) -> Iterator[Any]:
+        for number, (function, arguments) in enumerate(jobs):
+            path = Path(kept) / f"{function.__name__}-{number}-{_told(arguments)}"
+            if not path.exists():
+                path.write_bytes(pickle.dumps(function(*arguments)))
+            yield pickle.loads(path.read_bytes())
+
+    sim.datasets.build.results = done  # pyright: ignore[reportPrivateImportUsage]
+    sim.datasets.cluster.connected = lambda *_, **__: nullcontext()  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def _told(arguments: Sequence[object]) -> str:
+    """Of a job: members that are simulated, or the film."""
+    told = [getattr(argument, "name", argument) for argument in arguments if isinstance(argument, list | int | str)]
+    films = [getattr(argument, "index", "") for argument in arguments]
+    return "".join(letter if letter.isalnum() else "-" for letter in f"{told}{films}")
+
+
+@cache
+def _kept(path: str) -> object:
+    return pickle.loads(Path(path).read_bytes())
+
+
+LOOP = {
+    "close-loop": Command(
+        arguments=(
+            "close-loop", "--recipe", "{folder}/tracks.toml", "--bank", "{folder}/bank", "--level", str(LEVEL),
+            "--workers", "1", "--out", "{folder}/out", *_LAKE,
+        ),
+        state=lambda folder: (rows(folder), files("out")(folder)), stand_in="tests.failing.slow:kept_verdict",
+        one_step=False,
+    ),
+    "propose": Command(
+        arguments=(
+            "propose", "{folder}/tracks.toml", "--bank", "{folder}/bank", "--level", str(LEVEL), "--workers", "1",
+            "--out", "{folder}/out", *_LAKE,
+        ),
+        state=files("out"), stand_in="tests.failing.slow:kept_outcome", one_step=False,
+    ),
+}  # fmt: skip
+BUILD = {
+    "build": Command(
+        arguments=("build", "{folder}/tiny.toml", "--workers", "1", *_LAKE), state=rows,
+        stand_in="tests.failing.slow:kept_jobs", one_step=False,
+    ),
+}  # fmt: skip
+TRAIN = {
+    "train": Command(arguments=("train", "{folder}/small.toml", "--workers", "1", *_LAKE), state=artifacts),
+}
+MEASURE = {
+    "measure": Command(
+        arguments=(
+            "measure",
+            "{folder}/flag.mkv",
+            "--flag-size",
+            "1.5x1.0",
+            "--model",
+            "{folder}/model",
+            "--anyway",
+            "--report",
+            "{folder}/report.html",
+            "--zarr",
+            "{folder}/answer.zarr",
+            *_LAKE,
+        ),
+        state=rows,
+    ),
+}
+SCENES = {
+    "train": (train_scene, TRAIN), "measure": (measure_scene, MEASURE), "build": (build_scene, BUILD),
+    "loop": (loop_scene, LOOP),
+}  # fmt: skip
+"""Scenes, each with its commands."""
