@@ -10,6 +10,7 @@ are numbered as they fail. */
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -29,7 +30,7 @@ enum { READS = 1, WRITES = 2 };
 static struct {
     atomic_long calls;
     long first;         /* the call that fails, from 0; none while negative */
-    int number;         /* errno */
+    int number;         /* errno; the process is killed instead where it is negative */
     int stays;          /* whether all later calls fail too */
     int kinds;          /* READS, WRITES or both; 0 counts none */
     int traced;         /* whether the trace is written */
@@ -80,6 +81,7 @@ static int fails(int kind, const char *name, int fd, const char *path) {
         }
         fail = state->first >= 0 && (state->stays ? own >= state->first : own == state->first);
     }
+    if (fail && state->number < 0) kill(getpid(), SIGKILL);
     errno = !fail ? before : kind == READS && state->number == ENOSPC ? EIO : state->number;
     return fail;
 }

@@ -56,26 +56,47 @@ def tried(
     }  # fmt: skip
 
 
-def campaign(names: Sequence[str], results: Path, *, stride: int, stays: bool, first: int) -> None:
-    """Try commands and note the results of each in a JSON file."""
+def killed(command: Command, scene: Scene, injector: Injector, scratch: Path, *, points: int) -> dict[str, Any]:
+    """A command that is killed at so many of its calls, spread evenly, and given once more; what was wrong with any."""
+    begun = time.monotonic()
+    trials = Trials(command, scene.folder, scene.ids, injector, scratch)
+    total = trials.whole.done.calls
+    wrong = []
+    for call in sorted({total * point // points for point in range(points)}):
+        if (found := trials.wrong(Fault(call=call, kills=True), repeated=True)) is not None:
+            wrong.append(found)
+            print(json.dumps(found, indent=1), flush=True)  # noqa: T201
+    return {"calls": total, "points": points, "wrong": len(wrong), "seconds": round(time.monotonic() - begun)}
+
+
+def campaign(names: Sequence[str], results: Path, *, stride: int, stays: bool, first: int, kills: int | None) -> None:
+    """Try commands and note the results of each in a JSON file.
+
+    Args:
+        kills: points at which commands are killed; None lets calls fail.
+    """
     known: dict[str, Any] = json.loads(results.read_text()) if results.exists() else {}
     with ExitStack() as stack:
         scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="failing-")))
         (scratch / "injector").mkdir()
         injector = stack.enter_context(injecting(scratch / "injector"))
         assert injector is not None, "there is no compiler, or this is no Linux"
-        for title, (make, commands) in SCENES.items():
+        for group, (make, commands) in SCENES.items():
             wanted = [name for name in commands if name in names or not names]
             if not wanted:
                 continue
-            (scratch / title).mkdir()
-            scene = make(scratch / title)
+            (scratch / group).mkdir()
+            scene = make(scratch / group)
             for name in wanted:
-                place = scratch / f"{title}-{name}"
+                place = scratch / f"{group}-{name}"
                 place.mkdir()
-                found = tried(commands[name], scene, injector, place, stride=stride, stays=stays, first=first)
-                known[name] = {**found, "circumstances": circumstances(0)}
-                print(name, {**found}, flush=True)  # noqa: T201
+                if kills is not None:
+                    title, found = f"{name}, killed", killed(commands[name], scene, injector, place, points=kills)
+                else:
+                    title = f"{name}, alone" if not stays else name
+                    found = tried(commands[name], scene, injector, place, stride=stride, stays=stays, first=first)
+                known[title] = {**found, "circumstances": circumstances(0)}
+                print(title, found, flush=True)  # noqa: T201
                 results.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n")
 
 
@@ -86,5 +107,6 @@ if __name__ == "__main__":
     parser.add_argument("--stride", type=int, default=1, help="try every so many calls before the publication")
     parser.add_argument("--first", type=int, default=0, help="first call to try")
     parser.add_argument("--alone", action="store_true", help="only calls that fail alone")
+    parser.add_argument("--kill", type=int, metavar="N", help="kill commands at so many calls instead")
     given = parser.parse_args()
-    campaign(given.names, given.out, stride=given.stride, stays=not given.alone, first=given.first)
+    campaign(given.names, given.out, stride=given.stride, stays=not given.alone, first=given.first, kills=given.kill)

@@ -34,10 +34,17 @@ class Fault:
     Attributes:
         call: its number, from 0.
         stays: whether all later calls fail too, for want of space (reads: as a broken disk does); else it fails alone.
+        kills: whether the process is killed (SIGKILL) by that call instead, before the call is made.
     """
 
     call: int
     stays: bool = False
+    kills: bool = False
+
+    @property
+    def error(self) -> int:
+        """The number that `calls.c` takes."""
+        return -1 if self.kills else errno.ENOSPC if self.stays else errno.EIO
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +86,7 @@ class Injector:
         task = {
             "arguments": list(arguments), "folder": str(folder), "kinds": int(kinds), "traced": traced,
             "call": -1 if fault is None else fault.call, "stays": fault is not None and fault.stays,
-            "error": errno.ENOSPC if fault is not None and fault.stays else errno.EIO,
+            "error": 0 if fault is None else fault.error,
         }  # fmt: skip
         self._tasks.write(json.dumps(task) + "\n")
         self._tasks.flush()

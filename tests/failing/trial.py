@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import signal
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import timedelta
@@ -86,8 +87,9 @@ class Trials:
         command, folder = self._command, self._copy()
         done = self._injector.run(folder, command.given(folder, self._ids), fault)
         state = command.state(folder)
-        problems = [*self._report_against(done, state), *_health(folder / command.lake)]
-        if repeated and done.code:
+        problems = self._lost(done, state) if fault.kills else self._report_against(done, state)
+        problems += _health(folder / command.lake)
+        if done.code and (repeated or fault.kills):
             again = self._injector.run(folder, command.given(folder, self._ids))
             if again.code or command.state(folder) != self.whole.after:
                 problems.append(f"the repeat fails or ends otherwise: {again.stderr}")
@@ -115,6 +117,15 @@ class Trials:
         if done.code and "fix:" not in done.stderr:
             problems.append("no fix is named")
         return problems + [word for word in ("Traceback", "unforeseen", "interrupted") if word in done.stderr]
+
+    def _lost(self, done: Done, state: object) -> list[str]:
+        """What is wrong with a command that was killed: what was there before must be there."""
+        problems = [] if done.code == -signal.SIGKILL else [f"exit code {done.code}, not killed"]
+        if self._command.one_step and state not in (self.whole.before, self.whole.after):
+            problems.append("a part is published")
+        if isinstance(state, frozenset) and isinstance(self.whole.before, frozenset) and not self.whole.before <= state:
+            problems.append("something is lost")
+        return problems
 
     def _copy(self) -> Path:
         self._count += 1
