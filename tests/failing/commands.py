@@ -96,22 +96,22 @@ def made_scene(folder: Path) -> Scene:
     return core_scene(folder, video=write_video(folder / "film.mp4"), wind_log=log, write_video=write_video)
 
 
-def rows(folder: Path) -> object:
+def rows(folder: Path) -> frozenset[object]:
     """Every artifact of the lake with its object, by branch."""
     lake = Lake.open(folder / "lake")
     columns = ["artifact", "kind", "name", "branch", "object"]
     return frozenset(tuple(row.values()) for row in lake.rows(columns=columns).to_pylist())
 
 
-def artifacts(folder: Path) -> object:
+def artifacts(folder: Path) -> frozenset[object]:
     """Every artifact of the lake, of commands whose objects note how long something took."""
     return frozenset(Lake.open(folder / "lake").rows(columns=["artifact"])["artifact"].to_pylist())
 
 
-def files(*places: str) -> Callable[[Path], object]:
+def files(*places: str) -> Callable[[Path], frozenset[object]]:
     """What is at these places of the folder and under them: folders, and files with their hashes; no scratch files."""
 
-    def found(folder: Path) -> object:
+    def found(folder: Path) -> frozenset[object]:
         every = [entry for place in places for entry in ((folder / place), *(folder / place).rglob("*"))]
         return frozenset(
             (str(path.relative_to(folder)), path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest())

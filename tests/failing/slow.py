@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.lake import Lake
+from flagdata.lake import Artifact, Lake
+from flagdata.schema import Kind
 from measure.closing.close import close_loop
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.setting import Setting
@@ -94,9 +95,15 @@ frames = 30
 _LAKE = ("--lake", "{folder}/lake")
 
 
+def started(folder: Path) -> None:
+    """A lake that holds something already."""
+    with Lake.create(folder / "lake").transaction("what must not be lost") as transaction:
+        transaction.add(Artifact(kind=Kind.MARKERS, name="earlier", source_hash="0" * 64))
+
+
 def loop_scene(folder: Path) -> Scene:
     """Recordings with a drag that the base model lacks, a bank of nulls, a lake; beside the folder, results."""
-    Lake.create(folder / "lake")
+    started(folder)
     mesh = grid(width=WIDTH, height=HEIGHT, columns=8, rows=6)
     cloth = Specimen(
         mesh=mesh, material=named("camel-ponte-roma"), held=handles.corners(mesh.rest),
@@ -133,6 +140,7 @@ def _tracks(path: Path, markers: NDArray[np.float64], recordings: Sequence[NDArr
 
 def build_scene(folder: Path) -> Scene:
     """The recipe of a tiny data set; beside the folder, what workers make of its jobs."""
+    started(folder)
     (folder / "scene.toml").write_text(SIMULATED)
     (folder / "tiny.toml").write_text(DATA_SET)
     kept = folder.with_name(f"{folder.name}.kept")
@@ -154,7 +162,7 @@ def measure_scene(folder: Path) -> Scene:
     """A small model, a film and a lake."""
     from tests.measure.estimate.conftest import FRAMES, TARGETS, pictures, write_video, written
 
-    Lake.create(folder / "lake")
+    started(folder)
     written(folder / "model", TARGETS)
     write_video(folder / "flag.mkv", pictures(2 * FRAMES, height=40, width=56))
     return Scene(folder=folder)
@@ -224,7 +232,7 @@ LOOP = {
             "close-loop", "--recipe", "{folder}/tracks.toml", "--bank", "{folder}/bank", "--level", str(LEVEL),
             "--workers", "1", "--out", "{folder}/out", *_LAKE,
         ),
-        state=lambda folder: (rows(folder), files("out")(folder)), stand_in="tests.failing.slow:kept_verdict",
+        state=lambda folder: rows(folder) | files("out")(folder), stand_in="tests.failing.slow:kept_verdict",
         one_step=False,
     ),
     "propose": Command(
