@@ -69,10 +69,20 @@ def killed(command: Command, scene: Scene, injector: Injector, scratch: Path, *,
     return {"calls": total, "points": points, "wrong": len(wrong), "seconds": round(time.monotonic() - begun)}
 
 
-def campaign(names: Sequence[str], results: Path, *, stride: int, stays: bool, first: int, kills: int | None) -> None:
+def campaign(
+    names: Sequence[str],
+    results: Path,
+    *,
+    scenes: Path | None,
+    stride: int,
+    stays: bool,
+    first: int,
+    kills: int | None,
+) -> None:
     """Try commands and note the results of each in a JSON file.
 
     Args:
+        scenes: folder in which scenes are kept for a later campaign; None makes them anew.
         kills: points at which commands are killed; None lets calls fail.
     """
     known: dict[str, Any] = json.loads(results.read_text()) if results.exists() else {}
@@ -85,8 +95,7 @@ def campaign(names: Sequence[str], results: Path, *, stride: int, stays: bool, f
             wanted = [name for name in commands if name in names or not names]
             if not wanted:
                 continue
-            (scratch / group).mkdir()
-            scene = make(scratch / group)
+            scene = _kept(scenes or scratch, group, make)
             for name in wanted:
                 place = scratch / f"{group}-{name}"
                 place.mkdir()
@@ -100,13 +109,31 @@ def campaign(names: Sequence[str], results: Path, *, stride: int, stays: bool, f
                 results.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n")
 
 
+def _kept(folder: Path, group: str, make: Callable[[Path], Scene]) -> Scene:
+    """The scene that is kept in a folder, or one that is made there."""
+    ids = folder / f"{group}.json"
+    if not ids.exists():
+        (folder / group).mkdir(parents=True)
+        ids.write_text(json.dumps(make(folder / group).ids))
+    return Scene(folder=folder / group, ids=json.loads(ids.read_text()))
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="commands; all if none is named")
     parser.add_argument("--out", type=Path, required=True, help="JSON file of the results")
+    parser.add_argument("--scenes", type=Path, help="folder that scenes are kept in; some take minutes to make")
     parser.add_argument("--stride", type=int, default=1, help="try every so many calls before the publication")
     parser.add_argument("--first", type=int, default=0, help="first call to try")
     parser.add_argument("--alone", action="store_true", help="only calls that fail alone")
     parser.add_argument("--kill", type=int, metavar="N", help="kill commands at so many calls instead")
     given = parser.parse_args()
-    campaign(given.names, given.out, stride=given.stride, stays=not given.alone, first=given.first, kills=given.kill)
+    campaign(
+        given.names,
+        given.out,
+        scenes=given.scenes,
+        stride=given.stride,
+        stays=not given.alone,
+        first=given.first,
+        kills=given.kill,
+    )
