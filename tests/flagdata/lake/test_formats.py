@@ -16,12 +16,13 @@ import pytest
 from deltalake import DeltaTable
 
 from flagdata.checksums import content_hash
-from flagdata.errors import CorruptError, UsageError
+from flagdata.errors import ConflictError, CorruptError, UsageError
 from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.catalog import Moved
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, verify_catalog
+from flagdata.lake.log import Log
 from flagdata.schema import CATALOG, Kind
 
 Put = Callable[..., Artifact]
@@ -91,6 +92,18 @@ def test_of_two_appends_at_one_version_the_second_is_told_and_publishes_nothing(
         second.append(rows, base=base, info={})
     assert second.head() == base + 1
     assert lake.catalog.unpublished_files() == []
+
+
+def test_a_catalog_whose_protocol_another_program_raised_is_read_and_not_written(lake: Lake, put_text: Put) -> None:
+    """Delta: a writer must not write to a table that asks for a later writer version than it implements."""
+    kept = put_text(lake, "before")
+    raised = {"protocol": {"minReaderVersion": 1, "minWriterVersion": 4}}
+    log = Log(lake.path / "catalog" / "_delta_log", lake.path / "refs" / "newest")
+    assert log.put(2, [{"commitInfo": {"timestamp": 0, "operation": "UPGRADE PROTOCOL"}}, raised])
+    assert lake.rows()["artifact"].to_pylist() == [kept.id]
+    with pytest.raises(ConflictError, match="version 4 of Delta's protocol"):
+        put_text(lake, "after")
+    assert lake.catalog.head() == 2
 
 
 def test_a_batch_of_rows_is_one_version_and_one_file(lake: Lake) -> None:
