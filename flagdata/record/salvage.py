@@ -294,7 +294,7 @@ class _Pass:
 
     def _rest(self) -> bytes:
         """What follows in the file, up to what a chunk may hold; a read of more would take the memory first."""
-        return self._stream.read(min(CHUNK_LIMIT, self._size - self._stream.tell()))
+        return self._stream.read(min(CHUNK_LIMIT, max(0, self._size - self._stream.tell())))
 
     def _partial(self, start: int) -> None:
         """Keep the whole messages of a plain chunk whose end is missing, or whose length is wrong."""

@@ -24,6 +24,7 @@ from flagdata.documents import read_json
 from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownNameError
 from flagdata.outputs import rewrite
 from flagdata.provenance import canonical, digest, file_hash
+from flagdata.recipes import is_name
 from measure.observe.anchors import as_seen
 from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
 from sim import handles as held
@@ -89,7 +90,7 @@ class ChallengeFolder:
         sets, hashes = content.get("sets"), ("data", "commitment")
         stated = isinstance(content.get("title"), str) and isinstance(sets, dict) and all(
             isinstance(entry, dict) and all(isinstance(entry.get(key), str) for key in hashes)
-            and Path(name).name == name
+            and is_name(name) and Path(name).name == name
             for name, entry in sets.items()
         )  # fmt: skip
         if not stated:
@@ -133,7 +134,14 @@ class ChallengeFolder:
         Raises:
             CorruptError: they are not.
         """
-        if data_hash(self.data(name)) != self.manifest()["sets"][name]["data"]:
+        try:
+            found = data_hash(self.data(name))
+        except OSError as error:
+            raise CorruptError(
+                f"the data cannot be read: {error.strerror}", where=str(self.data(name)),
+                fix="restore the folder as it was made",
+            ) from None  # fmt: skip
+        if found != self.manifest()["sets"][name]["data"]:
             raise CorruptError(
                 "the data are not those that were published", where=str(self.data(name)),
                 fix="restore the folder as it was made",

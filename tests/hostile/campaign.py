@@ -103,6 +103,8 @@ def campaign(kind: str, *, count: int, start: int) -> dict[str, Any]:
             [sys.executable, "-m", "tests.hostile", kind, "--count", str(count), "--seed", str(start), "--out", out],
             cwd=REPOSITORY, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
         )  # fmt: skip
+        if not out.exists():
+            raise RuntimeError(f"the campaign did not begin: {done.stderr[-2000:]}")
         outcome: dict[str, Any] = json.loads(out.read_text())
         if done.returncode:  # it ended within an example, which stands there
             last = outcome.pop("last")

@@ -51,7 +51,8 @@ def test_a_header_that_states_more_than_the_file_holds_is_refused(tmp_path: Path
 @pytest.mark.parametrize(
     "content",
     [{}, {"title": "t"}, {"title": "t", "sets": []}, {"title": "t", "sets": {"set-001": {"data": "x"}}},
-     {"title": "t", "sets": {"../x": {"data": "x", "commitment": "y"}}}],
+     {"title": "t", "sets": {"../x": {"data": "x", "commitment": "y"}}},
+     {"title": "t", "sets": {"\0": {"data": "x", "commitment": "y"}}}],
 )  # fmt: skip
 def test_a_challenge_that_does_not_state_its_sets_is_refused(tmp_path: Path, content: dict[str, Any]) -> None:
     (tmp_path / "challenge.json").write_text(json.dumps(content))
@@ -64,3 +65,10 @@ def test_a_record_of_openings_without_verdicts_is_refused(tmp_path: Path, conten
     (tmp_path / "opened.json").write_text(content)
     with pytest.raises(CorruptError, match="openings"):
         opened(ChallengeFolder(tmp_path))
+
+
+def test_a_set_whose_folder_is_gone_is_refused(tmp_path: Path) -> None:
+    sets = {"set-001": {"data": "x", "commitment": "y"}}
+    (tmp_path / "challenge.json").write_text(json.dumps({"title": "t", "sets": sets}))
+    with pytest.raises(CorruptError, match="cannot be read"):
+        ChallengeFolder(tmp_path).experiment("set-001")
