@@ -6,10 +6,15 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 from flagdata.errors import NotFoundError
 from sim.blender import environment
+
+# A busy machine is no defect: what may take how long is the claim of tests of its own (pytest-timeout ends a hang).
+hypothesis.settings.register_profile("whatever-the-load", deadline=None)
+hypothesis.settings.load_profile("whatever-the-load")
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
