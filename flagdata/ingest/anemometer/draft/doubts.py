@@ -1,0 +1,203 @@
+"""Numbers of a drafted reading that are impossible or doubtful: each opens its field again, and only the user closes it.
+
+A doubt is answered for good by its key in a recipe: `[expect] confirmed = ["fast", …]`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from flagdata.ingest.anemometer.instants.stamps import DAY
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.recipe import Recipe
+from flagdata.signals import Series
+from flagdata.timebase import NANOSECONDS, iso
+from flagdata.units import UNITS, unit
+
+_FASTEST = 75.0
+"""m/s; above the strongest gusts of any storm but tornadoes and the record of Barrow Island (113 m/s)."""
+_STRONG = 30.0
+"""m/s; a median above it is a storm that lasts."""
+_FEW, _RARE = 0.05, 0.01
+_SLOW = 60 * NANOSECONDS
+_BEFORE = 631_152_000 * NANOSECONDS
+"""1990-01-01T00:00:00Z."""
+_TENS = 36.0
+_CALM = 0.2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doubt:
+    """What speaks against a drafted reading.
+
+    Attributes:
+        key: of the recipe's [expect].
+        text: what is odd, with numbers.
+        question: to be answered.
+    """
+
+    key: str
+    text: str
+    question: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Seen:
+    """A reading as it is examined: speed and direction as they are written, without missing values."""
+
+    reading: Reading
+    speed: Series
+    direction: Series
+    both: tuple[Series, Series]
+    unit: str
+    assumed: bool
+    left_out: int
+    now: int
+
+
+def doubts(
+    reading: Reading, recipe: Recipe, *, assumed: frozenset[str], left_out: int, now: int
+) -> tuple[Doubt, ...]:
+    """Everything that is odd of a drafted reading, but for what the recipe expects.
+
+    Args:
+        reading: in the order of the file, before it was judged.
+        assumed: channels whose unit is assumed.
+        left_out: lines that could not be read.
+        now: UTC nanoseconds.
+    """
+    speed, direction = (_written(reading, recipe, name) for name in ("wind_speed", "wind_direction"))
+    known = np.isfinite(speed) & np.isfinite(direction)
+    seen = _Seen(
+        reading=reading, speed=speed[np.isfinite(speed)], direction=direction[np.isfinite(direction)],
+        both=(speed[known], direction[known]), unit=_unit(recipe, "wind_speed"), assumed="wind_direction" in assumed,
+        left_out=left_out, now=now,
+    )  # fmt: skip
+    found = ((key, check(seen), question) for key, (check, question) in CHECKS.items() if key not in recipe.expect)
+    return tuple(Doubt(key=key, text=text, question=question) for key, text, question in found if text)
+
+
+def _unit(recipe: Recipe, name: str) -> str:
+    return recipe.channels[name].unit if name in recipe.channels else "m/s"
+
+
+def _written(reading: Reading, recipe: Recipe, name: str) -> Series:
+    """A channel in the file's unit; angles in degrees where they are points of the compass."""
+    values = reading.channels.get(name)
+    if values is None:
+        return np.full(len(reading.time), np.nan)
+    spelled = _unit(recipe, name)
+    return unit(spelled).from_si(values) if spelled in UNITS else np.rad2deg(values)
+
+
+def _si(seen: _Seen) -> Series:
+    return unit(seen.unit).to_si(seen.speed)
+
+
+def _fast(seen: _Seen) -> str:
+    over = _si(seen) > _FASTEST
+    return f"{int(over.sum())} speeds are above {_FASTEST:g} m/s, the highest {_si(seen).max():.4g}" if over.any() else ""
+
+
+def _strong(seen: _Seen) -> str:
+    median = float(np.median(_si(seen))) if len(seen.speed) else 0.0
+    return f"the median speed is {median:.3g} m/s" if median > _STRONG else ""
+
+
+def _negative(seen: _Seen) -> str:
+    below = seen.speed[seen.speed < 0]
+    values, counts = np.unique(below, return_counts=True)
+    if len(counts) and counts.max() > 1:
+        return f"{values[counts.argmax()]:g} {seen.unit} occurs {counts.max()} times and is no speed"
+    share = len(below) / max(1, len(seen.speed))
+    return f"{share:.0%} of the speeds are below 0, the lowest {below.min():g} {seen.unit}" if share > _FEW else ""
+
+
+def _still(seen: _Seen) -> str:
+    return "every speed is 0" if len(seen.speed) and not seen.speed.any() else ""
+
+
+def _constant(seen: _Seen) -> str:
+    same = len(seen.speed) > 10 and seen.speed[0] != 0 and bool((seen.speed == seen.speed[0]).all())
+    return f"every speed is {seen.speed[0]:g} {seen.unit}" if same else ""
+
+
+def _angles(seen: _Seen) -> str:
+    whole = len(seen.speed) > 10 and bool((seen.speed % 1 == 0).all()) and bool((seen.speed >= 0).all())
+    spread = whole and seen.speed.max() <= 360 and seen.speed.max() > 180 and len(np.unique(seen.speed)) > 10
+    return f"the speeds are whole numbers from {seen.speed.min():g} to {seen.speed.max():g}" if spread else ""
+
+
+def _turn(seen: _Seen) -> str:
+    out = seen.direction[(seen.direction < -180) | (seen.direction > 360)]
+    return f"{len(out)} directions are outside -180 to 360, one of them {out[0]:g}" if len(out) else ""
+
+
+def _tens(seen: _Seen) -> str:
+    found = seen.direction
+    small = seen.assumed and len(found) > 1 and bool((found % 1 == 0).all()) and 0 <= found.min() and found.max() <= _TENS
+    return f"the directions are whole numbers up to {found.max():g}, and no unit is stated" if small else ""
+
+
+def _fixed(seen: _Seen) -> str:
+    speed, direction = seen.both
+    same = len(direction) > 10 and bool((direction == direction[0]).all()) and len(np.unique(speed)) > 3
+    return f"the direction is {direction[0]:g} in every row, while the speed varies" if same else ""
+
+
+def _calm(seen: _Seen) -> str:
+    speed, direction = seen.both
+    zero = direction == 0
+    si = unit(seen.unit).to_si(speed)
+    only = zero.sum() > 1 and bool((si[zero] <= _CALM).all()) and bool((si[~zero] > _CALM).any())
+    return f"the direction is 0 in {int(zero.sum())} rows, all of them at speeds up to {_CALM:g} m/s" if only else ""
+
+
+def _order(seen: _Seen) -> str:
+    back = np.diff(seen.reading.time) <= 0
+    share = float(back.mean()) if len(back) else 0.0
+    return f"the time does not increase in {share:.0%} of the rows" if share > _RARE else ""
+
+
+def _future(seen: _Seen) -> str:
+    last = int(seen.reading.time.max())
+    return f"the last row is of {iso(last)}, which is to come" if last > seen.now + DAY else ""
+
+
+def _old(seen: _Seen) -> str:
+    first = int(seen.reading.time.min())
+    return f"the first row is of {iso(first)[:10]}" if first < _BEFORE else ""
+
+
+def _coarse(seen: _Seen) -> str:
+    steps = np.diff(np.sort(seen.reading.time))
+    step = float(np.median(steps)) / NANOSECONDS if len(steps) else 0.0
+    return f"rows are {step:g} s apart" if step * NANOSECONDS > _SLOW else ""
+
+
+def _lines(seen: _Seen) -> str:
+    share = seen.left_out / max(1, seen.left_out + len(seen.reading.time))
+    return f"{seen.left_out} lines ({share:.0%}) were left out" if share > _RARE else ""
+
+
+CHECKS: Mapping[str, tuple[Callable[[_Seen], str], str]] = {
+    "fast": (_fast, "Is the unit right?"),
+    "strong": (_strong, "Is the unit right?"),
+    "negative": (_negative, "Do negative speeds occur, as of a calibration's zero?"),
+    "still": (_still, "Did the wind rest all the time?"),
+    "constant": (_constant, "Did the wind never change?"),
+    "angles": (_angles, "Are these speeds, and no directions?"),
+    "turn": (_turn, "Are these angles right?"),
+    "tens": (_tens, "Are these degrees, and no tens of degrees or sectors?"),
+    "fixed": (_fixed, "Did the vane never turn?"),
+    "calm": (_calm, "Is 0 the north, and not calm air?"),
+    "order": (_order, "Are the stamps right?"),
+    "future": (_future, "Is the clock right?"),
+    "old": (_old, "Is the clock right?"),
+    "coarse": (_coarse, "Are these readings or means that long apart?"),
+    "lines": (_lines, "May these lines be left out?"),
+}
+"""Key of [expect] → the check, and what is asked; "yes" confirms the reading as it is."""

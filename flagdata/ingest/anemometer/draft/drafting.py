@@ -1,0 +1,323 @@
+"""A draft of a table that no recipe describes: what is stated, inferred, assumed or given, and what is open.
+
+A draft gives no rows. Where nothing is open, its recipe can be read and shown; where anything of it is inferred or
+assumed, what was read counts only when it is confirmed (see `confirm`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from flagdata import compass
+from flagdata.ingest.anemometer.draft.given import GivenColumns, given_columns
+from flagdata.ingest.anemometer.draft.shape import Shape, is_missing, is_number, shape_of
+from flagdata.ingest.anemometer.draft.times import TimeFields, find_time, of_columns
+from flagdata.ingest.anemometer.draft.toml import ChannelText, recipe_text
+from flagdata.ingest.anemometer.draft.words import Meaning, fits, meaning
+from flagdata.ingest.anemometer.instants import counted, yearless
+from flagdata.ingest.anemometer.options import WindOptions, in_shell
+from flagdata.units import canonical
+
+Origin = Literal["stated", "inferred", "assumed", "given"]
+_BESIDE = {"temperature": "air_temperature", "humidity": "relative_humidity", "pressure": "air_pressure"}
+_AXES = {"x": "wind_x", "y": "wind_y", "z": "wind_z"}
+_POINTS = 0.9
+"""Share of the cells that must be points of the compass."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fact:
+    """One thing that a draft says.
+
+    Attributes:
+        what: it is about: "time", "wind_speed", "delimiter".
+        value: for people.
+        origin: the file states it, the program inferred it from values or assumed it, or the user gave it.
+        evidence: what shows it.
+    """
+
+    what: str
+    value: str
+    origin: Origin
+    evidence: str = ""
+
+    def line(self) -> str:
+        return f"{self.what:<16}{self.value:<34}{self.origin}{f' ({self.evidence})' if self.evidence else ''}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Open:
+    """A question that only the user can answer.
+
+    Attributes:
+        key: the option that answers it.
+        question: in words.
+        example: of an answer.
+    """
+
+    key: str
+    question: str
+    example: str
+
+    def fix(self) -> str:
+        return f"--{self.key.replace('_', '-')} {self.example}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Draft:
+    """See the module's text.
+
+    Attributes:
+        facts: what is known, with its origin.
+        open: what is not.
+        recipe: TOML; complete where nothing is open.
+        unused: headings of the columns that are not read.
+        winds: labels of the anemometers that it holds.
+        of_earth: whether the components are towards east (x) and north (y).
+    """
+
+    facts: tuple[Fact, ...]
+    open: tuple[Open, ...]
+    recipe: str
+    unused: tuple[str, ...]
+    winds: tuple[str, ...]
+    of_earth: bool = False
+
+    @property
+    def stated(self) -> bool:
+        """Whether nothing of it is inferred or assumed."""
+        return not self.open and all(fact.origin in ("stated", "given") for fact in self.facts)
+
+
+@dataclass
+class _Parts:
+    """A draft as it is put together."""
+
+    facts: list[Fact] = field(default_factory=list)
+    open: list[Open] = field(default_factory=list)
+    channels: dict[str, ChannelText] = field(default_factory=dict)
+    used: set[int] = field(default_factory=set)
+
+
+def draft(lines: Sequence[str], options: WindOptions) -> Draft | None:
+    """The draft of the table that a file begins with; `None` where it holds none.
+
+    Raises:
+        UsageError, UnknownNameError, InputError: `options.columns` do not fit the table.
+    """
+    shape = shape_of(lines)
+    if shape is None:
+        return None
+    meanings = [meaning(name, below) for name, below in zip(shape.names, shape.units, strict=True)]
+    given = given_columns(options.columns, shape) if options.columns is not None else None
+    parts = _Parts()
+    winds, of_earth = _of_wind(parts, shape, meanings, options) if given is None else (_given(parts, shape, given), False)
+    time = _time(parts, shape, meanings, given, options)
+    if given is None and not winds and time is None:
+        return None
+    parts.facts.insert(0, _cutting(shape, lines))
+    label = options.wind or (winds[0] if winds else "anemometer")
+    unused = tuple(shape.shown(i) for i in range(len(shape.names)) if i not in parts.used and shape.names[i])
+    return Draft(
+        facts=tuple(parts.facts), open=tuple(parts.open), unused=unused, winds=winds, of_earth=of_earth,
+        recipe=recipe_text(
+            shape, time=None if time is None else time.columns, form=time.form if time is not None else None,
+            zone="UTC" if time is not None and time.utc and not time.zoned else None, channels=parts.channels, label=label,
+            missing=options.missing,
+        ),
+    )  # fmt: skip
+
+
+def _cutting(shape: Shape, lines: Sequence[str]) -> Fact:
+    named = {" ": "blanks", "\t": "tabs"}.get(shape.delimiter, repr(shape.delimiter))
+    value = f"cells divided by {named}, decimal {shape.decimal!r}"
+    plain = shape.delimiter in ",\t" and shape.decimal == "." and shape.preamble == 0 and shape.header == 1
+    where = f"line {shape.preamble + 1} names the columns" if shape.header else "no line names the columns"
+    return Fact(what="cells", value=value, origin="stated" if plain else "inferred", evidence=where)
+
+
+def _time(
+    parts: _Parts, shape: Shape, meanings: Sequence[Meaning], given: GivenColumns | None, options: WindOptions
+) -> TimeFields | None:
+    if given is not None:
+        time = of_columns(shape, given.time, options.date_order, given.form or None) if given.time else None
+    else:
+        time = find_time(shape, meanings, options.date_order)
+    if time is None:
+        question = "no column reads as a time: which one is it, and in what format?"
+        parts.open.append(Open(key="columns", question=question, example="'1=time[FORMAT],2=wind_speed[UNIT]'"))
+        return None
+    parts.used.update(time.columns)
+    shown = " + ".join(shape.shown(i) for i in time.columns)
+    if time.form is None:
+        question = f"{shown}: {shape.rows[0][time.columns[0]]!r} reads as {' and as '.join(time.forms)}: which is right?"
+        parts.open.append(Open(key="date_order", question=question, example="dmy (or mdy, ymd)"))
+        return time
+    if given is not None and given.form:
+        origin: Origin = "given"
+    elif time.form == "iso" and all(meanings[i].kind == "time" for i in time.columns):
+        origin = "stated"
+    else:
+        origin = "given" if options.date_order is not None else "inferred"
+    parts.facts.append(Fact(what="time", value=f"{shown} as {time.form}", origin=origin, evidence=time.evidence))
+    if counted.is_elapsed(time.form):
+        if options.start is None:
+            question = f"{shown} counts from a start: at what instant was the first row?"
+            parts.open.append(Open(key="start", question=question, example="2026-05-01T12:00:00+02:00"))
+        return time
+    if (counted.is_time_of_day(time.form) or yearless.is_yearless(time.form)) and options.date is None:
+        question = f"{shown} has no whole date: of what day is the first row?"
+        parts.open.append(Open(key="date", question=question, example="2026-05-01"))
+    epoch = time.form.startswith("epoch")
+    if time.zoned or epoch:
+        parts.facts.append(Fact(what="zone", value="in the stamps" if not epoch else "UTC, as Unix time", origin="stated"))
+    elif options.zone is not None:
+        parts.facts.append(Fact(what="zone", value=options.zone, origin="given"))
+    elif time.utc:
+        parts.facts.append(Fact(what="zone", value="UTC", origin="stated", evidence="the heading"))
+    else:
+        question = "zone of the logger's clock (Europe/Amsterdam, +02:00, UTC)"
+        parts.open.append(Open(key="zone", question=question, example="Europe/Amsterdam"))
+    return time
+
+
+def _given(parts: _Parts, shape: Shape, given: GivenColumns) -> tuple[str, ...]:
+    for channel, (index, unit) in given.channels.items():
+        towards = channel == "wind_direction" and given.towards
+        parts.used.add(index)
+        parts.channels[channel] = ChannelText(column=shape.reference(index), unit=unit, towards=towards)
+        parts.facts.append(Fact(what=channel, value=f"{shape.shown(index)} in {unit}", origin="given"))
+    first = next(iter(given.channels.values()))[0]
+    return (shape.names[first] or f"column {first + 1}",)
+
+
+def _of_wind(
+    parts: _Parts, shape: Shape, meanings: Sequence[Meaning], options: WindOptions
+) -> tuple[tuple[str, ...], bool]:
+    """Labels of the anemometers; the facts of the one that is read are added to `parts`."""
+    numeric = {i for i in range(len(meanings)) if _numeric(shape.column(i))}
+    speeds = [i for i, one in enumerate(meanings) if one.kind == "speed" and not one.against and i in numeric]
+    if any(meanings[i].named for i in speeds):
+        speeds = [i for i in speeds if meanings[i].named]
+    labels = {shape.names[i] or f"column {i + 1}": i for i in speeds}
+    chosen = labels.get(options.wind or "", speeds[0] if len(speeds) == 1 else None)
+    if options.wind is not None and options.wind not in labels:
+        every = {name: i for i, name in enumerate(shape.names) if name}
+        chosen = every.get(options.wind)
+        labels = {options.wind: chosen} if chosen is not None else labels
+    axes = {one.kind: i for i, one in reversed(list(enumerate(meanings))) if one.kind in _AXES and not one.against}
+    components = {_AXES[kind]: axes[kind] for kind in ("x", "y", "z") if kind in axes and axes[kind] in numeric}
+    if chosen is None and not speeds and {"wind_x", "wind_y"} <= set(components):
+        for channel, index in components.items():
+            _measured(parts, shape, meanings, channel, index, options)
+        earth = any(word in shape.names[components["wind_x"]].lower() for word in ("east", "u10"))
+        _beside(parts, shape, meanings)
+        return (shape.names[components["wind_x"]],), earth
+    if chosen is None:
+        listed = ", ".join(labels) if labels else ", ".join(name for name in shape.names if name)
+        question = f"which column is the wind's speed? {listed}" if not labels else f"which anemometer? {listed}"
+        example = in_shell(next(iter(labels), "COLUMN"))
+        parts.open.append(Open(key="wind", question=question, example=example))
+        return tuple(labels), False
+    against = meanings[chosen].against
+    moving = [shape.names[i] for i, one in enumerate(meanings) if set(one.against) & _PLATFORM or i == chosen and against]
+    if moving and options.platform is None:
+        question = (
+            f"{moving[0]!r} speaks of a platform that moves: fixed (it stands still), moving (the wind is apparent), or "
+            "corrected (the wind is over ground)?"
+        )
+        parts.open.append(Open(key="platform", question=question, example="moving"))
+    _measured(parts, shape, meanings, "wind_speed", chosen, options)
+    _direction(parts, shape, meanings, chosen)
+    _beside(parts, shape, meanings)
+    return tuple(labels), False
+
+
+_PLATFORM = frozenset(
+    "apparent aws awa awd bow vessel boat ship drone uav sog cog heading hdg ground vehicle track twd tws twa".split()
+)
+
+
+def _measured(
+    parts: _Parts, shape: Shape, meanings: Sequence[Meaning], channel: str, index: int, options: WindOptions
+) -> None:
+    """A column of wind with its unit."""
+    own = meanings[index]
+    parts.used.add(index)
+    unit, origin, evidence = own.unit, _STATED, "the heading"
+    if options.unit is not None:
+        unit, origin, evidence = canonical(options.unit), _GIVEN, "--unit"
+        if own.unit not in (None, unit):
+            evidence = f"--unit; the heading says {own.unit}"
+    if unit is None or not fits(channel, unit):
+        question = f"unit of {shape.shown(index)} (m/s, km/h, mph, kn)"
+        parts.open.append(Open(key="unit", question=question, example="m/s"))
+        unit = "?"
+    named = own.named or channel != "wind_speed"
+    if not named and options.wind is None:
+        origin, evidence = "inferred", f"of a speed, in {unit}; the heading does not name the wind"
+    parts.channels[channel] = ChannelText(column=shape.reference(index), unit=unit)
+    parts.facts.append(Fact(what=channel, value=f"{shape.shown(index)} in {unit}", origin=origin, evidence=evidence))
+
+
+_STATED: Origin = "stated"
+_GIVEN: Origin = "given"
+
+
+def _direction(parts: _Parts, shape: Shape, meanings: Sequence[Meaning], speed: int) -> None:
+    """The direction that belongs to a speed: of the same height, the only one of the table."""
+    near = [
+        i for i, one in enumerate(meanings)
+        if one.kind == "direction" and not set(one.against) - {"to", "toward", "towards", "going"}
+        and meanings[speed].height in (None, one.height)
+    ]  # fmt: skip
+    if len(near) != 1:
+        return
+    index = near[0]
+    own = meanings[index]
+    unit, origin, evidence = own.unit, _STATED, "the heading; from true north, clockwise, is the convention"
+    points = _compass(shape.column(index))
+    if points is not None:
+        unit, origin, evidence = points, "inferred", "its cells are points of the compass"
+    elif not _numeric(shape.column(index)):
+        return
+    elif unit is None:
+        unit, origin, evidence = "deg", "assumed", "no unit is stated"
+    elif not fits("wind_direction", unit):
+        return
+    if own.against:
+        question = f"does {shape.shown(index)} say where the wind comes from, or where it blows to?"
+        example = f"'{shape.reference(index)}=wind_direction[{unit}] (or wind_direction_to), and all other columns'"
+        parts.open.append(Open(key="columns", question=question, example=example))
+    parts.used.add(index)
+    parts.channels["wind_direction"] = ChannelText(column=shape.reference(index), unit=unit)
+    value = f"{shape.shown(index)} in {unit}"
+    parts.facts.append(Fact(what="wind_direction", value=value, origin=origin, evidence=evidence))
+
+
+def _beside(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
+    """Temperature, humidity and pressure whose unit is stated."""
+    for index, one in enumerate(meanings):
+        channel = _BESIDE.get(one.kind)
+        if channel is None or channel in parts.channels or one.against or not _numeric(shape.column(index)):
+            continue
+        if one.unit is not None and fits(channel, one.unit):
+            parts.used.add(index)
+            parts.channels[channel] = ChannelText(column=shape.reference(index), unit=one.unit)
+            value = f"{shape.shown(index)} in {one.unit}"
+            parts.facts.append(Fact(what=channel, value=value, origin="stated", evidence="the heading"))
+
+
+def _numeric(cells: Sequence[str]) -> bool:
+    filled = [cell for cell in cells if not is_missing(cell)]
+    return bool(filled) and sum(is_number(cell) for cell in filled) >= _POINTS * len(filled)
+
+
+def _compass(cells: Sequence[str]) -> str | None:
+    """The unit of points of the compass that a column's cells are; `None` for none, or for several languages."""
+    filled = {cell.upper() for cell in cells if not is_missing(cell)}
+    tables: Mapping[str, Mapping[str, float]] = compass.BY_UNIT
+    known = [name for name, points in tables.items() if filled and filled <= {*points, *compass.CALM}]
+    return known[0] if known and any(cell.isalpha() for cell in filled) else None
