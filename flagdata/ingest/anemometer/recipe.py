@@ -11,6 +11,7 @@ A recipe is parsed here and nowhere else; unknown keys are refused with the near
     [sensor]                  name, height, distance-constant, averaging, threshold, resolution, accuracy,
                               accuracy-relative (all SI)
     [quality]                 zero-offset, stale-after, frame-rate-of, fault-where-zero
+    [expect]                  confirmed: doubts about a draft that its user has answered (keys of draft/doubts.py)
     [[check]]                 column, values, about: cells that must be one of these texts, else the row is a fault
 """
 
@@ -214,6 +215,7 @@ class Recipe:
     quality: QualityRules = field(default_factory=QualityRules)
     checks: tuple[CheckLayout, ...] = ()
     rows: RowsLayout | None = None
+    expect: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         if not self.time.columns and not self.file.host:
@@ -274,7 +276,7 @@ class _Reader:
         self.where = where
 
     def recipe(self) -> Recipe:
-        self._known(self.data, "the recipe", "name about source file time rows channels sensor quality check")
+        self._known(self.data, "the recipe", "name about source file time rows channels sensor quality check expect")
         text = {key: self._text(self.data, key, "the recipe") for key in ("name", "about", "source")}
         channels = self._table(self.data, "channels")
         return Recipe(
@@ -285,6 +287,7 @@ class _Reader:
             sensor=self._sensor(self._table(self.data, "sensor")),
             quality=self._quality(self._table(self.data, "quality")),
             rows=self._rows(self._table(self.data, "rows")),
+            expect=self._expect(self._table(self.data, "expect")),
             checks=tuple(self._check(table) for table in self._typed(self.data, "check", list, [])),
         )  # fmt: skip
 
@@ -384,6 +387,10 @@ class _Reader:
             values=tuple(str(value).strip() for value in self._typed(table, "values", list, [])),
             about=self._text(table, "about", where),
         )
+
+    def _expect(self, table: Mapping[str, Any]) -> frozenset[str]:
+        self._known(table, "[expect]", "confirmed")
+        return frozenset(str(key) for key in self._typed(table, "confirmed", list, []))
 
     def _known(self, table: Mapping[str, Any], where: str, known: str) -> None:
         for key in table:

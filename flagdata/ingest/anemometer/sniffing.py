@@ -58,12 +58,3 @@ class Head:
 
 HEAD_LINES = 1000
 
-
-def as_taken(guesses: Sequence[Guess]) -> tuple[Guess, ...]:
-    """Guesses in the order in which they are tried.
-
-    A table in doubt goes before others that are not sure: its own reader refuses it, and knows what the user has said.
-    """
-    if guesses and guesses[0].score < SURE:
-        return tuple(sorted(guesses, key=lambda guess: not guess.doubts))
-    return tuple(guesses)

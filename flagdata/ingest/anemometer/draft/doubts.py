@@ -58,9 +58,7 @@ class _Seen:
     now: int
 
 
-def doubts(
-    reading: Reading, recipe: Recipe, *, assumed: frozenset[str], left_out: int, now: int
-) -> tuple[Doubt, ...]:
+def doubts(reading: Reading, recipe: Recipe, *, assumed: frozenset[str], left_out: int, now: int) -> tuple[Doubt, ...]:
     """Everything that is odd of a drafted reading, but for what the recipe expects.
 
     Args:
@@ -99,7 +97,9 @@ def _si(seen: _Seen) -> Series:
 
 def _fast(seen: _Seen) -> str:
     over = _si(seen) > _FASTEST
-    return f"{int(over.sum())} speeds are above {_FASTEST:g} m/s, the highest {_si(seen).max():.4g}" if over.any() else ""
+    return (
+        f"{int(over.sum())} speeds are above {_FASTEST:g} m/s, the highest {_si(seen).max():.4g}" if over.any() else ""
+    )
 
 
 def _strong(seen: _Seen) -> str:
@@ -138,7 +138,9 @@ def _turn(seen: _Seen) -> str:
 
 def _tens(seen: _Seen) -> str:
     found = seen.direction
-    small = seen.assumed and len(found) > 1 and bool((found % 1 == 0).all()) and 0 <= found.min() and found.max() <= _TENS
+    small = (
+        seen.assumed and len(found) > 1 and bool((found % 1 == 0).all()) and found.min() >= 0 and found.max() <= _TENS
+    )
     return f"the directions are whole numbers up to {found.max():g}, and no unit is stated" if small else ""
 
 

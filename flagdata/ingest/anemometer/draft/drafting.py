@@ -12,6 +12,7 @@ from typing import Literal
 
 from flagdata import compass
 from flagdata.ingest.anemometer.draft.given import GivenColumns, given_columns
+from flagdata.ingest.anemometer.draft.questions import Open
 from flagdata.ingest.anemometer.draft.shape import Shape, is_missing, is_number, shape_of
 from flagdata.ingest.anemometer.draft.times import TimeFields, find_time, of_columns
 from flagdata.ingest.anemometer.draft.toml import ChannelText, recipe_text
@@ -45,24 +46,6 @@ class Fact:
 
     def line(self) -> str:
         return f"{self.what:<16}{self.value:<34}{self.origin}{f' ({self.evidence})' if self.evidence else ''}"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Open:
-    """A question that only the user can answer.
-
-    Attributes:
-        key: the option that answers it.
-        question: in words.
-        example: of an answer.
-    """
-
-    key: str
-    question: str
-    example: str
-
-    def fix(self) -> str:
-        return f"--{self.key.replace('_', '-')} {self.example}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,7 +96,9 @@ def draft(lines: Sequence[str], options: WindOptions) -> Draft | None:
     meanings = [meaning(name, below) for name, below in zip(shape.names, shape.units, strict=True)]
     given = given_columns(options.columns, shape) if options.columns is not None else None
     parts = _Parts()
-    winds, of_earth = _of_wind(parts, shape, meanings, options) if given is None else (_given(parts, shape, given), False)
+    winds, of_earth = (
+        _of_wind(parts, shape, meanings, options) if given is None else (_given(parts, shape, given), False)
+    )
     time = _time(parts, shape, meanings, given, options)
     if given is None and not winds and time is None:
         return None
@@ -152,7 +137,9 @@ def _time(
     parts.used.update(time.columns)
     shown = " + ".join(shape.shown(i) for i in time.columns)
     if time.form is None:
-        question = f"{shown}: {shape.rows[0][time.columns[0]]!r} reads as {' and as '.join(time.forms)}: which is right?"
+        question = (
+            f"{shown}: {shape.rows[0][time.columns[0]]!r} reads as {' and as '.join(time.forms)}: which is right?"
+        )
         parts.open.append(Open(key="date_order", question=question, example="dmy (or mdy, ymd)"))
         return time
     if given is not None and given.form:
@@ -172,7 +159,9 @@ def _time(
         parts.open.append(Open(key="date", question=question, example="2026-05-01"))
     epoch = time.form.startswith("epoch")
     if time.zoned or epoch:
-        parts.facts.append(Fact(what="zone", value="in the stamps" if not epoch else "UTC, as Unix time", origin="stated"))
+        parts.facts.append(
+            Fact(what="zone", value="in the stamps" if not epoch else "UTC, as Unix time", origin="stated")
+        )
     elif options.zone is not None:
         parts.facts.append(Fact(what="zone", value=options.zone, origin="given"))
     elif time.utc:
@@ -222,7 +211,9 @@ def _of_wind(
         parts.open.append(Open(key="wind", question=question, example=example))
         return tuple(labels), False
     against = meanings[chosen].against
-    moving = [shape.names[i] for i, one in enumerate(meanings) if set(one.against) & _PLATFORM or i == chosen and against]
+    moving = [
+        shape.names[i] for i, one in enumerate(meanings) if set(one.against) & _PLATFORM or (i == chosen and against)
+    ]
     if moving and options.platform is None:
         question = (
             f"{moving[0]!r} speaks of a platform that moves: fixed (it stands still), moving (the wind is apparent), or "
@@ -236,7 +227,10 @@ def _of_wind(
 
 
 _PLATFORM = frozenset(
-    "apparent aws awa awd bow vessel boat ship drone uav sog cog heading hdg ground vehicle track twd tws twa".split()
+    (
+        "apparent aws awa awd bow vessel boat ship drone uav sog cog heading hdg ground vehicle track twd tws "
+        "twa"
+    ).split()
 )
 
 

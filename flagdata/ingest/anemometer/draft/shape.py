@@ -146,9 +146,7 @@ def _is_row(row: Sequence[str], numeric: frozenset[int]) -> bool:
     return fits > len(numeric) / 2 and any(is_number(cell) for cell in row)
 
 
-def _heading(
-    numbers: Sequence[int], above: Sequence[Sequence[str]], width: int
-) -> tuple[list[str], list[str], int]:
+def _heading(numbers: Sequence[int], above: Sequence[Sequence[str]], width: int) -> tuple[list[str], list[str], int]:
     """Names and units of the columns, and how many lines stand before the names; no names where there are none."""
     for at in range(len(above) - 1, -1, -1):
         row = above[at]

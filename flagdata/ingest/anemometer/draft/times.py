@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from flagdata.ingest.anemometer.draft.shape import Shape
 from flagdata.ingest.anemometer.draft.words import Meaning
-from flagdata.ingest.anemometer.instants import counted
+from flagdata.ingest.anemometer.instants.midnight import parse_as
 
 _CLOCKS = ("%H:%M:%S%f", "%H:%M", "%I:%M:%S%f %p", "%I:%M %p", "%H%M%S", "%H%M")
 _DATES = (
@@ -76,7 +76,7 @@ def of_columns(shape: Shape, columns: tuple[int, ...], order: str | None, form: 
     if not fitting:
         return None
     kept = _distinct(fitting, texts)
-    stamps = counted.parse(texts, kept[0])
+    stamps = parse_as(texts, kept[0])[0]
     evidence = f"first {texts[0]!r}"
     swapped = [one for one in forms if _same_but_order(one, kept[0]) and one not in fitting]
     if len(kept) == 1 and swapped:
@@ -94,7 +94,7 @@ def _candidates(texts: Sequence[str], columns: tuple[int, ...]) -> list[str]:
 
 
 def _reads(texts: Sequence[str], form: str) -> bool:
-    found = counted.parse(list(texts), form)
+    found = parse_as(list(texts), form)[0]
     return bool(len(texts)) and float(found.valid.mean()) >= _FITS
 
 
@@ -118,5 +118,5 @@ def _distinct(forms: Sequence[str], texts: Sequence[str]) -> tuple[str, ...]:
     """Of forms that read the same instants the first."""
     kept: dict[bytes, str] = {}
     for form in forms:
-        kept.setdefault(counted.parse(list(texts), form).ns.tobytes(), form)
+        kept.setdefault(parse_as(list(texts), form)[0].ns.tobytes(), form)
     return tuple(kept.values())

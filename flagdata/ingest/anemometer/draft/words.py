@@ -7,6 +7,7 @@ understood, and the user says what the column is.
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,42 +18,63 @@ Kind = Literal[
     "speed", "direction", "x", "y", "z", "time", "date", "temperature", "humidity", "pressure", "other"
 ]  # fmt: skip
 
-_WIND = frozenset(
-    "wind winds windmean anemometer anemo anem sonic csat viento vent vento gill vane cup cups windvane".split()
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+_WIND = _words(
+    "wind winds windmean anemometer anemo anem sonic csat viento vent vento gill vane cup cups windvane"
 )
-_SPEED = frozenset(
+_SPEED = _words(
     "speed spd sp velocity vel ws wspd wsp windspeed windspd windsp wndspd wndsp ff fff vv geschwindigkeit "
-    "windgeschwindigkeit vitesse velocidad snelheid windsnelheid velocita".split()
+    "windgeschwindigkeit vitesse velocidad snelheid windsnelheid velocita"
 )
-_DIRECTION = frozenset(
-    "direction dir dirn wd wdir winddir winddirection wnddir dd ddd bearing azimuth richtung windrichtung direccion "
-    "richting direzione".split()
+_DIRECTION = _words(
+    "direction dir dirn wd wdir winddir winddirection wnddir dd ddd bearing azimuth richtung windrichtung "
+    "direccion richting direzione"
 )
 _AXES: dict[str, Kind] = {
     **dict.fromkeys(("u", "ux", "x", "east", "eastward"), "x"),
     **dict.fromkeys(("v", "uy", "y", "north", "northward"), "y"),
     **dict.fromkeys(("w", "uz", "z", "up", "vertical", "upward"), "z"),
 }  # fmt: skip
-_TIME = frozenset(
+_TIME = _words(
     "time timestamp datetime stamp clock hour uhrzeit zeit heure hora tijd ora tmstamp epoch unixtime utc gmt "
-    "localtime zeitstempel date_time sampletime recordtime timestring millis elapsed".split()
+    "localtime zeitstempel date_time sampletime recordtime timestring millis elapsed"
 )
-_DATE = frozenset("date day datum fecha jour giorno dato yyyymmdd".split())
-_TEMPERATURE = frozenset("temperature temp ta airtemp tair temperatur temperatura".split())
-_HUMIDITY = frozenset("humidity rh hum relhum feuchte humedad umidita humidite".split())
-_PRESSURE = frozenset("pressure press baro bp barometer luftdruck presion pression pressione druk".split())
-_EXTREME = frozenset(
-    "gust gusts gustspeed max maximum min minimum peak high hi low lo highest lowest extreme boe böe bö rafale racha "
-    "raffica windgust maxi mini".split()
+_DATE = _words(
+    "date day datum fecha jour giorno dato yyyymmdd"
 )
-_SPREAD = frozenset("std stdev sd stddev sigma deviation dev variance var rms ti turbulence count quality qc flag".split())
-_MOVING = frozenset(
-    "apparent aws awa awd relative bow vessel boat ship drone uav sog cog heading hdg ground gps vehicle truewind tws twd "
-    "twa track".split()
+_TEMPERATURE = _words(
+    "temperature temp ta airtemp tair temperatur temperatura"
 )
-_TOWARDS = frozenset("to toward towards going".split())
-_RAW = frozenset("volt volts voltage counts pulses pulse raw adc mv frequency freq beaufort bft class chill".split())
-_OTHER = frozenset("battery batt rain solar radiation uv soil dew dewpoint snow wave tide water sea current".split())
+_HUMIDITY = _words(
+    "humidity rh hum relhum feuchte humedad umidita humidite"
+)
+_PRESSURE = _words(
+    "pressure press baro bp barometer luftdruck presion pression pressione druk"
+)
+_EXTREME = _words(
+    "gust gusts gustspeed max maximum min minimum peak high hi low lo highest lowest extreme boe böe bö rafale "
+    "racha raffica windgust maxi mini"
+)
+_SPREAD = _words(
+    "std stdev sd stddev sigma deviation dev variance var rms ti turbulence count quality qc flag"
+)
+_MOVING = _words(
+    "apparent aws awa awd relative bow vessel boat ship drone uav sog cog heading hdg ground gps vehicle truewind "
+    "tws twd twa track"
+)
+_TOWARDS = _words(
+    "to toward towards going"
+)
+_RAW = _words(
+    "volt volts voltage counts pulses pulse raw adc mv frequency freq beaufort bft class chill"
+)
+_OTHER = _words(
+    "battery batt rain solar radiation uv soil dew dewpoint snow wave tide water sea current"
+)
 _BRACKET = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]{1,20})[\])]\s*(?P<rest>.*)$")
 _WORD = re.compile(r"[a-zäöüß°]+|\d+(?:\.\d+)?")
 _HEIGHT = re.compile(r"(?<![a-z\d.])(\d{1,3}(?:\.\d+)?)\s*m(?![a-z/])", re.IGNORECASE)
@@ -84,7 +106,7 @@ def meaning(name: str, below: str = "") -> Meaning:
     bare, unit = _with_unit(name, below)
     split = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", bare).lower().replace("é", "e").replace("à", "a").replace("ó", "o")
     words = _WORD.findall(split.replace("_", " "))
-    joined = {*words, *(a + b for a, b in zip(words, words[1:], strict=False))}
+    joined = {*words, *(a + b for a, b in pairwise(words))}
     against = tuple(w for w in words if w in _EXTREME | _SPREAD | _MOVING | _RAW | _TOWARDS)
     height = _HEIGHT.search(name)
     kind = _kind(words, joined, unit)
@@ -105,11 +127,13 @@ def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:
         return "other"
     if joined & _DIRECTION:
         return "direction"
-    if joined & _SPEED or (joined & _WIND and unit is not None and UNITS[unit].si == "m/s"):
+    if joined & _SPEED:
         return "speed"
     axes = [_AXES[word] for word in words if word in _AXES]
     if axes and len(words) <= 3 and (unit is None or UNITS[unit].si == "m/s"):
         return axes[0]
+    if joined & _WIND and unit is not None and UNITS[unit].si == "m/s":
+        return "speed"
     for known, kind in (
         (_TEMPERATURE, "temperature"), (_HUMIDITY, "humidity"), (_PRESSURE, "pressure"), (_TIME, "time"), (_DATE, "date"),
     ):  # fmt: skip
@@ -120,6 +144,8 @@ def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:
 
 def _with_unit(name: str, below: str) -> tuple[str, str | None]:
     """A heading without its unit, and the unit: in brackets, behind a comma or blank, or in the line below."""
+    if (alone := spelled(name[:40])) is not None:
+        return "", alone
     match = _BRACKET.match(name[:200])
     if match is not None and (unit := spelled(match["unit"])) is not None:
         return f"{match['name']} {match['rest']}", unit

@@ -22,13 +22,12 @@ from flagdata.ingest.anemometer.instants.dates import decide
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, FileLayout, Recipe, TimeLayout
-from flagdata.ingest.anemometer.tables.rowclock import Given
-from flagdata.ingest.anemometer.tables.table import read_table
+from flagdata.ingest.anemometer.table.rowclock import Given
+from flagdata.ingest.anemometer.table.sonic import with_horizontal
+from flagdata.ingest.anemometer.table.table import read_table
 from flagdata.ingest.anemometer.text.columns import Columns
 from flagdata.ingest.anemometer.text.rows import RowReader
 from flagdata.ingest.anemometer.text.source import TextFile
-from flagdata.ingest.anemometer.winds.sonic import with_horizontal
-from flagdata.ingest.anemometer.words.headings import understand
 from flagdata.schema import CHANNELS
 from flagdata.signals import Sensor
 from flagdata.timebase import NANOSECONDS
@@ -272,7 +271,7 @@ def column_findings(assigned: Assigned) -> tuple[Finding, ...]:
         )  # fmt: skip
     if assigned.unread:
         # Columns that speak of the wind come first, so that none of them is lost among a hundred others.
-        names = sorted(assigned.unread, key=lambda name: "wind" not in understand(name).quantity)
+        names = sorted(assigned.unread, key=lambda name: "wind" not in name.lower())
         more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
         what = ", ".join(name[:_LONGEST] for name in names[:_LISTED]) + more
         found.append(Finding(kind="columns-not-read", severity=Severity.NOTE, count=len(names), what=what))

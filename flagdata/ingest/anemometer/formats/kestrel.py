@@ -17,8 +17,8 @@ from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, FileLayout, Recipe, TimeLayout
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.tables.rowclock import Given
-from flagdata.ingest.anemometer.tables.table import read_table
+from flagdata.ingest.anemometer.table.rowclock import Given
+from flagdata.ingest.anemometer.table.table import read_table
 from flagdata.ingest.anemometer.text.rows import RowReader
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.signals import Sensor

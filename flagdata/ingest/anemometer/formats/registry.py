@@ -40,7 +40,7 @@ class Format(Protocol):
 FORMATS = Registry(
     "anemometer format",
     {
-        "delimited": "flagdata.ingest.anemometer.tables.delimited:Delimited",
+        "delimited": "flagdata.ingest.anemometer.table.delimited:Delimited",
         "nmea": "flagdata.ingest.anemometer.formats.nmea:Nmea",
         "kestrel": "flagdata.ingest.anemometer.formats.kestrel:Kestrel",
         "toa5": "flagdata.ingest.anemometer.formats.toa5:Toa5",

@@ -29,7 +29,7 @@ from flagdata.ingest.anemometer.instants.stamps import parse as parse_stamps
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.samples import possible
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.tables.rowclock import instants
+from flagdata.ingest.anemometer.table.rowclock import instants
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Sensor
