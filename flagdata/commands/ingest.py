@@ -102,6 +102,13 @@ from flagdata.errors import UsageError
     "measured has its unit in brackets. A name that is not known is refused with the list of all.",
 )  # fmt: skip
 @click.option(
+    "--missing", multiple=True, metavar="TEXT", help="Wind: a cell that stands for no value, such as -99.9; repeatable."
+)
+@click.option(
+    "--expect", multiple=True, metavar="KEY",
+    help="Wind: a doubt about a draft that you have answered with yes, by the key that the refusal names; repeatable.",
+)  # fmt: skip
+@click.option(
     "--accept", metavar="HASH",
     help="Wind: confirms what was drafted from a table that no recipe describes, by the hash that the refusal shows.",
 )  # fmt: skip
@@ -137,6 +144,8 @@ def ingest(
     unit: str | None,
     wind: str | None,
     columns: str | None,
+    missing: tuple[str, ...],
+    expect: tuple[str, ...],
     accept: str | None,
     as_json: bool,
     lake_path: str,
@@ -174,7 +183,7 @@ def ingest(
             format_name=None if format_name in ("camera", "meshes", "markers") else format_name, sensor=sensor,
             zone_name=zone, date=date, date_order=date_order, platform=platform, talker=talker, azimuth=azimuth,
             clock=clock, zero_offset=zero_offset, encoding=encoding, unit=unit, start=start, wind=wind, columns=columns,
-            rate=rate if "rate" in given else None,
+            rate=rate if "rate" in given else None, missing=missing, expect=expect,
         ),
         meshes=mesh_options(rate=rate if "rate" in given else None, length=length_unit(unit)),
         markers=marker_options(rate=rate if "rate" in given else None, length=length_unit(unit)),

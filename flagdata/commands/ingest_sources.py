@@ -9,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
-from flagdata.commands.confirm import with_zone
+from flagdata.commands.confirm import Answers, with_answers
 from flagdata.commands.ingest_options import Given, check_applies
 from flagdata.commands.ingest_report import print_results, print_sniffed
 from flagdata.console import document, fail, progress, say
@@ -199,7 +199,7 @@ def _one(lake: Lake, source: Path, kind: Guess, options: Given) -> tuple[IngestR
     if kind.kind == "meshes":
         return (_meshes(lake, source, kind, options),)
     if kind.kind != "camera":
-        return with_zone(lambda zone: _winds(lake, source, _in_zone(options, zone)), asks=options.confirm.asks)
+        return with_answers(lambda answers: _winds(lake, source, _with(options, answers)), asks=options.confirm.asks)
     with progress(None, label=source.name, unit="frame") as advance, _CropPicture(options.crop_picture) as picture:
         result = ingest_camera(
             lake, source, options.camera, labels=options.labels, branch=options.branch, reasons=kind.reasons,
@@ -208,11 +208,9 @@ def _one(lake: Lake, source: Path, kind: Guess, options: Given) -> tuple[IngestR
     return (result,)
 
 
-def _in_zone(options: Given, zone: str | None) -> Given:
-    """The options with the zone that was typed, if one was."""
-    if zone is None:
-        return options
-    return replace(options, wind=replace(options.wind, wind=replace(options.wind.wind, zone=zone)))
+def _with(options: Given, answers: Answers) -> Given:
+    """The options with the answers that were typed."""
+    return replace(options, wind=replace(options.wind, wind=replace(options.wind.wind, **dict(answers))))  # type: ignore[arg-type]
 
 
 def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]:

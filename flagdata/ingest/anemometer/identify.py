@@ -1,4 +1,4 @@
-"""What a file is: a format that its maker's signature shows, a recipe whose heading it has, a table, or something else."""
+"""What a file is: of a format by its maker's signature, of a recipe by its heading, a table, or something else."""
 
 from __future__ import annotations
 

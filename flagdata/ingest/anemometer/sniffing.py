@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -57,4 +56,3 @@ class Head:
 
 
 HEAD_LINES = 1000
-

@@ -1,4 +1,4 @@
-"""Numbers of a drafted reading that are impossible or doubtful: each opens its field again, and only the user closes it.
+"""Numbers of a drafted reading that are impossible or doubtful: each opens a question that only the user answers.
 
 A doubt is answered for good by its key in a recipe: `[expect] confirmed = ["fast", …]`.
 """

@@ -109,8 +109,8 @@ def draft(lines: Sequence[str], options: WindOptions) -> Draft | None:
         facts=tuple(parts.facts), open=tuple(parts.open), unused=unused, winds=winds, of_earth=of_earth,
         recipe=recipe_text(
             shape, time=None if time is None else time.columns, form=time.form if time is not None else None,
-            zone="UTC" if time is not None and time.utc and not time.zoned else None, channels=parts.channels, label=label,
-            missing=options.missing,
+            zone="UTC" if time is not None and time.utc and not time.zoned else None, channels=parts.channels,
+            label=label, missing=options.missing,
         ),
     )  # fmt: skip
 
@@ -216,8 +216,8 @@ def _of_wind(
     ]
     if moving and options.platform is None:
         question = (
-            f"{moving[0]!r} speaks of a platform that moves: fixed (it stands still), moving (the wind is apparent), or "
-            "corrected (the wind is over ground)?"
+            f"{moving[0]!r} speaks of a platform that moves: fixed (it stands still), moving (the wind is apparent), "
+            "or corrected (the wind is over ground)?"
         )
         parts.open.append(Open(key="platform", question=question, example="moving"))
     _measured(parts, shape, meanings, "wind_speed", chosen, options)
@@ -227,10 +227,28 @@ def _of_wind(
 
 
 _PLATFORM = frozenset(
-    (
-        "apparent aws awa awd bow vessel boat ship drone uav sog cog heading hdg ground vehicle track twd tws "
-        "twa"
-    ).split()
+    [
+        "apparent",
+        "aws",
+        "awa",
+        "awd",
+        "bow",
+        "vessel",
+        "boat",
+        "ship",
+        "drone",
+        "uav",
+        "sog",
+        "cog",
+        "heading",
+        "hdg",
+        "ground",
+        "vehicle",
+        "track",
+        "twd",
+        "tws",
+        "twa",
+    ]
 )
 
 

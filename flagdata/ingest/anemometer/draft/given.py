@@ -3,9 +3,9 @@
     ENTRY,ENTRY,…              one entry a column, in the order of the file; a blank entry is a column that is not read
     COLUMN=ENTRY,COLUMN=ENTRY  or only those that are read, each after its heading or number (from 1)
 
-An entry is a channel with its unit in brackets, `wind_direction_to` for a direction that the wind blows to, or a part of
-the time: `time`, `date`, `year`, `month`, `day`, `day_of_year`, `hour`, `minute`, `second`. Behind `time` and `date` the
-format may stand in brackets, as a recipe's [time] format has it, or the unit of a count since a start (`time[s]`).
+An entry is a channel with its unit in brackets, `wind_direction_to` for a direction that the wind blows to, or a part
+of the time: `time`, `date`, `year`, `month`, `day`, `day_of_year`, `hour`, `minute`, `second`. Behind `time` and `date`
+the format may stand in brackets, as a recipe's [time] format has it, or the unit of a count since a start (`time[s]`).
 """
 
 from __future__ import annotations

@@ -12,14 +12,16 @@ from flagdata.ingest.anemometer.instants.midnight import parse_as
 
 _CLOCKS = ("%H:%M:%S%f", "%H:%M", "%I:%M:%S%f %p", "%I:%M %p", "%H%M%S", "%H%M")
 _DATES = (
-    "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y%m%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y", "%d.%m.%y",
-    "%d/%m/%y", "%m/%d/%y", "%d %b %Y", "%d-%b-%Y", "%b %d %Y", "%Y %j",
+    "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y%m%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y",
+    "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%d %b %Y", "%d-%b-%Y", "%b %d %Y", "%Y %j",
 )  # fmt: skip
 _WHOLE = ("iso", "%Y-%m-%d %H:%M:%S%f%z", "%Y%m%d%H%M%S", "%Y%m%d%H%M", "%Y%m%dT%H%M%S%z")
 _EPOCHS = ("epoch-s", "epoch-ms", "epoch-us")
 _FITS = 0.99
 """Share of the stamps that a form must read."""
 _ORDER = {"%d": "d", "%m": "m", "%Y": "y", "%y": "y"}
+_LOOK = 3
+"""Stamps that a form is tried on first."""
 _CLOCK = re.compile(r"\d:\d\d")
 
 
@@ -72,6 +74,7 @@ def of_columns(shape: Shape, columns: tuple[int, ...], order: str | None, form: 
     texts = [" ".join(row[i] for i in columns) for row in shape.rows]
     texts = [text for text in texts if text.strip()]
     forms = [form] if form is not None else _candidates(texts, columns)
+    forms = [one for one in forms if form is not None or _reads_any(texts[:_LOOK], one)]
     fitting = [one for one in forms if _reads(texts, one) and _ordered(one, order)]
     if not fitting:
         return None
@@ -91,6 +94,11 @@ def _candidates(texts: Sequence[str], columns: tuple[int, ...]) -> list[str]:
         return [*_EPOCHS, *(one for one in _WHOLE if one != "iso")]
     dated = [f"{date} {clock}" for date in _DATES for clock in _CLOCKS]
     return [*_WHOLE, *dated] if len(columns) > 1 or _CLOCK.search(first) else [*_WHOLE, *dated, *_DATES]
+
+
+def _reads_any(texts: Sequence[str], form: str) -> bool:
+    """Whether a form reads one of the first stamps, so that the others are worth a look."""
+    return bool(parse_as(list(texts), form)[0].valid.any())
 
 
 def _reads(texts: Sequence[str], form: str) -> bool:

@@ -33,8 +33,8 @@ def recipe_text(
     lines = [
         'name = "drafted"', 'about = "drafted from the first lines of the file"', 'source = "the file"', "",
         "[file]", f"delimiter = {quoted(delimiter)}", f"decimal = {quoted(shape.decimal)}",
-        f"preamble = {shape.preamble}", f"header = {shape.header}", f"missing = [{', '.join(map(quoted, missing))}]", "",
-        "[time]",
+        f"preamble = {shape.preamble}", f"header = {shape.header}", f"missing = [{', '.join(map(quoted, missing))}]",
+        "", "[time]",
     ]  # fmt: skip
     columns = ["?"] if time is None else [shape.reference(i) for i in time]
     lines += [f"columns = [{', '.join(map(_reference, columns))}]", f"format = {quoted(form or '?')}"]

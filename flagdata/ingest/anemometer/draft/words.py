@@ -7,8 +7,8 @@ understood, and the user says what the column is.
 from __future__ import annotations
 
 import re
-from itertools import pairwise
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 from flagdata.schema import CHANNELS
@@ -23,9 +23,7 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-_WIND = _words(
-    "wind winds windmean anemometer anemo anem sonic csat viento vent vento gill vane cup cups windvane"
-)
+_WIND = _words("wind winds windmean anemometer anemo anem sonic csat viento vent vento gill vane cup cups windvane")
 _SPEED = _words(
     "speed spd sp velocity vel ws wspd wsp windspeed windspd windsp wndspd wndsp ff fff vv geschwindigkeit "
     "windgeschwindigkeit vitesse velocidad snelheid windsnelheid velocita"
@@ -43,38 +41,22 @@ _TIME = _words(
     "time timestamp datetime stamp clock hour uhrzeit zeit heure hora tijd ora tmstamp epoch unixtime utc gmt "
     "localtime zeitstempel date_time sampletime recordtime timestring millis elapsed"
 )
-_DATE = _words(
-    "date day datum fecha jour giorno dato yyyymmdd"
-)
-_TEMPERATURE = _words(
-    "temperature temp ta airtemp tair temperatur temperatura"
-)
-_HUMIDITY = _words(
-    "humidity rh hum relhum feuchte humedad umidita humidite"
-)
-_PRESSURE = _words(
-    "pressure press baro bp barometer luftdruck presion pression pressione druk"
-)
+_DATE = _words("date day datum fecha jour giorno dato yyyymmdd")
+_TEMPERATURE = _words("temperature temp ta airtemp tair temperatur temperatura")
+_HUMIDITY = _words("humidity rh hum relhum feuchte humedad umidita humidite")
+_PRESSURE = _words("pressure press baro bp barometer luftdruck presion pression pressione druk")
 _EXTREME = _words(
     "gust gusts gustspeed max maximum min minimum peak high hi low lo highest lowest extreme boe böe bö rafale "
     "racha raffica windgust maxi mini"
 )
-_SPREAD = _words(
-    "std stdev sd stddev sigma deviation dev variance var rms ti turbulence count quality qc flag"
-)
+_SPREAD = _words("std stdev sd stddev sigma deviation dev variance var rms ti turbulence count quality qc flag")
 _MOVING = _words(
     "apparent aws awa awd relative bow vessel boat ship drone uav sog cog heading hdg ground gps vehicle truewind "
     "tws twd twa track"
 )
-_TOWARDS = _words(
-    "to toward towards going"
-)
-_RAW = _words(
-    "volt volts voltage counts pulses pulse raw adc mv frequency freq beaufort bft class chill"
-)
-_OTHER = _words(
-    "battery batt rain solar radiation uv soil dew dewpoint snow wave tide water sea current"
-)
+_TOWARDS = _words("to toward towards going")
+_RAW = _words("volt volts voltage counts pulses pulse raw adc mv frequency freq beaufort bft class chill")
+_OTHER = _words("battery batt rain solar radiation uv soil dew dewpoint snow wave tide water sea current")
 _BRACKET = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]{1,20})[\])]\s*(?P<rest>.*)$")
 _WORD = re.compile(r"[a-zäöüß°]+|\d+(?:\.\d+)?")
 _HEIGHT = re.compile(r"(?<![a-z\d.])(\d{1,3}(?:\.\d+)?)\s*m(?![a-z/])", re.IGNORECASE)
@@ -135,7 +117,8 @@ def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:
     if joined & _WIND and unit is not None and UNITS[unit].si == "m/s":
         return "speed"
     for known, kind in (
-        (_TEMPERATURE, "temperature"), (_HUMIDITY, "humidity"), (_PRESSURE, "pressure"), (_TIME, "time"), (_DATE, "date"),
+        (_TEMPERATURE, "temperature"), (_HUMIDITY, "humidity"), (_PRESSURE, "pressure"), (_TIME, "time"),
+        (_DATE, "date"),
     ):  # fmt: skip
         if joined & known:
             return kind  # type: ignore[return-value]

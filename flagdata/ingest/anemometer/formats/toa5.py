@@ -155,8 +155,8 @@ class Toa5:
         if not {"wind_speed", "wind_x"} & set(channels):
             raise InputError(
                 "no column looks like wind speed or a wind component", where=f"{source.path}, line 2",
-                fix="let its columns be drafted, and confirm them: --as delimited; or describe the file by a recipe; its "
-                f"columns are {', '.join(names)}",
+                fix="let its columns be drafted, and confirm them: --as delimited; or describe the file by a recipe; "
+                f"its columns are {', '.join(names)}",
             )  # fmt: skip
         rows = [row[names.index(stamp)] for row in csv.reader(source.head(5000)[4:]) if len(row) == len(names)]
         form, found = _FORM, ()
