@@ -7,9 +7,9 @@ from pathlib import Path
 
 from flagdata.addresses import local_path
 from flagdata.errors import FlagdataError, NotFoundError
-from flagdata.ingest.anemometer.containers import spreadsheet
+from flagdata.ingest.anemometer.containers import json_lines, spreadsheet
 from flagdata.ingest.anemometer.draft.drafting import Draft
-from flagdata.ingest.anemometer.formats import ft, thies, untimed
+from flagdata.ingest.anemometer.formats import ft, sentences_in_lines, thies, untimed
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
 from flagdata.ingest.anemometer.options import Limits, WindOptions
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKind, Head
@@ -19,11 +19,11 @@ from flagdata.ingest.anemometer.text.source import TextFile
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
 _MESHES = {".obj", ".ply", ".stl", ".off"}
-_TELEGRAMS = (thies, ft)
+_AS_TABLE = (json_lines, thies, ft)
 
 
 def opened(path: Path, options: WindOptions, encoding: str | None = None) -> TextFile:
-    """A log as lines: telegrams of instruments as a table, rows that carry no time on the clock that was given.
+    """A log as lines: telegrams and JSON lines as a table, rows that carry no time on the clock that was given.
 
     Raises:
         FlagdataError: it cannot be read as text, or does not fit the options.
@@ -31,8 +31,12 @@ def opened(path: Path, options: WindOptions, encoding: str | None = None) -> Tex
     source = open_text(path, limits=options.limits, encoding=options.encoding or encoding)
     if options.rate is not None:
         return untimed.timed(source, rate=options.rate, start=options.start, columns=options.columns)
-    for kind in _TELEGRAMS:
-        if options.format is None and kind.matches(source.head()):
+    if options.recipe is None and sentences_in_lines.matches(source.head()):
+        return sentences_in_lines.as_table(source)
+    if options.format is not None or options.recipe is not None or recognised(source):
+        return source
+    for kind in _AS_TABLE:
+        if kind.matches(source.head()):
             return kind.as_table(source) or source
     return source
 

@@ -82,9 +82,11 @@ def of_columns(shape: Shape, columns: tuple[int, ...], order: str | None, form: 
     stamps = parse_as(texts, kept[0])[0]
     evidence = f"first {texts[0]!r}"
     swapped = [one for one in forms if _same_but_order(one, kept[0]) and one not in fitting]
-    if len(kept) == 1 and swapped:
+    if len(kept) == 1 and order is not None:
+        evidence = f"the order {order} was given"
+    elif len(kept) == 1 and swapped:
         bad = next(text for text in texts if not _reads([text], swapped[0]))
-        evidence = f"{bad!r} is a date in this order alone" if order is None else f"the order {order} was given"
+        evidence = f"{bad!r} is a date in this order alone"
     return TimeFields(columns=columns, forms=kept, zoned=bool(stamps.utc.all()), evidence=evidence)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from flagdata.errors import InputError, LimitError, NotFoundError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.containers import json_lines, netcdf, spreadsheet
+from flagdata.ingest.anemometer.containers import netcdf, spreadsheet
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.text.source import GZIP, TextFile, opened
 
@@ -136,8 +136,7 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
         raise InputError(
             "the gzip file is damaged or incomplete", where=where, fix="copy it again, or save what is left: gunzip"
         ) from None
-    text = TextFile(path=path, encoding=codec, lines=lines, findings=(*problem, *findings))
-    return json_lines.as_table(text) if json_lines.matches(text.head()) else text
+    return TextFile(path=path, encoding=codec, lines=lines, findings=(*problem, *findings))
 
 
 def _looks_utf16(head: bytes) -> bool:

@@ -11,7 +11,6 @@ import pytest
 
 from flagdata.errors import InputError, TimeError
 from flagdata.ingest.anemometer import WindOptions, anemometers
-from flagdata.ingest.anemometer.words.headings import understand
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
 from flagdata.timebase import iso
@@ -398,12 +397,6 @@ STATISTICS = (
     "spikes", "skewness", "kurtosis", "flag", "qc", "var", "cov", "rand_err", "strg", "stdev", "sd", "skw", "kur", "se",
     "quality_flag", "itc", "timelag_hf", "mask", "error", "count",
 )  # fmt: skip
-
-
-@pytest.mark.parametrize("stem", ["u", "v", "w", "Ux", "u_rot", "wind_speed", "WS", "VENTO"])
-@pytest.mark.parametrize("statistic", STATISTICS)
-def test_a_heading_that_ends_in_a_statistic_is_never_a_wind(stem: str, statistic: str) -> None:
-    assert understand(f"{stem}_{statistic}").channel == ""
 
 
 def test_flux_networks_have_fixed_units_and_stamp_the_end(read: Read) -> None:
