@@ -109,7 +109,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     reasons = reading.understood or reasons
     text = reading.drafted or (_text(options.recipe) if options.recipe is not None else None)
     stated = reading.stated and _DOUBTS.isdisjoint(finding.kind for finding in findings)
-    rows = shown_rows(source, reading) if reading.drafted and not stated else ()
+    rows = shown_rows(source, reading) if reading.drafted else ()
     return WindLog(
         series=series, format=name, findings=findings, reasons=reasons, plan=understood(name, text),
         drafted=reading.drafted, stated=stated, rows=rows,

@@ -113,9 +113,11 @@ class WindOptions:
         every format alike.
         """
         apart = {"format", "recipe", "limits", "encoding", "zero_offset", "clock", "platform", "rate"}
-        return frozenset(
-            f.name for f in fields(self) if f.name not in apart and getattr(self, f.name) not in (None, ())
-        )
+        return frozenset(f.name for f in fields(self) if f.name not in apart and self._is_given(f.name))
+
+    def _is_given(self, name: str) -> bool:
+        value = getattr(self, name)
+        return bool(value) if isinstance(value, tuple) else value is not None
 
     def as_dict(self) -> Mapping[str, Any]:
         """Everything that shapes the result, for a recipe hash; limits do not (they only refuse).
@@ -123,7 +125,7 @@ class WindOptions:
         Options that came later are there only where they are given, so that older artifacts keep their hash.
         """
         content = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "limits"}
-        content = {name: value for name, value in content.items() if name not in _LATER or value not in (None, ())}
+        content = {name: value for name, value in content.items() if name not in _LATER or self._is_given(name)}
         content["date"] = self.date.isoformat() if self.date else None
         return content
 

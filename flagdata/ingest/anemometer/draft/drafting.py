@@ -24,6 +24,14 @@ from flagdata.units import canonical
 Origin = Literal["stated", "inferred", "assumed", "given"]
 _BESIDE = {"temperature": "air_temperature", "humidity": "relative_humidity", "pressure": "air_pressure"}
 _AXES = {"x": "wind_x", "y": "wind_y", "z": "wind_z"}
+_OF_WIND = frozenset({"speed", "direction", "x", "y", "z"})
+_PLAIN = {
+    "wind_speed": ("wind speed",), "wind_direction": ("wind direction",), "air_temperature": ("air temperature",),
+    "relative_humidity": ("relative humidity",), "air_pressure": ("air pressure",),
+    "wind_x": ("wind x", "eastward wind"), "wind_y": ("wind y", "northward wind"),
+    "wind_z": ("wind z", "upward wind"),
+}  # fmt: skip
+"""Words of a heading that state a quantity in full; others are understood, and what is understood is inferred."""
 _POINTS = 0.9
 """Share of the cells that must be points of the compass."""
 
@@ -58,6 +66,7 @@ class Draft:
         recipe: TOML; complete where nothing is open.
         unused: headings of the columns that are not read.
         winds: labels of the anemometers that it holds.
+        rivals: headings of other speeds and directions, which are not read.
         of_earth: whether the components are towards east (x) and north (y).
     """
 
@@ -66,12 +75,13 @@ class Draft:
     recipe: str
     unused: tuple[str, ...]
     winds: tuple[str, ...]
+    rivals: tuple[str, ...] = ()
     of_earth: bool = False
 
     @property
     def stated(self) -> bool:
-        """Whether nothing of it is inferred or assumed."""
-        return not self.open and all(fact.origin in ("stated", "given") for fact in self.facts)
+        """Whether nothing of it is inferred or assumed, and nothing else in it may be the wind."""
+        return not (self.open or self.rivals) and all(fact.origin in ("stated", "given") for fact in self.facts)
 
 
 @dataclass
@@ -104,9 +114,12 @@ def draft(lines: Sequence[str], options: WindOptions) -> Draft | None:
         return None
     parts.facts.insert(0, _cutting(shape, lines))
     label = options.wind or (winds[0] if winds else "anemometer")
-    unused = tuple(shape.shown(i) for i in range(len(shape.names)) if i not in parts.used and shape.names[i])
+    left = [i for i in range(len(shape.names)) if i not in parts.used and shape.names[i]]
+    unused = tuple(shape.shown(i) for i in left)
+    rivals = tuple(shape.names[i] for i in left if meanings[i].kind in _OF_WIND)
     return Draft(
-        facts=tuple(parts.facts), open=tuple(parts.open), unused=unused, winds=winds, of_earth=of_earth,
+        facts=tuple(parts.facts), open=tuple(parts.open), unused=unused, winds=winds, rivals=rivals,
+        of_earth=of_earth,
         recipe=recipe_text(
             shape, time=None if time is None else time.columns, form=time.form if time is not None else None,
             zone="UTC" if time is not None and time.utc and not time.zoned else None, channels=parts.channels,
@@ -140,7 +153,12 @@ def _time(
         question = (
             f"{shown}: {shape.rows[0][time.columns[0]]!r} reads as {' and as '.join(time.forms)}: which is right?"
         )
-        parts.open.append(Open(key="date_order", question=question, example="dmy (or mdy, ymd)"))
+        orders = {form.replace("%d", "%m") for form in time.forms}
+        if len(orders) == 1:
+            parts.open.append(Open(key="date_order", question=question, example="dmy (or mdy, ymd)"))
+        else:
+            example = f"'{shape.reference(time.columns[0])}=time[FORMAT], and all other columns'"
+            parts.open.append(Open(key="columns", question=question, example=example))
         return time
     if given is not None and given.form:
         origin: Origin = "given"
@@ -205,7 +223,7 @@ def _of_wind(
         _beside(parts, shape, meanings)
         return (shape.names[components["wind_x"]],), earth
     if chosen is None:
-        listed = ", ".join(labels) if labels else ", ".join(name for name in shape.names if name)
+        listed = ", ".join(labels) or ", ".join(shape.shown(i) for i in range(len(shape.names)))
         question = f"which column is the wind's speed? {listed}" if not labels else f"which anemometer? {listed}"
         example = in_shell(next(iter(labels), "COLUMN"))
         parts.open.append(Open(key="wind", question=question, example=example))
@@ -267,9 +285,9 @@ def _measured(
         question = f"unit of {shape.shown(index)} (m/s, km/h, mph, kn)"
         parts.open.append(Open(key="unit", question=question, example="m/s"))
         unit = "?"
-    named = own.named or channel != "wind_speed"
-    if not named and options.wind is None:
-        origin, evidence = "inferred", f"of a speed, in {unit}; the heading does not name the wind"
+    if own.plain not in _PLAIN[channel]:
+        origin = "given" if options.wind is not None and channel == "wind_speed" else "inferred"
+        evidence += "" if own.named else "; it does not name the wind"
     parts.channels[channel] = ChannelText(column=shape.reference(index), unit=unit)
     parts.facts.append(Fact(what=channel, value=f"{shape.shown(index)} in {unit}", origin=origin, evidence=evidence))
 
@@ -291,6 +309,11 @@ def _direction(parts: _Parts, shape: Shape, meanings: Sequence[Meaning], speed: 
     own = meanings[index]
     unit, origin, evidence = own.unit, _STATED, "the heading; from true north, clockwise, is the convention"
     points = _compass(shape.column(index))
+    if points == "?":
+        question = f"{shape.shown(index)} has points of the compass whose O may be east or west: of which language?"
+        example = f"'{shape.reference(index)}=wind_direction[points-de] (or points-es, …), and all other columns'"
+        parts.open.append(Open(key="columns", question=question, example=example))
+        return
     if points is not None:
         unit, origin, evidence = points, "inferred", "its cells are points of the compass"
     elif not _numeric(shape.column(index)):
@@ -299,6 +322,8 @@ def _direction(parts: _Parts, shape: Shape, meanings: Sequence[Meaning], speed: 
         unit, origin, evidence = "deg", "assumed", "no unit is stated"
     elif not fits("wind_direction", unit):
         return
+    elif own.plain not in _PLAIN["wind_direction"]:
+        origin = "inferred"
     if own.against:
         question = f"does {shape.shown(index)} say where the wind comes from, or where it blows to?"
         example = f"'{shape.reference(index)}=wind_direction[{unit}] (or wind_direction_to), and all other columns'"
@@ -319,17 +344,22 @@ def _beside(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
             parts.used.add(index)
             parts.channels[channel] = ChannelText(column=shape.reference(index), unit=one.unit)
             value = f"{shape.shown(index)} in {one.unit}"
-            parts.facts.append(Fact(what=channel, value=value, origin="stated", evidence="the heading"))
+            origin: Origin = "stated" if one.plain in _PLAIN[channel] else "inferred"
+            parts.facts.append(Fact(what=channel, value=value, origin=origin, evidence="the heading"))
 
 
 def _numeric(cells: Sequence[str]) -> bool:
-    filled = [cell for cell in cells if not is_missing(cell)]
+    filled = [cell for cell in cells if not is_missing(cell) and cell.upper() not in compass.CALM]
     return bool(filled) and sum(is_number(cell) for cell in filled) >= _POINTS * len(filled)
 
 
 def _compass(cells: Sequence[str]) -> str | None:
-    """The unit of points of the compass that a column's cells are; `None` for none, or for several languages."""
+    """The unit of points of the compass that a column's cells are; `None` for none, "?" where languages differ."""
     filled = {cell.upper() for cell in cells if not is_missing(cell)}
     tables: Mapping[str, Mapping[str, float]] = compass.BY_UNIT
     known = [name for name, points in tables.items() if filled and filled <= {*points, *compass.CALM}]
-    return known[0] if known and any(cell.isalpha() for cell in filled) else None
+    if not known or not any(cell.isalpha() for cell in filled):
+        return None
+    first = tables[known[0]]
+    same = all(tables[name].get(cell) == first.get(cell) for name in known for cell in filled)
+    return known[0] if same else "?"

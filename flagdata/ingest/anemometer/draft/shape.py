@@ -150,10 +150,11 @@ def _heading(numbers: Sequence[int], above: Sequence[Sequence[str]], width: int)
     """Names and units of the columns, and how many lines stand before the names; no names where there are none."""
     for at in range(len(above) - 1, -1, -1):
         row = above[at]
-        if len(row) not in (width, width - 1) or sum(bool(cell) for cell in row) < 2:
+        units = _is_units(row) and len(row) in (width, width - 1)
+        if not units and (len(row) not in (width, width - 1) or sum(bool(cell) for cell in row) < 2):
             continue
         full = [*row, *[""] * (width - len(row))]
-        if _is_units(row) and at and len(above[at - 1]) in (width, width - 1):
+        if units and at and len(above[at - 1]) in (width, width - 1):
             names = above[at - 1]
             return [*names, *[""] * (width - len(names))], full, numbers[at - 1] - 1
         return full, [], numbers[at] - 1
@@ -162,7 +163,7 @@ def _heading(numbers: Sequence[int], above: Sequence[Sequence[str]], width: int)
 
 def _is_units(row: Sequence[str]) -> bool:
     filled = [cell.strip("[]() ") for cell in row if cell]
-    return sum(spelled(cell) is not None for cell in filled) >= max(1, len(filled) / 3) and "" not in filled
+    return sum(spelled(cell) is not None for cell in filled) >= max(1, len(filled) / 3)
 
 
 def _decimal(rows: Sequence[Sequence[str]], numeric: frozenset[int], delimiter: str) -> str:

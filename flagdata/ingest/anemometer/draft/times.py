@@ -8,16 +8,17 @@ from dataclasses import dataclass
 
 from flagdata.ingest.anemometer.draft.shape import Shape
 from flagdata.ingest.anemometer.draft.words import Meaning
+from flagdata.ingest.anemometer.instants import counted, stamps
 from flagdata.ingest.anemometer.instants.midnight import parse_as
 
-_CLOCKS = ("%H:%M:%S%f", "%H:%M", "%I:%M:%S%f %p", "%I:%M %p", "%H%M%S", "%H%M")
+_CLOCKS = ("%H:%M:%S%f", "%H:%M", "%I:%M:%S%f %p", "%I:%M %p", "%H%M%S", "%H%M", "%H")
 _DATES = (
     "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y%m%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y",
     "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%d %b %Y", "%d-%b-%Y", "%b %d %Y", "%Y %j",
 )  # fmt: skip
 _WHOLE = ("iso", "%Y-%m-%d %H:%M:%S%f%z", "%Y%m%d%H%M%S", "%Y%m%d%H%M", "%Y%m%dT%H%M%S%z")
 _EPOCHS = ("epoch-s", "epoch-ms", "epoch-us")
-_FITS = 0.99
+_FITS = 0.95
 """Share of the stamps that a form must read."""
 _ORDER = {"%d": "d", "%m": "m", "%Y": "y", "%y": "y"}
 _LOOK = 3
@@ -79,7 +80,7 @@ def of_columns(shape: Shape, columns: tuple[int, ...], order: str | None, form: 
     if not fitting:
         return None
     kept = _distinct(fitting, texts)
-    stamps = parse_as(texts, kept[0])[0]
+    read = parse_as(texts, kept[0])[0]
     evidence = f"first {texts[0]!r}"
     swapped = [one for one in forms if _same_but_order(one, kept[0]) and one not in fitting]
     if len(kept) == 1 and order is not None:
@@ -87,7 +88,7 @@ def of_columns(shape: Shape, columns: tuple[int, ...], order: str | None, form: 
     elif len(kept) == 1 and swapped:
         bad = next(text for text in texts if not _reads([text], swapped[0]))
         evidence = f"{bad!r} is a date in this order alone"
-    return TimeFields(columns=columns, forms=kept, zoned=bool(stamps.utc.all()), evidence=evidence)
+    return TimeFields(columns=columns, forms=kept, zoned=bool(read.utc[read.valid].all()), evidence=evidence)
 
 
 def _candidates(texts: Sequence[str], columns: tuple[int, ...]) -> list[str]:
@@ -95,12 +96,17 @@ def _candidates(texts: Sequence[str], columns: tuple[int, ...]) -> list[str]:
     if re.fullmatch(r"\d{9,19}(\.\d+)?", first):
         return [*_EPOCHS, *(one for one in _WHOLE if one != "iso")]
     dated = [f"{date} {clock}" for date in _DATES for clock in _CLOCKS]
+    dated += _CLOCKS if len(columns) == 1 else ()
     return [*_WHOLE, *dated] if len(columns) > 1 or _CLOCK.search(first) else [*_WHOLE, *dated, *_DATES]
 
 
 def _reads_any(texts: Sequence[str], form: str) -> bool:
-    """Whether a form reads one of the first stamps, so that the others are worth a look."""
-    return bool(parse_as(list(texts), form)[0].valid.any())
+    """Whether a form fits one of the first stamps by its letters, so that all are worth a look."""
+    if "%" not in form:
+        return bool(parse_as(list(texts), form)[0].valid.any())
+    day = "%Y-%m-%d " if counted.is_time_of_day(form) else ""
+    expression = re.compile(stamps.pattern(f"{day}{form}"))
+    return any(expression.fullmatch(f"{'1970-01-01 ' if day else ''}{text.strip()}") for text in texts)
 
 
 def _reads(texts: Sequence[str], form: str) -> bool:

@@ -72,6 +72,7 @@ class Meaning:
         against: words that speak against a plain mean wind of a fixed instrument.
         named: whether the wind itself is named, and not a speed or a direction of something.
         height: in metres, where it is stated.
+        plain: its words, without the unit.
         utc: whether it says that a time is of UTC.
     """
 
@@ -80,6 +81,7 @@ class Meaning:
     against: tuple[str, ...] = ()
     named: bool = False
     height: float | None = None
+    plain: str = ""
     utc: bool = False
 
 
@@ -95,7 +97,7 @@ def meaning(name: str, below: str = "") -> Meaning:
     named = bool(joined & _WIND) or any(word.startswith(("wind", "wnd", "ws", "wd")) for word in words)
     return Meaning(
         kind=kind, unit=unit, against=against, named=named, utc=bool({"utc", "gmt"} & joined),
-        height=float(height[1]) if height else None,
+        height=float(height[1]) if height else None, plain=" ".join(words),
     )  # fmt: skip
 
 
@@ -105,7 +107,7 @@ def fits(channel: str, unit: str) -> bool:
 
 
 def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:
-    if joined & _OTHER:
+    if joined & _OTHER or ("sonic" in joined and joined & _TEMPERATURE):
         return "other"
     if joined & _DIRECTION:
         return "direction"

@@ -49,7 +49,7 @@ class Delimited:
         where = str(source.path)
         if options.recipe is None:
             return _by_draft(source, options, where)
-        strange = sorted(name for name in _ASKED if getattr(options, name) not in (None, ()))
+        strange = sorted(_ASKED & options.given())
         if strange:
             raise UsageError(
                 f"the recipe says for itself: {', '.join(strange)}", where=where, fix="leave it out, or edit the recipe"

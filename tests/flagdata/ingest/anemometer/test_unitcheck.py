@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from flagdata.ingest.anemometer.table import unitcheck
 from numpy.typing import NDArray
 
 from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest.anemometer.table import unitcheck
 from flagdata.units import unit
 
 WIND: NDArray[np.float64] = np.asarray(5 * np.abs(np.random.default_rng(7).weibull(2.0, 400)), dtype=np.float64)
