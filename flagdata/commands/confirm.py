@@ -102,6 +102,8 @@ def _answer(question: Open) -> tuple[str, object]:
     from flagdata import timebase
     from flagdata.units import canonical
 
+    if question.key == "sensor":
+        raise RefusedError(question.question, fix=question.fix())
     checks: dict[str, Callable[[str], object]] = {
         "zone": lambda text: timebase.zone(text, where="zone") and text,
         "unit": lambda text: canonical(text, where="unit"),

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from flagdata.addresses import local_path
 from flagdata.errors import FlagdataError, NotFoundError
+from flagdata.ingest.anemometer import untimed
 from flagdata.ingest.anemometer.containers import json_lines, spreadsheet
 from flagdata.ingest.anemometer.draft.drafting import Draft
-from flagdata.ingest.anemometer.formats import ft, sentences_in_lines, thies, untimed
+from flagdata.ingest.anemometer.formats import ft, sentences_in_lines, thies
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
 from flagdata.ingest.anemometer.options import Limits, WindOptions
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKind, Head

@@ -14,7 +14,7 @@ from flagdata.addresses import local_path
 from flagdata.errors import InputError, NothingMeasuredError, TimeError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import recipe as recipes
-from flagdata.ingest.anemometer.formats import untimed
+from flagdata.ingest.anemometer import untimed
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
 from flagdata.ingest.anemometer.identify import opened, recognised, unknown
 from flagdata.ingest.anemometer.instants import zones

@@ -32,6 +32,8 @@ _PLAIN = {
     "wind_z": ("wind z", "upward wind"),
 }  # fmt: skip
 """Words of a heading that state a quantity in full; others are understood, and what is understood is inferred."""
+_LISTED = 5
+"""Sites that a question names."""
 _POINTS = 0.9
 """Share of the cells that must be points of the compass."""
 
@@ -112,6 +114,8 @@ def draft(lines: Sequence[str], options: WindOptions) -> Draft | None:
     time = _time(parts, shape, meanings, given, options)
     if given is None and not winds and time is None:
         return None
+    if given is None:
+        _sites(parts, shape, meanings)
     parts.facts.insert(0, _cutting(shape, lines))
     label = options.wind or (winds[0] if winds else "anemometer")
     left = [i for i in range(len(shape.names)) if i not in parts.used and shape.names[i]]
@@ -126,6 +130,18 @@ def draft(lines: Sequence[str], options: WindOptions) -> Draft | None:
             label=label, missing=options.missing,
         ),
     )  # fmt: skip
+
+
+def _sites(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
+    """Ask where a column names several sites, whose rows must not be mixed."""
+    for index, one in enumerate(meanings):
+        values = sorted(set(shape.column(index)) - {""})
+        if one.kind == "site" and index not in parts.used and 1 < len(values) < len(shape.rows):
+            question = (
+                f"rows are of {len(values)} sites by {shape.shown(index)}: {', '.join(values[:_LISTED])}; which one?"
+            )
+            example = f"FILE.toml, with [rows] column = {shape.reference(index)!r}, value = {values[0]!r}"
+            parts.open.append(Open(key="sensor", question=question, example=example))
 
 
 def _cutting(shape: Shape, lines: Sequence[str]) -> Fact:

@@ -15,7 +15,7 @@ from flagdata.schema import CHANNELS
 from flagdata.units import UNITS, spelled
 
 Kind = Literal[
-    "speed", "direction", "x", "y", "z", "time", "date", "temperature", "humidity", "pressure", "other"
+    "speed", "direction", "site", "x", "y", "z", "time", "date", "temperature", "humidity", "pressure", "other"
 ]  # fmt: skip
 
 
@@ -57,6 +57,7 @@ _MOVING = _words(
 _TOWARDS = _words("to toward towards going")
 _RAW = _words("volt volts voltage counts pulses pulse raw adc mv frequency freq beaufort bft class chill")
 _OTHER = _words("battery batt rain solar radiation uv soil dew dewpoint snow wave tide water sea current")
+_SITES = _words("station site sensor device location turbine buoy node mast id serial place logger")
 _BRACKET = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]{1,20})[\])]\s*(?P<rest>.*)$")
 _WORD = re.compile(r"[a-zäöüß°]+|\d+(?:\.\d+)?")
 _HEIGHT = re.compile(r"(?<![a-z\d.])(\d{1,3}(?:\.\d+)?)\s*m(?![a-z/])", re.IGNORECASE)
@@ -116,8 +117,10 @@ def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:
     axes = [_AXES[word] for word in words if word in _AXES]
     if axes and len(words) <= 3 and (unit is None or UNITS[unit].si == "m/s"):
         return axes[0]
-    if joined & _WIND and unit is not None and UNITS[unit].si == "m/s":
+    if joined & _WIND and (UNITS[unit].si == "m/s" if unit is not None else set(words) <= _WIND):
         return "speed"
+    if set(words) & _SITES and not set(words) & (_TEMPERATURE | _HUMIDITY | _PRESSURE | _TIME | _DATE):
+        return "site"
     for known, kind in (
         (_TEMPERATURE, "temperature"), (_HUMIDITY, "humidity"), (_PRESSURE, "pressure"), (_TIME, "time"),
         (_DATE, "date"),

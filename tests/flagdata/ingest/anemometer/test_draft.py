@@ -108,6 +108,16 @@ def test_an_hour_is_not_taken_for_minutes() -> None:
     assert "columns" in asked(found)
 
 
+def test_rows_of_several_sites_are_not_mixed() -> None:
+    made = [
+        "station,time,wind_speed (m/s)",
+        *(f"{'AB'[k % 2]},2026-05-01T12:00:{k:02d}Z,{4 + k % 7 / 10}" for k in range(30)),
+    ]
+    found = draft(made, WindOptions())
+    assert found is not None
+    assert "sensor" in asked(found)
+
+
 def test_points_of_the_compass_of_several_languages_are_asked() -> None:
     assert "columns" in asked(drafted("time,wind_speed (m/s),wind_direction", ISO + ",{v},SO"))
 
