@@ -12,8 +12,6 @@ if TYPE_CHECKING:
 
 _ONCE = frozenset({"why", "note"})
 """What is told of one artifact alone where another of the same source has it, too."""
-_ANEMOMETERS = 4
-"""Of one table that are described each; beyond these their number is told."""
 
 
 def print_results(results: Sequence[IngestResult]) -> None:
@@ -100,13 +98,6 @@ def _device_lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
     return lines
 
 
-def _few(reasons: Sequence[str]) -> list[str]:
-    """Reasons, of which those that tell how each of many anemometers is read stand for the first few alone."""
-    each = [reason for reason in reasons if reason.startswith("anemometer ")]
-    shown = [reason for reason in reasons if reason not in each[_ANEMOMETERS:]]
-    return shown if len(each) <= _ANEMOMETERS else [*shown, f"{len(each) - _ANEMOMETERS} anemometers more: see --json"]
-
-
 def _how_sure(guess: Mapping[str, Any]) -> str:
     """What speaks for a guess: the format's own score, or how far a draft tells what the columns are."""
     if guess["draft"] and guess["kind"] == "anemometer":
@@ -120,7 +111,7 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
     for guess in entry["guesses"]:
         recipe = f", recipe {guess['recipe']}" if guess["recipe"] else ""
         click.echo(f"  {guess['kind']}: {guess['format']}{recipe} ({_how_sure(guess)})")
-        for reason in _few(guess["reasons"]):
+        for reason in guess["reasons"]:
             click.echo(f"    because {reason}")
         if guess["fix"] and guess["kind"] != "camera" and not guess["doubts"]:
             click.echo(f"    to do: {guess['fix']}")

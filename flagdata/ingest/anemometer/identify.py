@@ -31,6 +31,8 @@ def opened(path: Path, options: WindOptions, encoding: str | None = None) -> Tex
     """
     source = open_text(path, limits=options.limits, encoding=options.encoding or encoding)
     if options.rate is not None:
+        kind = next((one for one in _AS_TABLE if one.matches(source.head())), None)
+        source = source if kind is None else kind.as_table(source) or source
         return untimed.timed(source, rate=options.rate, start=options.start, columns=options.columns)
     if options.recipe is None and sentences_in_lines.matches(source.head()):
         return sentences_in_lines.as_table(source)
@@ -44,12 +46,16 @@ def opened(path: Path, options: WindOptions, encoding: str | None = None) -> Tex
 
 def recognised(source: TextFile) -> tuple[Guess, ...]:
     """The formats and recipes that know a file, the surest first; none where it is unknown."""
+    return tuple(guess for guess in _guesses(source) if guess.score >= SURE)
+
+
+def _guesses(source: TextFile) -> tuple[Guess, ...]:
     head = Head(lines=tuple(source.head(HEAD_LINES)), counted=source.counted)
     found: list[Guess] = []
     for name in FORMATS:
         reader: Format = FORMATS[name]()
         guess = reader.recognise(head)
-        if guess is not None and guess.score >= SURE:
+        if guess is not None:
             found.append(guess)
     return tuple(sorted(found, key=lambda guess: -guess.score))
 
@@ -92,7 +98,7 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
         found = recognised(source) or tuple(filter(None, [completed(path, WindOptions())]))
     except FlagdataError as error:
         return (Guess(format="unknown", score=0.0, reasons=(error.what,), kind="other", fix=error.fix),)
-    return tuple(replace(guess, notes=(*rewritten, *guess.notes)) for guess in found) or (unknown(),)
+    return tuple(replace(guess, notes=(*rewritten, *guess.notes)) for guess in found) or (unknown(source),)
 
 
 def completed(path: Path | str, options: WindOptions) -> Guess | None:
@@ -123,8 +129,11 @@ def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[s
     return found.winds if found is not None and len(found.winds) > 1 else ()
 
 
-def unknown() -> Guess:
-    """A text that no format and no recipe knows, and that is no table of a time and a wind."""
+def unknown(source: TextFile) -> Guess:
+    """A text that no format and no recipe knows, and that is no table of a time and a wind; or what a format says."""
+    said = next((guess for guess in _guesses(source) if guess.fix), None)
+    if said is not None:
+        return said
     text = "text, but neither a table with a time and a wind, nor sentences of a known log in its first lines"
     fix = "if it is a log, export it as a table with one row a reading, or describe it by a recipe: --sensor FILE.toml"
     return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix)

@@ -175,7 +175,7 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
     guesses = recognised(source)
     if not guesses:
         if drafted(source, options) is None:
-            other = unknown()
+            other = unknown(source)
             what = f"not a log of a known format: {'; '.join(other.reasons)}"
             raise InputError(what, where=str(source.path), fix=other.fix or "describe it by a recipe")
         return Delimited.name, options, ()

@@ -40,8 +40,8 @@ def open_dataset(path: Path, *, limits: Limits) -> TableText:
     xarray: Any = importlib.import_module("xarray")
     try:
         data = xarray.open_dataset(path, decode_times=True).squeeze()
-    except (ValueError, OSError, KeyError, ImportError) as error:
-        what = f"this netCDF file cannot be read: {type(error).__name__}"
+    except Exception as error:  # noqa: BLE001 - a damaged file makes its libraries raise anything
+        what = f"this netCDF or HDF5 file cannot be read: {type(error).__name__}"
         raise InputError(what, where=where, fix="pip install h5netcdf for netCDF-4, or export it as CSV") from None
     with data:
         time = next((name for name, axis in data.coords.items() if axis.dtype.kind == "M" and axis.ndim == 1), None)

@@ -10,13 +10,14 @@ from flagdata.ingest.anemometer.draft.shape import Shape
 from flagdata.ingest.anemometer.draft.words import Meaning
 from flagdata.ingest.anemometer.instants import counted, stamps
 from flagdata.ingest.anemometer.instants.midnight import parse_as
+from flagdata.ingest.anemometer.instants.stamps import Stamps
 
 _CLOCKS = ("%H:%M:%S%f", "%H:%M", "%I:%M:%S%f %p", "%I:%M %p", "%H%M%S", "%H%M", "%H")
 _DATES = (
     "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y%m%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y",
     "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%d %b %Y", "%d-%b-%Y", "%b %d %Y", "%Y %j",
 )  # fmt: skip
-_WHOLE = ("iso", "%Y-%m-%d %H:%M:%S%f%z", "%Y%m%d%H%M%S", "%Y%m%d%H%M", "%Y%m%dT%H%M%S%z")
+_WHOLE = ("iso", "%Y%m%d%H%M%S", "%Y%m%d%H%M", "%Y%m%dT%H%M%S%z")
 _EPOCHS = ("epoch-s", "epoch-ms", "epoch-us")
 _FITS = 0.95
 """Share of the stamps that a form must read."""
@@ -131,8 +132,15 @@ def _same_but_order(one: str, other: str) -> bool:
 
 
 def _distinct(forms: Sequence[str], texts: Sequence[str]) -> tuple[str, ...]:
-    """Of forms that read the same instants the first."""
-    kept: dict[bytes, str] = {}
+    """The forms but for those that read the same instants as one before, where both read any."""
+    kept: dict[str, Stamps] = {}
     for form in forms:
-        kept.setdefault(parse_as(list(texts), form)[0].ns.tobytes(), form)
-    return tuple(kept.values())
+        read = parse_as(list(texts), form)[0]
+        if not any(_alike(read, other) for other in kept.values()):
+            kept[form] = read
+    return tuple(kept)
+
+
+def _alike(one: Stamps, other: Stamps) -> bool:
+    both = one.valid & other.valid
+    return bool(both.any()) and bool((one.ns[both] == other.ns[both]).all())

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
+import string
 from collections.abc import Callable, Iterable, Sequence
 
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 
-_NOTHING = " \t\x00\x1a"
+_NOTHING = f"{string.whitespace}\x02\x03"
 
 
 def rows_of(source: TextFile, row: Callable[[str], list[str] | None]) -> tuple[list[list[str]], int]:

@@ -378,13 +378,6 @@ def test_eddypro_directions_in_the_unit_of_another_column_are_refused_with_a_ste
     assert "--columns" in (caught.value.fix or "")
 
 
-def test_a_line_of_units_that_lacks_one_is_told(read: Read) -> None:
-    rows = "".join(f"2026-05-01T12:{at:02d}:00Z,{3 + at % 5},{200 + at}\n" for at in range(20))
-    told = {one.what for one in read(f"time,wind,wind dir\nm/s,deg\n{rows}").findings}
-    assert "line 2 has 2 units for 3 columns: taken as those of all but the first" in told
-    assert not any("units for" in one.what for one in read(f"time,wind,wind dir\n,m/s,deg\n{rows}").findings)
-
-
 def test_statistics_of_components_are_no_wind_of_a_table_read_without_its_format(
     log_file: Callable[[str], Path],
 ) -> None:

@@ -69,13 +69,6 @@ QUOTED = (
 )
 
 
-@pytest.mark.parametrize("format_name", [None, "delimited"])
-def test_decimal_commas_in_quotes_are_read_in_an_export_of_few_rows(read: Read, format_name: str | None) -> None:
-    channels = read(QUOTED, zone="UTC", format=format_name).series.channels
-    assert channels["wind_speed"] == pytest.approx([3.5, 4.0])
-    assert np.degrees(channels["wind_direction"]) == pytest.approx([180, 200])
-
-
 @pytest.mark.parametrize(
     "text", [QUOTED.replace('"21,4"', "21.4"), QUOTED.replace('"3,5"', '"3,500"').replace('"4,0"', '"4,000"')]
 )
