@@ -27,6 +27,8 @@ _BEFORE = 631_152_000 * NANOSECONDS
 """1990-01-01T00:00:00Z."""
 _TENS = 36.0
 _CALM = 0.2
+_FAR = 0.1
+"""Share of a log by which its time goes back no clock that was set goes."""
 _NORTH = 30.0
 
 
@@ -166,8 +168,15 @@ def _calm(seen: _Seen) -> str:
 
 
 def _order(seen: _Seen) -> str:
-    back = np.diff(seen.reading.time) <= 0
+    steps = np.diff(seen.reading.time)
+    back = steps <= 0
     share = float(back.mean()) if len(back) else 0.0
+    span = int(np.ptp(seen.reading.time))
+    far = len(back) and -int(steps.min()) > max(_SLOW, _FAR * span)
+    if far:
+        return (
+            f"the time goes back by {-int(steps.min()) / NANOSECONDS:g} s, as where several devices follow one another"
+        )
     return f"the time does not increase in {share:.0%} of the rows" if share > _RARE else ""
 
 

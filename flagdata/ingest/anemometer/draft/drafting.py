@@ -16,7 +16,7 @@ from flagdata.ingest.anemometer.draft.questions import Open
 from flagdata.ingest.anemometer.draft.shape import Shape, is_missing, is_number, shape_of
 from flagdata.ingest.anemometer.draft.times import TimeFields, find_time, of_columns
 from flagdata.ingest.anemometer.draft.toml import ChannelText, recipe_text
-from flagdata.ingest.anemometer.draft.words import Meaning, fits, meaning
+from flagdata.ingest.anemometer.draft.words import MOVING, Meaning, fits, meaning
 from flagdata.ingest.anemometer.instants import counted, yearless
 from flagdata.ingest.anemometer.options import WindOptions, in_shell
 from flagdata.units import canonical
@@ -246,7 +246,7 @@ def _of_wind(
         return tuple(labels), False
     against = meanings[chosen].against
     moving = [
-        shape.names[i] for i, one in enumerate(meanings) if set(one.against) & _PLATFORM or (i == chosen and against)
+        shape.names[i] for i, one in enumerate(meanings) if set(one.against) & MOVING or (i == chosen and against)
     ]
     if moving and options.platform is None:
         question = (
@@ -258,32 +258,6 @@ def _of_wind(
     _direction(parts, shape, meanings, chosen)
     _beside(parts, shape, meanings)
     return tuple(labels), False
-
-
-_PLATFORM = frozenset(
-    [
-        "apparent",
-        "aws",
-        "awa",
-        "awd",
-        "bow",
-        "vessel",
-        "boat",
-        "ship",
-        "drone",
-        "uav",
-        "sog",
-        "cog",
-        "heading",
-        "hdg",
-        "ground",
-        "vehicle",
-        "track",
-        "twd",
-        "tws",
-        "twa",
-    ]
-)
 
 
 def _measured(

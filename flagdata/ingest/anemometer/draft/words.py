@@ -50,10 +50,11 @@ _EXTREME = _words(
     "racha raffica windgust maxi mini"
 )
 _SPREAD = _words("std stdev sd stddev sigma deviation dev variance var rms ti turbulence count quality qc flag")
-_MOVING = _words(
+MOVING = _words(
     "apparent aws awa awd relative bow vessel boat ship drone uav sog cog heading hdg ground gps vehicle truewind "
-    "tws twd twa track"
+    "tws twd twa track roll pitch yaw vx vy vz"
 )
+"""Words that speak of a platform which may move."""
 _TOWARDS = _words("to toward towards going")
 _RAW = _words("volt volts voltage counts pulses pulse raw adc mv frequency freq beaufort bft class chill")
 _OTHER = _words("battery batt rain solar radiation uv soil dew dewpoint snow wave tide water sea current")
@@ -92,7 +93,7 @@ def meaning(name: str, below: str = "") -> Meaning:
     split = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", bare).lower().replace("é", "e").replace("à", "a").replace("ó", "o")
     words = _WORD.findall(split.replace("_", " "))
     joined = {*words, *(a + b for a, b in pairwise(words))}
-    against = tuple(w for w in words if w in _EXTREME | _SPREAD | _MOVING | _RAW | _TOWARDS)
+    against = tuple(w for w in words if w in _EXTREME | _SPREAD | MOVING | _RAW | _TOWARDS)
     height = _HEIGHT.search(name)
     kind = _kind(words, joined, unit)
     named = bool(joined & _WIND) or any(word.startswith(("wind", "wnd", "ws", "wd")) for word in words)

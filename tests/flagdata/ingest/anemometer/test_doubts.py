@@ -67,6 +67,13 @@ def test_what_is_odd_is_asked_and_a_yes_closes_it(key: str, log_file: Write) -> 
         assert read_log(path, WindOptions(expect=every)).drafted
 
 
+def test_devices_that_follow_one_another_are_asked_about(log_file: Write) -> None:
+    """A column that no word calls a site: 2 devices of 200 rows each, so that the time goes back only once."""
+    made = [f"2026-05-01T12:{k // 60:02d}:{k % 60:02d}Z,{pod},{usual(k)}" for pod in (17, 23) for k in range(200)]
+    with pytest.raises(OpenFactsError, match="goes back by 199 s"):
+        read_log(log_file("\n".join(["time,pod,wind_speed (m/s)", *made]) + "\n"))
+
+
 def test_a_usual_log_is_not_doubted(log_file: Write) -> None:
     assert read_log(log_file(table(usual, vane))).stated
 

@@ -76,6 +76,7 @@ def test_each_fact_has_its_origin(heading: str, form: str, what: str, expected: 
         ("time,wind A (m/s),wind B (m/s)", ISO + ",{v},{v}", "wind"),
         ("when,wind_speed (m/s)", "day{n},{v}", "columns"),
         ("time,wind_speed (kn),SOG (kn)", ISO + ",{v},{v}", "platform"),
+        ("time,wind_speed (m/s),Vx,Vy,roll", ISO + ",{v},{v},{v},1", "platform"),
         ("time,wind_speed (m/s),wind dir to (deg)", ISO + ",{v},{d}", "columns"),
     ],
 )
