@@ -22,12 +22,18 @@ from flagdata.ingest.anemometer.options import WindOptions, in_shell
 from flagdata.units import canonical
 
 Origin = Literal["stated", "inferred", "assumed", "given"]
-_BESIDE = {"temperature": "air_temperature", "humidity": "relative_humidity", "pressure": "air_pressure"}
+_BESIDE = {
+    "sonic": "sonic_temperature",
+    "temperature": "air_temperature",
+    "humidity": "relative_humidity",
+    "pressure": "air_pressure",
+}
 _AXES = {"x": "wind_x", "y": "wind_y", "z": "wind_z"}
 _OF_WIND = frozenset({"speed", "direction", "x", "y", "z"})
 _PLAIN = {
     "wind_speed": ("wind speed",), "wind_direction": ("wind direction",), "air_temperature": ("air temperature",),
-    "relative_humidity": ("relative humidity",), "air_pressure": ("air pressure",),
+    "relative_humidity": ("relative humidity",), "sonic_temperature": ("sonic temperature",),
+    "air_pressure": ("air pressure",),
     "wind_x": ("wind x", "eastward wind"), "wind_y": ("wind y", "northward wind"),
     "wind_z": ("wind z", "upward wind"),
 }  # fmt: skip

@@ -15,7 +15,7 @@ from flagdata.schema import CHANNELS
 from flagdata.units import UNITS, spelled
 
 Kind = Literal[
-    "speed", "direction", "site", "x", "y", "z", "time", "date", "temperature", "humidity", "pressure", "other"
+    "speed", "direction", "site", "sonic", "x", "y", "z", "time", "date", "temperature", "humidity", "pressure", "other"
 ]  # fmt: skip
 
 
@@ -109,8 +109,10 @@ def fits(channel: str, unit: str) -> bool:
 
 
 def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:
-    if joined & _OTHER or ("sonic" in joined and joined & _TEMPERATURE):
+    if joined & _OTHER:
         return "other"
+    if "sonic" in joined and joined & _TEMPERATURE:
+        return "sonic"
     if joined & _DIRECTION:
         return "direction"
     if joined & _SPEED:
