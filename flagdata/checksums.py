@@ -44,8 +44,11 @@ def content_hash(path: Path) -> str:
 
     The folder's form is what `sha256sum` prints, so that it can be checked without this package. Empty folders and
     file modes do not count.
+
+    Raises:
+        InputError: as `files_of`.
     """
-    if path.is_file():
+    if files_of(path) == [path]:
         return file_hash(path)
     return hashlib.sha256(_lines({name: file_hash(file) for name, file in _named(path).items()}).encode()).hexdigest()
 

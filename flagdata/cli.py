@@ -32,9 +32,9 @@ VERBS: dict[str, tuple[str, str]] = {
     "ls": ("flagdata.commands.lake:ls", "List artifacts."),
     "show": ("flagdata.commands.lake:show", "Show one artifact, its parents and its report."),
     "log": ("flagdata.commands.lake:log", "List commits."),
-    "tag": ("flagdata.commands.lake:tag", "Name a version for good."),
-    "branch": ("flagdata.commands.lake:branch", "Create or list lines of work."),
-    "merge": ("flagdata.commands.lake:merge", "Commit on main what a branch has."),
+    "tag": ("flagdata.commands.lake:tag", "Name a version for good, list or delete tags."),
+    "branch": ("flagdata.commands.lake:branch", "Begin, list or delete lines of work."),
+    "merge": ("flagdata.commands.lake:merge", "Commit on main what a branch changed."),
     "diff": ("flagdata.commands.lake:diff", "Rows and objects added and removed between two versions."),
     "withdraw": ("flagdata.commands.lake:withdraw", "Take artifacts off a branch; tags keep them."),
     "query": ("flagdata.commands.query:query", "Select rows of the catalog by filter or SQL."),
@@ -106,7 +106,9 @@ def main(arguments: list[str] | None = None) -> None:
             document("error", {"kind": UsageError.kind, "what": error.format_message(), "where": None, "fix": _HELP})
         error.show()
         sys.exit(error.exit_code)
-    except (click.Abort, KeyboardInterrupt):
+    except (click.Abort, KeyboardInterrupt) as error:
+        if isinstance(error.__cause__, EOFError):  # of a file, which click takes for the end of the user's input
+            sys.exit(fail(foreseen(error.__cause__), as_json="--json" in given))
         click.echo("flagdata: interrupted", err=True)
         sys.exit(1)
     except Exception as error:  # noqa: BLE001  whatever it is, a user is told in one form

@@ -128,12 +128,31 @@ def _own_place(frame: traceback.FrameSummary) -> str | None:
     return f"{path.relative_to(_HOUSE)}, line {frame.lineno}"
 
 
+@contextmanager
+def following(published: str, doing: str) -> Iterator[None]:
+    """Work that follows the publication of `published`: an error in it becomes a warning, since that stays published.
+
+    Args:
+        published: what was published, e.g. "the data set in lake".
+        doing: what the block does, e.g. "writing its card".
+    """
+    try:
+        yield
+    except Exception as error:  # noqa: BLE001  whatever it is, the command has done what cannot be undone
+        known = foreseen(error)
+        _report(f"warning: {published} is published, but {doing} failed: {known.what}", known)
+
+
 def fail(error: FlagdataError, *, as_json: bool) -> int:
     """Report an error the way the command's user asked for; returns the exit code."""
     if as_json:
         document("error", error.as_dict())
-    say(f"flagdata: {error.what}")
+    _report(error.what, error)
+    return error.exit_code
+
+
+def _report(what: str, error: FlagdataError) -> None:
+    say(f"flagdata: {what}")
     if error.where:
         say(f"  where: {error.where}")
     say(f"  fix:   {error.fix}")
-    return error.exit_code

@@ -1,14 +1,65 @@
-"""Text files that a reader sees whole or not at all."""
+"""Files at the boundary: what may be read, and opening what is a file for certain."""
 
 from __future__ import annotations
 
+import errno
+import os
+import stat
+from io import BufferedReader
 from pathlib import Path
 
+from flagdata.errors import InputError, LimitError, NotFoundError
 
-def write_text(path: Path, text: str) -> None:
-    """Write `text` as UTF-8 beside `path`, then rename it, so that `path` holds the old text or all of the new one. The
-    folder is made where it is missing."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".part")
-    partial.write_text(text, encoding="utf-8", newline="")
-    partial.replace(path)
+_SHOWN = 300  # letters of a path in a message
+
+
+def is_folder(path: Path) -> bool:
+    """Whether there is a folder at a path; false for what is no path at all, as a name that is too long."""
+    try:
+        return path.is_dir()
+    except OSError:
+        return False
+
+
+def check_input(path: Path, *, noun: str = "file", limit: int | None = None) -> None:
+    """Make sure that a file can be read to its end, before it is opened.
+
+    Devices and pipes may have no end, and opening a pipe waits for whoever writes to it. Files of the kernel, as those
+    of /proc, state that they are empty.
+
+    Args:
+        noun: what the file is to the reader ("table"), for the messages.
+        limit: most bytes that are read; None for any.
+
+    Raises:
+        NotFoundError: there is nothing at the path.
+        InputError: a folder, a pipe or a device; or an empty file.
+        LimitError: more bytes than `limit`.
+    """
+    shown = str(path) if len(str(path)) <= _SHOWN else f"{str(path)[:_SHOWN]}…"
+    try:
+        status = path.stat()
+    except (OSError, ValueError) as error:  # a path with a null byte is a ValueError
+        why = "" if isinstance(error, FileNotFoundError) else f" ({getattr(error, 'strerror', None) or error})"
+        raise NotFoundError(f"there is no such {noun}{why}", where=shown, fix="check the path") from None
+    if not stat.S_ISREG(status.st_mode):
+        what = "a folder" if stat.S_ISDIR(status.st_mode) else "a pipe or device"
+        fix = f"give a {noun}" if stat.S_ISDIR(status.st_mode) else "write what it gives to a file first"
+        raise InputError(f"{what}, not a {noun}", where=shown, fix=fix)
+    if not status.st_size:
+        raise InputError(f"the {noun} is empty", where=shown, fix="copy or export it again")
+    if limit is not None and status.st_size > limit:
+        raise LimitError(f"a {noun} of {status.st_size} bytes", where=shown, fix=f"at most {limit} are read")
+
+
+def open_regular(path: Path) -> BufferedReader:
+    """A regular file, opened to read its bytes.
+
+    Raises:
+        OSError: what the system refused; or a folder, pipe or device, from which one may read without an end.
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # a pipe that nobody writes to would wait
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise OSError(errno.EINVAL, "not a regular file", str(path))
+    return os.fdopen(descriptor, "rb")

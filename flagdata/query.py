@@ -1,12 +1,17 @@
 """Rows of the catalog by filter or SQL, at any ref. DuckDB over the Arrow catalog, sealed off from everything else.
 
 SQL sees one table, `catalog`: the columns of `schema.CATALOG` and the derived ones of `DERIVED`. It cannot read or
-write files (nor spill to them), load extensions, change settings or run more than one statement.
+write files (nor spill to them), load extensions, change settings or run more than one statement. It is stopped after a
+time limit, and where it needs more than 2 GB or gives more rows than can be held; DuckDB looks at both between blocks
+of 2,048 rows.
 """
 
 from __future__ import annotations
 
+import math
 import re
+import threading
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,7 +20,8 @@ from typing import Protocol
 import duckdb
 import pyarrow as pa
 
-from flagdata.errors import UnknownNameError, UsageError
+from flagdata.errors import LimitError, UnknownNameError, UsageError
+from flagdata.lake.matching import Where, matching
 from flagdata.lake.refs import View
 from flagdata.schema import CATALOG, Field, Kind, catalog_schema
 
@@ -33,6 +39,10 @@ DERIVED: dict[str, tuple[Field, str]] = {
 }
 COLUMNS: dict[str, Field] = {**CATALOG, **{name: field for name, (field, _) in DERIVED.items()}}
 DEFAULT_ORDER = "kind, start NULLS LAST, artifact"
+TIME_LIMIT = 60.0
+"""What a query may take, if nothing else is asked for [s]; a catalog of a million rows takes one."""
+CELL_LIMIT, BYTE_LIMIT = 5_000_000, 256 << 20
+"""Most that SQL may give to be held at once, or else twice what the catalog itself has."""
 
 _SEALED: dict[str, str | bool | int | float | list[str]] = {
     "enable_external_access": "false",
@@ -42,6 +52,7 @@ _SEALED: dict[str, str | bool | int | float | list[str]] = {
     "temp_directory": "",
     "memory_limit": "2GB",  # a catalog of a million rows takes a tenth of it
 }
+_AGAIN = 0.1  # s between interrupts
 _MISSING_COLUMN = re.compile(r'Referenced column "([^"]+)" (?:was )?not found|does not have a column named "([^"]+)"')
 _MISSING_TABLE = re.compile(r"Table with name (\S+) does not exist")
 _TEXT_AS_INSTANT = re.compile(r"Could not convert string '\d{4}-\d\d.*' to INT64")
@@ -61,22 +72,25 @@ class Request:
     """What to select.
 
     Attributes:
-        where: an SQL boolean expression over the columns of `COLUMNS`; `None` is every row.
+        where: an SQL boolean expression over the columns of `COLUMNS`, or the values that columns of the catalog must
+            have; `None` is every row.
         columns: names in the order wanted; `None` is every stored column.
         order: SQL order terms ("wind DESC, start"); `None` is by kind, start and identity.
         sql: one SELECT over `catalog` instead of all of the above.
         limit: rows at most.
+        time_limit: what DuckDB may take for it in all [s].
 
     Raises:
-        UsageError: `sql` together with `where`, `columns` or `order`; a negative limit.
+        UsageError: `sql` together with `where`, `columns` or `order`; a negative limit; a time limit that is none.
         UnknownNameError: a column that is not in the catalog.
     """
 
-    where: str | None = None
+    where: Where | None = None
     columns: tuple[str, ...] | None = None
     order: str | None = None
     sql: str | None = None
     limit: int | None = None
+    time_limit: float = TIME_LIMIT
 
     def __post_init__(self) -> None:
         if self.sql is not None and (self.where, self.columns, self.order) != (None, None, None):
@@ -86,6 +100,8 @@ class Request:
             )
         if self.limit is not None and self.limit < 0:
             raise UsageError(f"a limit of {self.limit} rows", fix="give 0 or more")
+        if not (math.isfinite(self.time_limit) and self.time_limit > 0):
+            raise UsageError(f"a time limit of {self.time_limit} s", fix="give seconds, more than 0")
         if self.columns is not None and not self.columns:
             raise UsageError("no columns", fix=f"name some of: {', '.join(COLUMNS)}")
         for name in self.columns or ():
@@ -101,13 +117,18 @@ class Selection:
         request: what is wanted of them.
 
     Raises:
-        UsageError: SQL that is not a single SELECT, does not parse, or names what is not there.
+        UsageError: SQL that is not a single SELECT, does not parse, names what is not there, or needs too much memory.
+        LimitError: it takes longer than it may. These are raised by the methods, too.
     """
 
     def __init__(self, catalog: pa.Table, request: Request) -> None:
         self.request = request
+        if request.where is not None and not isinstance(request.where, str):
+            catalog = matching(catalog, request.where)
         self._connection = duckdb.connect(":memory:", config=_SEALED)
-        with _explained(request):
+        self._left = request.time_limit
+        self._held = max(CELL_LIMIT, 2 * catalog.num_rows * catalog.num_columns), max(BYTE_LIMIT, 2 * catalog.nbytes)
+        with self._running():
             self._connection.register("stored", catalog)
             self._connection.execute(f"CREATE VIEW catalog AS SELECT {_view_columns()} FROM stored")
             self._connection.execute("SET TimeZone = 'UTC'")
@@ -127,27 +148,27 @@ class Selection:
 
     def _filtered(self, request: Request) -> duckdb.DuckDBPyRelation:
         relation = self._connection.view("catalog")
-        if request.where is not None:
+        if isinstance(request.where, str):
             relation = relation.filter(request.where)
         relation = relation.order(request.order or DEFAULT_ORDER)
         return relation.project(", ".join(f'"{name}"' for name in request.columns or CATALOG))
 
     def total(self) -> int:
         """How many rows there are without the limit."""
-        with _explained(self.request):
+        with self._running():
             ((count,),) = self._relation.aggregate("count(*)").fetchall()
         return int(count)
 
     def batches(self, size: int = 65_536) -> pa.RecordBatchReader:
         """The rows as a stream of record batches of at most `size` rows."""
         relation = self._relation if self.request.limit is None else self._relation.limit(self.request.limit)
-        with _explained(self.request):
+        with self._running():
             raw = relation.to_arrow_reader(size)
         schema = self._schema(raw.schema)
 
         def stream() -> Iterator[pa.RecordBatch]:
             while True:
-                with _explained(self.request):
+                with self._running():
                     try:
                         batch = raw.read_next_batch()
                     except StopIteration:
@@ -159,8 +180,23 @@ class Selection:
         return pa.RecordBatchReader.from_batches(schema, stream())
 
     def table(self) -> pa.Table:
-        """The rows, whole. Columns of the catalog carry their unit and description; those of free SQL do not."""
-        return self.batches().read_all()
+        """The rows, whole. Columns of the catalog carry their unit and description; those of free SQL do not.
+
+        Raises:
+            LimitError: SQL gives more than can be held.
+        """
+        stream = self.batches()
+        batches: list[pa.RecordBatch] = []
+        cells = size = 0
+        for batch in stream:
+            batches.append(batch)
+            cells, size = cells + batch.num_rows * batch.num_columns, size + batch.nbytes
+            if self.request.sql is not None and (cells > self._held[0] or size > self._held[1]):
+                raise LimitError(
+                    f"the SQL gives more than {self._held[0]:,} values or {self._held[1] >> 20} MiB",
+                    where=self.request.sql, fix="aggregate in SQL, or give a limit; --csv and --arrow write any number",
+                )  # fmt: skip
+        return pa.Table.from_batches(batches, schema=stream.schema)
 
     def _schema(self, raw: pa.Schema) -> pa.Schema:
         """The catalog's own schema, for rows of the catalog; what free SQL makes has no description."""
@@ -169,6 +205,42 @@ class Selection:
         if self.request.columns is None:
             return catalog_schema()
         return pa.schema([_field(name, COLUMNS[name]) for name in self.request.columns])
+
+    @contextmanager
+    def _running(self) -> Iterator[None]:
+        """What DuckDB does within is interrupted when the time is up; its errors are explained."""
+        begun, done = time.monotonic(), threading.Event()
+        watch = threading.Thread(target=self._interrupt, args=(done, self._left), daemon=True)
+        watch.start()
+        try:
+            yield
+        except (duckdb.Error, pa.ArrowException, OSError) as error:  # the last two of a stream
+            self._refuse_late(begun)
+            raise explain(error, where=_shown(self.request)) from None
+        finally:
+            done.set()
+            watch.join()
+        self._refuse_late(begun)
+        self._left -= time.monotonic() - begun
+
+    def _interrupt(self, done: threading.Event, seconds: float) -> None:
+        """Interrupt DuckDB after so long, and again until it is done: an interrupt between two blocks is forgotten."""
+        while not done.wait(min(seconds, threading.TIMEOUT_MAX)):
+            self._connection.interrupt()
+            seconds = _AGAIN
+
+    def _refuse_late(self, begun: float) -> None:
+        if time.monotonic() - begun >= self._left:
+            raise LimitError(
+                f"the query took longer than {self.request.time_limit:g} s", where=_shown(self.request),
+                fix="narrow it down; `flagdata query --time-limit SECONDS` allows more",
+            )  # fmt: skip
+
+
+def _shown(request: Request) -> str | None:
+    """The user's own SQL, for a message."""
+    given = (request.sql, request.where, request.order)
+    return "; ".join(text for text in given if isinstance(text, str) and text) or None
 
 
 def _field(name: str, field: Field) -> pa.Field:
@@ -190,37 +262,30 @@ def _view_columns() -> str:
 
 def select(
     lake: Catalogued,
-    where: str | None = None,
+    where: Where | None = None,
     *,
     at: str | None = None,
     columns: Sequence[str] | None = None,
     order: str | None = None,
     sql: str | None = None,
     limit: int | None = None,
+    time_limit: float = TIME_LIMIT,
 ) -> pa.Table:
     """Rows of a lake's catalog at a ref; arguments as in `Request`.
 
     Raises:
         UsageError: SQL that cannot be run; the message carries DuckDB's reason and, for a misspelt column, its name.
+        LimitError: it takes longer, or gives more, than it may.
         NotFoundError: no such ref.
     """
     request = Request(
-        where=where, columns=None if columns is None else tuple(columns), order=order, sql=sql, limit=limit
-    )
+        where=where, columns=None if columns is None else tuple(columns), order=order, sql=sql, limit=limit,
+        time_limit=time_limit,
+    )  # fmt: skip
     return Selection(lake.table(lake.view(at)), request).table()
 
 
-@contextmanager
-def _explained(request: Request) -> Iterator[None]:
-    """Turns DuckDB's errors into usage errors that carry the fix."""
-    try:
-        yield
-    except duckdb.Error as error:
-        given = (request.sql, request.where, request.order)
-        raise explain(error, where="; ".join(text for text in given if text) or None) from None
-
-
-def explain(error: duckdb.Error, *, where: str | None) -> UsageError:
+def explain(error: Exception, *, where: str | None) -> UsageError:
     """The usage error for what DuckDB says about a user's SQL.
 
     Args:
@@ -239,11 +304,11 @@ def explain(error: duckdb.Error, *, where: str | None) -> UsageError:
     table = _MISSING_TABLE.search(text)
     if table:
         return UsageError(f"no table {table[1]!r}", where=where, fix="the one table is called catalog")
-    if isinstance(error, duckdb.PermissionException):
+    if isinstance(error, duckdb.PermissionException) or "Permission Error" in text:
         return UsageError(
             "SQL on a lake reads its catalog and nothing else", where=where, fix="select from catalog; leave out files"
         )
-    if isinstance(error, duckdb.OutOfMemoryException):
+    if isinstance(error, duckdb.OutOfMemoryException) or "Out of Memory Error" in text:
         return UsageError("it needs more memory than there is", where=where, fix="narrow it down, or aggregate in SQL")
     if _RESERVED_END.search(text):
         return UsageError(

@@ -6,21 +6,19 @@ names the user's own file in its place.
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from flagdata.addresses import local_path
-from flagdata.errors import InputError, LimitError, NotFoundError, UnknownNameError
+from flagdata.documents import SIZE_LIMIT, LimitsError, from_toml
+from flagdata.errors import InputError, LimitError, UnknownNameError
+from flagdata.files import check_input
 
 _SUFFIX = ".toml"
-SIZE_LIMIT = 64 << 20
-"""Largest recipe that is read [B]; a model's mesh is in its own."""
-NESTING_LIMIT = 100
-"""Most tables and lists within one another."""
+NAME_LIMIT = 100
+"""Longest name of a recipe [characters]: files and artifacts are called after it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,55 +89,51 @@ class Shelf:
             UnknownNameError: no such name; the nearest is suggested.
             UsageError: an address, not a path.
             NotFoundError: no such file.
-            InputError: it cannot be read.
+            InputError: it cannot be read, or its name cannot be that of an artifact.
+            LimitError: it is larger than any recipe.
         """
         path = local_path(source)
         if not source.endswith(_SUFFIX):
             return self.named(source)
-        if not path.is_file():
-            raise NotFoundError("no such recipe file", where=source, fix="check the path, or name one of the catalog")
-        try:
-            data = path.read_bytes()
-        except OSError as error:
-            raise InputError(f"the recipe cannot be read: {error.strerror}", where=source, fix="check it") from None
-        return Found(name=path.stem, data=data, folder=path.parent, where=source)
+        if not is_name(path.stem):
+            raise InputError(
+                f"a {self.noun} cannot be called {path.stem!r}", where=source,
+                fix=f"rename the file: 1 to {NAME_LIMIT} printable characters",
+            )  # fmt: skip
+        return read_recipe(path)
+
+
+def read_recipe(path: Path) -> Found:
+    """The recipe in a file.
+
+    Raises:
+        NotFoundError: no such file.
+        InputError: it cannot be read, or is empty.
+        LimitError: larger than `SIZE_LIMIT` characters can be.
+    """
+    check_input(path, noun="recipe file", limit=4 * SIZE_LIMIT)  # bytes of a character of UTF-8
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"the recipe cannot be read: {error.strerror}", where=str(path), fix="check it") from None
+    return Found(name=path.stem, data=data, folder=path.parent, where=str(path))
+
+
+def is_name(value: object) -> bool:
+    """Whether a recipe, and what is made by it, can be called so: text of printable characters, not too long."""
+    return isinstance(value, str) and bool(value.strip()) and value.isprintable() and len(value) <= NAME_LIMIT
 
 
 def parsed(text: str, *, where: str) -> dict[str, Any]:
     """The tables of a recipe's text.
 
     Raises:
-        InputError: it is not TOML, or holds a whole number of thousands of digits.
-        LimitError: larger than `SIZE_LIMIT`, or nested deeper than `NESTING_LIMIT`.
+        InputError: it is not TOML, or holds a number that is not finite or of thousands of digits.
+        LimitError: larger or nested deeper than the limits of `flagdata.documents`.
     """
-    if len(text) > SIZE_LIMIT:
-        raise LimitError(f"a recipe of {len(text)} characters", where=where, fix=f"at most {SIZE_LIMIT} are read")
     try:
-        content = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, ValueError) as error:  # Python itself refuses numbers of very many digits
-        raise InputError(f"not TOML: {error}", where=where, fix="correct the file") from None
-    except RecursionError:
-        raise _nested(where) from None
-    _check_depth(content, where=where)
-    return content
-
-
-def _check_depth(content: Any, *, where: str) -> None:
-    level: list[Any] = [content]
-    for _ in range(NESTING_LIMIT):
-        level = [item for value in level for item in _inside(value)]
-        if not level:
-            return
-    raise _nested(where)
-
-
-def _inside(value: Any) -> Iterable[Any]:
-    if isinstance(value, dict):
-        return value.values()
-    return value if isinstance(value, list) else ()
-
-
-def _nested(where: str) -> LimitError:
-    return LimitError(
-        f"tables or lists more than {NESTING_LIMIT} deep", where=where, fix="no recipe needs more than a few levels"
-    )
+        return from_toml(text)
+    except LimitsError as error:
+        raise LimitError(str(error), where=where, fix="no recipe needs more") from None
+    except ValueError as error:
+        raise InputError(str(error), where=where, fix="correct the file") from None

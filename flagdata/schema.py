@@ -13,7 +13,7 @@ from typing import Any
 
 import pyarrow as pa
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,6 +174,8 @@ CATALOG: dict[str, Field] = {
     "created": Field(type=pa.timestamp("us", tz="UTC"), nullable=False, about="when it was committed"),
     "recording": Field(type=pa.string(), about="artifact of the recording a clip belongs to"),
     "session": Field(type=pa.string(), about="one set-up at one place; never on two sides of a split"),
+    "dataset": Field(type=pa.string(), since=3, about="data set that a film and its clips were built for"),
+    "side": Field(type=pa.string(), since=3, about="side of that data set: train, validation or test"),
     "day": Field(type=pa.string(), about="calendar day (ISO, UTC) of the start; never on two sides of a split"),
     "start": Field(type=pa.int64(), unit="ns", about="first instant, UTC"),
     "end": Field(type=pa.int64(), unit="ns", about="last instant, UTC"),

@@ -15,6 +15,9 @@ WHOLE_LIMIT = 1_000_000
 """Most of anything that a recipe counts, where no other limit is named."""
 SEED_LIMIT = 2**63 - 1
 """Largest seed."""
+DEGREES = "-deg"
+"""Suffix of a key whose values are in degrees."""
+_TURN = 2 * math.pi + 1e-3  # rad; a whole turn, rounded by whoever writes it
 
 
 class Scale(StrEnum):
@@ -61,6 +64,13 @@ def ends(quantity: Quantity) -> tuple[float, float]:
     return (quantity.low, quantity.high) if isinstance(quantity, Range) else (quantity, quantity)
 
 
+def in_radians(quantity: Quantity) -> Quantity:
+    """A quantity that is given in degrees."""
+    if isinstance(quantity, Range):
+        return Range(low=math.radians(quantity.low), high=math.radians(quantity.high), scale=quantity.scale)
+    return math.radians(quantity)
+
+
 def plain(quantity: Quantity | None) -> Any:
     """As JSON."""
     return quantity.as_dict() if isinstance(quantity, Range) else quantity
@@ -103,11 +113,13 @@ class Table:
         """Whether the value is this text."""
         return self._take(key, None) == word
 
-    def number(self, key: str, default: float, *, least: float = -math.inf, above: float = -math.inf) -> float:
+    def number(
+        self, key: str, default: float, *, least: float = -math.inf, above: float = -math.inf, most: float = math.inf
+    ) -> float:
         value = self._take(key, default)
         if not _finite(value):
             raise self._wrong(key, value, "a finite number")
-        self._bound(key, float(value), least=least, above=above)
+        self._bound(key, float(value), least=least, above=above, most=most)
         return float(value)
 
     def whole(self, key: str, default: int, *, least: int, most: int = WHOLE_LIMIT) -> int:
@@ -210,9 +222,39 @@ class Table:
             for end in ends(value):
                 self._bound(key, end, least=least, above=above, most=most)
             return value
-        number = self.number(key, default, least=least, above=above)
-        self._bound(key, number, least=least, above=above, most=most)
-        return number
+        return self.number(key, default, least=least, above=above, most=most)
+
+    def angle(self, key: str, default: float) -> Quantity:
+        """An angle [rad]: a quantity in radians under `key`, or in degrees under `key-deg`.
+
+        Raises:
+            InputError: both, or more than a whole turn, as an angle in degrees is.
+        """
+        degrees = key + DEGREES
+        if degrees not in self:
+            given = self.quantity(key, default)
+        elif key in self:
+            raise InputError(f"{key} is given twice", where=self.where, fix=f"keep {key} or {degrees}")
+        else:
+            given = in_radians(self.quantity(degrees, 0.0))
+        for end in ends(given):
+            if abs(end) > _TURN:
+                raise InputError(
+                    f"{key} is {end:.4g} rad, more than a whole turn", where=self.where,
+                    fix=f"give radians, or degrees as {degrees} = {end:.4g}",
+                )  # fmt: skip
+        return given
+
+    def one_angle(self, key: str, default: float) -> float:
+        """An `angle` that is no range.
+
+        Raises:
+            InputError: as `angle`, or a range.
+        """
+        given = self.angle(key, default)
+        if isinstance(given, Range):
+            raise self._wrong(key, given.as_dict(), "one number")
+        return given
 
     def _take(self, key: str, default: Any) -> Any:
         self._asked.add(key)

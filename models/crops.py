@@ -20,6 +20,9 @@ from flagdata.errors import InputError
 SIDED = frozenset({"render.camera_angle", "render.sun_azimuth", "render.frame_offset_x", "wind_toward"})
 """Parameters that change their sign in a mirror image."""
 
+LEAST_SCALE = 0.05
+"""Least side of a crop, as a share of the picture's."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Crop:
@@ -49,7 +52,7 @@ class Cropping:
         mirror: whether half of the crops are mirror images.
 
     Raises:
-        InputError: no scale, or one outside of (0, 1].
+        InputError: no scale, or one outside of [`LEAST_SCALE`, 1].
     """
 
     frames: int = 30
@@ -58,8 +61,10 @@ class Cropping:
     mirror: bool = True
 
     def __post_init__(self) -> None:
-        if not self.scales or not all(0 < scale <= 1 for scale in self.scales):
-            raise InputError(f"scales {self.scales} of crops", fix="give shares of the picture, above 0 and up to 1")
+        if not self.scales or not all(LEAST_SCALE <= scale <= 1 for scale in self.scales):
+            raise InputError(
+                f"scales {self.scales} of crops", fix=f"give shares of the picture, from {LEAST_SCALE:g} to 1"
+            )
 
     def draw(self, rng: np.random.Generator, shape: tuple[int, int, int]) -> Crop:
         """A random part of a film of (frames, height, width).

@@ -16,7 +16,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from flagdata.errors import CorruptError, InputError
+from flagdata.errors import CorruptError, FlagdataError, InputError
 from flagdata.rng import torch_generator
 from models.crops import Cropping
 from models.frontend import FrontEnd
@@ -209,6 +209,8 @@ def load(folder: Path) -> Estimator:
         front_end = FrontEnd(**card["front_end"])
         crops = card["cropping"]
         cropping = Cropping(**{**crops, "scales": tuple(crops["scales"])})
+        if (cropping.frames, cropping.size) != (front_end.frames, front_end.size):
+            raise InputError("its crops are not the clips that its front end takes", fix=_FIX)
         loss, network = recipe["loss"], recipe["network"]
         learners = []
         for place in range(int(card.get("members", 1))):
@@ -222,19 +224,22 @@ def load(folder: Path) -> Estimator:
                 {name: value.float() if value.is_floating_point() else value for name, value in own.items()}
             )
             learners.append(learner.eval())
-        widening = torch.tensor(card.get("widening") or [1.0] * len(loss["targets"]))
-    except (KeyError, TypeError, ValueError, RuntimeError, InputError) as error:
-        raise CorruptError(
-            f"the model does not fit this version: {error}", where=str(folder), fix="train it again, or update flagdata"
-        ) from None
-    path = folder / CLOUD
-    cloud = None
-    if path.exists():
-        cloud = Familiarity.of_arrays({name: value.double().numpy() for name, value in read_tensors(path).items()})
-    return Estimator(
-        name=str(card["name"]), learners=tuple(learners), front_end=front_end, cropping=cropping, widening=widening,
-        cloud=cloud, card=card,
-    )  # fmt: skip
+        widening = torch.tensor(card.get("widening") or [1.0] * len(loss["targets"]), dtype=torch.float32)
+        if widening.shape != (len(loss["targets"]),) or not bool(((widening > 0) & widening.isfinite()).all()):
+            raise InputError(f"its distributions are spread by {widening.tolist()}", fix=_FIX)
+        path = folder / CLOUD
+        cloud = None
+        if path.exists():
+            cloud = Familiarity.of_arrays({name: value.double().numpy() for name, value in read_tensors(path).items()})
+        return Estimator(
+            name=str(card["name"]), learners=tuple(learners), front_end=front_end, cropping=cropping,
+            widening=widening, cloud=cloud, card=card,
+        )  # fmt: skip
+    except (KeyError, TypeError, ValueError, RuntimeError, ArithmeticError, AttributeError, FlagdataError) as error:
+        raise CorruptError(f"the model does not fit this version: {error}", where=str(folder), fix=_FIX) from None
+
+
+_FIX = "train it again, or update flagdata"
 
 
 def shipped(name: str = DEFAULT) -> Estimator:

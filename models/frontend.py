@@ -27,7 +27,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from flagdata.errors import InputError
+from flagdata.errors import InputError, LimitError
 from flagdata.provenance import canonical, digest
 from models import flow
 from models.course import at_rest, band_powers, centre_and_width, fourier_rows, log_power, shares_of_nyquist
@@ -52,6 +52,12 @@ WAVE_CHANNELS = (
 """Names of the wave maps, in order. Frequencies are shares of the Nyquist frequency, phase gradients shares of π a
 pixel of the pooled picture; powers are log(1 + I/10⁻³), I as in `periodogram`
 of standardised frames: logarithmic where something moves, near 0 where there is but noise."""
+FRAMES_LIMIT = 4096
+"""Most frames of a clip."""
+PIXELS_LIMIT = 1 << 26
+"""Most pixels of a clip, all frames together: 256 MiB in float32."""
+RATE_LIMIT = 1e6
+"""Highest frame rate [Hz]."""
 _TINY = 1e-12
 _FLOOR = 1e-3  # power below which the scale is linear; edges that move have 10⁻² to 10, camera noise 10⁻⁴
 _VERSION = 1
@@ -71,7 +77,9 @@ class FrontEnd:
         spatial_sigma: of the derivatives [px].
 
     Raises:
-        InputError: fewer than four frames, a size that is no multiple of 4, or a rate or width that is not above 0.
+        InputError: fewer than four frames, a size that is no multiple of 4, a rate or width that is not above 0, or a
+            Gaussian wider than what it smooths.
+        LimitError: clips larger than `FRAMES_LIMIT` and `PIXELS_LIMIT`.
     """
 
     maps: Maps
@@ -87,10 +95,16 @@ class FrontEnd:
             raise InputError(
                 f"{self.frames} frames of {self.size} px", fix=f"give 4 frames or more, and a multiple of {least} px"
             )
-        if not min(self.rate, self.temporal_sigma, self.spatial_sigma) > 0:
+        if self.frames > FRAMES_LIMIT or self.frames * self.size**2 > PIXELS_LIMIT:
+            raise LimitError(
+                f"clips of {self.frames:.3g} frames of {self.size:.3g} px",
+                fix=f"give at most {FRAMES_LIMIT} frames, and {PIXELS_LIMIT} px in all of them together",
+            )
+        within = (self.rate <= RATE_LIMIT, self.temporal_sigma <= self.frames, self.spatial_sigma <= self.size)
+        if not (min(self.rate, self.temporal_sigma, self.spatial_sigma) > 0 and all(within)):
             raise InputError(
                 f"rate {self.rate:g} Hz, σ of {self.temporal_sigma:g} frames and {self.spatial_sigma:g} px",
-                fix="give values above 0",
+                fix=f"give values above 0: at most {RATE_LIMIT:g} Hz, {self.frames} frames and {self.size} px",
             )
 
     @property

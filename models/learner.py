@@ -9,11 +9,18 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from flagdata.errors import InputError
+from flagdata.errors import InputError, LimitError
 from models.losses import contrastive_loss
 from models.mixture import Mixture, MixtureHead
 from models.registry import NETWORKS
 from models.targets import Scaling
+
+WEIGHTS_LIMIT = 1 << 28
+"""Most weights of a learner: 1 GiB in float32, and four times as much while it is trained."""
+NUMBER_LIMIT = 1_000_000
+"""Largest number among a network's options."""
+LIST_LIMIT = 200
+"""Longest list among a network's options: the names of all maps of one kind are 87."""
 
 
 class Loss(StrEnum):
@@ -127,6 +134,8 @@ def build(
 ) -> Learner:
     """A named network with its head, its weights drawn by torch's generator as it stands.
 
+    It is built without memory for its weights first, so that no recipe or card takes more than `WEIGHTS_LIMIT`.
+
     Args:
         network: name in `models.registry.NETWORKS`.
         options: the network's own; lists, as JSON and TOML have them, stand for tuples.
@@ -135,13 +144,44 @@ def build(
     Raises:
         UnknownNameError: no such network.
         InputError: options that the network does not take, or targets that do not go with the loss.
+        LimitError: numbers or lists beyond any network's, or more weights than `WEIGHTS_LIMIT`.
     """
     given = {key: tuple(value) if isinstance(value, list) else value for key, value in options.items()}
+    for key, value in {**given, "components": components, "margin": margin}.items():
+        _check_option(key, value)
+
+    def made() -> Learner:
+        return Learner(NETWORKS[network](**given), loss=loss, targets=targets, components=components, margin=margin)
+
     try:
-        built = NETWORKS[network](**given)
-    except TypeError as error:
+        with torch.device("meta"):
+            weights = sum(values.numel() for values in made().state_dict().values())
+    except (TypeError, ValueError, RuntimeError, ArithmeticError) as error:
         raise InputError(
             f"the network {network} does not take that: {error}", where="[network]",
             fix="see its docstring for what it takes",
         ) from None  # fmt: skip
-    return Learner(built, loss=loss, targets=targets, components=components, margin=margin)
+    if weights > WEIGHTS_LIMIT:
+        raise LimitError(
+            f"the network {network} would have {weights:.3g} weights", where="[network]",
+            fix=f"at most {WEIGHTS_LIMIT} are trained or read; give smaller widths",
+        )  # fmt: skip
+    return made()
+
+
+def _check_option(key: str, value: object) -> None:
+    """Make sure that an option is a positive number, a text, or a short list of them.
+
+    Raises:
+        InputError, LimitError: it is not.
+    """
+    many = value if isinstance(value, tuple) else (value,)
+    if len(many) > LIST_LIMIT:
+        raise LimitError(f"{key} has {len(many)} entries", where="[network]", fix=f"give at most {LIST_LIMIT}")
+    for one in many:
+        if isinstance(one, str):
+            continue
+        if isinstance(one, bool) or not isinstance(one, int | float) or not one > 0:
+            raise InputError(f"{key} is {one!r}", where="[network]", fix="give a positive number")
+        if one > NUMBER_LIMIT:
+            raise LimitError(f"{key} is {str(one)[:20]}", where="[network]", fix=f"give at most {NUMBER_LIMIT}")

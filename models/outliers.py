@@ -122,5 +122,20 @@ class Familiarity:
 
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, NDArray[np.float64]]) -> Familiarity:
-        """Rebuild it from what `arrays` gave."""
-        return cls(centre=arrays["centre"], whitening=arrays["whitening"], reference=arrays["reference"])
+        """Rebuild it from what `arrays` gave.
+
+        Raises:
+            KeyError, InputError: arrays that `arrays` does not give.
+        """
+        centre, whitening, reference = (arrays[name] for name in ("centre", "whitening", "reference"))
+        if (
+            centre.ndim != 1
+            or whitening.shape != (len(centre), len(centre))
+            or reference.ndim != 1
+            or not len(reference)
+        ):
+            raise InputError(
+                f"a cloud of shapes {centre.shape}, {whitening.shape} and {reference.shape}",
+                fix="give (d,), (d, d) and (clips,)",
+            )
+        return cls(centre=centre, whitening=whitening, reference=reference)

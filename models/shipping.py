@@ -22,6 +22,8 @@ from torch import Tensor
 from flagdata.checksums import write_sums
 from flagdata.console import LocalPath, progress, say
 from flagdata.errors import UsageError
+from flagdata.outputs import check_folder, fresh_folder
+from flagdata.schema import Kind
 from models.estimator import CLOUD, SHIPPED, Estimator, load
 from models.evaluation.predict import embedded
 from models.outliers import Familiarity
@@ -74,12 +76,13 @@ def write(folder: Path, members: Sequence[Path], *, train: Prepared, validation:
     """Make one model of trained ones.
 
     Args:
-        folder: of the model; made anew.
+        folder: of the model, which is not there yet.
         members: folders of the trained networks.
         train, validation: what they were trained on and judged by, prepared.
 
     Raises:
         UsageError: networks of different recipes or data.
+        ConflictError: a model, or anything else, is in the folder.
     """
     loaded = [load(member) for member in members]
     first = loaded[0]
@@ -96,22 +99,22 @@ def write(folder: Path, members: Sequence[Path], *, train: Prepared, validation:
     joint = replace(first, learners=learners, name=name)
     found = widening(joint, validation)
     cloud = familiar(joint, train, validation)
-    folder.mkdir(parents=True, exist_ok=True)
     card: dict[str, Any] = {key: first.card[key] for key in _KEPT}
     card |= {
         "name": name, "members": len(learners), "seeds": [one.card["seed"] for one in loaded], "widening": list(found),
         "seed": first.card["seed"], "parameters": sum(w.numel() for one in learners for w in one.network.parameters()),
         "trained": {"films": len(train), "sequences": len(np.unique(train.sequence))},
     }  # fmt: skip
-    write_card(folder, card)
     tensors = {
         f"{place}.{key}": value.half() if value.is_floating_point() else value
         for place, learner in enumerate(learners)
         for key, value in learner.state_dict().items()
     }
-    write_tensors(folder / WEIGHTS, tensors)
-    write_tensors(folder / CLOUD, {key: torch.from_numpy(value) for key, value in cloud.arrays().items()})
-    write_sums(folder)
+    with fresh_folder(folder) as scratch:
+        write_card(scratch, card)
+        write_tensors(scratch / WEIGHTS, tensors)
+        write_tensors(scratch / CLOUD, {key: torch.from_numpy(value) for key, value in cloud.arrays().items()})
+        write_sums(scratch)
     return load(folder)
 
 
@@ -135,8 +138,10 @@ def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Pa
     from models.training.recipe import load as recipe_of
 
     recipe = recipe_of(name)
+    check_folder(out / recipe.name)
     source = flagdata.open(lake_path)
-    rows = source.lake.rows(f"kind = 'network' and name = '{recipe.name}'", columns=["object", "recipe"]).to_pylist()
+    networks = {"kind": Kind.NETWORK, "name": recipe.name}
+    rows = source.lake.rows(networks, columns=["object", "recipe"]).to_pylist()
     wanted = _seedless(recipe.identity())
     members = [
         source.lake.object_path(row["object"])

@@ -19,11 +19,14 @@ from safetensors.torch import load, save
 from torch import Tensor
 
 from flagdata.checksums import SUMS, check_sums, content_hash
-from flagdata.errors import CorruptError, NotFoundError
+from flagdata.documents import read_json
+from flagdata.errors import CorruptError, LimitError, NotFoundError
 
 FORMAT = "flagdata.network/1"
 CARD = "card.json"
 WEIGHTS = "weights.safetensors"
+TENSORS_LIMIT = 1 << 32
+"""Largest file of tensors that is read [B]."""
 _OBJECT = re.compile(r"([0-9a-f]{64})\.model")
 
 
@@ -62,16 +65,13 @@ def read_card(folder: Path) -> dict[str, Any]:
 
     Raises:
         NotFoundError: there is none.
-        CorruptError: it is damaged, or of another format.
+        CorruptError: it is damaged, larger than any card, or of another format.
     """
     path = folder / CARD
-    try:
-        card = json.loads(path.read_text())
-    except FileNotFoundError:
-        raise NotFoundError("there is no model here", where=str(folder), fix="name a trained model") from None
-    except (ValueError, OSError) as error:
-        raise CorruptError(f"the model's card cannot be read: {error}", where=str(path), fix=_AGAIN) from None
-    if not isinstance(card, dict) or card.get("format") != FORMAT:
+    if not path.is_file():
+        raise NotFoundError("there is no model here", where=str(folder), fix="name a trained model")
+    card = read_json(path, noun="model's card", fix=_AGAIN)
+    if card.get("format") != FORMAT:
         raise CorruptError("the card is of another format", where=str(path), fix=_AGAIN)
     return card
 
@@ -90,14 +90,21 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
 
     Raises:
         NotFoundError: no such file.
-        CorruptError: it is cut off or damaged.
+        CorruptError: it is cut off or damaged, or holds numbers that are not finite.
+        LimitError: larger than `TENSORS_LIMIT`.
     """
     if not path.is_file():
         raise NotFoundError("there are no weights here", where=str(path), fix="name a trained model")
     try:
-        return load(path.read_bytes())
+        if (size := path.stat().st_size) > TENSORS_LIMIT:
+            raise LimitError(f"a file of {size} bytes", where=str(path), fix=f"at most {TENSORS_LIMIT} are read")
+        tensors = load(path.read_bytes())
     except (SafetensorError, OSError, ValueError) as error:
         raise CorruptError(f"the weights cannot be read: {error}", where=str(path), fix=_AGAIN) from None
+    for name, tensor in tensors.items():
+        if not bool(tensor.isfinite().all()):
+            raise CorruptError(f"{name} holds numbers that are not finite", where=str(path), fix=_AGAIN)
+    return tensors
 
 
 _AGAIN = "restore it from a copy, or train again"

@@ -54,6 +54,7 @@ def simulate(
     from sim.run.models import load
 
     lake = Lake.open(lake_path)
+    lake.check_writable()
     loaded = load(recipe, lake, branch=branch)
     loaded = replace(loaded, count=count or loaded.count, batch=batch or loaded.batch)
     with progress(loaded.count, label=loaded.name, unit="flag") as advance:

@@ -12,12 +12,13 @@ import pytest
 
 import flagdata
 from flagdata.lake import Lake
+from flagdata.outputs import check_folder
+from measure.demo.command import SCHEMA, SHORTEST
 from measure.demo.field import FieldRecipe, film
 from measure.demo.page import recovered
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-MINUTES = 3
 
 
 def blocks(language: str) -> list[str]:
@@ -37,10 +38,21 @@ def environment() -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory, environment: dict[str, str]) -> Path:
-    """A demonstration, shorter than `make demo`'s."""
-    out = tmp_path_factory.mktemp("readme") / "demo"
+    """The shortest demonstration."""
+    out = tmp_path_factory.mktemp("readme") / "out" / "demo"
     done = subprocess.run(
-        [sys.executable, "-m", "flagdata.cli", "demo", "--out", str(out), "--minutes", str(MINUTES), "--part", "field"],
+        [
+            sys.executable,
+            "-m",
+            "flagdata.cli",
+            "demo",
+            "--out",
+            str(out),
+            "--minutes",
+            str(SHORTEST),
+            "--part",
+            "field",
+        ],
         env=environment,
         capture_output=True,
         text=True,
@@ -64,12 +76,13 @@ def test_the_demonstration_ends_in_a_page_that_needs_no_other_file(folder: Path)
     assert "A field recording, end to end" in page
     assert page.count("data:image/webp;base64,") == 6
     assert not re.findall(r"(?:src|href)=\"(?!data:)", page)
+    assert ".partial" not in page
 
 
 def test_the_demonstration_recovers_the_offset_it_hid(folder: Path) -> None:
     """The hidden offset follows from the seed; the interval is stated at 90 %, so for this one seed twice its width is
     asked of it (a Gaussian is outside with probability 0.001)."""
-    offset = film(FieldRecipe(seed=2026, duration=MINUTES * 60))[2]
+    offset = film(FieldRecipe(seed=2026, duration=SHORTEST * 60))[2]
     (row,) = Lake.open(folder / "lake").rows("kind = 'recording'").to_pylist()
     found = recovered(row, offset)
     assert abs(found.offset - offset) < 0.5
@@ -79,22 +92,28 @@ def test_the_demonstration_recovers_the_offset_it_hid(folder: Path) -> None:
 def test_every_command_of_the_readme_runs(folder: Path, environment: dict[str, str]) -> None:
     script = "\n".join(["set -euo pipefail", *(c for c in commands() if not c.startswith("make "))])
     done = subprocess.run(
-        ["bash", "-c", script], cwd=folder, env=environment, capture_output=True, text=True, check=False
+        ["bash", "-c", script], cwd=folder.parents[1], env=environment, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
     assert "healthy" in done.stdout
-    assert (folder / "shards" / "manifest.json").exists()
+    assert (folder.with_name("field") / "shards" / "manifest.json").exists()
+
+
+def test_a_user_who_followed_the_readme_can_run_the_demonstration_again(folder: Path) -> None:
+    """After the commands: none of them has left anything in its folder, which may therefore be replaced."""
+    check_folder(folder, schema=SCHEMA)
 
 
 def test_the_python_of_the_readme_runs(folder: Path, environment: dict[str, str]) -> None:
     """After the commands: it opens the lake that they made."""
     (program,) = blocks("python")
     done = subprocess.run(
-        [sys.executable, "-c", program], cwd=folder, env=environment, capture_output=True, text=True, check=False
-    )
+        [sys.executable, "-c", program], cwd=folder.with_name("field"), env=environment, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("torch.Size([16, 1, 30, 300, 300])")
-    pairs = flagdata.open(folder / "field.lake").pairs(at="v1")
+    pairs = flagdata.open(folder.with_name("field") / "field.lake").pairs(at="v1")
     assert f"{len(pairs)} pairs; {len(pairs.refused)} refused" in done.stdout
 
 

@@ -10,10 +10,9 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-from flagdata.align.constant import ConstantWind, declared_wind
-from flagdata.align.declared import by_stamps
+from flagdata.align.constant import ConstantWind, declared_recording
 from flagdata.align.present import find_made, provenance
-from flagdata.align.recording import Alignment, Pair, RecordingResult, copy_frames, make_recording
+from flagdata.align.recording import RecordingResult, copy_frames, recorded
 from flagdata.dataset.clips import clip_rows
 from flagdata.errors import UsageError
 from flagdata.findings import Finding, Severity, quality_flags
@@ -27,8 +26,6 @@ from flagdata.schema import TRUTH_WINDOW, Kind
 from flagdata.timebase import NANOSECONDS, iso
 
 REPORT_SCHEMA = "flagdata.cloth-report/1"
-SAME_CLOCK = 1e-3
-"""σ of a film's clock on a declared wind's [s]: they are one clock, and the model asks for a σ above 0."""
 Progress = Callable[[int], object]
 
 
@@ -58,17 +55,11 @@ def cloth_recording(
     if cloth.wind is None:
         return _without_wind(lake, camera, cloth, stated, branch=branch, progress=progress)
     wind = ConstantWind(speed=cloth.wind[0], sigma=cloth.wind[1])
-    series = declared_wind(lake, camera, wind, session=cloth.fabric, branch=branch)
-    pair = Pair.of(lake, camera.id, series.id, at=branch)
-    start, end = pair.span
-    clock = by_stamps(camera.name, series.name, start=start, end=end, sigma=SAME_CLOCK)
-    alignment = Alignment(
-        clock=clock, recipe={**wind.recipe(), **_recipe(cloth)}, findings=(stated,), parameters=cloth.parameters,
-        details={"method": clock.method, "offset": 0.0, "sigma": SAME_CLOCK, "confidence": 1.0},
+    _, made = declared_recording(
+        lake, camera, wind, recipe=_recipe(cloth), findings=(stated,), parameters=cloth.parameters, name=camera.name,
+        session=cloth.fabric, branch=branch, progress=progress,
     )  # fmt: skip
-    return make_recording(
-        lake, pair, alignment, name=camera.name, session=cloth.fabric, branch=branch, progress=progress
-    )
+    return made
 
 
 def _recipe(cloth: ClothFilm) -> dict[str, Any]:
@@ -83,7 +74,7 @@ def _without_wind(
         lake, Kind.RECORDING, parents, recipe, what="recording", name=camera.name, session=cloth.fabric, branch=branch
     )
     if there is not None:
-        rows = lake.rows(f"kind = 'clip' and recording = '{there.id}'", at=branch, columns=["artifact"])
+        rows = lake.rows({"kind": Kind.CLIP, "recording": there.id}, at=branch, columns=["artifact"])
         return RecordingResult(recording=there, clips=tuple(rows["artifact"].to_pylist()), created=False)
     source = open_parent(lake, str(camera.object))
     times = source.device_frame_times
@@ -104,14 +95,9 @@ def _without_wind(
             session=cloth.fabric, day=iso(start)[:10], start=start, end=end, frame_count=len(times),
             rate=(len(times) - 1) * NANOSECONDS / (end - start) if end > start else None,
             parameters=canonical(cloth.parameters), quality=sorted({*camera.quality, *quality_flags((stated,))}),
-            report=json.dumps(report, allow_nan=False, ensure_ascii=False), branch=branch,
+            report=json.dumps(report, allow_nan=False, ensure_ascii=False),
         )  # fmt: skip
         transaction.add(recording)
-        clips = clip_rows(Record.open(lake.object_path(str(recording.object))), recording, window=TRUTH_WINDOW)
-        for clip in clips:
+        for clip in clip_rows(Record.open(lake.object_path(str(recording.object))), recording, window=TRUTH_WINDOW):
             transaction.add(clip)
-    committed = transaction.result
-    return RecordingResult(
-        recording=lake.artifact(recording.id, at=branch), clips=tuple(clip.id for clip in clips),
-        created=committed is not None and recording.id in committed.added,
-    )  # fmt: skip
+    return recorded(transaction, recording)

@@ -9,16 +9,29 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from flagdata.align.recording import MARGIN_AFTER, MARGIN_BEFORE
+from flagdata.align.declared import by_stamps
+from flagdata.align.present import find_made, provenance
+from flagdata.align.recording import (
+    MARGIN_AFTER,
+    MARGIN_BEFORE,
+    Alignment,
+    Pair,
+    Progress,
+    RecordingResult,
+    add_recording,
+    make_recording,
+    recorded,
+    session_of,
+)
 from flagdata.errors import UsageError
 from flagdata.findings import Finding, Severity, quality_flags
-from flagdata.lake import Artifact, Lake
-from flagdata.provenance import canonical, code_version, recipe_hash
+from flagdata.lake import Artifact, Lake, Transaction
 from flagdata.record import RecordWriter
 from flagdata.record.metadata import PROVENANCE
 from flagdata.schema import Kind
@@ -27,6 +40,8 @@ from flagdata.timebase import NANOSECONDS, iso
 
 REPORT_SCHEMA = "flagdata.declared-wind-report/1"
 DECLARED = "wind-declared"
+SAME_CLOCK = 1e-3
+"""σ of a film's clock on a declared wind's [s]: they are one clock, and the model asks for a σ above 0."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,23 +79,70 @@ class ConstantWind:
         )
 
 
-def declared_wind(lake: Lake, camera: Artifact, wind: ConstantWind, *, session: str | None, branch: str) -> Artifact:
-    """The wind artifact of a film in a declared wind; the one that is there where there is one.
+def declared_recording(
+    lake: Lake,
+    camera: Artifact,
+    wind: ConstantWind,
+    *,
+    recipe: Mapping[str, Any] | None = None,
+    findings: tuple[Finding, ...] = (),
+    parameters: Mapping[str, float | str] | None = None,
+    name: str | None = None,
+    session: str | None = None,
+    branch: str = "main",
+    progress: Progress | None = None,
+) -> tuple[Artifact, RecordingResult]:
+    """The wind artifact and the recording of a film in a declared wind, in one commit; what is there where it is there.
+
+    Args:
+        recipe: what else the recording's identity depends on.
+        findings, parameters: see `flagdata.align.recording.Alignment`.
+        name: what people call the recording; the camera's name if `None`.
+        session: one set-up at one place; the camera's if `None`.
+        progress: called with 1 for each frame copied.
 
     Raises:
         UsageError: `camera` is no camera artifact.
+        ConflictError: the recording is there under another name or session.
     """
     if camera.kind is not Kind.CAMERA or camera.start is None or camera.end is None:
         raise UsageError(
             f"{camera.name!r} is a {camera.kind}, not a camera", where=camera.id,
             fix="flagdata declare CAMERA takes a camera artifact; see flagdata ls",
         )  # fmt: skip
+
+    def alignment(pair: Pair) -> Alignment:
+        start, end = pair.span
+        clock = by_stamps(camera.name, pair.wind.name, start=start, end=end, sigma=SAME_CLOCK)
+        return Alignment(
+            clock=clock, recipe={**wind.recipe(), **(recipe or {})}, findings=findings, parameters=parameters or {},
+            details={"method": clock.method, "offset": 0.0, "sigma": SAME_CLOCK, "confidence": 1.0},
+        )  # fmt: skip
+
+    stated = find_made(
+        lake, Kind.WIND, {"camera": camera}, wind.recipe(), what="declared wind", name=None, session=None, branch=branch
+    )
+    if stated is not None:
+        pair = Pair.opened(lake, camera, stated)
+        made = make_recording(
+            lake, pair, alignment(pair), name=name, session=session, branch=branch, progress=progress
+        )  # fmt: skip
+        return stated, made
+    with lake.transaction(f"declare the wind of {camera.name}", branch=branch) as transaction:
+        stated = _add_wind(transaction, camera, wind, session=session or camera.session)
+        pair = Pair.opened(lake, camera, stated)
+        recording = add_recording(
+            lake, transaction, pair, alignment(pair), name=name, session=session_of(pair, named=session),
+            progress=progress,
+        )  # fmt: skip
+    return transaction.result.artifacts[stated.id], recorded(transaction, recording)
+
+
+def _add_wind(transaction: Transaction, camera: Artifact, wind: ConstantWind, *, session: str | None) -> Artifact:
+    """Write the wind artifact of a film in a declared wind for a transaction."""
     recipe = wind.recipe()
-    for row in lake.rows(f"kind = 'wind' and recipe_hash = '{recipe_hash(recipe)}'", at=branch).to_pylist():
-        if list(row["parents"]) == [camera.id]:
-            return Artifact.from_row(row)
     before, after = round(MARGIN_BEFORE * NANOSECONDS), round(MARGIN_AFTER * NANOSECONDS)
-    series = wind.series(camera.start - before, camera.end + after)
+    series = wind.series(cast(int, camera.start) - before, cast(int, camera.end) + after)
     stated = Finding(
         kind=DECLARED, severity=Severity.WARNING, value=wind.speed,
         what=f"the wind was not measured, but declared to be {wind.speed:g} ± {wind.sigma:g} m/s all along",
@@ -90,19 +152,14 @@ def declared_wind(lake: Lake, camera: Artifact, wind: ConstantWind, *, session: 
         "schema": REPORT_SCHEMA, "kind": Kind.WIND.value, "speed": wind.speed, "sigma": wind.sigma,
         "start": iso(start), "end": iso(end), "findings": [stated.as_dict()],
     }  # fmt: skip
-    provenance = {
-        "camera": camera.id, "recipe": canonical(recipe), "recipe_hash": recipe_hash(recipe),
-        "code_version": code_version(),
-    }  # fmt: skip
-    with lake.transaction(f"declare the wind of {camera.name}", branch=branch) as transaction:
-        staged = transaction.staging(".mcap")
-        with RecordWriter(staged, metadata={PROVENANCE: provenance}) as record:
-            record.wind(series)
-        artifact = Artifact(
-            kind=Kind.WIND, name=f"{camera.name} declared wind", object=transaction.put(staged),
-            parents=(camera.id,), recipe=recipe, session=session or camera.session, day=iso(start)[:10], start=start,
-            end=end, rate=1.0, quality=quality_flags((stated,)),
-            report=json.dumps(report, allow_nan=False, ensure_ascii=False), branch=branch,
-        )  # fmt: skip
-        transaction.add(artifact)
-    return lake.artifact(artifact.id, at=branch)
+    staged = transaction.staging(".mcap")
+    with RecordWriter(staged, metadata={PROVENANCE: provenance({"camera": camera}, recipe)}) as record:
+        record.wind(series)
+    artifact = Artifact(
+        kind=Kind.WIND, name=f"{camera.name} declared wind", object=transaction.put(staged),
+        parents=(camera.id,), recipe=recipe, session=session, day=iso(start)[:10], start=start,
+        end=end, rate=1.0, quality=quality_flags((stated,)),
+        report=json.dumps(report, allow_nan=False, ensure_ascii=False),
+    )  # fmt: skip
+    transaction.add(artifact)
+    return artifact

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,14 +15,33 @@ from flagdata.align.drift import ClockLine
 from flagdata.align.lag import LagEstimate
 from flagdata.align.methods import Evidence
 from flagdata.errors import InputError
+from flagdata.outputs import check_file, write_file
 from flagdata.signals import Series
 from flagdata.timebase import NANOSECONDS, iso
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_COMMAND = "align"
 _MARGIN = 30.0  # s of wind shown either side of the film
 _MOTION, _WIND, _MARK = "#b5541c", "#1f5f8b", "#444444"
+
+
+def check(path: Path) -> None:
+    """Refuse a picture that cannot be drawn or written, before anything is searched for it.
+
+    Raises:
+        InputError: a suffix of no format that is drawn, or no folder to write into.
+        ConflictError: another file is there.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    formats = FigureCanvasAgg.get_supported_filetypes()
+    if path.suffix.lower().removeprefix(".") not in formats:
+        raise InputError(
+            f"no picture of format {path.suffix or path.name!r} is drawn", where=str(path), fix="name a .png file"
+        )
+    check_file(path, command=_COMMAND)
 
 
 def draw(evidence: Evidence, path: Path, *, title: str) -> None:
@@ -33,11 +53,13 @@ def draw(evidence: Evidence, path: Path, *, title: str) -> None:
     with their 90 % intervals, and the line through them.
 
     Raises:
-        InputError: a suffix that cannot be drawn, or a folder that cannot be written.
+        InputError, ConflictError: as `check`.
+        FlagdataError: the disk refuses it.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    check(path)
     line = evidence.line if evidence.line is not None and evidence.line.parts else None
     figure = Figure(figsize=(10, 6.4 if line is None else 8.8), layout="constrained")
     FigureCanvasAgg(figure)
@@ -49,10 +71,9 @@ def draw(evidence: Evidence, path: Path, *, title: str) -> None:
     _draw_peak(figure.add_subplot(grid[1, 1]), evidence.estimate)
     if line is not None:
         _draw_parts(figure.add_subplot(grid[2, :]), line)
-    try:
-        figure.savefig(path, dpi=120)
-    except (OSError, ValueError) as error:
-        raise InputError(f"the plot cannot be written: {error}", where=str(path), fix="name a .png file") from None
+    picture = io.BytesIO()
+    figure.savefig(picture, dpi=120, format=path.suffix.lower().removeprefix("."))
+    write_file(path, picture.getvalue(), command=_COMMAND)
 
 
 def _draw_series(axes: Axes, evidence: Evidence) -> None:

@@ -33,7 +33,7 @@ def find_made(
         ConflictError: it is there under another name or session than the one asked for.
     """
     wanted = [parent.id for parent in parents.values()]
-    rows = lake.rows(f"kind = '{kind.value}' and recipe_hash = '{recipe_hash(recipe)}'", at=branch).to_pylist()
+    rows = lake.rows({"kind": kind, "recipe_hash": recipe_hash(recipe)}, at=branch).to_pylist()
     for row in rows:
         if list(row["parents"]) != wanted:
             continue

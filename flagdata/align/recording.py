@@ -11,7 +11,7 @@ import json
 import math
 import mimetypes
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from flagdata.align.present import find_made, provenance
 from flagdata.dataset.clips import clip_rows
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, quality_flags
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, Transaction
 from flagdata.provenance import canonical
 from flagdata.record import Record, RecordWriter
 from flagdata.record.metadata import CAMERA, CLOCK, PROVENANCE
@@ -91,8 +91,13 @@ class Pair:
                     fix="flagdata align CAMERA WIND takes a camera artifact, then a wind artifact; see flagdata ls",
                 )
             artifacts.append(artifact)
-        records = [open_parent(lake, str(artifact.object)) for artifact in artifacts]
-        return cls(camera=artifacts[0], wind=artifacts[1], camera_record=records[0], wind_record=records[1])
+        return cls.opened(lake, *artifacts)
+
+    @classmethod
+    def opened(cls, lake: Lake, camera: Artifact, wind: Artifact) -> Pair:
+        """A camera and a wind whose objects are in the lake, whether or not they are committed."""
+        records = [open_parent(lake, str(artifact.object)) for artifact in (camera, wind)]
+        return cls(camera=camera, wind=wind, camera_record=records[0], wind_record=records[1])
 
     @property
     def parents(self) -> dict[str, Artifact]:
@@ -227,25 +232,45 @@ def make_recording(
     present = find_recording(lake, pair, alignment.recipe, name=name, session=session, branch=branch)
     if present is not None:
         return present
-    chosen = session_of(pair, named=session)
+    with lake.transaction(f"align {pair.camera.name} with {pair.wind.name}", branch=branch) as transaction:
+        recording = add_recording(
+            lake, transaction, pair, alignment, name=name, session=session_of(pair, named=session), progress=progress
+        )
+    return recorded(transaction, recording)
+
+
+def add_recording(
+    lake: Lake,
+    transaction: Transaction,
+    pair: Pair,
+    alignment: Alignment,
+    *,
+    name: str | None,
+    session: str | None,
+    progress: Progress | None,
+) -> Artifact:
+    """Write the recording and its clips for a transaction; see `make_recording`."""
     clock = alignment.clock
     frames = clock.to_common(pair.camera_record.device_frame_times)
     window = truth_window(alignment.recipe)
     before = max(MARGIN_BEFORE, window)
     wind = _near(pair.series(), int(frames[0]), int(frames[-1]), before=before, where=pair.wind.id)
-    with lake.transaction(f"align {pair.camera.name} with {pair.wind.name}", branch=branch) as transaction:
-        staged = transaction.staging(".mcap")
-        _write(staged, pair, alignment, wind, first=int(frames[0]), progress=progress)
-        recording = _artifact(pair, alignment, frames, stored=transaction.put(staged), name=name, session=chosen)
-        transaction.add(replace(recording, branch=branch))
-        clips = clip_rows(Record.open(lake.object_path(str(recording.object))), recording, window=window)
-        for clip in clips:
-            transaction.add(clip)
-    committed = transaction.result
-    created = committed is not None and recording.id in committed.added
+    staged = transaction.staging(".mcap")
+    _write(staged, pair, alignment, wind, first=int(frames[0]), progress=progress)
+    recording = _artifact(pair, alignment, frames, stored=transaction.put(staged), name=name, session=session)
+    transaction.add(recording)
+    for clip in clip_rows(Record.open(lake.object_path(str(recording.object))), recording, window=window):
+        transaction.add(clip)
+    return recording
+
+
+def recorded(transaction: Transaction, recording: Artifact) -> RecordingResult:
+    """What a transaction did that has ended and made `recording` and its clips."""
+    result = transaction.result
     return RecordingResult(
-        recording=lake.artifact(recording.id, at=branch), clips=tuple(clip.id for clip in clips), created=created
-    )
+        recording=result.artifacts[recording.id], created=recording.id in result.added,
+        clips=tuple(made.id for made in result.artifacts.values() if made.recording == recording.id),
+    )  # fmt: skip
 
 
 def _near(series: WindSeries, start: int, end: int, *, before: float, where: str) -> WindSeries:
@@ -364,7 +389,7 @@ def _artifact(
 
 
 def _clips_of(lake: Lake, recording: Artifact, branch: str) -> tuple[str, ...]:
-    rows = lake.rows(f"kind = 'clip' and recording = '{recording.id}'", at=branch, columns=["artifact"])
+    rows = lake.rows({"kind": Kind.CLIP, "recording": recording.id}, at=branch, columns=["artifact"])
     return tuple(rows["artifact"].to_pylist())
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from flagdata.align.clock import NINETY
@@ -124,8 +124,8 @@ def make_aligned(
             clock_sigma=float(clock.sigma(middle)), clock_model=clock.to_json(), quality=pair.sensor.quality,
             report=json.dumps(report, allow_nan=False, ensure_ascii=False),
         )  # fmt: skip
-        transaction.add(replace(artifact, branch=branch))
-    return lake.artifact(artifact.id, at=branch)
+        transaction.add(artifact)
+    return transaction.result.artifacts[artifact.id]
 
 
 def summary(found: LogClock) -> dict[str, Any]:

@@ -90,7 +90,10 @@ def align(
     from flagdata.schema import TRUTH_WINDOW, Kind
 
     options = _options(by, offset, offset_sigma, centre, search, response, response_sigma, max_sigma)
+    _check_plot(plot, options)
     lake = Lake.open(lake_path)
+    if not dry_run:
+        lake.check_writable()
     if {lake.artifact(which, at=branch).kind for which in (first, second)} == {Kind.WIND}:
         from flagdata.commands.align_logs import align_logs
 
@@ -126,7 +129,10 @@ def realign(
     from flagdata.lake import Lake
 
     options = _options(by, offset, offset_sigma, centre, search, response, response_sigma, max_sigma)
+    _check_plot(plot, options)
     lake = Lake.open(lake_path)
+    if not dry_run:
+        lake.check_writable()
     old, parents = parents_of(lake, recording, at=branch)
     pair = Pair.of(lake, *parents, at=branch)
     kept = truth_window(old.recipe) if window is None else window
@@ -137,6 +143,20 @@ def realign(
     )  # fmt: skip
     if not dry_run:
         say(f"the recording {old.id[:_SHORT]} it supersedes is still on {branch}; flagdata withdraw takes it off")
+
+
+def _check_plot(plot: Path | None, options: ClockOptions) -> None:
+    """Refuse a --plot that would not be drawn or cannot be written."""
+    from flagdata.align.methods import Method
+    from flagdata.errors import UsageError
+
+    if plot is None:
+        return
+    if options.by is not Method.ESTIMATE:
+        raise UsageError(f"alignment by {options.by} has no search to draw", where="--plot", fix="leave it out")
+    from flagdata.align.plot import check
+
+    check(plot)
 
 
 def _options(
@@ -202,11 +222,8 @@ def _warn_of_clocks(pair: Pair, options: ClockOptions) -> None:
 
 def _outcome(pair: Pair, options: ClockOptions, *, recipe: dict[str, Any], plot: Path | None) -> Outcome:
     from flagdata.align.methods import Method, declared, estimated, evidence
-    from flagdata.errors import UsageError
 
     if options.by is not Method.ESTIMATE:
-        if plot is not None:
-            raise UsageError(f"alignment by {options.by} has no search to draw", where="--plot", fix="leave it out")
         return declared(pair, options, recipe=recipe)
     with progress(pair.camera_record.frame_count, label="motion", unit="frame") as advance:
         found = evidence(pair, options, progress=advance)

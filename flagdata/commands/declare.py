@@ -6,9 +6,6 @@ import click
 
 from flagdata.console import document, json_option, lake_option, progress
 
-SAME_CLOCK = 1e-3
-"""σ of the film's clock on the declared wind's [s]: they are one clock, and the model asks for a σ above 0."""
-
 
 @click.command()
 @click.argument("camera")
@@ -28,24 +25,15 @@ def declare(
     When it was filmed does not matter then: ingest a film whose start nobody knows by --start unknown. The declared
     wind becomes a wind artifact of its own, and recording and clips bear the quality flag wind-declared.
     """
-    from flagdata.align.constant import ConstantWind, declared_wind
-    from flagdata.align.declared import by_stamps
-    from flagdata.align.recording import Alignment, Pair, make_recording
+    from flagdata.align.constant import ConstantWind, declared_recording
     from flagdata.lake import Lake
 
     wind = ConstantWind(speed=speed, sigma=sigma)
     lake = Lake.open(lake_path)
+    lake.check_writable()
     film = lake.artifact(camera, at=branch)
-    stated = declared_wind(lake, film, wind, session=session, branch=branch)
-    pair = Pair.of(lake, film.id, stated.id, at=branch)
-    start, end = pair.span
-    clock = by_stamps(film.name, stated.name, start=start, end=end, sigma=SAME_CLOCK)
-    details = {"method": clock.method, "offset": 0.0, "sigma": SAME_CLOCK, "confidence": 1.0}
-    with progress(pair.camera_record.frame_count, label="copying", unit="frame") as advance:
-        made = make_recording(
-            lake, pair, Alignment(clock=clock, recipe=wind.recipe(), details=details), name=name, session=session,
-            branch=branch, progress=advance,
-        )  # fmt: skip
+    with progress(film.frame_count, label="copying", unit="frame") as advance:
+        stated, made = declared_recording(lake, film, wind, name=name, session=session, branch=branch, progress=advance)
     if as_json:
         document(
             "declare",

@@ -37,6 +37,7 @@ def declare_cloths(table: Path, crop: str, branch: str, as_json: bool, lake_path
 
     box = parse_crop(crop)
     lake = Lake.open(lake_path)
+    lake.check_writable()
     cloths = read_cloths(table)
     made = []
     with progress(len(cloths), label="films", unit="film") as advance:

@@ -50,9 +50,11 @@ def export(
     """
     from flagdata.export import Export, prepare
     from flagdata.lake import Lake
+    from flagdata.outputs import check_folder
 
     if salt and split is None:
         raise UsageError("--salt without --split", fix="name the side by --split, or leave out --salt")
+    check_folder(target)
     given = {"frames": frames, "shard_bytes": shard_bytes, "shuffle": shuffle, "crf": crf}
     request = Export(
         format=format_name,

@@ -164,6 +164,7 @@ def ingest(
       flagdata ingest station.csv --unit km/h --zone Europe/Amsterdam
       flagdata ingest arcsim-output --name reference-4ms
     """
+    from flagdata.outputs import check_file
     from flagdata.timebase import names_zone
 
     given = frozenset(
@@ -172,8 +173,8 @@ def ingest(
     )  # fmt: skip
     if crop_picture is not None and crop.strip().lower() != "auto":
         raise UsageError("--crop-picture without --crop auto", where=str(crop_picture), fix="add --crop auto")
-    if crop_picture is not None and crop_picture.exists():
-        raise UsageError("the crop picture exists", where=str(crop_picture), fix="choose another path")
+    if crop_picture is not None:
+        check_file(crop_picture, command="ingest")
     options = Given(
         camera=camera_options(
             start=start, zone_name=zone, true_fps=true_fps, sequence_fps=sequence_fps, rate=rate, crop=crop,
@@ -201,4 +202,6 @@ def ingest(
         return
     from flagdata.lake import Lake
 
-    ingest_sources(Lake.open(lake_path), sources, options, given=given, format_name=format_name, as_json=as_json)
+    lake = Lake.open(lake_path)
+    lake.check_writable()
+    ingest_sources(lake, sources, options, given=given, format_name=format_name, as_json=as_json)

@@ -13,7 +13,7 @@ from flagdata.commands.confirm import Answers, with_answers
 from flagdata.commands.ingest_options import Given, check_applies
 from flagdata.commands.ingest_report import print_results, print_sniffed
 from flagdata.console import document, fail, progress, say
-from flagdata.errors import FlagdataError, InputError
+from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
 
 if TYPE_CHECKING:
@@ -269,7 +269,7 @@ class _CropPicture:
     """The file of --crop-picture; one that was written is removed when the block fails.
 
     Args:
-        path: nothing is there yet; `None` where no picture was asked for.
+        path: free, or that of an earlier picture; `None` where no picture was asked for.
     """
 
     def __init__(self, path: Path | None) -> None:
@@ -289,16 +289,12 @@ class _CropPicture:
         """Write the picture.
 
         Raises:
-            InputError: the disk refuses it.
+            ConflictError: another file is there.
+            FlagdataError: the disk refuses it.
         """
+        from flagdata.outputs import write_file
+
         if self._path is None:
             return
-        try:
-            with self._path.open("xb") as stream:
-                self._written = True
-                stream.write(data)
-        except OSError as error:
-            raise InputError(
-                f"the crop picture cannot be written: {error.strerror}", where=str(self._path),
-                fix="choose another path",
-            ) from None  # fmt: skip
+        write_file(self._path, data, command="ingest")
+        self._written = True

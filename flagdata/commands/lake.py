@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from click.core import ParameterSource
@@ -15,6 +15,8 @@ from flagdata.errors import UsageError
 
 if TYPE_CHECKING:
     from flagdata.lake.refs import Ref
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 _SHORT = 12  # characters of an id that are shown; look-ups take any unique beginning
 
@@ -55,7 +57,7 @@ def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
 
     if kind is not None and kind not in list(Kind):
         raise UnknownNameError.of("kind", kind, [k.value for k in Kind])
-    found = Lake.open(lake_path).rows(None if kind is None else f"kind = '{kind}'", at=at).to_pylist()
+    found = Lake.open(lake_path).rows(None if kind is None else {"kind": kind}, at=at).to_pylist()
     rows = [row for row in found if kind is not None or row["kind"] != Kind.CLIP]
     clips = len(found) - len(rows)
     if as_json:
@@ -137,38 +139,73 @@ def log(limit: int | None, as_json: bool, lake_path: str) -> None:
         table(columns, [[entry[column] for column in columns] for entry in entries])
 
 
+def _deletion_options(command: F) -> F:
+    """Adds --delete, --discard and --message to the command of tags or of branches."""
+    for option in (
+        click.option("--message", "-m", help="--delete: why."),
+        click.option("--discard", is_flag=True, help="--delete: also if it alone shows artifacts, which gc deletes."),
+        click.option("--delete", is_flag=True, help="Delete NAME; the log notes what it showed."),
+    ):
+        command = option(command)
+    return command
+
+
+def _check_ref_options(name: str | None, given: Mapping[str, object], *, delete: bool) -> None:
+    allowed = () if name is None else ("--discard", "--message") if delete else ("--at",)
+    if name is None and delete:
+        raise UsageError("--delete without a NAME", fix="give the NAME of what is to be deleted")
+    for option, value in given.items():
+        if value and option not in allowed:
+            what = "without a NAME" if name is None else "with --delete" if delete else "without --delete"
+            raise UsageError(f"{option} {what}", fix="leave it out, or see --help")
+
+
 @click.command()
 @click.argument("name", required=False)
 @at_option
+@_deletion_options
 @json_option
 @lake_option
-def tag(name: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
-    """Name what REF shows, for good; without NAME, list the tags."""
+def tag(
+    name: str | None, at: str | None, delete: bool, discard: bool, message: str | None, as_json: bool, lake_path: str
+) -> None:
+    """Name what REF shows, for good; without NAME, list the tags.
+
+    The name of a tag that was deleted never shows anything else.
+    """
     from flagdata.lake import Lake
 
+    _check_ref_options(name, {"--at": at, "--discard": discard, "--message": message}, delete=delete)
     lake = Lake.open(lake_path)
-    if name is not None:
-        lake.tag(name, at=at)
-    elif at is not None:
-        raise UsageError("--at without a NAME", fix="give the tag a NAME")
-    _print_refs("tags", lake.refs.tags(), name, as_json=as_json)
+    if name is not None and delete:
+        _tell_deletion("tag", name, lake.delete_tag(name, message, discard=discard), as_json=as_json)
+        return
+    refs = lake.refs.tags().values() if name is None else [lake.tag(name, at=at)]
+    _print_refs("tags", refs, as_json=as_json)
 
 
 @click.command()
 @click.argument("name", required=False)
 @at_option
+@_deletion_options
 @json_option
 @lake_option
-def branch(name: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
-    """Begin a line of work NAME from what REF shows; without NAME, list the branches."""
+def branch(
+    name: str | None, at: str | None, delete: bool, discard: bool, message: str | None, as_json: bool, lake_path: str
+) -> None:
+    """Begin a line of work NAME from what REF shows; without NAME, list the branches.
+
+    A branch that is deleted leaves its commits to the log, to its tags and to branches made from it.
+    """
     from flagdata.lake import Lake
 
+    _check_ref_options(name, {"--at": at, "--discard": discard, "--message": message}, delete=delete)
     lake = Lake.open(lake_path)
-    if name is not None:
-        lake.branch(name, at=at)
-    elif at is not None:
-        raise UsageError("--at without a NAME", fix="give the branch a NAME")
-    _print_refs("branches", lake.refs.branches(), name, as_json=as_json)
+    if name is not None and delete:
+        _tell_deletion("branch", name, lake.delete_branch(name, message, discard=discard), as_json=as_json)
+        return
+    refs = lake.refs.branches().values() if name is None else [lake.branch(name, at=at)]
+    _print_refs("branches", refs, as_json=as_json)
 
 
 @click.command()
@@ -178,15 +215,27 @@ def branch(name: str | None, at: str | None, as_json: bool, lake_path: str) -> N
 @json_option
 @lake_option
 def merge(branch_name: str, into: str, message: str | None, as_json: bool, lake_path: str) -> None:
-    """Commit on main what was committed on BRANCH."""
+    """Commit on main what BRANCH changed since the two were last the same: what it added, and what it withdrew.
+
+    What main withdrew meanwhile stays withdrawn, and is listed where the branch still has it.
+    """
+    from dataclasses import asdict
+
     from flagdata.lake import Lake
 
     result = Lake.open(lake_path).merge(branch_name, message or f"merge {branch_name}", into=into)
     if as_json:
-        content = {"version": result.version, "commit": result.commit}
-        document("merge", {**content, "added": list(result.added), "existing": list(result.existing)})
-    else:
-        click.echo(f"version {result.version}: {len(result.added)} added, {len(result.existing)} were there")
+        document("merge", asdict(result))
+        return
+    for artifact, version in result.left_out.items():
+        say(f"stays withdrawn from {into}: {artifact[:_SHORT]}, since version {version}")
+    for artifact, version in result.brought_back.items():
+        say(f"comes back to {into}: {artifact[:_SHORT]}, which version {version} had withdrawn")
+    if result.commit is None:
+        click.echo(f"nothing new on {branch_name}")
+        return
+    withdrawn = f", {len(result.withdrawn)} withdrawn" if result.withdrawn else ""
+    click.echo(f"version {result.version}: {len(result.added)} added, {len(result.existing)} were there{withdrawn}")
 
 
 @click.command()
@@ -235,7 +284,7 @@ def withdraw(
 ) -> None:
     """Take artifacts off a branch, a recording with its clips.
 
-    Tags keep showing them; gc frees what no ref shows any more.
+    Tags, and the branch that this one began from, keep showing them; gc frees what no ref shows any more.
     """
     from flagdata.lake import Lake
 
@@ -253,6 +302,13 @@ def withdraw(
     if made:
         parts.append(f"{len(made)} made from them")
     click.echo(f"version {done.version}: {', '.join(parts)}")
+
+
+def _tell_deletion(noun: str, name: str, version: int, *, as_json: bool) -> None:
+    if as_json:
+        document(f"{noun}-deleted", {"version": version, "name": name})
+    else:
+        click.echo(f"version {version}: {noun} {name} deleted")
 
 
 def counted(count: int, noun: str) -> str:
@@ -314,22 +370,21 @@ def _plain(row: Mapping[str, Any]) -> dict[str, Any]:
     return {column: value.isoformat() if isinstance(value, datetime) else value for column, value in row.items()}
 
 
-def _print_refs(noun: str, refs: Mapping[str, Ref], name: str | None, *, as_json: bool) -> None:
-    shown: Iterable[Ref] = refs.values() if name is None else [refs[name]]
+def _print_refs(noun: str, refs: Collection[Ref], *, as_json: bool) -> None:
     entries = [
         {
             "name": ref.name,
             "created": ref.created,
             "view": [{"branch": part.branch, "version": part.version} for part in ref.view],
         }
-        for ref in shown
+        for ref in refs
     ]
     if as_json:
         document(noun, {noun: entries})
     elif entries:
         table(
             ("name", "created", "shows" if noun == "tags" else "begins at"),
-            [[ref.name, ref.created, " + ".join(f"{p.branch}@{p.version}" for p in ref.view)] for ref in shown],
+            [[ref.name, ref.created, " + ".join(f"{p.branch}@{p.version}" for p in ref.view)] for ref in refs],
         )
     else:
         say(f"no {noun}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import math
 import sys
-import uuid
 from collections.abc import Iterable, Sequence
 from datetime import date, datetime, time
 from decimal import Decimal
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flagdata.console import LocalPath, document, json_option, lake_option, say, table
-from flagdata.errors import ConflictError, InputError, UsageError
+from flagdata.errors import UsageError
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from flagdata.query import Request, Selection
 
 PEOPLE_LIMIT = 20
+_TIME_LIMIT = 60.0  # s; that of `flagdata.query`, which is not imported for --help
 _SHORT = 12  # characters of an identity; look-ups take unique prefixes
 
 # What people see without --columns, by the one kind that was selected.
@@ -53,6 +53,10 @@ VIEWS: dict[str | None, tuple[str, ...]] = {
 @click.option(
     "--limit", type=click.IntRange(min=0), help=f"Rows at most; {PEOPLE_LIMIT} in the table for people, else all."
 )
+@click.option(
+    "--time-limit", type=click.FloatRange(min=0, min_open=True), default=_TIME_LIMIT, show_default=True,
+    metavar="SECONDS", help="What the query may take, before it is stopped.",
+)  # fmt: skip
 @click.option("--arrow", metavar="FILE", type=LocalPath(), help="Write an Arrow IPC file.")
 @click.option("--csv", "as_csv", is_flag=True, help="Comma-separated values on stdout.")
 @click.option("--describe", is_flag=True, help="List the columns with their units.")
@@ -65,6 +69,7 @@ def query(
     columns: str | None,
     order: str | None,
     limit: int | None,
+    time_limit: float,
     arrow: Path | None,
     as_csv: bool,
     describe: bool,
@@ -86,13 +91,16 @@ def query(
         _describe(as_json=as_json)
         return
     from flagdata.lake import Lake
+    from flagdata.outputs import check_file
     from flagdata.query import Request, Selection
 
+    if arrow is not None:
+        check_file(arrow)
     lake = Lake.open(lake_path)
     view = lake.view(at)
     version = view[0].version
     names = None if columns is None else tuple(name.strip() for name in columns.split(","))
-    request = Request(where=where, sql=sql, columns=names, order=order, limit=limit)
+    request = Request(where=where, sql=sql, columns=names, order=order, limit=limit, time_limit=time_limit)
     catalog = lake.table(view)
     if arrow is not None:
         count = write_arrow(Selection(catalog, request), arrow)
@@ -115,24 +123,15 @@ def write_arrow(selection: Selection, path: Path) -> int:
     """
     import pyarrow as pa
 
-    from flagdata.lake.durable import disk_errors
+    from flagdata.outputs import fresh_file
 
-    if path.exists():
-        raise ConflictError(f"{path} exists", fix="choose another name or remove it")
-    if not path.absolute().parent.is_dir():
-        raise InputError("no such folder", where=str(path.parent), fix="create it first")
-    partial = path.with_name(f".{path.name}.{uuid.uuid4().hex}.partial")
     count = 0
-    with disk_errors("writing an Arrow file", path):
-        try:
-            batches = selection.batches()
-            with pa.OSFile(str(partial), "wb") as sink, pa.ipc.new_file(sink, batches.schema) as writer:
-                for batch in batches:
-                    writer.write_batch(batch)
-                    count += batch.num_rows
-            partial.rename(path)
-        finally:
-            partial.unlink(missing_ok=True)
+    with fresh_file(path) as scratch:
+        batches = selection.batches()
+        with pa.OSFile(str(scratch), "wb") as sink, pa.ipc.new_file(sink, batches.schema) as writer:
+            for batch in batches:
+                writer.write_batch(batch)
+                count += batch.num_rows
     return count
 
 

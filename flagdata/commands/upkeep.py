@@ -13,8 +13,8 @@ import click
 from flagdata.addresses import local_path
 from flagdata.commands.lake import counted, size_text
 from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
-from flagdata.errors import ConflictError, NotFoundError
-from flagdata.findings import Finding
+from flagdata.files import check_input
+from flagdata.findings import Finding, Severity
 
 _GATE_NOT_MET = 3
 _CENTURY = 36_525 * 86_400  # s
@@ -76,16 +76,20 @@ def doctor(deep: bool, grace: timedelta, as_json: bool, lake_path: str) -> None:
     from flagdata.lake.health import catalog_files
     from flagdata.lake.health import doctor as examined
     from flagdata.lake.health import verify as verified
+    from flagdata.schema import Kind
 
     lake = Lake.open(lake_path)
-    winds = lake.rows("kind = 'wind'").to_pylist()
-    findings = (*examined(lake, grace=grace), *unconfirmed(Artifact.from_row(row) for row in winds))
+    findings = examined(lake, grace=grace)
+    if all(f.severity is not Severity.ERROR for f in findings):  # else rows may not be readable
+        winds = lake.rows({"kind": Kind.WIND}).to_pylist()
+        findings += unconfirmed(Artifact.from_row(row) for row in winds)
     checked = "structure checked, contents not (flagdata verify)"
     if deep:
-        findings += tuple(f for f in catalog_files(lake) if f.kind not in {known.kind for known in findings})
+        findings += tuple(f for f in catalog_files(lake) if f.kind not in {found.kind for found in findings})
         names = [stored.name for stored in lake.objects]
         with progress(len(names), label="re-hash", unit="object") as advance:
-            findings += verified(lake, names, advance=advance)
+            known = {(f.kind, f.where) for f in findings}
+            findings += tuple(f for f in verified(lake, names, advance=advance) if (f.kind, f.where) not in known)
         checked = f"structure checked, {counted(len(names), 'object')} re-hashed"
     _conclude("doctor", findings, checked, as_json=as_json)
 
@@ -132,16 +136,13 @@ def recover(source: str, target: Path, as_json: bool, lake_path: str) -> None:
     """
     from flagdata.lake import Lake
     from flagdata.lake.artifact import OBJECT_NAME
+    from flagdata.outputs import fresh_file
     from flagdata.record import salvage
 
     path = Lake.open(lake_path).object_path(source) if OBJECT_NAME.fullmatch(source) else local_path(source)
-    if not path.is_file():
-        raise NotFoundError(
-            "there is no such record", where=source, fix="give an .mcap file, or mcap/<sha256> of the lake"
-        )
-    if target.exists():
-        raise ConflictError("there is a file already", where=str(target), fix="choose a new name")
-    findings = salvage(path, target)
+    check_input(path, noun="record")
+    with fresh_file(target) as scratch:
+        findings = salvage(path, scratch)
     if as_json:
         document("recover", {"source": str(path), "target": str(target), "findings": [f.as_dict() for f in findings]})
         return

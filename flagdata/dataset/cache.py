@@ -11,6 +11,7 @@ import fcntl
 import hashlib
 import json
 import os
+import re
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -21,10 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.addresses import local_path
+from flagdata.documents import from_json
 from flagdata.errors import FlagdataError, UsageError
 
 _FORMAT = "flagdata.decoded/1"
 _SUFFIX = ".clip"
+_NAME = re.compile(r"[0-9a-f]{64}" + re.escape(_SUFFIX))  # of a clip
 _WRITING = "writing.part"  # the one file being written; only under the lock
 _TALLY = "tally"  # the lock, and in it the bytes of all clips
 _MAX_HEADER = 4096  # B
@@ -47,11 +50,11 @@ class DecodedCache:
     folder is full, the clips that were read least recently go.
 
     Args:
-        path: the folder; made if it is not there. Not inside a lake.
+        path: the folder, for the cache alone; made if it is not there. Not inside a lake.
         limit: [B].
 
     Raises:
-        UsageError: no room for anything, or a folder inside a lake.
+        UsageError: no room for anything, a folder inside a lake, or one that holds other files.
     """
 
     def __init__(self, path: Path | str, *, limit: int) -> None:
@@ -65,6 +68,12 @@ class DecodedCache:
                     "a cache inside a lake", where=str(self.path), fix="choose a folder outside it: it is disposable"
                 )
         self.path.mkdir(parents=True, exist_ok=True)
+        with os.scandir(self.path) as found:
+            for entry in found:
+                if not _NAME.fullmatch(entry.name) and entry.name not in (_TALLY, _WRITING):
+                    raise UsageError(
+                        "a cache among other files", where=entry.path, fix="give it a new or empty folder of its own"
+                    )
         self._verified: set[str] = set()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -91,7 +100,7 @@ class DecodedCache:
         try:
             with path.open("rb") as stream:
                 line = stream.readline(_MAX_HEADER)
-                header = json.loads(line)
+                header = from_json(line)
                 shape = tuple(header["shape"])
                 data = np.fromfile(stream, dtype=np.uint8)
                 with contextlib.suppress(PermissionError):  # a cache that may be read only keeps its order of eviction
@@ -155,7 +164,7 @@ class DecodedCache:
         entries: list[_Entry] = []
         with os.scandir(self.path) as found:
             for entry in found:
-                if entry.name.endswith(_SUFFIX):
+                if _NAME.fullmatch(entry.name):
                     with contextlib.suppress(FileNotFoundError):
                         status = entry.stat()
                         entries.append(_Entry(path=Path(entry.path), size=status.st_size, read=status.st_mtime_ns))

@@ -136,6 +136,8 @@ def _row(
         seed=recording.seed,
         recording=recording.id,
         session=recording.session,
+        dataset=recording.dataset,
+        side=recording.side,
         day=None if recording.seed is not None else day,
         start=start,
         end=end,

@@ -10,21 +10,17 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from flagdata.dataset.splits import Origin
+from flagdata.lake.matching import matching
 from flagdata.schema import Kind
 
-_SOURCES = (Kind.CAMERA, Kind.MESHES)
+_TIED = (Kind.CAMERA, Kind.MESHES, Kind.RECORDING)
+_TIES = ["artifact", "kind", "source_hash", "object", "session"]
 
 
 def origins_of(catalog: pa.Table, clips: pa.Table) -> list[Origin]:
     """One origin a recording, with the days of `clips` only."""
     parents = dict(zip(catalog["artifact"].to_pylist(), catalog["parents"].to_pylist(), strict=True))
-    kinds = catalog.filter(pc.field("kind").isin([kind.value for kind in _SOURCES]))
-    sources = {
-        artifact: f"{kind} {source or artifact}"
-        for artifact, kind, source in zip(
-            kinds["artifact"].to_pylist(), kinds["kind"].to_pylist(), kinds["source_hash"].to_pylist(), strict=True
-        )
-    }
+    ties = {row["artifact"]: _ties(row) for row in matching(catalog, {"kind": _TIED}).select(_TIES).to_pylist()}
     days: dict[str, set[str]] = defaultdict(set)
     known: dict[str, Origin] = {}
     for row in clips.group_by(["recording", "session", "seed", "day"]).aggregate([]).to_pylist():
@@ -32,14 +28,21 @@ def origins_of(catalog: pa.Table, clips: pa.Table) -> list[Origin]:
         if row["day"]:
             days[recording].add(row["day"])
         if recording not in known:
-            ancestry = _ancestors(recording, parents)
+            lineage = {recording, *_ancestors(recording, parents)}
             known[recording] = Origin(
                 recording=recording,
                 session=row["session"],
                 seed=row["seed"],
-                sources=tuple(sorted({sources[a] for a in ancestry if a in sources})),
+                sources=tuple(sorted({tie for artifact in lineage for tie in ties.get(artifact, ())})),
             )
     return [replace(known[recording], days=tuple(sorted(days[recording]))) for recording in sorted(known)]
+
+
+def _ties(row: Mapping[str, str | None]) -> list[str]:
+    """What must not be on two sides because of one artifact of a recording's lineage, in words."""
+    ties = [] if row["kind"] == Kind.RECORDING else [f"{row['kind']} {row['source_hash'] or row['artifact']}"]
+    ties += [f"{column} {row[column]}" for column in ("object", "session") if row[column]]
+    return ties
 
 
 def _ancestors(artifact: str, parents: Mapping[str, list[str]]) -> set[str]:

@@ -18,6 +18,7 @@ from flagdata.dataset.table import COLUMNS, PairTable
 from flagdata.dataset.tolerance import Refusal, Tolerance, judge
 from flagdata.errors import NotFoundError, RefusedError, UsageError
 from flagdata.lake import Lake
+from flagdata.lake.matching import Where
 from flagdata.query import Request, Selection
 from flagdata.record import Record
 from flagdata.schema import TRUTH_WINDOW, Kind
@@ -108,7 +109,7 @@ def resolve(
     return Resolved(table=table.take(kept), refused=tuple(refused.values()))
 
 
-def _clips(catalog: pa.Table, where: str | None, columns: tuple[str, ...]) -> pa.Table:
+def _clips(catalog: pa.Table, where: Where | None, columns: tuple[str, ...]) -> pa.Table:
     clips = catalog.filter(pc.field("kind") == Kind.CLIP.value)  # not a part of the filter, which could undo it
     return Selection(clips, Request(where=where, columns=columns)).table()
 
@@ -122,7 +123,7 @@ def clips_on_side(catalog: pa.Table, split: str, split_by: HashedSplit | Explici
     """
     check_side(split, split_by)
     if isinstance(split_by, ExplicitSplit):
-        return _explicit_side(catalog, split_by, split)
+        return set(explicit_sides(catalog, split_by)[split]["artifact"].to_pylist())
     return _hashed_side(catalog, split_by, split)
 
 
@@ -135,11 +136,15 @@ def _hashed_side(catalog: pa.Table, split_by: HashedSplit, split: str) -> set[st
     return set(clips.filter(pc.field("recording").isin(recordings))["artifact"].to_pylist())
 
 
-def _explicit_side(catalog: pa.Table, split_by: ExplicitSplit, split: str) -> set[str]:
-    """Clips of the side. All sides are resolved and compared, whichever is asked for."""
+def explicit_sides(catalog: pa.Table, split_by: ExplicitSplit) -> dict[str, pa.Table]:
+    """Side → its clips: what `Origin` is made of. All sides are resolved and compared, whichever is wanted.
+
+    Raises:
+        RefusedError: two of them share a recording, a film, a mesh sequence, a seed, a session or a day.
+    """
     taken = {side: _clips(catalog, where, _ORIGIN) for side, where in split_by.where.items()}
     refuse_leaks({side: origins_of(catalog, clips) for side, clips in taken.items()})
-    return set(taken[split]["artifact"].to_pylist())
+    return taken
 
 
 def _windows(clips: pa.Table, table: PairTable) -> NDArray[np.float64]:

@@ -19,6 +19,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from flagdata.errors import RefusedError, UnknownNameError, UsageError
+from flagdata.lake.matching import Where
 
 DEFAULT_FRACTIONS: Mapping[str, float] = {"train": 0.7, "validation": 0.15, "test": 0.15}
 _LISTED = 3  # leaks named in an error
@@ -33,7 +34,8 @@ class Origin:
         session: one set-up at one place; `None` where none was named.
         days: calendar days (ISO, UTC) of its clips; left out of account when there is a seed.
         seed: root seed of a simulation; `None` for a real recording.
-        sources: camera files and mesh sequences it was made from, as "kind hash".
+        sources: what else must stay together, in words: the camera files and mesh sequences it was made from, the
+            objects that hold them and the film, and the sessions that they are of.
     """
 
     recording: str
@@ -129,14 +131,15 @@ class ExplicitSplit:
     """Sides chosen by the user, each by a filter over the catalog; refused where they leak.
 
     Attributes:
-        where: side → SQL boolean expression over catalog columns, e.g. {"train": "day < '2026-06-01'", …}. Clips that
-            no side takes are in none.
+        where: side → what selects its clips: the values that columns must have, e.g. {"train": {"dataset":
+            "flagsim-small", "side": "train"}, …}, or an SQL boolean expression over catalog columns, e.g. {"train":
+            "day < '2026-06-01'", …}. Clips that no side takes are in none.
 
     Raises:
         UsageError: no side.
     """
 
-    where: Mapping[str, str]
+    where: Mapping[str, Where]
 
     def __post_init__(self) -> None:
         if not self.where:

@@ -32,8 +32,7 @@ class ObjFolders:
         for row in source.rows.to_pylist():
             if row["object"] is None:
                 raise CorruptError("a row without an object", where=row["artifact"], fix="run flagdata doctor")
-            source.lake.objects.check(row["object"])
-            sequence = read_meshes(source.lake.object_path(row["object"]))
+            sequence = read_meshes(source.lake.whole_object(row["object"]))
             write_folder(folder / row["artifact"], sequence, scene=_scene(sequence, row))
             frames += len(sequence)
             advance(1)

@@ -12,8 +12,9 @@ from typing import Any, Protocol
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.export.choice import check_kinds, current, on_side
 from flagdata.export.source import Source
-from flagdata.export.target import fresh_folder, write_manifest
 from flagdata.lake import Lake
+from flagdata.manifest import write_manifest
+from flagdata.outputs import fresh_folder
 from flagdata.provenance import code_version, digest, recipe_hash
 from flagdata.query import Request, Selection
 from flagdata.registry import Registry
@@ -132,6 +133,7 @@ class Prepared:
             manifest = write_manifest(
                 folder,
                 {
+                    "schema": "flagdata.export/1",
                     **recipe,
                     "at": request.at,
                     "recipe_hash": recipe_hash(recipe),

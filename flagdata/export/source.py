@@ -26,7 +26,7 @@ FILMED = frozenset({Kind.CLIP, Kind.RECORDING, Kind.CAMERA})
 # Columns that say what a sample is and where it comes from; written beside the data by every format.
 IDENTITY = (
     "artifact", "kind", "name", "object", "parents", "recipe_hash", "code_version", "seed",
-    "recording", "session", "day", "frame_first", "frame_count", "rate",
+    "recording", "session", "dataset", "side", "day", "frame_first", "frame_count", "rate",
 )  # fmt: skip
 TRUTH = (
     "wind", "wind_sigma", "wind_coverage", "wind_staleness",
@@ -154,7 +154,7 @@ class Source:
                 if name is None:
                     raise CorruptError("a row without an object", where=row["artifact"], fix="run flagdata doctor")
                 if name not in checked:
-                    self.lake.objects.check(name)
+                    self.lake.whole_object(name)
                     checked.add(name)
                 if opened is None or opened[0] != name:
                     opened = (name, Record.open(self.lake.object_path(name)))

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flagdata.errors import FlagdataError, InputError, UnknownNameError
+from flagdata.files import check_input, is_folder
 from flagdata.ingest.anemometer import Guess, sniff
 from flagdata.ingest.anemometer.formats.registry import FORMATS
 from flagdata.ingest.markers import COLUMNS, is_marker_table
@@ -25,7 +26,8 @@ def guesses(path: Path) -> tuple[Guess, ...]:
         NotFoundError: there is no such source.
         InputError: it is empty, or a pipe or device, which has no content to go by.
     """
-    _check_plain(path)
+    if not is_folder(path):
+        check_input(path)
     if path.is_file() and is_marker_table(path):
         reason = f"its columns are {', '.join(COLUMNS)} and more"
         return (Guess(format="marker table", score=0.99, reasons=(reason,), kind="markers"),)
@@ -55,7 +57,8 @@ def classify(
         UnknownNameError: no such format.
         NotFoundError: there is no such source.
     """
-    _check_plain(path)
+    if not is_folder(path):
+        check_input(path)
     if format_name == CAMERA:
         return Guess(format="video", score=1.0, reasons=("it was said to be a camera's",), kind="camera")
     if format_name == MESHES:
@@ -80,11 +83,6 @@ def classify(
         where=str(path),
         fix=best.fix or "see flagdata ingest --sniff",
     )
-
-
-def _check_plain(path: Path) -> None:
-    if path.exists() and not (path.is_file() or path.is_dir()):
-        raise InputError("a pipe or device, not a file", where=str(path), fix="write what it gives to a file first")
 
 
 def _probe(path: Path) -> CameraProbe | None:

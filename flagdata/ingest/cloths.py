@@ -19,7 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flagdata.addresses import local_path
-from flagdata.errors import InputError, LimitError, NotFoundError
+from flagdata.errors import FlagdataError, InputError
+from flagdata.files import check_input, is_folder
 from flagdata.ingest.headings import check_columns, delimiter_of
 
 COLUMNS = ("film", "fabric", "area_weight")
@@ -71,12 +72,7 @@ def read_cloths(path: Path) -> tuple[ClothFilm, ...]:
         InputError: columns or values that are missing, doubled or malformed; a film that is named twice; a fabric with
             two area weights or stiffnesses.
     """
-    if not path.is_file():
-        raise NotFoundError("no such table", where=str(path), fix="check the path")
-    if path.stat().st_size > SIZE_LIMIT:
-        raise LimitError(
-            f"a table of {path.stat().st_size} bytes", where=str(path), fix=f"at most {SIZE_LIMIT} are read"
-        )
+    check_input(path, noun="table", limit=SIZE_LIMIT)
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
@@ -113,8 +109,12 @@ def _film(row: Mapping[str, str], folder: Path, where: str) -> ClothFilm:
         if not row[name]:
             raise InputError(f"no {name}", where=where, fix="fill the cell, or leave the row out")
     film = folder / local_path(row["film"])
-    if not film.exists():
-        raise NotFoundError(f"no such film: {row['film']}", where=where, fix="give its path from the table's folder on")
+    if not is_folder(film):
+        try:
+            check_input(film, noun="film")
+        except FlagdataError as error:
+            fix = "give the path of a film from the table's folder on"
+            raise type(error)(f"{error.what}: {row['film']}", where=where, fix=fix) from None
     density = _number(row, "area_weight", where, unit="kg/m²")
     if density is None or not _WEIGHTS[0] <= density <= _WEIGHTS[1]:
         raise InputError(

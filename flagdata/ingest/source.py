@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.errors import ConflictError, InputError
+from flagdata.files import check_input, is_folder
 from flagdata.provenance import canonical, code_version, digest, file_hash, recipe_hash
 
 
@@ -39,8 +40,10 @@ class Source:
         """The source as it is now.
 
         Raises:
-            InputError: it cannot be read.
+            InputError: it cannot be read, or is empty, a pipe or a device.
         """
+        if not is_folder(path):
+            check_input(path)
         before = _state(path)
         if path.is_dir():
             parts = [f"{os.fsencode(name).hex()} {file_hash(path / name)}" for name, _, _ in before]
@@ -75,7 +78,7 @@ class Source:
 def _state(path: Path) -> tuple[tuple[str, int, int], ...]:
     """Name, size and time of change of the file, or of each file in the folder that is not hidden."""
     try:
-        if not path.is_dir():
+        if not is_folder(path):
             status = path.stat()
             return ((path.name, status.st_size, status.st_mtime_ns),)
         with os.scandir(path) as entries:

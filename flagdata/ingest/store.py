@@ -182,7 +182,7 @@ def ingest_camera(
             rate=times.rate, frame_count=times.count, stored=transaction.put(staged),
         )  # fmt: skip
         transaction.add(artifact)
-    return result_of(lake, transaction, artifact, report, labels, branch=branch)
+    return result_of(transaction, artifact, report, labels)
 
 
 def ingest_wind(
@@ -242,7 +242,7 @@ def ingest_winds(
         for artifact, _ in staged:
             transaction.add(artifact)
     done = (
-        result_of(lake, transaction, artifact, report, one.labels, branch=branch)
+        result_of(transaction, artifact, report, one.labels)
         for one, (artifact, report) in zip(new, staged, strict=True)
     )
     return tuple(next(done) if isinstance(one, _Read) else one for one in read)
@@ -448,19 +448,15 @@ def _artifact(
     )
 
 
-def result_of(
-    lake: Lake, transaction: Transaction, artifact: Artifact, report: Mapping[str, Any], labels: Labels, *, branch: str
-) -> IngestResult:
+def result_of(transaction: Transaction, artifact: Artifact, report: Mapping[str, Any], labels: Labels) -> IngestResult:
     """What an ingest did whose transaction has ended.
 
     Raises:
         ConflictError: another process published it meanwhile, under another name or session than the one asked for.
     """
-    committed = transaction.result
-    created = committed is not None and artifact.id in committed.added
-    if created:
-        return IngestResult(artifact=artifact, created=True, report=report)
-    kept = lake.artifact(artifact.id, at=branch)
+    kept = transaction.result.artifacts[artifact.id]
+    if artifact.id in transaction.result.added:
+        return IngestResult(artifact=kept, created=True, report=report)
     _check_labels(kept, labels)
     return IngestResult(artifact=kept, created=False, report=json.loads(kept.report or "{}"))
 

@@ -63,6 +63,8 @@ class Artifact:
     created: datetime | None = None
     recording: str | None = None
     session: str | None = None
+    dataset: str | None = None
+    side: str | None = None
     day: str | None = None
     start: int | None = None
     end: int | None = None
@@ -98,6 +100,8 @@ class Artifact:
                 raise self._bad("parents", parent, "full artifact ids (32 hexadecimal digits)")
         if self.source_hash is not None and not _SHA256.fullmatch(self.source_hash):
             raise self._bad("source_hash", self.source_hash, "a SHA-256 in hexadecimal")
+        if (self.dataset is None) != (self.side is None):
+            raise self._bad("side", self.side, "a data set and its side, both or neither")
         if self.start is not None and self.end is not None and self.end < self.start:
             raise self._bad("end", self.end, "an instant that is not before the start")
         for column in ("object_bytes", "frame_first", "frame_count"):

@@ -30,13 +30,14 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import deltalake
 import pyarrow as pa
 import pyarrow.parquet as pq
-from deltalake import CommitProperties, DeltaTable, PostCommitHookProperties
+from deltalake import CommitProperties, DeltaTable
 from deltalake.exceptions import CommitFailedError, DeltaError
-from deltalake.transaction import AddAction, RemoveAction
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
+from flagdata.files import open_regular
 from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder
 from flagdata.lake.log import FILE_HASH, PREVIOUS_HASH, Log
+from flagdata.lake.older_rows import with_data_sets
 from flagdata.provenance import file_hash
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
 
@@ -118,6 +119,7 @@ class Catalog:
         self._table: DeltaTable | None = None
         self._files: dict[str, pa.Table] = {}
         self._rows: tuple[int, pa.Table] | None = None
+        self._history: tuple[int, list[dict[str, Any]]] | None = None
 
     def __reduce__(self) -> tuple[type[Catalog], tuple[Path, Path]]:
         return (Catalog, (self.path, self._marks))
@@ -152,7 +154,8 @@ class Catalog:
 
     @_one_at_a_time
     def rows(self, version: int) -> pa.Table:
-        """All rows of one version, of all branches, in the catalog's schema; absent columns of old rows are null.
+        """All rows of one version, of all branches, in the catalog's schema. Columns that old rows lack are null, but
+        for those that `flagdata.lake.older_rows` fills.
 
         Args:
             version: at most `head()`.
@@ -166,7 +169,7 @@ class Catalog:
         known = self._files
         self._files = {name: known[name] if name in known else self._read(name) for name in self._names(version)}
         parts = list(self._files.values())
-        rows = pa.concat_tables(parts) if parts else catalog_schema().empty_table()
+        rows = with_data_sets(pa.concat_tables(parts) if parts else catalog_schema().empty_table())
         rows = rows.sort_by([(name, "ascending") for name in ROW_ORDER])
         self._rows = (version, rows)
         return rows
@@ -257,55 +260,49 @@ class Catalog:
         Args:
             limit: the newest so many; all if `None`.
         """
-        return [
-            {
-                "version": entry["version"],
-                "timestamp": entry["timestamp"],
-                "operation": entry["operation"],
-                **{k.removeprefix(_INFO_PREFIX): v for k, v in entry.items() if k.startswith(_INFO_PREFIX)},
-            }
-            for entry in self._open(self.head()).history(limit)
-        ]
+        head = self.head()
+        if self._history is None or self._history[0] != head:
+            entries = [
+                {
+                    "version": entry["version"],
+                    "timestamp": entry["timestamp"],
+                    "operation": entry["operation"],
+                    **{k.removeprefix(_INFO_PREFIX): v for k, v in entry.items() if k.startswith(_INFO_PREFIX)},
+                }
+                for entry in self._open(head).history()
+            ]
+            self._history = (head, entries)
+        return self._history[1][:limit]
 
     def _commit(
         self, table: DeltaTable, rows: pa.Table, *, removed: Sequence[str], rows_change: bool, info: Mapping[str, str]
     ) -> None:
         version = table.version() + 1
+        if (protocol := table.protocol()).min_writer_version > _WRITER:
+            raise newer(f"writing to it takes version {protocol.min_writer_version} of Delta's protocol", self.path)
         path = self.path / f"{uuid.uuid4().hex}.parquet"
         # The Arrow schema is schema.py's, and most values occur once: without both, a row's file has 6 kB, not 15.
         pq.write_table(rows, path, compression="zstd", store_schema=False, use_dictionary=False)
         flush_file(path)
         flush_folder(self.path)
         now = time.time_ns() // 1_000_000
-        added = AddAction(
-            path=path.name,
-            size=path.stat().st_size,
-            partition_values={},
-            modification_time=now,
-            data_change=rows_change,
-            stats=json.dumps({"numRecords": rows.num_rows}),
-        )
-        dropped = [RemoveAction(path=name, data_change=rows_change, deletion_timestamp=now) for name in removed]
-        try:
-            table.create_write_transaction(
-                [added, *dropped],
-                "append",
-                table.schema(),
-                commit_properties=_properties({**info, **self._hashes(version, path)}),
-                post_commithook_properties=_HOOKS,
-            )
-        except DeltaError as error:  # which may come after the entry was put
-            if not self._entries.adds(version, path.name):
-                if isinstance(error, CommitFailedError):
-                    path.unlink()
-                    raise Moved from None
-                raise OSError(str(error)) from error
+        written = {
+            "timestamp": now, "operation": "WRITE", "operationParameters": {"mode": "Append", "partitionBy": "[]"},
+            "engineInfo": "flagdata", **{f"{_INFO_PREFIX}{key}": value for key, value in info.items()},
+            FILE_HASH: file_hash(path), PREVIOUS_HASH: file_hash(self._entries.path(version - 1)),
+        }  # fmt: skip
+        added = {
+            "path": path.name, "partitionValues": {}, "size": path.stat().st_size, "modificationTime": now,
+            "dataChange": rows_change, "stats": json.dumps({"numRecords": rows.num_rows}),
+        }  # fmt: skip
+        dropped = [{"path": name, "dataChange": rows_change, "deletionTimestamp": now} for name in removed]
+        # Not by the Delta library, which reads the log again after it has put the entry, and may fail then.
+        actions = [{"commitInfo": written}, {"add": added}, *({"remove": action} for action in dropped)]
+        if not self._entries.put(version, actions):
+            path.unlink()
+            raise Moved
         with confirming(f"version {version}", self._entries.path(version)):
-            self._flush_log(version)
-
-    def _hashes(self, version: int, path: Path) -> dict[str, str]:
-        hashes = {FILE_HASH: file_hash(path), PREVIOUS_HASH: file_hash(self._entries.path(version - 1))}
-        return {key.removeprefix(_INFO_PREFIX): digest for key, digest in hashes.items()}
+            self._entries.acknowledge(version)
 
     def _checkpoint(self) -> int:
         """The version of the newest, by the files' names: a process may die before `_last_checkpoint` is written."""
@@ -320,7 +317,7 @@ class Catalog:
                 self._table.update_incremental()
             if self._table is None or self._table.version() != version:
                 self._table = DeltaTable(self.path.as_uri(), version=version)
-        except DeltaError as error:
+        except (DeltaError, OSError) as error:
             if _SYSTEM_ERROR in str(error):
                 with disk_errors("reading the catalog", self._log):
                     raise OSError(str(error).splitlines()[0]) from error
@@ -355,7 +352,8 @@ class Catalog:
 
     def _read(self, name: str) -> pa.Table:
         try:
-            table = self._conform(pq.read_table(self.path / name))
+            with open_regular(self.path / name) as stream:
+                table = self._conform(pq.read_table(pa.BufferReader(stream.read())))
             table.validate(full=True)  # text that is not UTF-8, for one
         except (OSError, pa.ArrowException) as error:
             raise CorruptError(
@@ -396,7 +394,8 @@ class Catalog:
 _CHECKPOINT = ".checkpoint.parquet"
 _HINT = "_last_checkpoint"
 _SYSTEM_ERROR = "(os error "  # as the Delta library writes it
-_HOOKS = PostCommitHookProperties(create_checkpoint=False, cleanup_expired_logs=False)
+_WRITER = 2
+"""Version of Delta's protocol that tables of this package ask of writers; a later one has duties unknown here."""
 
 
 def _properties(info: Mapping[str, str]) -> CommitProperties:

@@ -16,9 +16,10 @@ from flagdata.errors import CorruptError
 from flagdata.findings import Severity
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.lake import Lake
+from flagdata.lake.layout import check_own
 from flagdata.lake.leases import collecting, last_written, leases, unleased
 from flagdata.lake.marking import catalog_files, mark
-from flagdata.lake.objects import Objects
+from flagdata.lake.objects import Objects, bytes_at
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,8 +35,10 @@ def garbage(lake: Lake, *, grace: timedelta) -> Garbage:
     """What `collect` would delete now.
 
     Raises:
+        LinkError: a folder of the lake is not its own.
         CorruptError: a ref cannot be read or the catalog is damaged, so what it needs is unknown.
     """
+    check_own(lake.path)
     with collecting(lake.staging):
         return _find(lake, grace)
 
@@ -44,8 +47,10 @@ def collect(lake: Lake, *, grace: timedelta) -> Garbage:
     """Delete the garbage and say what it was. Transactions wait while it works; none loses anything.
 
     Raises:
+        LinkError: a folder of the lake is not its own; nothing was deleted.
         CorruptError: a ref cannot be read or the catalog is damaged, so what it needs is unknown; nothing was deleted.
     """
+    lake.check_writable()
     with collecting(lake.staging), disk_errors("collecting", lake.path):
         found = _find(lake, grace)
         for name in found.objects:
@@ -70,15 +75,9 @@ def _find(lake: Lake, grace: timedelta) -> Garbage:
     objects = [o for o in lake.objects if o.name not in marked.objects and o.name not in held and o.modified <= limit]
     leftovers = [state.folder for state in states if state.leased and not state.alive]
     leftovers += [path for path in unleased(lake.staging) if last_written(path) <= limit]
-    leftovers += [path for path in lake.unpublished_files() if path.stat().st_mtime <= limit]
+    leftovers += [path for path in lake.unpublished_files() if path.lstat().st_mtime <= limit]
     return Garbage(
         objects=tuple(o.name for o in objects),
         leftovers=tuple(leftovers),
-        size=sum(o.size for o in objects) + sum(_bytes(path) for path in leftovers),
+        size=sum(o.size for o in objects) + sum(bytes_at(path) for path in leftovers),
     )
-
-
-def _bytes(path: Path) -> int:
-    """Size of whatever it is; a link counts for itself, not for what it leads to."""
-    inside = path.rglob("*") if path.is_dir() and not path.is_symlink() else ()
-    return sum(entry.lstat().st_size for entry in (path, *inside) if entry.is_symlink() or entry.is_file())

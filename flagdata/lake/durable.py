@@ -17,6 +17,8 @@ from pathlib import Path
 
 from flagdata.errors import FlagdataError
 
+SCRATCH = re.compile(r"\.[0-9a-f]{32}")
+"""Names of files that are written before they are linked under their own."""
 _LOG = logging.getLogger("flagdata")
 
 
@@ -34,10 +36,13 @@ def flush_folder(path: Path) -> None:
     flush_file(path)
 
 
-def put_if_absent(path: Path, data: bytes) -> bool:
+def put_if_absent(path: Path, data: bytes, *, what: str | None = None) -> bool:
     """Create `path` with all of `data`, or leave what is there; False when the name was taken.
 
     The bytes are written and flushed beside it under another name, then linked: the name appears whole or not at all.
+
+    Args:
+        what: is published by it, for a warning; the file by its name if `None`.
 
     Raises:
         OSError: what the disk refused; the name was not taken.
@@ -54,9 +59,10 @@ def put_if_absent(path: Path, data: bytes) -> bool:
         with suppress(OSError):  # what is left is a collection's
             scratch.unlink(missing_ok=True)
         raise
-    with confirming(f"the file {path.name}", path):
+    what = what or f"the file {path.name}"
+    with confirming(what, path):
         flush_folder(path.parent)
-    with confirming(f"the file {path.name}", path):
+    with confirming(what, path):
         scratch.unlink(missing_ok=True)
     return True
 
@@ -66,10 +72,12 @@ def confirming(what: str, where: Path) -> Iterator[None]:
     """Work on `what` after it was published: what the disk refuses is a warning, since it stays published."""
     try:
         yield
-    except OSError as error:
+    except (OSError, FlagdataError) as error:
+        refused = isinstance(error, OSError)
+        said = (error.strerror or str(error)) if refused else error.what
         _LOG.warning(
             "flagdata: warning: %s is published, but the disk did not confirm it (%s)\n  where: %s\n  fix:   %s",
-            what, " ".join((error.strerror or str(error)).split()), error.filename or where,
+            what, " ".join(said.split()), (error.filename if refused else error.where) or where,
             "check the disk, then run flagdata doctor: until it confirms, a power cut may lose it",
         )  # fmt: skip
 
@@ -89,7 +97,7 @@ def disk_errors(doing: str, where: Path) -> Iterator[None]:
         raise FlagdataError(
             f"{doing} failed: {text}",
             where=str(error.filename or where),
-            fix=f"{_FIXES.get(number, 'check the disk that holds the lake')}, then do it again",
+            fix=f"{_FIXES.get(number, 'check the disk')}, then do it again",
         ) from error
 
 
@@ -99,7 +107,7 @@ _FIXES = {
     errno.ENOSPC: "free some space, or move the lake to a larger disk",
     errno.EDQUOT: "free some space, or ask for a larger quota",
     errno.EFBIG: "raise the file size limit (ulimit -f)",
-    errno.EACCES: "give yourself read and write permission on the lake's folder",
-    errno.EPERM: "give yourself read and write permission on the lake's folder",
+    errno.EACCES: "give yourself read and write permission on the folder",
+    errno.EPERM: "give yourself read and write permission on the folder",
     errno.EROFS: "mount the disk writable",
 }

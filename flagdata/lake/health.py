@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -13,10 +13,12 @@ from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.lake import Lake
+from flagdata.lake.layout import STORES, foreign_entries
 from flagdata.lake.leases import LeaseState, collecting, last_written, leases, unleased
 from flagdata.lake.log import LogGapError
 from flagdata.lake.marking import Marked, catalog_files, mark
-from flagdata.lake.objects import STORES, StoredObject
+from flagdata.lake.objects import StoredObject
+from flagdata.lake.removals import removals
 from flagdata.schema import FORMAT_VERSION
 
 GRACE = timedelta(hours=24)
@@ -27,23 +29,28 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
     """All that is wrong with the lake's structure; contents are `verify`'s.
 
     Errors are damage: rows without object or parent, objects of another size than recorded, refs that cannot be read,
-    rows of a newer format. Warnings are what a crash leaves and `gc` removes. Notes are younger than `grace`, and
-    nothing to act on.
+    links where the lake keeps files of its own, rows of a newer format. Warnings are what a crash leaves and `gc`
+    removes. Notes are younger than `grace`, and nothing to act on.
     """
+    foreign = _foreign(lake)
     stored = list(lake.objects)
-    with collecting(lake.staging):
-        states = leases(lake.staging)
-        unowned = [(path, last_written(path)) for path in unleased(lake.staging)]
+    states: list[LeaseState] = []
+    unowned: list[tuple[Path, float]] = []
+    if lake.staging not in foreign:
+        with collecting(lake.staging):
+            states = leases(lake.staging)
+            unowned = [(path, last_written(path)) for path in unleased(lake.staging)]
     # The catalog last: what was put by now is held by a lease seen above, or committed below, or left behind.
     marked = mark(lake, grace=grace)
-    findings = [*marked.findings, *_rows(lake, marked)]
+    findings = [*map(_linked, foreign), *marked.findings, *_rows(lake, marked, foreign)]
     if LogGapError.kind in {finding.kind for finding in marked.findings}:
         return tuple(findings)  # what follows would call the files of the missing entries' commits leftovers
     if not marked.findings:
         held = {name for state in states if state.alive for name in state.objects}
+        findings += _collected(lake, marked, {found.name for found in stored})
         needed = marked.objects | held
         findings += [_orphan(found, grace) for found in stored if found.name not in needed]
-    findings += _strays(lake)
+    findings += _strays(lake, foreign)
     findings += [_abandoned(state) for state in states if state.leased and not state.alive]
     findings += [_unleased(path, written, grace) for path, written in unowned]
     try:
@@ -52,7 +59,7 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
         findings.append(
             Finding(kind="log-damaged", severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
         )
-    return tuple(findings)
+    return tuple(dict.fromkeys(findings))  # an entry that cannot be read stops more than one check
 
 
 def verify(lake: Lake, names: Sequence[str], *, advance: Callable[[int], None] = lambda _: None) -> tuple[Finding, ...]:
@@ -66,7 +73,7 @@ def verify(lake: Lake, names: Sequence[str], *, advance: Callable[[int], None] =
         try:
             lake.objects.check(name)
         except FlagdataError as error:
-            kind = "object-missing" if error.kind == "not-found" else "object-changed"
+            kind = {"not-found": "object-missing", "link": "link"}.get(error.kind, "object-changed")
             findings.append(
                 Finding(kind=kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
             )
@@ -75,8 +82,11 @@ def verify(lake: Lake, names: Sequence[str], *, advance: Callable[[int], None] =
 
 
 def verify_catalog(lake: Lake) -> tuple[Finding, ...]:
-    """Re-hash the catalog's files and read every ref; a finding for what is missing, damaged, or cannot be checked."""
-    return (*mark(lake, grace=timedelta(0)).findings, *catalog_files(lake))
+    """Re-hash the catalog's files and read every ref; a finding for what is missing, damaged, a link, or cannot be
+    checked."""
+    foreign = [path for path in _foreign(lake) if path.parent.name not in STORES]  # objects are `verify`'s
+    found = (*map(_linked, foreign), *mark(lake, grace=timedelta(0)).findings, *catalog_files(lake))
+    return tuple(dict.fromkeys(found))  # an entry that cannot be read stops both
 
 
 def object_names(lake: Lake) -> list[str]:
@@ -95,7 +105,26 @@ def is_healthy(findings: Sequence[Finding]) -> bool:
     return all(f.severity is Severity.NOTE for f in findings)
 
 
-def _rows(lake: Lake, marked: Marked) -> list[Finding]:
+def _foreign(lake: Lake) -> list[Path]:
+    """What is a link or special file, sorted; for what lies in an object, the object."""
+    found = set()
+    for path in foreign_entries(lake.path):
+        parts = path.relative_to(lake.path).parts
+        found.add(lake.path.joinpath(*parts[:2]) if parts[0] in STORES else path)
+    return sorted(found)
+
+
+def _linked(path: Path) -> Finding:
+    return Finding(
+        kind="link",
+        severity=Severity.ERROR,
+        what="a link or special file, or a folder that holds one: its content lies elsewhere, where it may change",
+        where=str(path),
+        fix="put in its place what the link leads to; commands that write refuse a lake whose folders are links",
+    )
+
+
+def _rows(lake: Lake, marked: Marked, foreign: Collection[Path]) -> list[Finding]:
     findings: list[Finding] = []
     seen: set[str] = set()
     for ref, table in marked.refs.items():
@@ -114,11 +143,11 @@ def _rows(lake: Lake, marked: Marked) -> list[Finding]:
         fresh = table.filter(pa.array([identity not in seen for identity in ids], type=pa.bool_()))
         seen |= known
         for row in fresh.to_pylist():
-            findings += _row(lake, row, known, ref)
+            findings += _row(lake, row, known, ref, foreign)
     return findings
 
 
-def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str) -> list[Finding]:
+def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign: Collection[Path]) -> list[Finding]:
     where = f"{row['kind']} {row['name']!r}, artifact {row['artifact']}, ref {ref}"
 
     def error(kind: str, what: str, fix: str) -> Finding:
@@ -143,13 +172,39 @@ def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str) -> list[
         if not path.exists():
             findings.append(error("dangling-row", f"its object {artifact.object} is missing", again))
         elif (
-            artifact.object_bytes is not None and (size := lake.objects.size(artifact.object)) != artifact.object_bytes
+            artifact.object_bytes is not None
+            and path not in foreign  # of which a finding says more
+            and (size := lake.objects.size(artifact.object)) != artifact.object_bytes
         ):
             what = f"its object has {size} bytes instead of {artifact.object_bytes}"
             findings.append(
                 error("object-size", what, f"{again}; flagdata recover saves what a cut-off record still has")
             )
     return findings
+
+
+def _collected(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
+    """A note where gc has deleted what was withdrawn, so that older versions show rows without data."""
+    needed = {name for table in marked.refs.values() for name in table["object"].drop_null().to_pylist()}
+    gone = {
+        removal.version: sum(name not in needed and name not in stored for name in removal.objects.values())
+        for removal in removals(lake)
+    }
+    versions = [version for version, count in gone.items() if count]
+    if not versions:
+        return []
+    told = ", ".join(str(version) for version in sorted(versions)[-3:])
+    return [
+        Finding(
+            kind="withdrawn-collected",
+            severity=Severity.NOTE,
+            what=f"gc deleted the data of withdrawn artifacts: {sum(gone.values())} in all, withdrawn by version {told}"
+            f"{' and others' if len(versions) > 3 else ''}",
+            where=f"versions before {max(versions)}",
+            count=sum(gone.values()),
+            fix=f"none needed; all tags, and versions from {max(versions)} on, are whole without them",
+        )
+    ]
 
 
 def _orphan(stored: StoredObject, grace: timedelta) -> Finding:
@@ -169,8 +224,8 @@ def _later(grace: timedelta) -> str:
     return f"once it is {hours:g} h old" if hours < 48 else f"once it is {hours / 24:g} days old"
 
 
-def _strays(lake: Lake) -> list[Finding]:
-    known = {stored.path for stored in lake.objects}
+def _strays(lake: Lake, foreign: Collection[Path]) -> list[Finding]:
+    known = {stored.path for stored in lake.objects} | set(foreign)
     strays = [p for store in STORES for p in sorted((lake.path / store).glob("*")) if p not in known]
     return [
         Finding(
@@ -211,7 +266,7 @@ def _unleased(path: Path, written: float, grace: timedelta) -> Finding:
 
 
 def _unpublished(path: Path, grace: timedelta) -> Finding:
-    old = path.stat().st_mtime <= (datetime.now(UTC) - grace).timestamp()
+    old = path.lstat().st_mtime <= (datetime.now(UTC) - grace).timestamp()
     return Finding(
         kind="write-left",
         severity=Severity.WARNING if old else Severity.NOTE,

@@ -8,9 +8,7 @@ import uuid
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
-from graphlib import TopologicalSorter
 from pathlib import Path
-from typing import cast
 from urllib.parse import unquote
 
 import pyarrow as pa
@@ -18,20 +16,29 @@ import pyarrow.compute as pc
 
 from flagdata import provenance
 from flagdata.addresses import local_path
+from flagdata.documents import from_json
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
+from flagdata.files import open_regular
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
-from flagdata.lake.catalog import ROW_ORDER, Catalog, newer, persist
+from flagdata.lake.catalog import ROW_ORDER, Catalog, newer
+from flagdata.lake.deletion import check_reuse, delete
 from flagdata.lake.durable import disk_errors, put_if_absent
-from flagdata.lake.leases import collecting, keeping_collectors_out
-from flagdata.lake.objects import STORES, Objects
-from flagdata.lake.refs import MAIN, Refs, View
-from flagdata.lake.transaction import CommitResult, Transaction
-from flagdata.lake.withdrawal import Withdrawal, check_leaving, clips_of, descendants
+from flagdata.lake.layout import STAGING, STORES, check_writable, scratch_files
+from flagdata.lake.leases import collecting
+from flagdata.lake.lineage import Lineage
+from flagdata.lake.matching import Where, matching
+from flagdata.lake.merging import MergeResult, merge
+from flagdata.lake.objects import Objects
+from flagdata.lake.refs import MAIN, Ref, Refs, Slice, View
+from flagdata.lake.removals import explained
+from flagdata.lake.transaction import Transaction
+from flagdata.lake.withdrawal import Withdrawal, descendants, withdraw
 from flagdata.schema import CATALOG, FORMAT_VERSION
 
 _MARKER = "lake.json"
 _MARKER_SCHEMA = "flagdata.lake/1"
+_ORDER = ", ".join(ROW_ORDER)
 _UNUSABLE = re.compile("[\\\\\ud800-\udfff]")  # the Delta library takes a backslash for a separator; no UTF-8
 
 
@@ -46,7 +53,7 @@ class Lake:
         self.catalog = Catalog(path / "catalog", path / "refs" / "newest")
         self.objects = Objects(path)
         self.refs = Refs(path / "refs")
-        self.staging = path / "staging"
+        self.staging = path / STAGING
 
     @classmethod
     def create(cls, path: Path | str) -> Lake:
@@ -91,8 +98,8 @@ class Lake:
         lake = cls(_usable(path))
         marker = lake.path / _MARKER
         try:
-            with _readable(marker):
-                content = json.loads(marker.read_text())
+            with _readable(marker), open_regular(marker) as stream:
+                content = from_json(stream.read())
             version = int(content["format_version"])
         except (FileNotFoundError, NotADirectoryError):
             raise NotFoundError(
@@ -119,6 +126,15 @@ class Lake:
         }
         put_if_absent(self.path / _MARKER, (json.dumps(marker, indent=2) + "\n").encode())
 
+    def check_writable(self) -> None:
+        """Whether this process may write here: called before the first second of work that ends in a commit.
+
+        Raises:
+            LinkError: a folder of the lake is a link, so that what is written would lie elsewhere.
+            FlagdataError: the lake can only be read.
+        """
+        check_writable(self.path)
+
     def transaction(self, message: str, *, branch: str = MAIN) -> Transaction:
         """A context manager: collects objects and rows, publishes all when its block ends, nothing when that raises.
 
@@ -130,13 +146,14 @@ class Lake:
         return Transaction(self, message, branch=branch)
 
     def rows(
-        self, where: str | None = None, *, at: str | None = None, columns: Sequence[str] | None = None
+        self, where: Where | None = None, *, at: str | None = None, columns: Sequence[str] | None = None
     ) -> pa.Table:
         """Rows of the catalog in the order of commit, then start, then frame.
 
         Args:
-            where: an SQL expression as in `flagdata.query` ("kind = 'clip' and wind between 3 and 6"; the column "end"
-                needs its quotes, `end_time` does not).
+            where: the values that columns must have, {"kind": Kind.CLIP, "recording": identity}, see
+                `flagdata.lake.matching`; or an SQL expression as in `flagdata.query` ("kind = 'clip' and wind between
+                3 and 6"; the column "end" needs its quotes, `end_time` does not).
             at: tag, branch, version number or commit id; the head of main if `None`.
             columns: which to return, in this order; all if `None`.
 
@@ -146,8 +163,10 @@ class Lake:
             UnknownNameError: no such column.
         """
         table = self.table(self.view(at))
-        if where is not None:
+        if isinstance(where, str):
             table = _filter(table, where)
+        elif where is not None:
+            table = matching(table, where)
         if columns is None:
             return table
         for column in columns:
@@ -178,9 +197,24 @@ class Lake:
 
         Raises:
             InputError: not an object's name.
-            NotFoundError: it is not there.
+            NotFoundError: it is not there; if gc deleted it, after which version.
         """
-        return self.objects.existing(object)
+        try:
+            return self.objects.existing(object)
+        except NotFoundError as error:
+            raise explained(self, object, error) from None
+
+    def whole_object(self, object: str) -> Path:  # noqa: A002 — the catalog's name for it
+        """Where an object lies, once its bytes have been compared with its name.
+
+        Raises:
+            NotFoundError: as `object_path`.
+            LinkError: it is, or holds, a link or special file.
+            CorruptError: its bytes are not what its name says.
+        """
+        path = self.object_path(object)
+        self.objects.check(object)
+        return path
 
     def resolve(self, at: str | None) -> int:
         """The Delta version a ref stands for (for a tag of a branch, the branch's).
@@ -190,81 +224,90 @@ class Lake:
         """
         return self.view(at)[0].version
 
-    def tag(self, name: str, *, at: str | None = None) -> None:
+    def tag(self, name: str, *, at: str | None = None) -> Ref:
         """Name what `at` shows, for good.
 
         Raises:
             UsageError: a name that cannot be one.
-            ConflictError: the name is taken.
+            ConflictError: the name is taken, or was that of a tag that showed other artifacts.
         """
+        self.check_writable()
         with collecting(self.staging):  # one ref at a time, so that no name is both a tag and a branch
-            self.refs.put("tags", name, self.view(at))
+            view = self.view(at)
+            check_reuse(self, name, view)
+            return self.refs.put("tags", name, view)
 
-    def branch(self, name: str, *, at: str | None = None) -> None:
+    def branch(self, name: str, *, at: str | None = None) -> Ref:
         """Begin a branch from what `at` shows.
 
         Raises:
             UsageError: a name that cannot be one.
             ConflictError: the name is taken.
         """
+        self.check_writable()
         with collecting(self.staging):  # one ref at a time, so that no name is both a tag and a branch
-            self.refs.put("branches", name, self.view(at))
+            return self.refs.put("branches", name, self.view(at))
 
-    def merge(self, branch: str, message: str, *, into: str = MAIN) -> CommitResult:
-        """Commit on `into` what was committed on `branch` itself; rows that are there already stay as they are.
+    def delete_tag(self, name: str, message: str | None = None, *, discard: bool = False) -> int:
+        """Delete a tag; the version that notes it. Its name never shows another version.
 
-        Rows are only ever added, so nothing can conflict; what `branch` withdrew is not withdrawn from `into`.
+        Objects that only it showed stay for the grace period of garbage collection.
+
+        Args:
+            discard: also where it alone shows some rows.
+
+        Raises:
+            NotFoundError: no such tag.
+            ConflictError: it alone shows some rows.
+        """
+        return delete(self, "tags", name, message, discard=discard)
+
+    def delete_branch(self, name: str, message: str | None = None, *, discard: bool = False) -> int:
+        """Delete a branch; the version that takes its rows off. Tags, commits and branches made from it stay.
+
+        Args:
+            discard: also where it alone shows some rows.
 
         Raises:
             NotFoundError: no such branch.
-            NotFoundError: a row was made from one that `into` does not show: merge the branch it is on first.
+            ConflictError: it alone shows some rows.
+            UsageError: main.
         """
-        own = self.refs.view(branch, self.catalog.head())[0]
-        if own.branch != branch or branch == into:
-            raise UsageError(f"{branch!r} cannot be merged into {into!r}", fix="name two branches")
-        rows = {row["artifact"]: row for row in self.table((own,)).to_pylist()}
-        parents = {artifact: [p for p in row["parents"] if p in rows] for artifact, row in rows.items()}
-        with self.transaction(message, branch=into) as transaction:
-            for artifact in TopologicalSorter(parents).static_order():  # the table's order is by time, not by descent
-                transaction.add(Artifact.from_row(rows[artifact]))
-        return cast(CommitResult, transaction.result)
+        return delete(self, "branches", name, message, discard=discard)
+
+    def merge(self, branch: str, message: str, *, into: str = MAIN) -> MergeResult:
+        """Commit on `into` what `branch` changed since the two last had the same: its new rows come, rows that it
+        withdrew go. Rows that `into` withdrew meanwhile stay withdrawn. See `flagdata.lake.merging`.
+
+        Raises:
+            NotFoundError: no such branch, or an object of a new row is missing.
+            ConflictError: a row would lack what it was made from, which was withdrawn on the other branch.
+            UsageError: no message, or a branch into itself.
+        """
+        return merge(self, branch, message, into=into)
 
     def withdraw(self, artifacts: Sequence[str], message: str, *, branch: str = MAIN) -> Withdrawal:
         """Take rows off a branch, in one commit; clips that are slices of a withdrawn recording go along with it.
 
-        Tags made before keep showing them. Their objects stay for as long as a tag or another branch needs them, and
-        then for the grace period of garbage collection.
+        The branch that this one began from keeps showing its own; tags made before keep showing them. Their objects
+        stay for as long as a tag or another branch needs them, and then for the grace period of garbage collection.
 
         Args:
             artifacts: full ids.
 
         Raises:
-            NotFoundError: one that was not committed on this branch itself (but maybe on its parent).
+            NotFoundError: one that the branch does not show.
             ConflictError: a row that stays on the branch was made from one of them; see `descendants`.
         """
-        asked = frozenset(artifacts)
-
-        def attempt() -> Withdrawal:
-            head = self.catalog.head()
-            shown = self.table(self.refs.view(branch, head))
-            clips = clips_of(shown, asked)
-            leaving = asked | clips
-            check_leaving(shown, leaving, branch=branch, where=str(self.path))
-            info = {"message": message, "branch": branch, "withdrawn": str(len(leaving))}
-            drop = (pc.field("branch") == branch) & pc.field("artifact").isin(sorted(leaving))
-            version = self.catalog.replace(self.catalog.rows(head).filter(~drop), base=head, info=info)
-            return Withdrawal(version=version, asked=tuple(sorted(asked)), clips=tuple(sorted(clips)))
-
-        with disk_errors("withdrawing", self.path), keeping_collectors_out(self.staging):
-            return persist(attempt, where=self.catalog.path)
+        return withdraw(self, artifacts, message, branch=branch)
 
     def descendants(self, artifacts: Collection[str], *, at: str | None = None) -> frozenset[str]:
         """Ids of all rows at a ref that were made from `artifacts` (full ids), directly or not; without these."""
         return descendants(self.table(self.view(at)), artifacts)
 
     def unpublished_files(self) -> list[Path]:
-        """Files that a process left which died while it wrote to the catalog or the refs."""
-        return [*self.catalog.unpublished_files(), *self.refs.scratch_files()]
+        """Files that a process left which died while it wrote to the catalog or the refs, or made the lake."""
+        return [*self.catalog.unpublished_files(), *scratch_files(self.path)]
 
     def view(self, at: str | None) -> View:
         """What a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""
@@ -272,16 +315,31 @@ class Lake:
 
     def table(self, view: View) -> pa.Table:
         """All rows of a view, its base first. An identity is on one branch of a view only."""
-        parts = []
-        for part in view:
-            rows = self.catalog.rows(part.version)
-            parts.append(rows.filter(pc.field("branch") == part.branch))
-        if len(parts) == 1:
-            return parts[0]
-        return pa.concat_tables(reversed(parts))
+        *later, first = view
+        rows = self._own(first)
+        for part in reversed(later):
+            hidden = self.lineage().hidden(part)
+            if hidden:
+                rows = rows.filter(~pc.field("artifact").isin(sorted(hidden)))
+            rows = pa.concat_tables([rows, self._own(part)])
+        return rows
 
-    def _commits(self) -> dict[str, tuple[int, str]]:
-        return {e["commit"]: (e["version"], e["branch"]) for e in self.catalog.history() if "commit" in e}
+    def lineage(self) -> Lineage:
+        """How branches came to be, as known at the head."""
+        return Lineage(self.catalog.history(), {name: ref.view for name, ref in self.refs.branches().items()})
+
+    def _own(self, part: Slice) -> pa.Table:
+        """The rows of one branch at one version."""
+        return self.catalog.rows(part.version).filter(pc.field("branch") == part.branch)
+
+    def _commits(self) -> dict[str, View]:
+        lineage = self.lineage()
+        parts = {
+            entry["commit"]: Slice(branch=entry["branch"], version=entry["version"])
+            for entry in self.catalog.history()
+            if "commit" in entry
+        }
+        return {commit: lineage.view(part) for commit, part in parts.items() if lineage.fork(part) is not None}
 
 
 @contextmanager
@@ -319,4 +377,4 @@ def _usable(path: Path | str) -> Path:
 def _filter(table: pa.Table, where: str) -> pa.Table:
     from flagdata.query import Request, Selection  # it knows what a view is, so it imports this package
 
-    return Selection(table, Request(where=where, order=", ".join(ROW_ORDER))).table()
+    return Selection(table, Request(where=where, order=_ORDER)).table()

@@ -12,6 +12,7 @@ Locks work between processes of one machine, and over file systems that carry fl
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
@@ -25,7 +26,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO
 
+from flagdata.documents import from_json
 from flagdata.lake.durable import disk_errors
+from flagdata.lake.layout import LinkError
 
 _LEASE = "lease"
 _COLLECT = ".collect"
@@ -106,10 +109,10 @@ def leases(staging: Path) -> list[LeaseState]:
     for folder in sorted(p for p in staging.iterdir() if _is_folder(p)):
         leased = True
         try:
-            with (folder / _LEASE).open(encoding="utf-8") as file:
+            with _plain(folder / _LEASE) as file:
                 alive = not _try_lock(file.fileno())
                 lines = file.read().splitlines()
-        except FileNotFoundError:
+        except (FileNotFoundError, IsADirectoryError, LinkError):
             leased, alive, lines = False, False, []
             if not folder.exists():
                 continue
@@ -137,7 +140,7 @@ def _is_folder(path: Path) -> bool:
 
 def _owner(line: str) -> str:
     try:
-        owner = json.loads(line)
+        owner = from_json(line)
         return f"process {owner['pid']} on {owner['host']} since {owner['since']}"
     except (ValueError, KeyError, TypeError):  # it died, or the disk was full, before the line was whole
         return "owner unknown"
@@ -165,7 +168,22 @@ def _locked(staging: Path, mode: int) -> Iterator[None]:
 
 def _opened(path: Path) -> IO[str]:
     with disk_errors("locking the lake", path):
-        if not path.exists():
+        if not os.path.lexists(path):
             path.parent.mkdir(exist_ok=True)  # copies of a lake may come without empty folders
             path.touch()
-        return path.open()
+        return _plain(path)
+
+
+def _plain(path: Path) -> IO[str]:
+    """A file of staging, opened to read; a link is not followed, and a pipe not waited for.
+
+    Raises:
+        LinkError: a link.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except OSError as error:
+        if error.errno != errno.ELOOP:
+            raise
+        raise LinkError("a link where a lock of the lake belongs", where=str(path), fix="delete the link") from None
+    return os.fdopen(descriptor, encoding="utf-8")

@@ -12,10 +12,14 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
+from flagdata.documents import from_json
 from flagdata.errors import CorruptError
+from flagdata.files import open_regular
 from flagdata.lake.durable import put_if_absent
 from flagdata.provenance import file_hash
 
@@ -54,7 +58,7 @@ class Log:
 
         Raises:
             LogGapError: an entry before it, or one that was acknowledged after it, is missing, or there is none.
-            CorruptError: an entry is empty.
+            CorruptError: an entry is empty or cannot be read.
         """
         acknowledged = self.acknowledged()  # first: all entries up to it were on the disk before
         present = self._present()
@@ -66,8 +70,7 @@ class Log:
         if missing:
             raise self._gap(missing, newest=newest)
         for version in sorted(present - self._filled):
-            if self.path(version).stat().st_size == 0:  # the Delta library takes it for a commit of nothing
-                raise self._damaged(version)
+            self._text(version)
         self._filled = present
         return max(newest, acknowledged)
 
@@ -94,7 +97,7 @@ class Log:
         newest = self.acknowledged()
         if newest >= 0:
             with suppress(FileNotFoundError):  # another commit has just replaced it
-                noted[newest] = (self.marks / str(newest)).read_text().strip()
+                noted[newest] = _content_of(self.marks / str(newest)).strip()
         present = self._present()
         for version in sorted(present):
             previous = self._content(version)[1].get(PREVIOUS_HASH)
@@ -102,23 +105,37 @@ class Log:
                 noted[version - 1] = previous
         return [self.path(v) for v in sorted(present & noted.keys()) if file_hash(self.path(v)) != noted[v]]
 
-    def adds(self, version: int, name: str) -> bool:
-        """Whether there is an entry of `version` and it adds the file `name`."""
-        try:
-            return name in self._content(version)[0]
-        except (OSError, CorruptError):
-            return False
+    def put(self, version: int, actions: Sequence[Mapping[str, Any]]) -> bool:
+        """Publish the entry of `version`, one action a line; False when another writer has published it.
+
+        This is a commit's point of no return: one link, after the entry's bytes are on the disk.
+
+        Raises:
+            OSError: what the disk refused; there is no such entry.
+        """
+        text = "\n".join(json.dumps(action, ensure_ascii=False, separators=(",", ":")) for action in actions)
+        return put_if_absent(self.path(version), text.encode(), what=f"version {version}")
 
     def _content(self, version: int) -> tuple[list[str], dict[str, str]]:
         """Names of the files that an entry adds, and its commit info."""
         try:
-            actions = [json.loads(line) for line in self.path(version).read_text().splitlines()]
+            actions = [from_json(line) for line in self._text(version).splitlines()]
             if not actions or not all(_ACTIONS.issuperset(action.keys()) for action in actions):
                 raise self._damaged(version)
             info = next((action["commitInfo"] for action in actions if "commitInfo" in action), {})
             return [action["add"]["path"] for action in actions if "add" in action], dict(info)
         except (ValueError, KeyError, TypeError, AttributeError):
             raise self._damaged(version) from None
+
+    def _text(self, version: int) -> str:
+        """What an entry holds; the Delta library would take an empty one for a commit of nothing."""
+        try:
+            text = _content_of(self.path(version))
+        except FileNotFoundError as error:  # a link that leads nowhere
+            raise _unreadable(self.path(version), error) from None
+        if not text:
+            raise self._damaged(version)
+        return text
 
     def _damaged(self, version: int) -> CorruptError:
         path = self.path(version)
@@ -140,17 +157,10 @@ class Log:
         return max(self._marks(), default=-1)
 
     def _present(self) -> set[int]:
-        try:
-            found = [_ENTRY.fullmatch(path.name) for path in self.folder.iterdir()]
-        except FileNotFoundError:
-            return set()
-        return {int(match[1]) for match in found if match}
+        return {int(match[1]) for name in _names_in(self.folder) if (match := _ENTRY.fullmatch(name))}
 
     def _marks(self) -> list[int]:
-        try:
-            return [int(path.name) for path in self.marks.iterdir() if _MARK.fullmatch(path.name)]
-        except FileNotFoundError:
-            return []
+        return [int(name) for name in _names_in(self.marks) if _MARK.fullmatch(name)]
 
     def _gap(self, missing: list[int], *, newest: int) -> LogGapError:
         names = ", ".join(self.path(version).name for version in missing[:3])
@@ -161,3 +171,37 @@ class Log:
         return LogGapError(
             f"an entry of the catalog's log is missing: {names}{more}", where=str(self.path(missing[0])), fix=fix
         )
+
+
+def _names_in(folder: Path) -> list[str]:
+    """Names in a folder, none if it is not there."""
+    try:
+        return [path.name for path in folder.iterdir()]
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise _unreadable(folder, error) from None
+
+
+def _content_of(path: Path) -> str:
+    """The text of a file, which is damaged if it is not UTF-8.
+
+    Raises:
+        FileNotFoundError: it is not there.
+        CorruptError: it cannot be read.
+    """
+    try:
+        with open_regular(path) as stream:
+            return stream.read().decode(errors="replace")
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        raise _unreadable(path, error) from None
+
+
+def _unreadable(path: Path, error: OSError) -> CorruptError:
+    return CorruptError(
+        f"{path.name} of the catalog's log cannot be read: {error.strerror}",
+        where=str(path),
+        fix="give yourself read permission on it, or restore it from a copy",
+    )

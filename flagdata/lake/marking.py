@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
 from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
-from flagdata.lake.lake import Lake
+from flagdata.lake.lineage import noted_hidden, noted_view
 from flagdata.lake.log import LogGapError
-from flagdata.lake.refs import MAIN
+from flagdata.lake.refs import MAIN, Slice
 from flagdata.provenance import file_hash
+
+if TYPE_CHECKING:
+    from flagdata.lake.lake import Lake
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +28,8 @@ class Marked:
 
     Attributes:
         refs: each ref (main, branches, tags) → its rows, in the catalog's schema.
-        objects: names of all objects that a row of a ref, or one withdrawn within the grace period, points to.
+        objects: names of all objects that a row of a ref points to, or one that was withdrawn, or shown by a ref that
+            was deleted, within the grace period.
         findings: refs that cannot be read or are lost; while there are any, nothing may be collected.
     """
 
@@ -33,7 +39,7 @@ class Marked:
 
 
 def mark(lake: Lake, *, grace: timedelta) -> Marked:
-    """Read every ref, and the catalog as it was before each withdrawal younger than `grace`."""
+    """Read every ref, and what was shown before each withdrawal and deletion younger than `grace`."""
     refs: dict[str, pa.Table] = {}
     recent: list[pa.Table] = []
     findings: list[Finding] = []
@@ -54,7 +60,7 @@ def mark(lake: Lake, *, grace: timedelta) -> Marked:
             findings.append(_unreadable(error, f"ref {name}"))
     try:
         findings += _lost(lake.catalog.rows(lake.catalog.head()), names)
-        recent = [lake.catalog.rows(v - 1) for v in _withdrawals(lake, datetime.now(UTC) - grace)]
+        recent = list(_withdrawn(lake, since=datetime.now(UTC) - grace))
     except FlagdataError as error:
         findings.append(_unreadable(error, "recent versions"))
     objects = {name for table in (*refs.values(), *recent) for name in table["object"].drop_null().to_pylist()}
@@ -73,9 +79,16 @@ def catalog_files(lake: Lake) -> tuple[Finding, ...]:
         )
     findings = [_damaged("log-damaged", "an entry of the catalog's log has changed", path) for path in changed]
     for path, noted in sorted(hashes.items()):
-        if not path.exists():
+        try:
+            found = file_hash(path)
+        except FileNotFoundError:
             findings.append(_damaged("catalog-file-missing", "a file of the catalog is missing", path))
-        elif noted is not None and file_hash(path) != noted:
+            continue
+        except OSError as error:
+            what = f"a file of the catalog cannot be read: {error.strerror}"
+            findings.append(_damaged("catalog-file-unreadable", what, path))
+            continue
+        if noted is not None and found != noted:
             findings.append(_damaged("catalog-file-changed", "a file of the catalog has changed", path))
     unchecked = list(hashes.values()).count(None)
     if unchecked:
@@ -112,9 +125,17 @@ def _lost(head: pa.Table, known: list[str]) -> list[Finding]:
     ]
 
 
-def _withdrawals(lake: Lake, since: datetime) -> list[int]:
+def _withdrawn(lake: Lake, *, since: datetime) -> Iterator[pa.Table]:
     limit = since.timestamp() * 1000
-    return [e["version"] for e in lake.catalog.history() if "withdrawn" in e and e["timestamp"] >= limit]
+    for entry in lake.catalog.history():
+        if entry["timestamp"] < limit:
+            continue
+        if "withdrawn" in entry:
+            yield lake.catalog.rows(entry["version"] - 1)
+        if noted_hidden(entry):  # rows of a base, which may have left the table long ago
+            yield lake.table(lake.lineage().view(Slice(branch=entry["branch"], version=entry["version"] - 1)))
+        if "deleted" in entry:
+            yield lake.table(noted_view(entry))
 
 
 def _unreadable(error: FlagdataError, where: str) -> Finding:

@@ -14,8 +14,8 @@ from flagdata.checksums import content_hash, files_of
 from flagdata.errors import CorruptError, InputError, NotFoundError
 from flagdata.lake.artifact import OBJECT_NAME
 from flagdata.lake.durable import flush_file, flush_folder
+from flagdata.lake.layout import STORES, LinkError
 
-STORES = {"mcap": ".mcap", "zarr": ".zarr", "model": ".model"}
 _READ_ONLY = 0o444
 _ATTEMPTS = 5
 """How often an object is moved to its place while other writers publish the same one."""
@@ -103,12 +103,12 @@ class Objects:
         target = self.path(name)
         target.parent.mkdir(exist_ok=True)
         for attempt in range(_ATTEMPTS):
-            if target.exists():
+            if os.path.lexists(target):
                 if self.is_whole(name):
                     os.utime(target)
                     self.remove(staged)
                     return
-                if target.is_dir():
+                if target.is_dir() or target.is_symlink():
                     with suppress(FileNotFoundError):  # another writer has moved it away
                         target.rename(staged.with_name(f"damaged-{attempt}-{target.name}"))
             try:
@@ -121,34 +121,36 @@ class Objects:
 
     def is_whole(self, name: str) -> bool:
         """Whether the object is there and its content hashes to its name."""
-        path = self.path(name)
         try:
-            return path.exists() and content_hash(path) == name.partition("/")[2]
-        except InputError:
+            self.check(name)
+        except (NotFoundError, CorruptError):
             return False
+        return True
 
     def check(self, name: str) -> None:
         """Re-hash one object.
 
         Raises:
             NotFoundError: it is not there.
+            LinkError: it is, or holds, a link or special file.
             CorruptError: its bytes are not what its name says.
         """
         path = self.existing(name)
-        if not self.is_whole(name):
-            raise CorruptError(
-                f"the bytes of {name} have changed since they were written",
-                where=str(path),
-                fix="ingest the source again (it replaces the object), or restore it from a copy",
-            )
+        fix = "ingest the source again (it replaces the object), or restore it from a copy"
+        try:
+            whole = content_hash(path) == name.partition("/")[2]
+        except InputError:
+            raise LinkError(f"{name} is, or holds, a link or special file", where=str(path), fix=fix) from None
+        if not whole:
+            raise CorruptError(f"the bytes of {name} have changed since they were written", where=str(path), fix=fix)
 
     def __iter__(self) -> Iterator[StoredObject]:
-        """Everything in the stores that has an object's name."""
+        """Everything in the stores that has an object's name; a link counts for itself, not for what it leads to."""
         for store, suffix in STORES.items():
             for path in sorted((self.root / store).glob("*")):
                 name = f"{store}/{path.name.removesuffix(suffix)}"
                 if path.name.endswith(suffix) and OBJECT_NAME.fullmatch(name):
-                    yield StoredObject(name=name, path=path, size=size_of(path), modified=path.stat().st_mtime)
+                    yield StoredObject(name=name, path=path, size=bytes_at(path), modified=path.lstat().st_mtime)
 
     @staticmethod
     def remove(path: Path) -> None:
@@ -162,3 +164,9 @@ class Objects:
 def size_of(path: Path) -> int:
     """Bytes of a file, or of all files in a folder."""
     return sum(f.stat().st_size for f in files_of(path))
+
+
+def bytes_at(path: Path) -> int:
+    """Bytes of whatever lies at a path; a link counts for itself, not for what it leads to."""
+    inside = path.rglob("*") if path.is_dir() and not path.is_symlink() else ()
+    return sum(entry.lstat().st_size for entry in (path, *inside) if entry.is_symlink() or entry.is_file())

@@ -1,8 +1,9 @@
 """Tags and branches: small JSON files, put only if absent. Delta has neither.
 
 A view is what a ref shows: for each branch of its line, that branch's rows at one version of the table. A branch's
-view is its own rows at the head, and its parent's view at the version it forked from; so `main` may go on without the
-branch noticing. Every row names the branch it was committed on. A tag stores its whole view and stays what it was.
+view is its own rows at the head, and its parent's view at the version it forked from, without rows that were withdrawn
+from the branch; so `main` may go on without the branch noticing. Every row names the branch that it was committed on. A
+tag stores its whole view and stays what it was.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from flagdata.documents import from_json
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
-from flagdata.lake.durable import disk_errors, put_if_absent
+from flagdata.files import open_regular
+from flagdata.lake.durable import confirming, disk_errors, flush_folder, put_if_absent
 
 MAIN = "main"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
@@ -33,6 +36,16 @@ class Slice:
 
 
 View = tuple[Slice, ...]
+
+
+def as_json(view: View) -> list[dict[str, Any]]:
+    """The form in which a view is stored."""
+    return [{"branch": part.branch, "version": part.version} for part in view]
+
+
+def view_from(stored: Iterable[Mapping[str, Any]]) -> View:
+    """The view that `as_json` stored."""
+    return tuple(Slice(branch=part["branch"], version=int(part["version"])) for part in stored)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,8 +93,8 @@ class Refs:
         """All branches but `main`, by name."""
         return self._all("branches")
 
-    def put(self, kind: str, name: str, view: View) -> None:
-        """Create a tag or branch.
+    def put(self, kind: str, name: str, view: View) -> Ref:
+        """Create a tag or branch, and return it.
 
         Args:
             kind: "tags" or "branches".
@@ -91,11 +104,12 @@ class Refs:
         """
         check_name(name, noun=_NOUNS[kind])
         other = "branches" if kind == "tags" else "tags"
+        ref = Ref(name=name, created=datetime.now(UTC).isoformat(timespec="seconds"), view=view)
         content = {
             "schema": "flagdata.ref/1",
-            "name": name,
-            "created": datetime.now(UTC).isoformat(timespec="seconds"),
-            "view": [{"branch": s.branch, "version": s.version} for s in view],
+            "name": ref.name,
+            "created": ref.created,
+            "view": as_json(view),
         }
         path = self.root / kind / f"{name}.json"
         with disk_errors(f"creating the ref {name}", path):
@@ -106,6 +120,7 @@ class Refs:
                     where=str(path),
                     fix="choose another name; a tag never moves" if kind == "tags" else "choose another name",
                 )
+        return ref
 
     def view(self, branch: str, head: int) -> View:
         """What a branch shows when the table is at version `head`.
@@ -120,9 +135,16 @@ class Refs:
             raise _not_there("branch", branch, [MAIN, *known])
         return (Slice(branch=branch, version=head), *known[branch].view)
 
-    def scratch_files(self) -> list[Path]:
-        """What a process left that died while it made a ref."""
-        return sorted(self.root.glob("*/.*"))
+    def remove(self, kind: str, name: str) -> None:
+        """Take a tag or branch away; what is noted of it is the log's.
+
+        Raises:
+            OSError: what the disk refused.
+        """
+        path = self.root / kind / f"{name}.json"
+        path.unlink()
+        with confirming(f"the deletion of {name}", path):
+            flush_folder(path.parent)
 
     def _all(self, kind: str) -> dict[str, Ref]:
         return {path.stem: self._read(path) for path in sorted((self.root / kind).glob("[!.]*.json"))}
@@ -130,18 +152,24 @@ class Refs:
     @staticmethod
     def _read(path: Path) -> Ref:
         try:
-            content: dict[str, Any] = json.loads(path.read_text())
-            view = tuple(Slice(branch=s["branch"], version=int(s["version"])) for s in content["view"])
-            return Ref(name=content["name"], created=content["created"], view=view)
+            with open_regular(path) as stream:
+                content: dict[str, Any] = from_json(stream.read())
+            return Ref(name=content["name"], created=content["created"], view=view_from(content["view"]))
+        except OSError as error:
+            raise CorruptError(
+                f"the ref cannot be read: {error.strerror}",
+                where=str(path),
+                fix="give yourself read permission on it, or restore it from a copy",
+            ) from None
         except (ValueError, KeyError, TypeError):
             raise CorruptError("the ref cannot be read", where=str(path), fix="restore it from a copy") from None
 
 
-def resolve(refs: Refs, at: str | None, *, head: int, commits: Callable[[], Mapping[str, tuple[int, str]]]) -> View:
+def resolve(refs: Refs, at: str | None, *, head: int, commits: Callable[[], Mapping[str, View]]) -> View:
     """The view of a tag, branch, version number, or commit id; `None` is the head of main.
 
     Args:
-        commits: gives commit id → (version, branch); called only when `at` has the form of a commit id.
+        commits: gives commit id → what it shows; called only when `at` has the form of a commit id.
 
     Raises:
         NotFoundError: none of these, with the nearest name; or a version beyond the newest.
@@ -156,8 +184,7 @@ def resolve(refs: Refs, at: str | None, *, head: int, commits: Callable[[], Mapp
         known = commits()
         if at not in known:
             raise _not_there("commit", at, known)
-        version, branch = known[at]
-        return refs.view(branch, version)
+        return known[at]
     tags = refs.tags()
     if at in tags:
         return tags[at].view

@@ -1,22 +1,27 @@
-"""A transaction: objects put first, rows collected, one Delta append publishes them all or nothing."""
+"""A transaction: objects put first, rows collected, one Delta append publishes them all or nothing.
+
+Whoever asks what was published gets it from the transaction's result, which was complete before publication: a disk
+that refuses to be read afterwards changes no answer.
+"""
 
 from __future__ import annotations
 
 import secrets
 import shutil
 import uuid
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from flagdata.checksums import files_of
-from flagdata.errors import FlagdataError, NotFoundError, UsageError
+from flagdata.errors import ConflictError, FlagdataError, NotFoundError, UsageError
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Moved, persist
 from flagdata.lake.durable import disk_errors
@@ -37,12 +42,14 @@ class CommitResult:
         commit: commit id, `None` when there was nothing new.
         added: ids of rows it published, in order.
         existing: ids that were on the branch already, so nothing was published for them.
+        artifacts: all of these by id, as the branch has them; none of it is read after publication.
     """
 
     version: int
     commit: str | None
     added: tuple[str, ...]
     existing: tuple[str, ...]
+    artifacts: Mapping[str, Artifact] = field(default_factory=dict)
 
 
 class Transaction:
@@ -66,7 +73,7 @@ class Transaction:
             raise UsageError("the commit has no message", fix="say in a few words what it brings in")
         self.branch = branch
         self.message = message
-        self.result: CommitResult | None = None
+        self._result: CommitResult | None = None
         self._lake = lake
         self._known: frozenset[str] = frozenset()
         self._pending: dict[str, Artifact] = {}
@@ -75,7 +82,8 @@ class Transaction:
         self._held: Lease | None = None
 
     def __enter__(self) -> Transaction:
-        self._known = self._look()[1]
+        self._lake.check_writable()
+        self._known = _identities(self._look()[1])
         with disk_errors("starting a transaction", self._lake.staging):
             self._held = Lease(self._lake.staging)
         return self
@@ -92,6 +100,17 @@ class Transaction:
             with suppress(OSError, FlagdataError):  # what is left is a collection's
                 lease.close()
 
+    @property
+    def result(self) -> CommitResult:
+        """What it did.
+
+        Raises:
+            UsageError: its block has not ended, or was left by an exception.
+        """
+        if self._result is None:
+            raise UsageError("the transaction has not committed", fix="ask for its result after its with-block")
+        return self._result
+
     def _commit(self) -> None:
         """Publish; once that is done no error of the disk is one of this transaction.
 
@@ -100,9 +119,9 @@ class Transaction:
         """
         with disk_errors("committing", self._lake.catalog.path):
             try:
-                self.result = self._publish()
-            except OSError:
-                if self.result is None:
+                self._result = self._publish()
+            except (OSError, FlagdataError):
+                if self._result is None:
                     raise
 
     def staging(self, suffix: str) -> Path:
@@ -163,11 +182,10 @@ class Transaction:
             raise UsageError("the transaction is not open", fix="use it inside its with-block")
         return self._held
 
-    def _look(self) -> tuple[int, frozenset[str]]:
-        """The head, and the identities that the branch shows at it."""
+    def _look(self) -> tuple[int, pa.Table]:
+        """The head, and the rows that the branch shows at it."""
         head = self._lake.catalog.head()
-        shown = self._lake.table(self._lake.refs.view(self.branch, head))
-        return head, frozenset(shown["artifact"].to_pylist())
+        return head, self._lake.table(self._lake.refs.view(self.branch, head))
 
     def _publish(self) -> CommitResult:
         if self._pending and self._lake.catalog.is_due_for_tidying():
@@ -177,13 +195,21 @@ class Transaction:
         commit = f"c{secrets.token_hex(8)}"
 
         def attempt() -> CommitResult:
-            version, known = self._look()
-            fresh = [a for identity, a in self._pending.items() if identity not in known]
+            version, shown = self._look()
+            known = _identities(shown)
+            fresh = {i: replace(a, created=created) for i, a in self._pending.items() if i not in known}
             existing = (*self._existing, *(identity for identity in self._pending if identity in known))
+            if gone := [identity for identity in self._existing if identity not in known]:
+                raise ConflictError(
+                    f"{gone[0]} was withdrawn from branch {self.branch!r} meanwhile", where=str(self._lake.path),
+                    fix="do it again",
+                )  # fmt: skip
+            there = shown.filter(pc.field("artifact").isin(existing)).to_pylist() if existing else []
+            artifacts = {row["artifact"]: Artifact.from_row(row) for row in there} | fresh
             if not fresh:
-                return CommitResult(version=version, commit=None, added=(), existing=existing)
-            self._check_parents(fresh, known)
-            rows = pa.Table.from_pylist([{**a.row(), "created": created} for a in fresh], schema=catalog_schema())
+                return CommitResult(version=version, commit=None, added=(), existing=existing, artifacts=artifacts)
+            self._check_parents(fresh.values(), known)
+            rows = pa.Table.from_pylist([artifact.row() for artifact in fresh.values()], schema=catalog_schema())
             info = {
                 "commit": commit,
                 "message": self.message,
@@ -193,10 +219,10 @@ class Transaction:
             }
             with self._lease.keeping_collectors_out():
                 version = self._lake.catalog.append(rows, base=version, info=info)
-                self.result = CommitResult(
-                    version=version, commit=commit, added=tuple(a.id for a in fresh), existing=existing
+                self._result = CommitResult(
+                    version=version, commit=commit, added=tuple(fresh), existing=existing, artifacts=artifacts
                 )
-            return self.result
+            return self._result
 
         return persist(attempt, where=self._lake.catalog.path)
 
@@ -229,3 +255,7 @@ class Transaction:
         else:
             raise NotFoundError("there is no such file or folder", where=str(path), fix="write the object first")
         return inside
+
+
+def _identities(rows: pa.Table) -> frozenset[str]:
+    return frozenset(rows["artifact"].to_pylist())

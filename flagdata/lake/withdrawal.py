@@ -1,14 +1,27 @@
-"""Taking rows off a branch: what goes along by itself, and what has to be named."""
+"""Taking rows off a branch: what goes along by itself, and what has to be named.
+
+The branch's own rows leave the table; rows of its base, which its parent goes on to show, are hidden by a note of the
+commit, see `flagdata.lake.lineage`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import json
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from flagdata.errors import ConflictError, NotFoundError
-from flagdata.schema import Kind
+from flagdata.lake.catalog import persist
+from flagdata.lake.durable import disk_errors
+from flagdata.lake.leases import keeping_collectors_out
+from flagdata.schema import Kind, catalog_schema
+
+if TYPE_CHECKING:
+    from flagdata.lake.lake import Lake
 
 _COLUMNS = ["artifact", "branch", "kind", "name", "object", "parents"]
 
@@ -26,6 +39,53 @@ class Withdrawal:
     version: int
     asked: tuple[str, ...]
     clips: tuple[str, ...]
+
+
+def withdraw(lake: Lake, artifacts: Collection[str], message: str, *, branch: str) -> Withdrawal:
+    """See `Lake.withdraw`."""
+    asked = frozenset(artifacts)
+
+    def attempt() -> Withdrawal:
+        head = lake.catalog.head()
+        shown = lake.table(lake.refs.view(branch, head))
+        clips = clips_of(shown, asked)
+        leaving = asked | clips
+        check_leaving(shown, leaving, branch=branch, where=str(lake.path))
+        info = {"message": message, "branch": branch, "withdrawn": str(len(leaving))}
+        version = take_off(lake, leaving, branch=branch, base=head, info=info)
+        return Withdrawal(version=version, asked=tuple(sorted(asked)), clips=tuple(sorted(clips)))
+
+    lake.check_writable()
+    with disk_errors("withdrawing", lake.path), keeping_collectors_out(lake.staging):
+        return persist(attempt, where=lake.catalog.path)
+
+
+def take_off(
+    lake: Lake,
+    leaving: Collection[str],
+    *,
+    branch: str,
+    base: int,
+    info: Mapping[str, str],
+    fresh: pa.Table | None = None,
+) -> int:
+    """Commit that a branch does not show the rows `leaving` any more; its version.
+
+    Args:
+        fresh: rows that the same commit adds.
+
+    Raises:
+        Moved: `base` is no longer the newest version; nothing was published.
+    """
+    rows = lake.catalog.rows(base)
+    going = (pc.field("branch") == branch) & pc.field("artifact").isin(pa.array(sorted(leaving), pa.string()))
+    own = rows.filter(going)["artifact"].to_pylist()
+    hidden = sorted(set(leaving) - set(own))
+    fresh = catalog_schema().empty_table() if fresh is None else fresh
+    noted = {**info, "hidden": json.dumps(hidden)} if hidden else info
+    if not own:
+        return lake.catalog.append(fresh, base=base, info=noted)
+    return lake.catalog.replace(pa.concat_tables([rows.filter(~going), fresh]), base=base, info=noted)
 
 
 def clips_of(shown: pa.Table, artifacts: Collection[str]) -> frozenset[str]:
@@ -57,16 +117,16 @@ def check_leaving(shown: pa.Table, leaving: Collection[str], *, branch: str, whe
     """Whether the rows `leaving` can go.
 
     Raises:
-        NotFoundError: one that was not committed on this branch itself (but maybe on its parent).
+        NotFoundError: one that the branch does not show.
         ConflictError: a row that stays on the branch was made from one of them.
     """
     rows = shown.select(_COLUMNS).to_pylist()
-    foreign = set(leaving) - {row["artifact"] for row in rows if row["branch"] == branch}
+    foreign = set(leaving) - {row["artifact"] for row in rows}
     if foreign:
         raise NotFoundError(
-            f"{', '.join(sorted(foreign))} was not committed on branch {branch!r}",
+            f"{', '.join(sorted(foreign))} is not on branch {branch!r}",
             where=where,
-            fix="give full ids of rows that flagdata ls shows with this branch",
+            fix=f"give ids of rows that flagdata ls --at {branch} shows",
         )
     staying = [r for r in rows if r["artifact"] not in leaving and set(leaving).intersection(r["parents"])]
     if staying:

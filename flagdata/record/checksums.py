@@ -79,7 +79,7 @@ class Checksums:
                 raise ValueError(f"they are of {document['schema']!r}, which this version does not know")
             channels = {topic: _channel(entry) for topic, entry in document["channels"].items()}
             metadata = {name: int(value) for name, value in document["metadata"].items()}
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise CorruptError(f"the record's checksums cannot be read: {error}", where=where, fix=FIX) from None
         return cls(channels=channels, metadata=metadata)
 

@@ -21,5 +21,5 @@ def open_parent(lake: Lake, name: str) -> Record:
     """
     record = Record.open(lake.object_path(name))
     if not record.has_checksums:
-        lake.objects.check(name)
+        lake.whole_object(name)
     return record

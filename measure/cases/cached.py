@@ -1,12 +1,14 @@
 """Intermediate results on disk, named by a hash of all that went in: a study that was interrupted goes on from there.
 
-What went in includes the source of the modules that computed it: a changed method never meets old results.
+What went in includes the source of the modules that computed it: a changed method never meets old results. Each file
+ends with its checksum; a damaged one is computed anew, with a warning.
 """
 
 from __future__ import annotations
 
-import os
+import logging
 from collections.abc import Callable, Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,7 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.checksums import is_sealed, sealed
+from flagdata.outputs import rewrite
 from flagdata.provenance import file_hash, recipe_hash
+
+_LOG = logging.getLogger("flagdata")
 
 
 def cached(
@@ -35,12 +41,15 @@ def cached(
     source = {module.__name__: file_hash(Path(module.__file__ or "")) for module in method}
     target = folder / f"{recipe_hash({'inputs': dict(inputs), 'source': source})[:20]}.npz"
     if target.is_file():
-        with np.load(target) as stored:
-            return {name: stored[name] for name in stored.files}
+        if is_sealed(target):
+            with np.load(target) as stored:
+                return {name: stored[name] for name in stored.files}
+        _LOG.warning(
+            "flagdata: warning: an intermediate result is damaged, or of an older version; it is computed anew"
+            "\n  where: %s", target,
+        )  # fmt: skip
     arrays = make()
-    folder.mkdir(parents=True, exist_ok=True)
-    unfinished = target.with_suffix(f".{os.getpid()}.partial")
-    with unfinished.open("wb") as stream:
-        np.savez_compressed(stream, **arrays)  # pyright: ignore[reportArgumentType]
-    unfinished.replace(target)
+    buffer = BytesIO()
+    np.savez_compressed(buffer, **arrays)  # pyright: ignore[reportArgumentType]
+    rewrite(target, sealed(buffer.getvalue()))
     return arrays

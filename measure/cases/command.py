@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
@@ -28,20 +27,16 @@ def case(name: str, data: Path, out: Path, as_json: bool) -> None:
     from measure.cases.verdict import judge
 
     chosen = load_case(name)
+    page.check(out)
     keep = out / "kept"
     with progress(len(chosen.clips), label="tracking", unit="clip") as advance:
         seen = observe(chosen, data, keep=keep, advance=advance)
     with progress(strips(chosen), label="simulating", unit="strip") as advance:
         found = study(chosen, seen, keep=keep, advance=advance)
     verdict = judge(chosen, seen, found)
-    out.mkdir(parents=True, exist_ok=True)
-    content = page.as_json(chosen, seen, found, verdict)
-    (out / "result.json").write_text(
-        json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8"
-    )
-    target = page.write_page(out, case=chosen, seen=seen, study=found, verdict=verdict)
+    target = page.write(out, case=chosen, seen=seen, study=found, verdict=verdict)
     if as_json:
-        document("case", {**content, "page": str(target)})
+        document("case", {**page.as_json(chosen, seen, found, verdict), "page": str(target)})
     else:
         table(("", ""), page.summary(found, verdict).items())
     say(f"Open {target}")

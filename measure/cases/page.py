@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from flagdata.outputs import check_files, write_files
 from flagdata.provenance import code_version
 from measure.cases import plots
 from measure.cases.candidates import Candidate, Shear
@@ -21,23 +23,33 @@ from measure.cases.verdict import Verdict
 from measure.cases.words import ledger, verdict_words
 from measure.pages.render import data_url, render
 
+_PAGE, _RESULT = "index.html", "result.json"
+_PICTURES = ("lines", "along", "lengths", "speeds", "plane")
+_COMMAND = "case"
 
-def write_page(folder: Path, *, case: Case, seen: Observations, study: Study, verdict: Verdict) -> Path:
-    """Write `index.html` and its pictures into `folder`; returns the page's path."""
-    figures = {
-        "lines": plots.lines(case, _whole_held_out(case, seen), study),
-        "along": plots.along(seen, study, case),
-        "lengths": plots.lengths(case, seen, study),
-        "speeds": plots.speeds(case, seen, study),
-        "plane": plots.plane(case, seen, study.tables[Candidate.REACTIVE]),
-    }
-    images = {}
-    for name, figure in figures.items():
-        picture = plots.png(figure)
-        (folder / f"{name}.png").write_bytes(picture)
-        images[name] = data_url(picture, "image/png")
+
+def check(folder: Path) -> None:
+    """Refuse a folder in which `write` cannot write, before anything is studied; raises as `write`."""
+    check_files(folder, *(f"{name}.png" for name in _PICTURES), _PAGE, _RESULT, command=_COMMAND)
+
+
+def write(folder: Path, *, case: Case, seen: Observations, study: Study, verdict: Verdict) -> Path:
+    """Write `index.html`, its pictures and `result.json` into `folder`, which is made; returns the page's path.
+
+    Raises:
+        ConflictError: one of them is there and was not written by a case, or was changed since.
+    """
+    figures = (
+        plots.lines(case, _whole_held_out(case, seen), study),
+        plots.along(seen, study, case),
+        plots.lengths(case, seen, study),
+        plots.speeds(case, seen, study),
+        plots.plane(case, seen, study.tables[Candidate.REACTIVE]),
+    )
+    pictures = {name: plots.png(figure) for name, figure in zip(_PICTURES, figures, strict=True)}
     values = {
-        "case": case, "verdict": verdict, "words": verdict_words(seen, study, verdict), "images": images,
+        "case": case, "verdict": verdict, "words": verdict_words(seen, study, verdict),
+        "images": {name: data_url(picture, "image/png") for name, picture in pictures.items()},
         "clips": [_clip_row(clip, case) for clip in seen.clips],
         "stretches": [(c.spec.name, c.stretch) for c in seen.clips if c.stretch is not None], "far": _far(case, seen),
         "declared": [_declared_row(cell) for cell in study.declared],
@@ -50,9 +62,11 @@ def write_page(folder: Path, *, case: Case, seen: Observations, study: Study, ve
         "floor": {kind.value: 100 * value for kind, value in study.floor.items()}, "ledger": ledger(study, verdict),
         "version": f"flagdata {code_version()}",
     }  # fmt: skip
-    target = folder / "index.html"
-    target.write_text(render("measure.cases", "page.html.j2", values), encoding="utf-8")
-    return target
+    content = json.dumps(as_json(case, seen, study, verdict), indent=2, allow_nan=False, ensure_ascii=False)
+    files: dict[str, str | bytes | None] = {f"{name}.png": picture for name, picture in pictures.items()}
+    files |= {_RESULT: content + "\n", _PAGE: render("measure.cases", "page.html.j2", values)}
+    write_files(folder, files, command=_COMMAND)
+    return folder / _PAGE
 
 
 def as_json(case: Case, seen: Observations, study: Study, verdict: Verdict) -> dict[str, Any]:

@@ -136,7 +136,7 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
 @challenge.command()
 @_FOLDER
 @_ONLY
-@click.option("--out", type=LocalPath(), help="Path to which the sheet is also written, as .json, .md and .png.")
+@click.option("--out", type=LocalPath(), help="Folder to which the sheet is also written, as .json, .md and .png.")
 @click.option(
     "--history", type=LocalPath(), metavar="FILE.csv",
     help="File of all graded challenges, to which this one is added under its folder's name.",
@@ -163,6 +163,8 @@ def score(
 
     target, oracle = ChallengeFolder(folder), true_model if against == "oracle" else None
     name = folder.resolve().name
+    if out is not None:
+        sheets.check(out)
     before = [] if history is None else histories.without(history, name)  # refused before any key is opened
     with progress(len(target.chosen(only)), label="grading", unit="set") as advance:
         sheet = score_challenge(target, only=only, oracle=oracle, progress=advance)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from flagdata.documents import read_json
 from flagdata.errors import ConflictError, CorruptError, RefusedError
+from flagdata.outputs import rewrite
 from flagdata.provenance import file_hash
 from measure.challenge.folder import ChallengeFolder, write_json
 from measure.verdict.record import Verdict
@@ -62,7 +63,7 @@ def file(folder: ChallengeFolder, filing: Filing) -> None:
             fix="make a new challenge: a verdict is given once",
         )  # fmt: skip
     digest = write_json(folder.verdict(filing.name), filing.as_dict())
-    folder.verdict_hash(filing.name).write_text(digest + "\n", encoding="utf-8")
+    rewrite(folder.verdict_hash(filing.name), digest + "\n")
 
 
 def filed(folder: ChallengeFolder, name: str) -> bool:
@@ -86,7 +87,7 @@ def read(folder: ChallengeFolder, name: str) -> Filing:
     kept = opened(folder).get(name, found)
     if folder.verdict_hash(name).read_text(encoding="utf-8").strip() != found or kept != found:
         raise CorruptError("the verdict is not as it was filed", where=str(path), fix="restore it; nothing is scored")
-    content = json.loads(path.read_text(encoding="utf-8"))
+    content = read_json(path, noun="verdict")
     filing = Filing(**{key: value for key, value in content.items() if key != "schema"})
     if filing.name != name or filing.data != folder.manifest()["sets"][name]["data"]:
         raise CorruptError("the verdict is about other data", where=str(path), fix="restore it; nothing is scored")
@@ -97,7 +98,7 @@ def opened(folder: ChallengeFolder) -> Mapping[str, str]:
     """Set → hash of its verdict when its key was opened."""
     if not folder.opened.is_file():
         return {}
-    return json.loads(folder.opened.read_text(encoding="utf-8"))["verdicts"]
+    return read_json(folder.opened, noun="record of openings")["verdicts"]
 
 
 def note_opening(folder: ChallengeFolder, names: list[str]) -> None:

@@ -10,7 +10,6 @@ opened.json               once the keys were opened: hashes of the verdicts that
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,8 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import ConflictError, CorruptError, InputError, NotFoundError, UnknownNameError
-from flagdata.files import write_text
+from flagdata.documents import read_json
+from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownNameError
+from flagdata.outputs import rewrite
 from flagdata.provenance import canonical, digest, file_hash
 from measure.observe.anchors import as_seen
 from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
@@ -76,6 +76,7 @@ class ChallengeFolder:
 
         Raises:
             NotFoundError: no challenge there.
+            CorruptError: it is no JSON.
         """
         if not self.public.is_file():
             raise NotFoundError(
@@ -83,7 +84,7 @@ class ChallengeFolder:
                 where=str(self.path),
                 fix="check the path, or make one: `flagdata challenge make`",
             )
-        return json.loads(self.public.read_text(encoding="utf-8"))
+        return read_json(self.public, noun="challenge")
 
     def names(self) -> list[str]:
         """Names of the sets, sorted."""
@@ -111,10 +112,7 @@ class ChallengeFolder:
         path = self.sealed(name)
         if not path.is_file():
             raise NotFoundError("no sealed key", where=str(path), fix="bring it from where the challenge was made")
-        try:
-            return json.loads(path.read_text(encoding="utf-8"))
-        except ValueError as error:
-            raise CorruptError(f"not a sealed key: {error}", where=str(path), fix="restore the file") from error
+        return read_json(path, noun="sealed key")
 
     def checked(self, name: str) -> None:
         """Make sure that a set's data are those that were published.
@@ -146,20 +144,8 @@ def data_hash(folder: Path) -> str:
 def write_json(path: Path, content: Mapping[str, Any]) -> str:
     """Write canonical JSON so that a reader sees all of it or nothing; its SHA-256."""
     text = canonical(content) + "\n"
-    write_text(path, text)
+    rewrite(path, text)
     return digest(text)
-
-
-def fresh(path: Path) -> ChallengeFolder:
-    """An empty folder for a new challenge.
-
-    Raises:
-        ConflictError: something is there.
-    """
-    if path.exists() and (not path.is_dir() or any(path.iterdir())):
-        raise ConflictError("the folder is not empty", where=str(path), fix="name one that is not there yet")
-    path.mkdir(parents=True, exist_ok=True)
-    return ChallengeFolder(path)
 
 
 def write_set(
@@ -186,7 +172,7 @@ def read_set(folder: Path) -> Experiment:
     if not (folder / "set.json").is_file():
         raise NotFoundError("no set.json", where=str(folder), fix="name the folder of a set")
     try:
-        about = json.loads((folder / "set.json").read_text(encoding="utf-8"))
+        about = read_json(folder / "set.json", noun="set")
         flag = about["flag"]
         mesh = grid(width=flag["width"], height=flag["height"], columns=MODEL_COLUMNS, rows=MODEL_ROWS)
         markers = np.load(folder / "markers.npy")
@@ -203,6 +189,6 @@ def read_set(folder: Path) -> Experiment:
             )
             for entry in about["recordings"]
         )  # fmt: skip
-    except (KeyError, ValueError, OSError) as error:
+    except (KeyError, ValueError, OSError, EOFError) as error:
         raise InputError(f"not a set: {error!r}", where=str(folder), fix="restore the folder as it was made") from error
     return Experiment(specimen=as_seen(specimen, recordings), recordings=recordings)

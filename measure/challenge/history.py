@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.errors import ConflictError, CorruptError
-from flagdata.files import write_text
+from flagdata.outputs import check_rewrite, rewrite
 
 KEYS = ("challenge", "title", "code_version", "criteria", "sets")
 """Columns before the shares: the folder's name, its title, the grader's code, hashes of the verdicts' criteria divided
@@ -50,7 +50,9 @@ def without(path: Path, name: str) -> list[dict[str, str]]:
     Raises:
         ConflictError: it is: a challenge is graded once.
         CorruptError: see `rows`.
+        InputError: the file cannot be written.
     """
+    check_rewrite(path)
     known = rows(path)
     if any(one["challenge"] == name for one in known):
         fix = "keep the history as it is, or give the challenge's folder another name"
@@ -65,7 +67,7 @@ def write(path: Path, entries: list[dict[str, str]]) -> None:
     writer = csv.DictWriter(stream, list(columns), restval="", lineterminator="\n")
     writer.writeheader()
     writer.writerows(entries)
-    write_text(path, stream.getvalue())
+    rewrite(path, stream.getvalue())
 
 
 def _told(share: Mapping[str, Any]) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.outputs import fresh_folder
 from flagdata.provenance import code_version
 from flagdata.rng import stream
 from measure.challenge import folder as files
@@ -38,7 +39,7 @@ def make(
     workers: int = 1,
     progress: Callable[[int], object] | None = None,
 ) -> ChallengeFolder:
-    """A challenge in a new folder; the same recipe and seed give the same bytes on one machine.
+    """A challenge in a new folder, which appears whole; the same recipe and seed give the same bytes on one machine.
 
     Args:
         count: of sets.
@@ -46,10 +47,23 @@ def make(
         progress: called with the number of sets that were written.
 
     Raises:
-        ConflictError: the folder is not empty.
+        ConflictError: something is there.
         FlagdataError: a flag diverged, with weak effects too.
     """
-    target = files.fresh(path)
+    with fresh_folder(path) as scratch:
+        _make(ChallengeFolder(scratch), recipe, seed=seed, count=count, workers=workers, progress=progress)
+    return ChallengeFolder(path)
+
+
+def _make(
+    target: ChallengeFolder,
+    recipe: ChallengeRecipe,
+    *,
+    seed: int,
+    count: int,
+    workers: int,
+    progress: Callable[[int], object] | None,
+) -> None:
     keys = draw(recipe, seed=seed, count=count)
     entries: dict[str, Any] = {}
 
@@ -76,7 +90,6 @@ def make(
             "sets": {name: entries[name] for name in sorted(entries)},
         },
     )  # fmt: skip
-    return target
 
 
 def _write(target: ChallengeFolder, recipe: ChallengeRecipe, seed: int, key: Key, flight: Flight) -> dict[str, str]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
+from flagdata.documents import read_json
 from flagdata.errors import ConflictError, InputError
+from flagdata.outputs import check_folder
 from flagdata.provenance import code_version, recipe_hash
 from flagdata.rng import child_seed, stream
 from measure.challenge.folder import HEIGHT, MODEL_COLUMNS, MODEL_ROWS, write_json
@@ -67,14 +68,15 @@ def claim(folder: Path, recipe: ChallengeRecipe, *, seed: int) -> None:
     """Note what the nulls of a folder are made from, so that a build that was stopped goes on with the same.
 
     Raises:
-        ConflictError: the folder's are of another recipe or seed.
+        ConflictError: the folder's are of another recipe or seed, or the folder holds something else.
     """
     made = {"recipe": recipe_hash(asdict(recipe)), "title": recipe.title, "seed": seed}
     path = folder / "bank.json"
     if not path.exists():
+        check_folder(folder)
         write_json(path, {**made, "code": code_version()})
         return
-    noted = json.loads(path.read_text(encoding="utf-8"))
+    noted = read_json(path, noun="note of what the nulls are made from")
     for key in ("title", "recipe", "seed"):
         if noted.get(key) != made[key]:
             raise ConflictError(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -10,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flagdata.markdown import plain
+from flagdata.outputs import check_files, write_files
 from flagdata.provenance import code_version
 from measure.challenge.classes import class_of
-from measure.challenge.folder import write_json
 from measure.challenge.rates import Power
 from measure.challenge.recipe import Kind
 from measure.challenge.score import ENOUGH, Sheet
@@ -23,6 +26,8 @@ if TYPE_CHECKING:
     from measure.challenge.outcome import Outcome
 
 _MILLI = 1e3
+_FILES = ("challenge-score.json", "challenge-score.md", "challenge-score.png")
+_COMMAND = "challenge score"
 
 
 def as_dict(sheet: Sheet) -> dict[str, Any]:
@@ -67,17 +72,17 @@ def confusion(sheet: Sheet) -> dict[str, dict[str, int]]:
 def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
     """The sheet for people."""
     count = len(sheet.outcomes)
-    parts = [f"# Score: {sheet.title}", "", f"{count} sets: " + ", ".join(
+    parts = [f"# Score: {plain(sheet.title)}", "", f"{count} sets: " + ", ".join(
         f"{len(sheet.of_kind(kind))} {kind.value}" for kind in Kind) + f". Code {code_version()}.", ""]  # fmt: skip
     parts += ["| gate | value | wanted | met |", "|---|---|---|---|"]
     for gate in sheet.gates:
         sign = "≤" if gate.at_most else "≥"
         met = "yes" if gate.met else "no"
-        parts.append(f"| {gate.name} | {_number(gate.value)} | {sign} {gate.wanted:g} | {met} |")
+        parts.append(f"| {plain(gate.name)} | {_number(gate.value)} | {sign} {gate.wanted:g} | {met} |")
     parts += ["", "| share | of | value | Clopper–Pearson 90 % |", "|---|---|---|---|"]
     for name, share in sheet.shares.items():
         bounds = f"[{share.low:.2f}, {share.high:.2f}]"
-        parts.append(f"| {name} | {share.hits}/{share.count} | {_number(share.value)} | {bounds} |")
+        parts.append(f"| {plain(name)} | {share.hits}/{share.count} | {_number(share.value)} | {bounds} |")
     levels = ", ".join(f"{100 * level:g} %" for level in sheet.coefficients.levels)
     if levels:
         parts += ["", f"The true strengths are to lie in intervals stated at {levels}."]
@@ -99,11 +104,14 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
     parts += _half_rows("frames a second", sheet.by_rate, Counter(str(o.key.rate) for o in acted))
     parts += ["", "| effect | half detected at | unit |", "|---|---|---|"]
     for effect, half in sheet.half_strengths.items():
-        parts.append(f"| {effect} | {_digits(half.value)} [{_digits(half.low)}, {_digits(half.high)}] | {half.unit} |")
+        bounds = f"{_digits(half.value)} [{_digits(half.low)}, {_digits(half.high)}]"
+        parts.append(f"| {plain(effect)} | {bounds} | {plain(half.unit)} |")
     if picture is not None:
         parts += ["", f"![Power curves]({picture})"]
     parts += ["", "| true | said | sets |", "|---|---|---|"]
-    parts += [f"| {true} | {said} | {n} |" for true, row in confusion(sheet).items() for said, n in row.items()]
+    parts += [
+        f"| {plain(true)} | {plain(said)} | {n} |" for true, row in confusion(sheet).items() for said, n in row.items()
+    ]
     parts += ["", "| set | true | impact, mm | noise, mm | rate | numerics | said | E_red | control gap | s |",
               "|---|---|---|---|---|---|---|---|---|---|"]  # fmt: skip
     for o in sheet.outcomes:
@@ -111,22 +119,30 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
             o.key.name, _truth(o, strengths=True), f"{_MILLI * o.key.impact:.2g}", f"{_MILLI * o.key.noise:g}",
             str(o.key.rate), o.key.numerics, _said(o), _number(o.reduction), _number(o.control_gap), f"{o.seconds:.0f}",
         )  # fmt: skip
-        parts.append("| " + " | ".join(cells) + " |")
+        parts.append("| " + " | ".join(plain(cell) for cell in cells) + " |")
     return "\n".join(parts) + "\n"
 
 
 def write(sheet: Sheet, folder: Path) -> tuple[Path, ...]:
-    """challenge-score.json, .md and .png into a folder; their paths."""
-    folder.mkdir(parents=True, exist_ok=True)
-    document, page, picture = (folder / f"challenge-score.{ending}" for ending in ("json", "md", "png"))
-    write_json(document, as_dict(sheet))
-    plot(sheet, picture)
-    page.write_text(markdown(sheet, picture=picture.name), encoding="utf-8")
-    return document, page, picture
+    """challenge-score.json, .md and .png into a folder, which is made; their paths.
+
+    Raises:
+        ConflictError: one of them is there and was not written by a score, or was changed since.
+    """
+    document, page, picture = _FILES
+    content = json.dumps(as_dict(sheet), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False) + "\n"
+    files = {document: content, page: markdown(sheet, picture=picture), picture: plot(sheet)}
+    write_files(folder, files, command=_COMMAND)
+    return tuple(folder / name for name in _FILES)
 
 
-def plot(sheet: Sheet, path: Path) -> None:
-    """Power curves by class, noise and frame rate; cases above (detected) and below (not)."""
+def check(folder: Path) -> None:
+    """Refuse a folder in which `write` cannot write, before any key is opened; raises as `write`."""
+    check_files(folder, *_FILES, command=_COMMAND)
+
+
+def plot(sheet: Sheet) -> bytes:
+    """PNG of power curves by class, noise and frame rate; cases above (detected) and below (not)."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13, 5.0), layout="constrained")
@@ -139,7 +155,9 @@ def plot(sheet: Sheet, path: Path) -> None:
     )
     _panel(panels[2], "any effect, by frames a second", sheet.by_rate, [(str(o.key.rate), o) for o in acted])
     panels[0].set_ylabel("chance of detection")
-    figure.savefig(path, dpi=110, metadata={"Software": None})
+    picture = io.BytesIO()
+    figure.savefig(picture, format="png", dpi=110, metadata={"Software": None})
+    return picture.getvalue()
 
 
 def _panel(axes: Axes, title: str, power: Power | None, cases: Sequence[tuple[str, Outcome]]) -> None:
@@ -173,7 +191,7 @@ def _half_rows(what: str, power: Power | None, counts: Counter[str]) -> list[str
 
 def _half_row(group: str, bounds: tuple[float, float, float], count: str) -> str:
     half, low, high = (_digits(_MILLI * value) for value in bounds)
-    return f"| {group} | {half} [{low}, {high}] mm | {count} |"
+    return f"| {plain(group)} | {half} [{low}, {high}] mm | {count} |"
 
 
 def _curve(power: Power | None) -> dict[str, Any] | None:

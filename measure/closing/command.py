@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
 _OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "accept", "rate", "unit", "noise", "up")
 """Options that say how sources of the command line are read."""
 
+
+_FILES = ("report.html", "verdict.json", "base.toml", "model.toml")
+"""What is written; the last one only where an effect was found."""
 
 _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
 """Kinds of findings that look like an effect."""
@@ -141,6 +145,7 @@ def close_loop(
       flagdata close-loop --recipe flag.toml --lake lake
     """
     from flagdata.lake import Lake
+    from flagdata.outputs import check_files
     from measure.closing.artifacts import Closed, keep
     from measure.closing.close import close_loop as close
     from measure.closing.models import models
@@ -154,7 +159,10 @@ def close_loop(
         _refuse_beside(context, sources)
     elif not sources:
         raise UsageError("no recordings", where="SOURCE", fix="name them, or a recipe that does")
+    check_files(out, *_FILES, command="close-loop")
     lake = None if lake_path is None else Lake.open(lake_path)
+    if lake is not None:
+        lake.check_writable()
     said = said_of_nulls(recipe, level=level, nulls=nulls, bank=bank)
     options = Options(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)), **said)
     setup = _setup(Setup() if recipe is None else recipe.setup, material, density_uncertainty, size, pins)
@@ -181,16 +189,14 @@ def close_loop(
 
 
 def _write(out: Path, closed: Closed) -> None:
+    from flagdata.outputs import write_files
     from measure.closing import toml
     from measure.report.document import as_document
-    from measure.report.page import write_page
+    from measure.report.page import page
 
-    out.mkdir(parents=True, exist_ok=True)
-    write_page(closed.verdict, out / "report.html")
     content = json.dumps(as_document(closed.verdict), indent=1, allow_nan=False)
-    (out / "verdict.json").write_text(content + "\n", encoding="utf-8")
-    for file, model in zip(("base.toml", "model.toml"), closed.models, strict=False):
-        (out / file).write_text(toml.dumps(model.content), encoding="utf-8")
+    texts = [page(closed.verdict), content + "\n", *(toml.dumps(model.content) for model in closed.models)]
+    write_files(out, dict(zip_longest(_FILES, texts)), command="close-loop")
 
 
 def _tell(closed: Closed, kept: Kept | None, out: Path, *, as_json: bool) -> None:
@@ -213,7 +219,7 @@ def _tell(closed: Closed, kept: Kept | None, out: Path, *, as_json: bool) -> Non
         say(f"measurement {kept.measurement}")
         for model, identity in zip(closed.models, kept.models, strict=True):
             say(f"model {identity} {model.name}")
-    files = ["report.html", "verdict.json", "base.toml", "model.toml"][: 2 + len(closed.models)]
+    files = _FILES[: 2 + len(closed.models)]
     say(f"wrote {', '.join(str(out / file) for file in files)}")
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
-import shutil
 import subprocess
 import sys
 import time
@@ -16,9 +16,13 @@ from typing import Any
 import click
 
 from flagdata.console import LocalPath, progress, say
-from flagdata.errors import ConflictError, FlagdataError
+from flagdata.errors import FlagdataError
 
-_MARK = ".flagdata-demo"
+SHORTEST = 3.0
+"""Length of the shortest video [min]: camera and log must share two minutes, and the log has a gap and a reading that
+sticks."""
+SCHEMA = "flagdata.demo/1"
+"""Of its folder's manifest."""
 
 
 class Part(StrEnum):
@@ -55,10 +59,13 @@ class Transcript:
         )
         if done.returncode:
             raise FlagdataError(
-                f"`{typed}` ended with {done.returncode}", where=str(self.folder), fix="see its message above"
+                f"`{typed}` ended with {done.returncode}", where="the demonstration", fix="see its message above"
             )
-        self.entries.append((typed, done.stdout))
-        return done.stdout
+        printed = done.stdout.replace(
+            f"{self.folder.absolute()}{os.sep}", ""
+        )  # a folder that is named when it is whole
+        self.entries.append((typed, printed))
+        return printed
 
     def show(self, *arguments: str) -> str:
         """`run`, and its stdout printed for the person who watches."""
@@ -80,11 +87,16 @@ class Transcript:
     type=LocalPath(),
     default=Path("out/demo"),
     show_default=True,
-    help="Folder for the pages and the data; one that an earlier demonstration made is replaced.",
+    help="Folder for the pages and the data. What an earlier demonstration wrote there is replaced, unless it was "
+    "changed or anything else lies beside it.",
 )
 @click.option("--seed", type=click.IntRange(min=0), default=2026, show_default=True, help="Seed of all that is random.")
 @click.option(
-    "--minutes", type=click.FloatRange(2, 120), default=10.0, show_default=True, help="Length of the video it makes."
+    "--minutes",
+    type=click.FloatRange(SHORTEST, 120),
+    default=10.0,
+    show_default=True,
+    help="Length of the video it makes.",
 )
 @click.option(
     "--part",
@@ -94,16 +106,22 @@ class Transcript:
     help="What to show.",
 )
 def demo(out: Path, seed: int, minutes: float, part: str) -> None:
-    """Make a small field recording and a tracked flag, and take them through everything, to pages to open."""
-    _fresh(out)
-    shell = Transcript(folder=out)
-    shell.show("init", "lake")
-    pages: list[Path] = []
-    if part != Part.LOOP:
-        pages.append(_field(shell, seed, minutes))
-    if part != Part.FIELD:
-        pages.append(_loop(shell, seed))
-    say("\nOpen " + " and ".join(str(page) for page in pages))
+    """Make a small field recording and a tracked flag, and take them through everything, to pages to open.
+
+    The folder appears with the last of its files; its manifest.json lists them all. Running the demonstration again
+    removes exactly what is listed there and is as it was written.
+    """
+    from flagdata.outputs import fresh_folder
+
+    with fresh_folder(out, schema=SCHEMA) as scratch:
+        shell = Transcript(folder=scratch)
+        shell.show("init", "lake")
+        pages: list[Path] = []
+        if part != Part.LOOP:
+            pages.append(_field(shell, seed, minutes))
+        if part != Part.FIELD:
+            pages.append(_loop(shell, seed))
+    say("\nOpen " + " and ".join(str(out / page.relative_to(scratch)) for page in pages))
 
 
 def _field(shell: Transcript, seed: int, minutes: float) -> Path:
@@ -151,17 +169,3 @@ def _loop(shell: Transcript, seed: int) -> Path:
     unit = "" if made.unit == "1" else f" {made.unit}"
     say(f"\nWhat acted was {made.effect}, {made.parameter} {made.strength:g}{unit}.")
     return shell.folder / "loop" / "report.html"
-
-
-def _fresh(folder: Path) -> None:
-    """An empty folder, replacing only what an earlier demonstration left."""
-    if folder.exists() and any(folder.iterdir()):
-        if not (folder / _MARK).exists():
-            raise ConflictError(
-                "the folder is not empty and was not made by a demonstration",
-                where=str(folder),
-                fix="name another one by --out",
-            )
-        shutil.rmtree(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / _MARK).touch()

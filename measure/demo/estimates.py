@@ -43,17 +43,18 @@ class Series:
     def sentence(self) -> str:
         """What is to be thought of it, in words."""
         verdict = self.measured.verdict
-        strange, count = int(verdict.strange.sum()), len(self.measured.windows)
+        strange, count = int(verdict.strange.sum()), len(verdict.window_p)
         compared = self.beside.window
         known = (
             f"The model {self.measured.model!r} was trained on simulated flags; this one is drawn by plain formulas, "
             "and moves faster in stronger wind, but not as cloth does: its readings can follow the wind, not meet it."
         )
-        if compared is not None:
+        if compared is not None and compared.bias is not None and compared.interval is not None:
+            low, high = compared.interval
             known += (
                 f" Beside the anemometer over the same windows they are {_apart(compared.bias)} (root mean square "
-                f"{compared.rmse:.1f} m/s [{compared.interval[0]:.1f}, {compared.interval[1]:.1f}] 90 %, "
-                f"n = {compared.count} windows){_together(self.beside)}."
+                f"{compared.rmse:.1f} m/s [{low:.1f}, {high:.1f}] 90 %, "
+                f"n = {compared.count - compared.bounded} windows){_together(self.beside)}."
             )
         unlike = f"{strange} of {count} windows are unlike what the model was trained on"
         if verdict.refused:
@@ -61,7 +62,7 @@ class Series:
                 f"{known} {unlike}, as a drawn flag should be: `flagdata measure` refuses the film, and what is shown "
                 "hollow is not to be relied on."
             )
-        return f"{known} {unlike} (expected of familiar films: {verdict.false_alarm:.0%})."
+        return f"{known} {unlike} ({verdict.refusing} would refuse the film)."
 
 
 def _apart(bias: float) -> str:

@@ -1,9 +1,9 @@
-"""What a measurement says of each quantity: a value with its interval, or that the film told nothing of it."""
+"""What a measurement says of each quantity: a value with its interval, a bound, or that the film told nothing of it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from measure.ends import PILED, WITHIN, Bound, Span, limits_of, span
 from models.targets import TARGETS
 
 LEAST_INFORMATION = 0.05
@@ -30,55 +32,85 @@ class Quantity:
     Attributes:
         name: of `models.targets.TARGETS`.
         unit: SI.
-        value: mean of the posterior.
-        sigma: its standard deviation.
-        low, high: central interval of the measurement's level.
+        value: mean of the posterior; None where its draws pile up at an end of the range that is not one of the
+            quantity's own.
+        sigma: its standard deviation, likewise.
+        span: central interval of the measurement's level, or a bound on one side (`measure.ends`).
         assumed: the range that the simulations covered, for this size of flag.
         information: what the film added to that, see `LEAST_INFORMATION` [nat].
     """
 
     name: str
     unit: str
-    value: float
-    sigma: float
-    low: float
-    high: float
+    value: float | None
+    sigma: float | None
+    span: Span
     assumed: tuple[float, float]
     information: float
 
     @property
     def told(self) -> bool:
         """Whether the film says more of it than was assumed."""
-        return self.information >= LEAST_INFORMATION
+        return self.information >= LEAST_INFORMATION and self.span.bound is not Bound.NOTHING
 
-    def phrase(self, *, level: float, first: bool) -> str:
+    def phrase(self, *, first: bool) -> str:
         """In words, without a full stop.
 
         Args:
-            level: of the interval.
-            first: whether the level is stated.
+            first: whether the level of an interval is stated; that of a bound always is.
         """
-        light = self.name == "density" and self.assumed[1] < 0.1  # of a small flag
-        digits = _DIGITS[self.name] + light
-        short = SHORT[self.name]
-        unit = "" if self.unit == "1" else f" {self.unit}"
+        short, bound = SHORT[self.name], self.span.bound
         if not self.told:
-            low, high = self.assumed
-            return f"{short}: not told by this clip; {low:.{digits}f} to {high:.{digits}f}{unit} is what was assumed"
-        stated = f" {level * 100:.3g} %" if first else ""
-        return f"{short} {self.value:.{digits}f}{unit} [{self.low:.{digits}f}, {self.high:.{digits}f}]{stated}"
+            low, high = (self._number(end) for end in self.assumed)
+            return f"{short}: not told by this clip; {low} to {high}{self._suffix} is what was assumed"
+        stated = f"{self.span.level * 100:.3g} %"
+        if bound is None:
+            shown = self.span.phrase(self._digits)
+            return f"{short} {self._number(self.value)}{self._suffix} {shown}" + (f" {stated}" if first else "")
+        why = "" if self.value is not None else f" ({self._beyond})"
+        return f"{short} {self.span.phrase(self._digits, self._suffix)}, {stated}{why}"
+
+    def finding(self) -> Finding | None:
+        """Why it is bounded on one side only; None where it is not, or where nothing lies beyond the end."""
+        if self.value is not None or not self.told:
+            return None
+        other = "more" if self.span.bound is Bound.LEAST else "less"
+        return Finding(
+            kind=f"{self.name.replace('_', '-')}-at-end", severity=Severity.WARNING,
+            what=f"{SHORT[self.name]}: {self._beyond}, and {PILED:.0%} of the draws or more lie within {WITHIN:.0%} of "
+            f"that end; {other} would look the same, so that only a bound is given",
+            fix="check --flag-size, with which the range grows",
+        )  # fmt: skip
+
+    @property
+    def _beyond(self) -> str:
+        what, end = ("ends", self.assumed[1]) if self.span.bound is Bound.LEAST else ("begins", self.assumed[0])
+        return f"the model's range {what} at {self._number(end)}{self._suffix}"
+
+    @property
+    def _digits(self) -> int:
+        light = self.name == "density" and self.assumed[1] < 0.1  # of a small flag
+        return _DIGITS[self.name] + light
+
+    @property
+    def _suffix(self) -> str:
+        return "" if self.unit == "1" else f" {self.unit}"
+
+    def _number(self, value: float | None) -> str:
+        return "" if value is None else f"{value:.{self._digits}f}"
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """JSON values; an end of the interval that nothing bounds is null."""
         return {
-            "unit": self.unit, "value": self.value, "sigma": self.sigma, "interval": [self.low, self.high],
+            "unit": self.unit, "value": self.value, "sigma": self.sigma, "interval": self.span.ends(),
+            "level": self.span.level, "bound": None if self.span.bound is None else self.span.bound.value,
             "assumed": list(self.assumed), "information": self.information, "told": self.told,
         }  # fmt: skip
 
 
 def quantities(
     draws: NDArray[np.float64], prior: NDArray[np.float64], names: Sequence[str], *, level: float,
-    assumed: NDArray[np.float64],
+    assumed: NDArray[np.float64], places: NDArray[np.float64], stated: Mapping[str, tuple[float, float]],
 ) -> tuple[Quantity, ...]:  # fmt: skip
     """All quantities of a posterior.
 
@@ -88,21 +120,27 @@ def quantities(
         names: of the targets.
         level: share of each central interval.
         assumed: (target, 2) range of the simulations, for this size of flag.
+        places: (k, target) of the draws in the range that the model learned, 0 to 1; of means, those of their parts.
+        stated: name → the range in which the user states that the quantity lies.
 
     Raises:
         InputError: a level that is not between 0 and 1.
     """
     if not 0 < level < 1:
         raise InputError(f"an interval of {level:g}", where="--level", fix="give a share between 0 and 1, as in 0.9")
-    low, high = np.quantile(draws, [(1 - level) / 2, (1 + level) / 2], axis=0)
-    return tuple(
-        Quantity(
-            name=name, unit=TARGETS[name].unit, value=float(draws[:, k].mean()), sigma=float(draws[:, k].std()),
-            low=float(low[k]), high=float(high[k]), assumed=(float(assumed[k, 0]), float(assumed[k, 1])),
-            information=information(draws[:, k], prior[:, k]),
-        )
-        for k, name in enumerate(names)
-    )  # fmt: skip
+    found = []
+    for k, name in enumerate(names):
+        ends = float(assumed[k, 0]), float(assumed[k, 1])
+        limits = stated.get(name, limits_of(name))
+        own = span(draws[:, k], places[:, k], level=level, limits=limits, assumed=ends)
+        found.append(
+            Quantity(
+                name=name, unit=TARGETS[name].unit, value=float(draws[:, k].mean()) if own.estimated else None,
+                sigma=float(draws[:, k].std()) if own.estimated else None, span=own, assumed=ends,
+                information=information(draws[:, k], prior[:, k]),
+            )
+        )  # fmt: skip
+    return tuple(found)
 
 
 def information(posterior: NDArray[np.float64], prior: NDArray[np.float64]) -> float:
@@ -114,10 +152,11 @@ def information(posterior: NDArray[np.float64], prior: NDArray[np.float64]) -> f
     return 0.5 * (ratio - 1 - math.log(ratio) + shift**2 / variance)
 
 
-def sentence(found: Sequence[Quantity], *, level: float) -> str:
+def sentence(found: Sequence[Quantity]) -> str:
     """The answer in one line."""
     shown = [quantity for name in HEADLINE for quantity in found if quantity.name == name]
     told = [quantity for quantity in shown if quantity.told]
-    first = [quantity.phrase(level=level, first=not place) for place, quantity in enumerate(told)]
-    rest = [quantity.phrase(level=level, first=False) for quantity in shown if not quantity.told]
+    leading = next((quantity for quantity in told if quantity.span.bound is None), None)
+    first = [quantity.phrase(first=quantity is leading) for quantity in told]
+    rest = [quantity.phrase(first=False) for quantity in shown if not quantity.told]
     return "; ".join([", ".join(first), *rest] if first else rest)

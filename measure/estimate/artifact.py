@@ -24,6 +24,9 @@ from measure.estimate.series import WIND, Beside
 from measure.estimate.source import Network, Reading, Subject
 
 _FORMAT = 1
+_ANSWER = 2
+"""Raised when the same film, network and options get another answer, which is then another measurement. 2: bounds at
+the ends of the range, and sizes that are judged one by one."""
 _HEAD = "flagdata_estimate"
 REFUSED = "refused-by-gate"
 """Quality flag of what was kept although the gate refused it."""
@@ -36,17 +39,18 @@ def artifact(
     parents = [] if subject.artifact is None else [subject.artifact.id]
     parents += [] if network.artifact is None else [network.artifact.id]
     start = subject.film.start
-    wind = next((q for q in measured.quantities if q.name == WIND and q.told), None)
-    flags = quality_flags(measured.findings)
+    estimates = {q.name: q for q in measured.quantities if q.told and q.value is not None}  # no bounds among them
+    wind = estimates.get(WIND)
+    flags = quality_flags(measured.noticed(anyway=True))
     return Artifact(
         kind=Kind.MEASUREMENT, name=measured.film, object=stored, parents=parents, seed=measured.options.seed,
         source_hash=subject.content_hash(), source_name=None if subject.path is None else subject.path.name,
         recipe={
-            "measure": _FORMAT, "network": network.identity, **measured.options.recipe(), **reading.recipe(),
+            "measure": _ANSWER, "network": network.identity, **measured.options.recipe(), **reading.recipe(),
         },
         start=start, end=None if start is None else start + round(measured.duration * NANOSECONDS),
         wind=None if wind is None else wind.value, wind_sigma=None if wind is None else wind.sigma,
-        parameters=canonical({q.name: q.value for q in measured.quantities if q.told}),
+        parameters=canonical({name: q.value for name, q in estimates.items()}),
         quality=sorted({*flags, REFUSED}) if measured.verdict.refused else flags,
         report=canonical(report(measured)),
     )  # fmt: skip
@@ -55,17 +59,17 @@ def artifact(
 def report(measured: Measurement) -> Mapping[str, Any]:
     """What the row says of it: JSON values."""
     return {
-        "schema": "flagdata.measure-report/1", "sentence": measured.sentence, "model": measured.model,
+        "schema": "flagdata.measure-report/2", "sentence": measured.sentence, "model": measured.model,
         "quantities": {q.name: q.as_dict() for q in measured.quantities}, "gate": measured.verdict.as_dict(),
-        "combined": measured.combined, "findings": [finding.as_dict() for finding in measured.findings],
+        "combined": measured.combined, "findings": [finding.as_dict() for finding in measured.noticed(anyway=True)],
     }  # fmt: skip
 
 
 def keep(
     lake: Lake, measured: Measurement, subject: Subject, network: Network, reading: Reading, series: Beside, *,
     branch: str, refinement: Mapping[str, Any] | None = None,
-) -> tuple[str, bool]:  # fmt: skip
-    """Commit a measurement; the same one again adds nothing. Returns its id and whether it was there already.
+) -> bool:  # fmt: skip
+    """Commit a measurement and return whether it is new; the same one again adds nothing.
 
     Args:
         refinement: what a refinement found, as JSON values.
@@ -76,11 +80,11 @@ def keep(
     wanted = artifact(measured, subject, network, reading)
     with lake.transaction(f"measure {measured.film}", branch=branch) as transaction:
         if transaction.find(wanted.id) is not None:
-            return wanted.id, True
+            return False
         staged = transaction.staging(".zarr")
         write(staged, measured, series, refinement)
         transaction.add(artifact(measured, subject, network, reading, stored=transaction.put(staged)))
-    return wanted.id, False
+    return wanted.id in transaction.result.added
 
 
 def write(path: Path, measured: Measurement, series: Beside, refinement: Mapping[str, Any] | None = None) -> None:

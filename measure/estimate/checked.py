@@ -34,7 +34,7 @@ class CheckedGate:
             return [Reason(kind="familiar", what=f"nothing stands out, p = {found.p:.3f} over all checks", p=found.p)]
         # The first speaks for all checks together.
         return [
-            Reason(kind=told.kind, what=told.sentence, p=told.p if place else found.p, fix=told.fix)
+            Reason(kind=told.kind, what=told.sentence, p=told.p if place else found.p, fix=told.fix, blank=told.blank)
             for place, told in enumerate(found.reasons)
         ]
 

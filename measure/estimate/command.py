@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,8 +14,8 @@ import click
 
 from flagdata.commands.durations import DURATION
 from flagdata.commands.ranges import RANGE
-from flagdata.console import LocalPath, document, json_option, progress, say
-from flagdata.errors import ConflictError, RefusedError, UsageError
+from flagdata.console import LocalPath, document, following, json_option, progress, say
+from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 
 if TYPE_CHECKING:
@@ -50,7 +50,8 @@ if TYPE_CHECKING:
               help="Where simulated clips are kept, so that an interrupted refinement goes on.")  # fmt: skip
 @click.option("--false-alarm", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.05,
               show_default=True, help="Share of familiar films that the gate may refuse.")  # fmt: skip
-@click.option("--anyway", is_flag=True, help="Show, marked, what the model says of a film that the gate refuses.")
+@click.option("--anyway", is_flag=True, help="Show, marked, what the model says of a film that the gate refuses, if "
+              "anything moves in it.")  # fmt: skip
 @click.option("--report", type=LocalPath(), metavar="FILE.html", help="Write a page that needs no other.")
 @click.option("--zarr", "zarr_path", type=LocalPath(), metavar="FOLDER",
               help="Write draws and series as a Zarr data set.")  # fmt: skip
@@ -105,17 +106,17 @@ def measure(
         raise UsageError("more than one form of output", fix="choose one of --json and --csv")
     if cache is not None and refine is None:
         raise UsageError("--cache without --refine", fix="give --refine N, or leave --cache out")
-    for path in (report, zarr_path):
-        if path is not None and not path.absolute().parent.is_dir():
-            raise UsageError("no such folder", where=str(path.parent), fix="create it first")
-    if zarr_path is not None and zarr_path.exists():
-        raise ConflictError(f"{zarr_path} exists", fix="choose another name or remove it")
     from flagdata.ingest.camera import CropBox, parse_crop
     from flagdata.lake import Lake
+    from flagdata.outputs import check_file, check_folder
     from measure.estimate.measuring import Options
     from measure.estimate.similarity import parse_size
     from measure.estimate.source import Reading, network, subjects
 
+    if report is not None:
+        check_file(report, command="measure")
+    if zarr_path is not None:
+        check_folder(zarr_path)
     box = None if crop is None else parse_crop(crop)
     if not (box is None or isinstance(box, CropBox)):
         raise UsageError(f"the crop {crop!r} is not a box", where="--crop", fix="give x,y,width,height in pixels")
@@ -125,6 +126,8 @@ def measure(
         false_alarm=false_alarm, seed=seed, refine=refine, area_weight=area_weight,
     )  # fmt: skip
     lake = None if lake_path is None else Lake.open(lake_path)
+    if lake is not None and not read_only:
+        lake.check_writable()
     seen = at if at is not None else branch
     found = subjects(source, query=query, lake=lake, at=seen, reading=reading)
     job = _Job(
@@ -157,7 +160,7 @@ class _Done:
     refinement: Refinement | None
 
     def as_dict(self, *, anyway: bool) -> dict[str, Any]:
-        shown = anyway or not self.measured.verdict.refused
+        shown = self.measured.shown(anyway=anyway)
         known = self.subject.known or {}
         return {
             **self.measured.as_dict(anyway=anyway), "series": self.series.as_dict() if shown else None,
@@ -185,6 +188,8 @@ class _Job:
 
     def do(self, subject: Subject) -> _Done:
         """Measure one film; commit and write what is to be shown."""
+        from flagdata.outputs import fresh_folder, write_file
+        from measure.estimate.artifact import artifact as artifact_of
         from measure.estimate.artifact import keep, write
         from measure.estimate.dependence import of_model
         from measure.estimate.measuring import measure as measured_of
@@ -201,8 +206,8 @@ class _Job:
             )  # fmt: skip
         wind = None if subject.record is None else subject.record.wind()
         series = beside(measured, start=subject.film.start, wind=wind)
-        _warn(measured.findings)
-        shown = self.anyway or not measured.verdict.refused
+        _warn(measured.noticed(anyway=self.anyway))
+        shown = measured.shown(anyway=self.anyway)
         refinement = None
         if self.options.refine is not None and shown:
             refinement = refined(
@@ -211,35 +216,50 @@ class _Job:
             )  # fmt: skip
             _warn(refinement.findings)
         told = None if refinement is None else refinement.as_dict()
-        artifact = None
-        if self.lake is not None and self.commit and shown:
-            artifact, existing = keep(
-                self.lake, measured, subject, self.network, self.reading, series, branch=self.branch, refinement=told
-            )
-            say(f"{artifact[:12]}  measurement, {'there already' if existing else 'committed'}")
-        if self.zarr is not None and shown:
-            write(self.zarr, measured, series, told)
+        lake = self.lake if self.commit and shown else None
+        artifact = None if lake is None else artifact_of(measured, subject, self.network, self.reading).id
+        text = None
         if self.report is not None:
-            self._write_page(self.report, measured, series, subject, artifact, refinement)
+            text = self._page(measured, series, subject, artifact, refinement)
+        published = lake is not None and keep(
+            lake, measured, subject, self.network, self.reading, series, branch=self.branch, refinement=told
+        )
+        if artifact is not None:
+            say(f"{artifact[:12]}  measurement, {'committed' if published else 'there already'}")
+
+        def writing(what: str) -> AbstractContextManager[None]:
+            return following(f"the measurement {artifact}", f"writing {what}") if published else nullcontext()
+
+        if self.zarr is not None and shown:
+            with writing("its Zarr folder"), fresh_folder(self.zarr) as scratch:
+                write(scratch, measured, series, told)
+        if self.report is not None and text is not None:
+            with writing("its report"):
+                write_file(self.report, text, command="measure")
+                say(f"report: {self.report}")
         return _Done(measured=measured, series=series, artifact=artifact, subject=subject, refinement=refinement)
 
     def refuse(self, done: _Done) -> None:
         """Raises:
-        RefusedError: the gate refused the film, and it is not to be shown anyway.
+        RefusedError: the gate refused the film, and it is not to be shown anyway or there is nothing to measure.
         """
         verdict = done.measured.verdict
-        if verdict.refused and not self.anyway:
+        if not done.measured.shown(anyway=self.anyway):
             where = done.measured.film + (f", see {self.report}" if self.report is not None else "")
             raise RefusedError(
                 verdict.sentence, where=where,
                 fix=verdict.reasons[0].fix,
             )  # fmt: skip
 
-    def _write_page(
-        self, path: Path, measured: Measurement, series: Beside, subject: Subject, artifact: str | None,
+    def _page(
+        self, measured: Measurement, series: Beside, subject: Subject, artifact: str | None,
         refinement: Refinement | None,
-    ) -> None:  # fmt: skip
-        from flagdata.lake.durable import disk_errors
+    ) -> str:  # fmt: skip
+        """The page of a report.
+
+        Args:
+            artifact: id of the measurement in the lake; None where it is not to be there.
+        """
         from measure.estimate.nearest import nearest
         from measure.estimate.page import Context, Section, page
         from measure.refine.section import section
@@ -264,10 +284,7 @@ class _Job:
         sections = ()
         if refinement is not None:
             sections = (Section(anchor="refinement", title="Refined by simulation", body=section(refinement)),)
-        text = page(measured, series, context, anyway=self.anyway, sections=sections)
-        with disk_errors("writing the report", path):
-            path.write_text(text, encoding="utf-8")
-        say(f"report: {path}")
+        return page(measured, series, context, anyway=self.anyway, sections=sections)
 
     def _provenance(self, subject: Subject, artifact: str | None) -> Mapping[str, str]:
         film = subject.film
@@ -288,7 +305,7 @@ def _given(options: Options, reading: Reading) -> Mapping[str, Any]:
 
 def _several(job: _Job, found: Sequence[Subject], *, as_json: bool) -> None:
     done = [job.do(subject) for subject in found]
-    told = [one for one in done if job.anyway or not one.measured.verdict.refused]
+    told = [one for one in done if one.measured.shown(anyway=job.anyway)]
     if as_json:
         document("measurements", {"measurements": [one.as_dict(anyway=job.anyway) for one in done]})
     else:
@@ -313,18 +330,18 @@ def _tell(done: _Done, *, series: bool) -> None:
     measured = done.measured
     mark = "refused by the gate, not to be relied on: " if measured.verdict.refused else ""
     click.echo(mark + measured.sentence)
-    say(f"  {measured.verdict.sentence}; {measured.combined} of {len(measured.windows)} windows")
+    say(f"  {measured.verdict.sentence}; {measured.combined} of {len(measured.verdict.window_p)} windows in the answer")
     if done.refinement is not None:
         click.echo(f"{mark}refined: {done.refinement.sentence}")
     if not series:
         return
-    wind = [window.quantity("wind_speed") for window in measured.windows]
-    for window, quantity in zip(measured.windows, wind, strict=True):
-        click.echo(f"{window.start:9.2f} s  {quantity.value:6.2f} m/s [{quantity.low:.2f}, {quantity.high:.2f}]")
+    for window in measured.windows:
+        wind = window.quantity("wind_speed")
+        value = f"{wind.value:6.2f} m/s " if wind.span.bound is None else ""
+        click.echo(f"{window.start:9.2f} s  {value}{wind.span.phrase(2, ' m/s')}")
     for title, agreement in (("window", done.series.window), ("minute", done.series.of_minute)):
         if agreement is not None:
-            say(f"  against the anemometer's {title} means: bias {agreement.bias:+.2f} m/s, RMSE {agreement.rmse:.2f} "
-                f"[{agreement.interval[0]:.2f}, {agreement.interval[1]:.2f}] 90 %, n = {agreement.count}")  # fmt: skip
+            say(f"  against the anemometer's {title} means: {agreement.sentence}")
 
 
 @contextmanager

@@ -1,17 +1,19 @@
 """Whether a recording is one that the model can judge, before any interval is shown.
 
 A gate looks at one window and gives reasons, each with the p-value of a familiar clip being as strange. A recording has
-several windows whose p-values depend on each other; its own is their median. With normal scores Φ⁻¹(p) that are
-exchangeable and jointly Gaussian, of any correlation from 0 to 1, the median score has at most the variance of one of
-them, so that the median p is below α < ½ at most as often as one p is: as often for windows that are alike, less often
-the less they are. (Whatever the dependence, twice the median would do: Rüger, Metrika 25, 1978.) Where the flag's size
-is unknown, a window counts as that of the size at which it is least strange, which is the p-value of the composite
-hypothesis "of some size".
+several windows; how many of them may be strange, and from which p on one is, `measure.gate.several` says.
+
+A flag has one size. Where it is not given, the model looks at the film as that of each of several sizes, and each of
+them is judged as if it had been given: by the same windows, at the same level. The sizes at which the recording is
+refused are left out of the answer, and it is refused if none is left. This is the test of the composite hypothesis "of
+one of these sizes", whose p-value is the largest of its parts' (Lehmann and Romano, Testing Statistical Hypotheses,
+2005, section 3.1): a familiar recording is refused at its own size at most at the stated rate, and at all sizes no more
+often, however many are tried. So nothing is shown without the size that would not be shown with one of those sizes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -19,6 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
+from measure.gate.blank import blank
+from measure.gate.several import refusing, window_rate
 from models.estimator import Estimator
 from models.outliers import Familiarity
 
@@ -32,12 +36,14 @@ class Reason:
         what: a sentence for people, with the figure in it.
         p: probability that a familiar clip is at least as strange.
         fix: what the user can do about it.
+        blank: whether there is nothing to measure in the window, so that no number is given of it in any case.
     """
 
     kind: str
     what: str
     p: float
     fix: str = "crop to the flag by --crop, give another film, or look at it with --anyway"
+    blank: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """JSON values."""
@@ -59,10 +65,13 @@ class Gate(Protocol):
         ...
 
     def level(self, false_alarm: float) -> float:
-        """p at or below which a recording is refused, so that this happens to familiar ones at most so often.
+        """p at or below which a window is strange, so that this happens to familiar ones at most so often.
 
         The rate itself where p-values are exact; less where the clips that they were calibrated by are few and the rate
         is to hold for most draws of these.
+
+        Raises:
+            InputError: too few of these to tell such a rate: no window would be strange.
         """
         ...
 
@@ -74,6 +83,10 @@ class FamiliarityGate:
     cloud: Familiarity
 
     def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
+        nothing = blank(frames)
+        if nothing is not None:
+            least = 1 / (len(self.cloud.reference) + 1)
+            return [Reason(kind=nothing.kind, what=nothing.sentence, p=least, fix=nothing.fix, blank=True)]
         distance = float(self.cloud.distance(summary[None])[0])
         p = float(self.cloud.p_value(summary[None])[0])
         usual = float(np.median(self.cloud.reference))
@@ -84,6 +97,7 @@ class FamiliarityGate:
         return [Reason(kind="unlike-training", what=what, p=p)]
 
     def level(self, false_alarm: float) -> float:
+        self.cloud.threshold(false_alarm)  # so many clips can tell such a rate
         return false_alarm
 
 
@@ -107,21 +121,34 @@ class Verdict:
 
     Attributes:
         false_alarm: share of familiar recordings that are refused, at most.
-        level: p at or below which that is.
-        p: of the recording.
-        window_p: (k,) of each window, whatever the flag's size.
-        reasons: of the window of median p, the strongest first.
+        level: p at or below which a window is strange.
+        refusing: how many strange windows refuse the recording.
+        sizes: (i,) places of the sizes at which it is not refused; all of them where it is.
+        size: place of the size at which it is least strange.
+        p: of the window that decides there, the `refusing`-th strangest.
+        window_p: (k,) of each window there.
+        blank: (k,) whether there is nothing to measure in it, at any size.
+        reasons: of a usual window, among the strange ones where the recording is refused; the strongest first.
     """
 
     false_alarm: float
     level: float
+    refusing: int
+    sizes: tuple[int, ...]
+    size: int
     p: float
     window_p: tuple[float, ...]
+    blank: tuple[bool, ...]
     reasons: tuple[Reason, ...]
 
     @property
     def refused(self) -> bool:
         return self.p <= self.level
+
+    @property
+    def measurable(self) -> bool:
+        """Whether there is anything to measure, familiar or not."""
+        return not all(self.blank)
 
     @property
     def strange(self) -> NDArray[np.bool_]:
@@ -130,41 +157,56 @@ class Verdict:
 
     @property
     def sentence(self) -> str:
-        """In words, with the rate."""
+        """In words, with the level that is applied and the rate that it keeps to."""
+        strange, count = int(self.strange.sum()), len(self.window_p)
         rate = f"{self.false_alarm:.0%} of familiar recordings are refused at most"
+        windows = (
+            f"p = {self.p:.2g}, refused at {self.level:.2g} or below"
+            if count == 1
+            else f"windows with p at {self.level:.2g} or below: {strange} of {count}, refused from {self.refusing} on"
+        )
+        if not self.measurable:
+            what = self.reasons[0].what
+            return f"there is nothing to measure, so that no number is given, not even with --anyway: {what}"
         if self.refused:
-            return f"this is not like what the model was trained on: {self.reasons[0].what} ({rate})"
-        return f"like what the model was trained on, p = {self.p:.2f} ({rate})"
+            return f"this is not like what the model was trained on: {self.reasons[0].what}; {windows} ({rate})"
+        return f"like what the model was trained on; {windows} ({rate})"
 
     def as_dict(self) -> Mapping[str, Any]:
         """JSON values."""
         return {
             "refused": self.refused, "p": self.p, "level": self.level, "false_alarm": self.false_alarm,
-            "windows": list(self.window_p), "reasons": [reason.as_dict() for reason in self.reasons],
+            "strange": int(self.strange.sum()), "refusing": self.refusing, "windows": list(self.window_p),
+            "blank": int(sum(self.blank)), "reasons": [reason.as_dict() for reason in self.reasons],
         }  # fmt: skip
 
 
 def verdict(
-    windows: Sequence[Sequence[Sequence[Reason]]], *, false_alarm: float, level: float | None = None
+    windows: Sequence[Sequence[Sequence[Reason]]], *, false_alarm: float, level: Callable[[float], float]
 ) -> Verdict:
     """The verdict on a recording.
 
     Args:
         windows: the reasons of each window, for each size of flag considered.
         false_alarm: between 0 and 1.
-        level: p at or below which a recording is refused; the rate itself by default.
+        level: p at or below which a window is strange, of the rate at which familiar windows may be; see `Gate.level`.
 
     Raises:
         InputError: no window, a rate out of range, or a window about which the gate said nothing.
     """
     if not windows or any(not sizes or any(not reasons for reasons in sizes) for sizes in windows):
         raise InputError("a window without a reason", where="gate", fix="this is a defect of the gate")
-    if not 0 < false_alarm < 1:
-        raise InputError(f"false-alarm rate {false_alarm:g}", where="--false-alarm", fix="give a share, as in 0.05")
-    told = [max(sizes, key=lambda reasons: reasons[0].p) for sizes in windows]
-    p = np.array([reasons[0].p for reasons in told])
-    middle = told[int(np.argsort(p, kind="stable")[len(p) // 2])]
+    count = len(windows)
+    at, needed = level(window_rate(count, false_alarm)), refusing(count)
+    p = np.array([[reasons[0].p for reasons in sizes] for sizes in windows])
+    deciding = np.sort(p, axis=0)[needed - 1]
+    size = int(np.argmax(deciding))
+    kept = tuple(np.flatnonzero(deciding > at).tolist()) or tuple(range(p.shape[1]))
+    order = np.argsort(p[:, size], kind="stable")
+    speaking = int((p[:, size] <= at).sum()) if deciding[size] <= at else count
     return Verdict(
-        false_alarm=false_alarm, level=false_alarm if level is None else level, p=float(np.median(p)),
-        window_p=tuple(p.tolist()), reasons=tuple(middle),
+        false_alarm=false_alarm, level=at, refusing=needed, sizes=kept, size=size, p=float(deciding[size]),
+        window_p=tuple(p[:, size].tolist()),
+        blank=tuple(all(reasons[0].blank for reasons in sizes) for sizes in windows),
+        reasons=tuple(windows[int(order[speaking // 2])][size]),
     )  # fmt: skip

@@ -103,8 +103,8 @@ def _batch(
         member = outcome.member
         seed = child_seed(simulation.seed, "film", member.index)
         job = Film(
-            name=f"{simulation.name}-{member.index}", cast=cast, index=member.index, sequence="", seed=seed,
-            sequence_seed=member.seed, look=seed, begin=EPOCH, filming={},
+            name=f"{simulation.name}-{member.index}", dataset=recipe.name, cast=cast, index=member.index, sequence="",
+            seed=seed, sequence_seed=member.seed, look=seed, begin=EPOCH, filming={},
         )  # fmt: skip
         zeta, drawn = recipe.prior.draw(seed, assets), picture.settings(recipe.camera, seed=seed)
         seen = jobs.shot(recipe, job, outcome.sequence, zeta, assets, device="cpu").numpy()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -132,14 +132,15 @@ class Measurement:
         names: of the targets.
         draws: (n, target) of the joint posterior.
         quantities: of these.
-        windows: each by itself, in order.
+        windows: each by itself, in order; those without anything to measure are left out.
         combined: how many of them the answer rests on.
         dependence: of their errors.
         verdict: of the gate.
-        sizes: of flags that were considered.
+        sizes: of flags at which the gate does not refuse it; all that were considered where it is refused.
         summary: (dimension,) of the window of median p.
-        clip: (frames, height, width) of the first window, at the size in the middle.
+        clip: (frames, height, width) of the first window, at the size at which the film is least strange.
         findings: on film, size and windows.
+        bounds: why quantities are bounded on one side only; a part of the answer.
     """
 
     film: str
@@ -158,15 +159,24 @@ class Measurement:
     summary: NDArray[np.float32]
     clip: NDArray[np.uint8]
     findings: tuple[Finding, ...]
+    bounds: tuple[Finding, ...]
 
     @property
     def sentence(self) -> str:
         """The answer in one line; whether it may be believed, the verdict says."""
-        return sentence(self.quantities, level=self.options.level)
+        return sentence(self.quantities)
+
+    def shown(self, *, anyway: bool) -> bool:
+        """Whether anything is said of it: of a refused film only `anyway`, of one with nothing to measure never."""
+        return self.verdict.measurable and (anyway or not self.verdict.refused)
+
+    def noticed(self, *, anyway: bool) -> tuple[Finding, ...]:
+        """The findings, those on the answer where it is `shown`."""
+        return (*self.findings, *self.bounds) if self.shown(anyway=anyway) else self.findings
 
     def as_dict(self, *, anyway: bool) -> Mapping[str, Any]:
-        """JSON values. What was refused is left out, unless `anyway`."""
-        shown = anyway or not self.verdict.refused
+        """JSON values. What is not `shown` is left out."""
+        shown = self.shown(anyway=anyway)
         return {
             "film": self.film, "rate": self.rate, "duration": self.duration, "model": self.model,
             "options": {**self.options.recipe(), "seed": self.options.seed}, "gate": self.verdict.as_dict(),
@@ -177,20 +187,34 @@ class Measurement:
             "dependence": {
                 "wind": self.dependence.wind, "cloth": self.dependence.cloth, "source": self.dependence.source,
             },
-            "findings": [finding.as_dict() for finding in self.findings],
+            "findings": [finding.as_dict() for finding in self.noticed(anyway=anyway)],
         }  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Seen:
-    """A window as the model sees it: logits (i, n, target), its first network's summaries (i, dimension), reasons, and
-    the share of the model's draws that lay where the area weight is known to lie (1 if nothing is known)."""
+    """A window as the model sees it at each size: logits (i, n, target), its first network's summaries (i, dimension),
+    reasons, and the share of the model's draws that lay where the area weight is known to lie (1 if nothing is
+    known)."""
 
     start: float
     logits: NDArray[np.float64]
     summaries: NDArray[np.float32]
     reasons: tuple[list[Reason], ...]
     within: float
+
+    @property
+    def blank(self) -> bool:
+        """Whether there is nothing to measure, at any size."""
+        return all(reasons[0].blank for reasons in self.reasons)
+
+    def only(self, places: Sequence[int]) -> _Seen:
+        """The same at some of the sizes."""
+        chosen = list(places)
+        return replace(
+            self, logits=self.logits[chosen], summaries=self.summaries[chosen],
+            reasons=tuple(self.reasons[place] for place in chosen),
+        )  # fmt: skip
 
 
 def measure(
@@ -223,36 +247,43 @@ def measure(
         last=options.last, spacings=tuple(spacing(s, rate=model.front_end.rate) for s in considered.scale.tolist()),
     )  # fmt: skip
     seen: list[_Seen] = []
-    clip: NDArray[np.uint8] | None = None
+    clips: NDArray[np.uint8] | None = None  # of the first window, or of the first with something to measure
     worst, repeats = 0.0, 0
     margin = layout.tolerance
     for window in cut(film.frames(layout.first - margin, layout.last + margin), layout):
-        if clip is None:
-            clip = window.clips[len(window.clips) // 2]
-        seen.append(_look(window, model, gate, seed=options.seed, known=known))
+        one = _look(window, model, gate, seed=options.seed, known=known)
+        if clips is None or (all(before.blank for before in seen) and not one.blank):
+            clips = window.clips
+        seen.append(one)
         worst, repeats = max(worst, window.worst), repeats + window.repeats
         if advance is not None:
             advance(layout.count, 1)
-    if clip is None:
+    if clips is None:
         raise UsageError(
             f"none of {layout.count} windows has all its frames", where=film.name,
             fix="the film's stamps have gaps: choose another part by --start and --end",
         )  # fmt: skip
-    judged = verdict(
-        [one.reasons for one in seen], false_alarm=options.false_alarm, level=gate.level(options.false_alarm)
-    )
-    answer = _Answer(model=model, sizes=considered, options=options)
-    used = _used(seen, judged, layout)
-    draws = answer.joint([seen[k] for k in used], dependence)
+    judged = verdict([one.reasons for one in seen], false_alarm=options.false_alarm, level=gate.level)
+    kept = considered.only(judged.sizes)
+    answer = _Answer(model=model, sizes=kept, options=options)
+    whole = [one.only(judged.sizes) for one in seen]
+    used = _used(whole, judged, layout)
+    draws, places = answer.joint([whole[k] for k in used], dependence)
     middle = seen[int(np.argsort(judged.window_p, kind="stable")[len(seen) // 2])]
     found = findings_of(layout, found=len(seen), worst=worst, repeats=repeats, rate=film.rate)
+    windows = tuple(
+        answer.window(one, layout, p)
+        for one, p, blank in zip(whole, judged.window_p, judged.blank, strict=True)
+        if not (blank and judged.measurable)
+    )
+    own = answer.quantities(draws, places)
     return Measurement(
         film=film.name, rate=film.rate, duration=film.duration, model=model.name, options=options,
-        names=tuple(answer.names), draws=draws, quantities=answer.quantities(draws),
-        windows=tuple(answer.window(one, layout, p) for one, p in zip(seen, judged.window_p, strict=True)),
-        combined=len(used), dependence=dependence, verdict=judged, sizes=considered,
-        summary=middle.summaries[len(middle.summaries) // 2], clip=clip,
-        findings=(*film.findings(), *considered.findings, *found, *_about_windows(seen, judged, used, dependence)),
+        names=tuple(answer.names), draws=draws, quantities=own, windows=windows, combined=len(used),
+        dependence=dependence, verdict=judged, sizes=kept, summary=middle.summaries[judged.size],
+        clip=clips[judged.size],
+        findings=(*film.findings(), *kept.findings, *found, *_about_windows(whole, judged, used, dependence)),
+        bounds=tuple(_at_ends(own, windows)),
     )  # fmt: skip
 
 
@@ -273,15 +304,15 @@ def _look(window: Window, model: Estimator, gate: Gate, *, seed: int, known: Kno
 
 
 def _used(seen: Sequence[_Seen], judged: Verdict, layout: Layout) -> list[int]:
-    """Windows that the answer rests on: none that overlap; of a familiar recording none that are strange."""
+    """Windows that the answer rests on: none that overlap, none without anything to measure where others have it; of a
+    familiar recording none that are strange."""
     apart = layout.frames * max(layout.spacings)
+    left_out = np.array(judged.blank) & judged.measurable
+    if not judged.refused:
+        left_out |= judged.strange
     chosen: list[int] = []
-    strange = judged.strange
-    leave_out = not judged.refused and not strange.all()
-    for k, one in enumerate(seen):
-        if leave_out and strange[k]:
-            continue
-        if not chosen or one.start - seen[chosen[-1]].start >= apart - layout.tolerance:
+    for k in np.flatnonzero(~left_out).tolist():
+        if not chosen or seen[k].start - seen[chosen[-1]].start >= apart - layout.tolerance:
             chosen.append(k)
     return chosen
 
@@ -304,9 +335,10 @@ def _about_windows(
     if strange and not judged.refused:
         found.append(
             Finding(
-                kind="strange-windows", severity=Severity.NOTE, count=strange,
-                what=f"{strange} of {len(seen)} windows are unlike what the model was trained on by themselves "
-                f"(expected of familiar ones: {judged.false_alarm:.0%}) and were left out of the answer",
+                kind="strange-windows", severity=Severity.WARNING, count=strange,
+                what=f"{strange} of {len(seen)} windows are unlike what the model was trained on, p at most "
+                f"{judged.level:.2g}, and were left out of the answer; {judged.refusing} would refuse the film",
+                fix="choose a part of the film without them by --start and --end",
             )
         )  # fmt: skip
     if len(used) > 1:
@@ -321,6 +353,22 @@ def _about_windows(
     return found
 
 
+def _at_ends(found: Sequence[Quantity], windows: Sequence[WindowAnswer]) -> list[Finding]:
+    """Why quantities are bounded on one side only, and of how many windows the wind is where the answer's is not."""
+    own = [finding for quantity in found if (finding := quantity.finding()) is not None]
+    bounded = [one.quantity(name).value is None for one in windows for name in OWN]
+    if any(bounded) and not any(quantity.value is None for quantity in found if quantity.name in OWN):
+        own.append(
+            Finding(
+                kind="windows-at-end", severity=Severity.WARNING, count=sum(bounded),
+                what=f"{sum(bounded)} of {len(windows)} windows bound the wind on one side only: theirs may lie beyond "
+                "what the model knows, and so may the mean over all windows lie beyond its interval",
+                fix="give the wind of single windows by --windows",
+            )
+        )  # fmt: skip
+    return own
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Answer:
     """Turns logits at the sizes considered into quantities of the flag itself."""
@@ -333,11 +381,12 @@ class _Answer:
     def names(self) -> tuple[str, ...]:
         return self.model.learners[0].scaling.quantities
 
-    def joint(self, seen: Sequence[_Seen], dependence: Dependence) -> NDArray[np.float64]:
-        """(n, target) draws of all windows together."""
+    def joint(self, seen: Sequence[_Seen], dependence: Dependence) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n, target) draws of all windows together, the wind their mean, and (m, target) places of the windows' own in
+        the model's range."""
         own = [place for place, name in enumerate(self.names) if name in OWN]
         cloth = [place for place, name in enumerate(self.names) if name not in OWN]
-        parts = []
+        parts, places = [], []
         for stratum in range(len(self.sizes.scale)):
             prior = self.prior_logits[stratum]
             winds, shared = combined(
@@ -348,24 +397,40 @@ class _Answer:
             logits = np.empty((*winds.shape[:2], len(self.names)))
             logits[..., own] = winds
             logits[..., cloth] = shared
-            parts.append(scaled_back(self._values(logits).mean(axis=0), self.names, self.sizes.draws[stratum]))
+            values = self._values(logits)
+            parts.append(scaled_back(values.mean(axis=0), self.names, self.sizes.draws[stratum]))
+            places.append(self._places(values))
         draws = np.concatenate(parts)
         if self.options.area_weight is not None:  # combining windows moves draws a little, some out of the range
             column = self.names.index("density")
             draws[:, column] = np.clip(draws[:, column], *self.options.area_weight)
-        return draws
+        return draws, np.concatenate(places)
 
     def window(self, one: _Seen, layout: Layout, p: float) -> WindowAnswer:
-        parts = [
-            scaled_back(self._values(one.logits[stratum]), self.names, self.sizes.draws[stratum])
-            for stratum in range(len(self.sizes.scale))
-        ]
+        values = [self._values(logits) for logits in one.logits]
+        draws = [scaled_back(v, self.names, s) for v, s in zip(values, self.sizes.draws, strict=True)]
+        places = np.concatenate([self._places(v) for v in values])
         return WindowAnswer(
-            start=one.start, end=one.start + layout.length, quantities=self.quantities(np.concatenate(parts)), p=p
-        )
+            start=one.start, end=one.start + layout.length,
+            quantities=self.quantities(np.concatenate(draws), places), p=p,
+        )  # fmt: skip
 
-    def quantities(self, draws: NDArray[np.float64]) -> tuple[Quantity, ...]:
-        return quantities(draws, self.prior, self.names, level=self.options.level, assumed=self.assumed)
+    def quantities(self, draws: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[Quantity, ...]:
+        weight = self.options.area_weight
+        return quantities(
+            draws, self.prior, self.names, level=self.options.level, assumed=self.assumed, places=places,
+            stated={} if weight is None else {"density": weight},
+        )  # fmt: skip
+
+    def _places(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(m, target) of values (…, target) in the model's range, 0 to 1: the range moves with the flag's size."""
+        low, high = self._ends
+        return ((values - low) / (high - low)).reshape(-1, len(self.names))
+
+    @property
+    def _ends(self) -> NDArray[np.float64]:
+        """(2, target) of the range that the model learned."""
+        return np.array([[t.low for t in self.model.targets], [t.high for t in self.model.targets]])
 
     @cached_property
     def prior(self) -> NDArray[np.float64]:
@@ -391,7 +456,7 @@ class _Answer:
     @cached_property
     def assumed(self) -> NDArray[np.float64]:
         """(target, 2) range that was simulated, at these sizes; of what was not simulated evenly 90 % of it."""
-        ends = np.array([[t.low for t in self.model.targets], [t.high for t in self.model.targets]])
+        ends = self._ends
         smallest, largest = np.quantile(self.sizes.draws, [0.05, 0.95])
         low, high = scaled_back(ends[0], self.names, smallest), scaled_back(ends[1], self.names, largest)
         even = np.array([name in POWERS for name in self.names])[:, None]

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import pyarrow.compute as pc
 import torch
 from numpy.typing import NDArray
 
@@ -51,9 +52,10 @@ def nearest(
         advance: called after each clip with how many there are and 1.
     """
     count = model.front_end.frames
-    where = f"kind = '{Kind.CLIP}' and seed is not null and frame_count >= {count}"
+    long_enough = pc.field("seed").is_valid() & (pc.field("frame_count") >= count)
+    clips = lake.rows({"kind": Kind.CLIP}, at=at).filter(long_enough)
     columns = ["artifact", "name", "object", "frame_first", "recording"]
-    rows = [row for row in lake.rows(where, at=at, columns=columns).to_pylist() if row["recording"] != without]
+    rows = [row for row in clips.select(columns).to_pylist() if row["recording"] != without]
     chosen = stream(seed, "nearest").permutation(len(rows))[:COMPARED].tolist()
     whitening = np.eye(len(summary)) if model.cloud is None else model.cloud.whitening
     found: list[Neighbour] = []

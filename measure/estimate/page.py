@@ -55,16 +55,17 @@ def page(
     """The page.
 
     Args:
-        anyway: whether estimates are shown although the gate refused the film; they are marked then.
+        anyway: whether estimates are shown although the gate refused the film; they are marked then. Where there is
+            nothing to measure, none are shown.
         sections: what comes between the answer and its provenance, each under its own heading.
     """
-    shown = anyway or not measured.verdict.refused
+    shown, noticed = measured.shown(anyway=anyway), measured.noticed(anyway=anyway)
     spacing = measured.windows[0].end - measured.windows[0].start
     clip_rate = (len(measured.clip) - 1) / spacing if spacing > 0 else context.rate
     values = {
         "film": measured.film, "shown": shown, "refused": measured.verdict.refused, "gate": measured.verdict.sentence,
         "reasons": [reason.what for reason in measured.verdict.reasons], "answer": measured.sentence,
-        "rows": [_row(quantity, context.known, measured.options.level) for quantity in measured.quantities],
+        "rows": [_row(quantity, context.known) for quantity in measured.quantities],
         "simulated": bool(context.known), "level": f"{measured.options.level * 100:.3g} %",
         "clip": pictures.animation(measured.clip, rate=clip_rate),
         "neighbours": [_neighbour(one, context.rate) for one in context.neighbours], "compared": context.compared,
@@ -75,20 +76,21 @@ def page(
         "agreement": [_agreement("over the window", series.window), _agreement("minute mean", series.of_minute)]
         if series.logged is not None and shown else [],
         "delay": _delay(series) if shown else None,
-        "windows": len(measured.windows), "combined": measured.combined, "dependence": measured.dependence,
-        "strange": int(measured.verdict.strange.sum()), "false_alarm": f"{measured.options.false_alarm:.0%}",
-        "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in measured.findings],
+        "windows": len(measured.verdict.window_p), "combined": measured.combined, "dependence": measured.dependence,
+        "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in noticed],
         "sections": list(sections), "provenance": {**context.provenance, "code": code_version()},
     }  # fmt: skip
     return render("measure.estimate", "page.html.j2", values)
 
 
-def _row(quantity: Quantity, known: Mapping[str, float], level: float) -> dict[str, str | bool]:
+def _row(quantity: Quantity, known: Mapping[str, float]) -> dict[str, str | bool]:
     digits = 3 if quantity.name == "density" else 2
     truth = known.get(quantity.name)
+    bound_level = "" if quantity.span.bound is None else f" ({quantity.span.level * 100:.3g} %)"
     return {
         "name": SHORT[quantity.name], "unit": "" if quantity.unit == "1" else quantity.unit, "told": quantity.told,
-        "value": f"{quantity.value:.{digits}f}", "interval": f"[{quantity.low:.{digits}f}, {quantity.high:.{digits}f}]",
+        "value": "" if quantity.value is None else f"{quantity.value:.{digits}f}",
+        "interval": quantity.span.phrase(digits) + bound_level,
         "assumed": f"{quantity.assumed[0]:.{digits}f} to {quantity.assumed[1]:.{digits}f}",
         "information": f"{quantity.information:.2f}", "known": "" if truth is None else f"{truth:.{digits}f}",
     }  # fmt: skip
@@ -108,11 +110,7 @@ def _neighbour(one: Neighbour, rate: float) -> dict[str, str]:
 def _agreement(title: str, found: Agreement | None) -> dict[str, str]:
     if found is None:
         return {"title": title, "text": "the anemometer was silent"}
-    return {
-        "title": title,
-        "text": f"bias {found.bias:+.2f} m/s, RMSE {found.rmse:.2f} m/s [{found.interval[0]:.2f}, "
-        f"{found.interval[1]:.2f}] 90 %, the intervals hold {found.covered:.0%} of it, n = {found.count} windows",
-    }  # fmt: skip
+    return {"title": title, "text": found.sentence}
 
 
 def _delay(series: Beside) -> str | None:

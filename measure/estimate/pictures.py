@@ -52,7 +52,8 @@ def corner(measured: Measurement) -> str:
             if row == column:
                 quantity = measured.quantities[row]
                 axes.hist(draws[:, row], bins=40, color=_BLUE if quantity.told else _GRAY, histtype="stepfilled")
-                axes.axvspan(quantity.low, quantity.high, color=_RUST, alpha=0.15, linewidth=0)
+                low, high = np.clip([quantity.span.low, quantity.span.high], draws[:, row].min(), draws[:, row].max())
+                axes.axvspan(low, high, color=_RUST, alpha=0.15, linewidth=0)
                 axes.set_yticks([])
             else:
                 axes.hist2d(draws[:, column], draws[:, row], bins=30, cmap="Blues")
@@ -70,7 +71,8 @@ def _label(measured: Measurement, place: int) -> str:
 
 
 def series(found: Beside, *, level: float) -> str:
-    """Wind by window with its intervals, beside the anemometer where there is one; hollow where p ≤ `level`."""
+    """Wind by window with its intervals, beside the anemometer where there is one; hollow where p ≤ `level`, an arrow
+    where a window gives a bound instead of a value."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.5, 3.0), layout="constrained")
@@ -78,9 +80,12 @@ def series(found: Beside, *, level: float) -> str:
     if found.logged is not None and found.minute is not None:
         axes.plot(found.time, found.logged, color=_BLUE, linewidth=1.0, label="anemometer, over the window")
         axes.plot(found.time, found.minute, color=_BLUE, linewidth=1.6, linestyle=":", label="anemometer, minute mean")
-    axes.vlines(found.time, found.low, found.high, color=_RUST, alpha=0.35, linewidth=1.4)
+    bounded = np.isnan(found.wind)
+    axes.vlines(found.time[~bounded], found.low[~bounded], found.high[~bounded], color=_RUST, alpha=0.35, linewidth=1.4)
+    if bounded.any():
+        axes.plot(found.time[bounded], found.low[bounded], "^", markersize=5, color=_RUST, label="film, at least")
     for strange, label in ((False, "film, with its interval"), (True, "film, window unlike the training data")):
-        own = (found.p <= level) == strange
+        own = ~bounded & ((found.p <= level) == strange)
         if own.any():
             face = "none" if strange else _RUST
             axes.plot(found.time[own], found.wind[own], "o", markersize=4, color=_RUST, mfc=face, label=label)

@@ -69,7 +69,5 @@ def _one(interval: Interval, s: float) -> Interval:
     name = interval.name.partition(".")[0]
     factor = s ** POWERS.get(name, 0.0)
     shift = LOGARITHMS.get(name, 0.0) * math.log10(s)
-    return replace(
-        interval, median=interval.median * factor + shift, low=interval.low * factor + shift,
-        high=interval.high * factor + shift,
-    )  # fmt: skip
+    own = replace(interval.span, low=interval.span.low * factor + shift, high=interval.span.high * factor + shift)
+    return replace(interval, median=None if interval.median is None else interval.median * factor + shift, span=own)

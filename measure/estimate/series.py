@@ -9,6 +9,9 @@ the longest run of windows without gaps, that overlap by a half. With k such seg
 coherence 1 − 0.05^(1/(k − 1)) at one frequency in twenty (Carter, Knapp and Nuttall, IEEE Trans. AU 21, 1973), where
 the overlap is not counted. The delay is found as `flagdata.align` finds a clock's offset, with the wind off the film in
 place of the motion.
+
+A window whose wind is bounded on one side only (`measure.ends`) has no value, and an interval that ends at infinity. It
+counts where intervals are compared with the anemometer, and not among the errors, spectra and delays of values.
 """
 
 from __future__ import annotations
@@ -48,23 +51,36 @@ class Agreement:
 
     Attributes:
         count: windows compared.
-        bias: mean difference [m/s].
-        rmse: root mean square [m/s].
-        interval: 90 % of the RMSE, by resampling blocks of ten windows [m/s].
-        covered: share of the windows whose interval holds the reference.
+        bounded: of these, windows with a bound instead of a value.
+        bias: mean difference of the others [m/s]; None where there are none.
+        rmse: root mean square of the same [m/s], likewise.
+        interval: 90 % of the RMSE, by resampling blocks of ten windows [m/s], likewise.
+        covered: share of all windows compared whose interval holds the reference.
     """
 
     count: int
-    bias: float
-    rmse: float
-    interval: tuple[float, float]
+    bounded: int
+    bias: float | None
+    rmse: float | None
+    interval: tuple[float, float] | None
     covered: float
+
+    @property
+    def sentence(self) -> str:
+        """In words."""
+        found = f"the intervals hold {self.covered:.0%} of it, n = {self.count} windows"
+        if self.bounded:
+            found += f", of which {self.bounded} give a bound and no value"
+        if self.bias is None or self.rmse is None or self.interval is None:
+            return found
+        low, high = self.interval
+        return f"bias {self.bias:+.2f} m/s, RMSE {self.rmse:.2f} m/s [{low:.2f}, {high:.2f}] 90 %, {found}"
 
     def as_dict(self) -> dict[str, Any]:
         """JSON values."""
         return {
-            "count": self.count, "bias": self.bias, "rmse": self.rmse, "interval": list(self.interval),
-            "covered": self.covered,
+            "count": self.count, "bounded": self.bounded, "bias": self.bias, "rmse": self.rmse,
+            "interval": None if self.interval is None else list(self.interval), "covered": self.covered,
         }  # fmt: skip
 
 
@@ -119,7 +135,8 @@ class Beside:
 
     Attributes:
         time: (n,) middles of the windows [s from the film's first frame].
-        wind, low, high: (n,) estimated [m/s].
+        wind: (n,) estimated [m/s]; NaN where it is bounded on one side only.
+        low, high: (n,) its interval [m/s]; infinite at an end that nothing bounds.
         p: (n,) of the gate.
         logged, minute: (n,) references [m/s]; NaN where the anemometer was silent. None without an anemometer.
         window, of_minute: agreement with them.
@@ -147,7 +164,7 @@ class Beside:
         return out
 
     def rows(self) -> Iterator[Sequence[str]]:
-        """Lines of a table, its header first; unknown values are empty."""
+        """Lines of a table, its header first; unknown values are empty, an end that nothing bounds is "inf"."""
         columns = self.columns()
         yield list(columns)
         for values in zip(*columns.values(), strict=True):
@@ -169,8 +186,9 @@ def beside(measured: Measurement, *, start: int | None, wind: WindSeries | None)
     found = [window.quantity(WIND) for window in measured.windows]
     series = Beside(
         time=np.array([(window.start + window.end) / 2 for window in measured.windows]),
-        wind=np.array([one.value for one in found]), low=np.array([one.low for one in found]),
-        high=np.array([one.high for one in found]), p=np.array(measured.verdict.window_p),
+        wind=np.array([math.nan if one.value is None else one.value for one in found]),
+        low=np.array([one.span.low for one in found]), high=np.array([one.span.high for one in found]),
+        p=np.array([window.p for window in measured.windows]),
     )  # fmt: skip
     if start is None or wind is None or over_ground(wind) is None:
         return series
@@ -194,10 +212,12 @@ def agreement(series: Beside, reference: NDArray[np.float64], *, seed: int) -> A
     count = int(known.sum())
     if not count:
         return None
-    off = series.wind[known] - reference[known]
+    off = (series.wind - reference)[known & np.isfinite(series.wind)]
     inside = (series.low[known] <= reference[known]) & (reference[known] <= series.high[known])
+    found = bool(len(off))
     return Agreement(
-        count=count, bias=float(off.mean()), rmse=float(np.sqrt(np.mean(off**2))), interval=_rmse_interval(off, seed),
+        count=count, bounded=count - len(off), bias=float(off.mean()) if found else None,
+        rmse=float(np.sqrt(np.mean(off**2))) if found else None, interval=_rmse_interval(off, seed) if found else None,
         covered=float(inside.mean()),
     )  # fmt: skip
 
@@ -213,14 +233,15 @@ def _rmse_interval(off: NDArray[np.float64], seed: int) -> tuple[float, float]:
 
 
 def spectrum(time: NDArray[np.float64], estimated: NDArray[np.float64], logged: NDArray[np.float64]) -> Spectrum | None:
-    """Over the longest run of windows one step apart, all of them logged; None where that is shorter than
+    """Over the longest run of windows one step apart, all of them estimated and logged; None where that is shorter than
     `LEAST_SPECTRUM`, or where one of the series does not vary."""
     if len(time) < LEAST_SPECTRUM:
         return None
     from scipy import signal
 
     step = float(np.median(np.diff(time)))
-    broken = np.flatnonzero((np.abs(np.diff(time) - step) > 0.01 * step) | ~np.isfinite(logged[1:] + logged[:-1])) + 1
+    known = np.isfinite(estimated + logged)
+    broken = np.flatnonzero((np.abs(np.diff(time) - step) > 0.01 * step) | ~(known[1:] & known[:-1])) + 1
     runs = np.split(np.arange(len(time)), broken)
     run = max(runs, key=len)
     if len(run) < LEAST_SPECTRUM:

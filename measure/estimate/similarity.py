@@ -27,7 +27,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,6 +168,21 @@ class Sizes:
     scale: NDArray[np.float64]
     draws: NDArray[np.float64]
     findings: tuple[Finding, ...]
+
+    def only(self, places: Sequence[int]) -> Sizes:
+        """Some of the sizes, those at which the film is one that the model can judge."""
+        chosen = list(places)
+        left_out = [place for place in range(len(self.scale)) if place not in chosen]
+        if not left_out:
+            return self
+        finding = Finding(
+            kind="sizes-left-out", severity=Severity.WARNING, count=len(left_out),
+            what=f"{len(left_out)} of {len(self.scale)} sizes of flag were left out of the answer: as that of a flag "
+            + " or ".join(f"{self.scale[place]:.2f}" for place in left_out)
+            + " times as long as those of the training the film is unlike what the model was trained on",
+            fix="give --flag-size LENGTHxHEIGHT",
+        )  # fmt: skip
+        return replace(self, scale=self.scale[chosen], draws=self.draws[chosen], findings=(*self.findings, finding))
 
 
 def sizes(

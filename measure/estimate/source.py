@@ -12,6 +12,7 @@ from flagdata.addresses import local_path
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.ingest.camera import CropBox
 from flagdata.lake import Artifact, Lake
+from flagdata.lake.matching import matching
 from flagdata.provenance import digest, file_hash
 from flagdata.record import Record
 from flagdata.schema import Kind
@@ -118,15 +119,14 @@ def subjects(
         )  # fmt: skip
     if source is not None:
         return [_stored(lake, _named(lake, source, at), reading)]
-    rows = lake.rows(f"kind = '{Kind.CLIP}' and ({query})", at=at)
+    rows = matching(lake.rows(query, at=at), {"kind": Kind.CLIP})
     if not rows.num_rows:
         raise NotFoundError("no clip matches", where=query, fix="look with flagdata query --where")
     return [_stored(lake, Artifact.from_row(row), reading) for row in rows.to_pylist()]
 
 
 def _named(lake: Lake, source: str, at: str | None) -> Artifact:
-    kinds = ", ".join(f"'{kind}'" for kind in FILMED)
-    rows = lake.rows(f"kind in ({kinds})", at=at, columns=["artifact", "kind", "name"]).to_pylist()
+    rows = lake.rows({"kind": FILMED}, at=at, columns=["artifact", "kind", "name"]).to_pylist()
     meant = [row for row in rows if row["name"] == source and row["kind"] != Kind.CLIP]
     if not meant and len(source) >= _LEAST_PREFIX:
         meant = [row for row in rows if row["artifact"].startswith(source)]
@@ -199,7 +199,7 @@ def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
         return _loaded(estimator.SHIPPED / chosen, None)
     rows: Sequence[Mapping[str, Any]] = []
     if lake is not None:
-        rows = lake.rows(f"kind = '{Kind.NETWORK}'", at=at, columns=["artifact", "name"]).to_pylist()
+        rows = lake.rows({"kind": Kind.NETWORK}, at=at, columns=["artifact", "name"]).to_pylist()
     meant = [row for row in rows if row["name"] == chosen]
     meant = meant or [row for row in rows if len(chosen) >= _LEAST_PREFIX and row["artifact"].startswith(chosen)]
     if not meant or lake is None:

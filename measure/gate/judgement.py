@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from measure.gate.blank import blank
 from measure.gate.checks import CHECKS
 from measure.gate.distortions import DISTORTIONS
 from measure.gate.features import features_of
 from measure.gate.gate import SCORES, Gate, Vector
+from measure.gate.motion import LEAST_AREA
 from measure.gate.reasons import REASONS
 from measure.gate.tails import level
 from models.estimator import Estimator
@@ -22,6 +24,7 @@ FALSE_ALARM = 0.05
 CONFIDENCE = 0.9
 """Probability, over which clips the gate was calibrated by, that no larger share of them is."""
 _USUAL = (0.01, 0.99)
+_AREA = list(CHECKS).index("area")
 _LIKENESS = 0.5
 """Weight of the likeness to a distortion beside the surprise, where reasons are put in order: chosen on development
 clips, of the training side, where 1 called still pictures repeated and 0 called dark ones still."""
@@ -38,6 +41,7 @@ class Told:
         check: the score that speaks for it.
         value: its figure, in the unit that the sentence names; None where none could be measured.
         p: conformal p of the clip by this score alone, at the scale of all.
+        blank: whether there is nothing to measure in the clip.
     """
 
     kind: str
@@ -46,6 +50,7 @@ class Told:
     check: str
     value: float | None
     p: float
+    blank: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -128,32 +133,34 @@ def judge(
         )
     least = 1 / (len(gate.calibration) + 1)
 
-    def refused(kind: str, sentence: str, check: str, value: float) -> Judgement:
-        told = Told(kind=kind, sentence=sentence, fix=REASONS[kind].fix, check=check, value=value, p=least)
+    def refused(told: Told) -> Judgement:
         return Judgement(
             familiar=False, p=least, level=at, false_alarm=false_alarm, confidence=confidence, reasons=(told,),
             statistics=None, summary=None, frequency=None,
         )  # fmt: skip
 
     if len(frames) < wanted:
-        what = f"{REASONS['too-few-frames'].sentence}: {len(frames)} instead of {wanted}"
-        return refused("too-few-frames", what, "frames", float(len(frames)))
-    if float(frames.std()) < 1:
-        what = f"{REASONS['too-dark'].sentence}: all gray levels lie within {frames.std():.2g} of each other"
-        return refused("too-dark", what, "contrast", float(frames.std()))
+        reason = REASONS["too-few-frames"]
+        what = f"{reason.sentence}: {len(frames)} instead of {wanted}"
+        told = Told(kind="too-few-frames", sentence=what, fix=reason.fix, check="frames", value=len(frames), p=least)
+        return refused(told)
+    nothing = blank(frames)
+    if nothing is not None:
+        return refused(Told(**vars(nothing), p=least, blank=True))
     found = features_of(model, frames, summary)
     vector = found.vector(model)
     scores, surprises = gate.scores(vector[None])[0], gate.surprises(vector[None])[0]
     p = gate.p_value(float(surprises.max()))
-    reasons = () if p > at else _reasons(gate, scores, surprises, at)
+    still = found.checks[_AREA] <= np.log10(LEAST_AREA)
+    reasons = () if p > at else _reasons(gate, scores, surprises, at, still=bool(still))
     return Judgement(
         familiar=p > at, p=p, level=at, false_alarm=false_alarm, confidence=confidence, reasons=reasons,
         statistics=found.checks, summary=found.summary, frequency=found.frequency,
     )  # fmt: skip
 
 
-def _reasons(gate: Gate, scores: Vector, surprises: Vector, at: float) -> tuple[Told, ...]:
-    """Each kind once, of those whose scores would refuse the clip alone.
+def _reasons(gate: Gate, scores: Vector, surprises: Vector, at: float, *, still: bool) -> tuple[Told, ...]:
+    """Each kind once, of those whose scores would refuse the clip alone. Of a still clip none is about what moves.
 
     A fault shows in many scores. The kinds are in the order of two voices: the surprise of the kind's weightiest score
     as a share of the clip's largest, and, by `_LIKENESS`, the log-likelihood ratio of the kind's likeliest distortion
@@ -162,7 +169,8 @@ def _reasons(gate: Gate, scores: Vector, surprises: Vector, at: float) -> tuple[
     weightiest: dict[str, int] = {}
     pictured: dict[str, int] = {}
     for place in np.argsort(-surprises):
-        if gate.p_value(float(surprises[place])) <= at:
+        of_motion = REASONS[SCORES[place].reason].of_motion
+        if gate.p_value(float(surprises[place])) <= at and not (still and of_motion):
             weightiest.setdefault(SCORES[place].reason, int(place))
             if SCORES[place].name in CHECKS:
                 pictured.setdefault(SCORES[place].reason, int(place))

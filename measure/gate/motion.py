@@ -16,12 +16,12 @@ _SMOOTHING = 3.0
 """σ [px] by which the motion is smoothed before its regions are told apart: folds of one flag are one region."""
 _REGION = 0.15
 """Share of the strongest smoothed motion above which a pixel belongs to a region."""
-_LEAST_AREA = 1 / SIDE**2
+LEAST_AREA = 1 / SIDE**2
 
 
 def area(seen: Seen) -> float:
     """Common logarithm of the share of the picture that moves."""
-    return float(np.log10(max(float(seen.moving.mean()), _LEAST_AREA)))
+    return float(np.log10(max(float(seen.moving.mean()), LEAST_AREA)))
 
 
 def energy(seen: Seen) -> float:

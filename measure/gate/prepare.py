@@ -17,8 +17,10 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.console import LocalPath, progress, say
+from flagdata.dataset.resolve import explicit_sides
 from flagdata.errors import InputError
 from flagdata.rng import stream
+from flagdata.schema import Kind
 from measure.gate.distortions import DISTORTIONS, Film
 from measure.gate.features import Features, features_of
 from measure.gate.gate import Gate
@@ -93,15 +95,16 @@ class FilmsOf(Sequence[Film]):
 
     Raises:
         InputError: there are none.
+        RefusedError: films of this side share a sequence or a session with those of another side.
     """
 
     def __init__(self, lake_path: Path, data: DataSpec, side: str, *, at: str | None = None) -> None:
         import flagdata
 
         self._lake = flagdata.open(lake_path).lake
-        rows = self._lake.rows(
-            f"kind = 'recording' and {data.where(side)}", columns=["name", "seed", "object"], at=at
-        ).to_pylist()
+        explicit_sides(self._lake.table(self._lake.view(at)), data.split("train", "validation", "test"))
+        films = {"kind": Kind.RECORDING, **data.where(side)}
+        rows = self._lake.rows(films, columns=["name", "seed", "object"], at=at).to_pylist()
         if not rows:
             raise InputError(
                 f"no films of the {side} side of {', '.join(data.datasets)}", where=str(lake_path),

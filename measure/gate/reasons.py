@@ -10,10 +10,12 @@ class Reason:
     """Attributes:
     sentence: what is said, without a final stop.
     fix: what the user can do.
+    of_motion: whether it is about what moves, so that it is no reason where nothing does.
     """
 
     sentence: str
     fix: str
+    of_motion: bool = False
 
 
 REASONS: dict[str, Reason] = {
@@ -22,7 +24,9 @@ REASONS: dict[str, Reason] = {
         fix="crop to the flag, or choose a part of the film in which it flies",
     ),
     "cut-off": Reason(
-        sentence="the picture's edge cuts through what moves", fix="crop or film so that the whole flag is in the frame"
+        sentence="the picture's edge cuts through what moves",
+        of_motion=True,
+        fix="crop or film so that the whole flag is in the frame",
     ),
     "moving-camera": Reason(
         sentence="the camera moves: the background shifts", fix="film from a tripod, or stabilise the film first"
@@ -39,13 +43,15 @@ REASONS: dict[str, Reason] = {
     "too-dark": Reason(
         sentence="the picture is darker, flatter or noisier than those known", fix="film by daylight, or expose longer"
     ),
-    "several-flags": Reason(sentence="more than one region moves", fix="crop to one flag"),
+    "several-flags": Reason(sentence="more than one region moves", fix="crop to one flag", of_motion=True),
     "scale": Reason(
         sentence="what moves is larger or smaller in the picture than the flags known",
         fix="crop so that the flag takes a half to most of the frame",
+        of_motion=True,
     ),
     "unlike-cloth": Reason(
         sentence="what moves does not move as simulated cloth does",
         fix="make sure that the crop holds a flag on a pole and little else that moves",
+        of_motion=True,
     ),
 }

@@ -18,7 +18,7 @@ SIDE = 112
 LEAST_FRAMES = 3
 _NOISES = 4.0
 """Deviations of the noise that a pixel's must have to be called moving."""
-_LEAST_DEVIATION = 1.5
+LEAST_DEVIATION = 1.5
 """Gray levels below which no deviation is called motion: rounding and coding leave up to one."""
 _ROUGH = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
 """The difference of two Laplacians; white noise of deviation σ leaves 6 σ."""
@@ -84,7 +84,7 @@ class Seen:
     @cached_property
     def moving(self) -> NDArray[np.bool_]:
         """(SIDE, SIDE)."""
-        return self.deviation > max(_NOISES * self.still, _LEAST_DEVIATION)
+        return self.deviation > max(_NOISES * self.still, LEAST_DEVIATION)
 
     @cached_property
     def contrast(self) -> float:

@@ -36,8 +36,7 @@ def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None) ->
             f"a {artifact.kind.value}, not markers", where=f"artifact {artifact.id}",
             fix="name a marker artifact; flagdata ls lists them",
         )  # fmt: skip
-    lake.objects.check(artifact.object)  # damage must not be measured
-    sequence = read_markers(lake.object_path(artifact.object))
+    sequence = read_markers(lake.whole_object(artifact.object))  # damage must not be measured
     return _observation(sequence, name=name or artifact.name, source=artifact.id)
 
 

@@ -67,8 +67,7 @@ def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None, ma
             f"a {artifact.kind.value}, not a mesh sequence", where=f"artifact {artifact.id}",
             fix="name a mesh sequence; flagdata ls lists them",
         )  # fmt: skip
-    lake.objects.check(artifact.object)  # damage must not be measured
-    sequence = read_meshes(lake.object_path(artifact.object))
+    sequence = read_meshes(lake.whole_object(artifact.object))  # damage must not be measured
     seen = from_sequence(sequence, name=name or artifact.name, markers=markers)
     first = sequence.frame(0).rest.astype(np.float64)
     known = seen.known if seen.known.pins is not None else of_simulation(artifact, first)

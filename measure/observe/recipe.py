@@ -11,11 +11,13 @@
     [[recording]]       source: an artifact's id, a folder of meshes, or a marker table; take (a recording of a table
                         that holds several), name, rate, unit, rest-unit, noise
     [recording.wind]    velocity = [x, y, z], where the air goes to; or speed and toward (from +x towards +y); or log
-                        (an artifact's id or an anemometer's file) with axis or north, and offset or start (ISO 8601);
+                        (an artifact's id or an anemometer's file) with axis or north (where it lies, from +x towards
+                        +y), and offset or start (ISO 8601);
                         sensor (a recipe of catalogs/sensors or a file) and zone, where the log does not state them;
                         accept (the hash that confirms a drafted reading, as a refusal shows it)
 
-All values are SI and radians. What a recording's own description says may be left out. Paths are relative to the file.
+All values are SI and radians; toward-deg, north-deg and direction-sigma-deg are in degrees. What a recording's own
+description says may be left out. Paths are relative to the file.
 """
 
 from __future__ import annotations
@@ -34,9 +36,9 @@ from flagdata.ingest.anemometer.confirm import UNASKED, Accepting, Confirm
 from flagdata.ingest.markers import MarkerOptions
 from flagdata.ingest.meshes import read_obj
 from flagdata.lake import Lake
-from flagdata.recipes import Found, parsed
+from flagdata.recipes import parsed, read_recipe
 from flagdata.schema import Kind
-from flagdata.tables import Table
+from flagdata.tables import DEGREES, Table
 from measure.observe import markers, meshes, wind
 from measure.observe.cloth import VERTICES, outline
 from measure.observe.experiment import Observed, observe
@@ -142,8 +144,6 @@ def parse(path: Path) -> ExperimentRecipe:
         InputError: a value that does not fit.
         UsageError: values that do not fit together.
     """
-    if not path.is_file():
-        raise NotFoundError("no such recipe file", where=str(path), fix="check the path")
     top = Table(_parsed_file(path), where=str(path))
     folder = path.parent
     test = top.table("test")
@@ -263,14 +263,11 @@ def _material(table: Table, folder: Path) -> Material | None:
 def _material_file(path: Path) -> Material:
     if path.suffix == ".json":
         return read_material(path)
-    if not path.is_file():
-        raise NotFoundError("no such material file", where=str(path), fix="check the path")
     return Material.from_mapping(_parsed_file(path), name=path.stem)
 
 
 def _parsed_file(path: Path) -> dict[str, Any]:
-    found = Found(name=path.stem, data=path.read_bytes(), folder=path.parent, where=str(path))
-    return parsed(found.text, where=str(path))
+    return parsed(read_recipe(path).text, where=str(path))
 
 
 def _recording(table: Table, folder: Path) -> RecordingSource:
@@ -290,10 +287,13 @@ def _recording(table: Table, folder: Path) -> RecordingSource:
 
 def _wind(table: Table, folder: Path) -> WindSource:
     velocity, log = table.numbers("velocity"), table.text("log", "") or ""
-    gain, direction, clock = (
+    gain, clock = (
         table.number(f"{name}-sigma", 0.0, least=0.0) if f"{name}-sigma" in table else None
-        for name in ("gain", "direction", "clock")
+        for name in ("gain", "clock")
     )
+    direction = table.one_angle("direction-sigma", 0.0) if _stated(table, "direction-sigma") else None
+    if direction is not None and direction < 0:
+        raise InputError(f"direction-sigma is {direction:g}", where=table.where, fix="give a number of at least 0")
     given = [bool(velocity), "speed" in table, bool(log)]
     if sum(given) != 1:
         raise UsageError(f"{sum(given)} winds", where=table.where, fix="give one of velocity, speed and log")
@@ -301,7 +301,7 @@ def _wind(table: Table, folder: Path) -> WindSource:
         axis = _triple(table, "axis", table.numbers("axis"))
         start = table.text("start", None)
         placement = LogPlacement(
-            axis=axis, north=table.number("north", 0.0) if "north" in table else None,
+            axis=axis, north=table.one_angle("north", 0.0) if _stated(table, "north") else None,
             offset=table.number("offset", 0.0) if "offset" in table else None,
             start=timebase.parse(start, where=f"{table.where} start") if start is not None else None,
         )  # fmt: skip
@@ -315,11 +315,16 @@ def _wind(table: Table, folder: Path) -> WindSource:
             log=log, placement=placement, options=options, confirm=confirm, gain=gain, direction=direction, clock=clock
         )
     if not velocity:
-        speed, toward = table.number("speed", 0.0, least=0.0), table.number("toward", 0.0)
+        speed, toward = table.number("speed", 0.0, least=0.0), table.one_angle("toward", 0.0)
         velocity = (speed * math.cos(toward), speed * math.sin(toward), 0.0)
     source = WindSource(velocity=_triple(table, "velocity", velocity), gain=gain, direction=direction, clock=clock)
     table.done()
     return source
+
+
+def _stated(table: Table, angle: str) -> bool:
+    """Whether an angle is given, in radians or degrees."""
+    return any(key in table for key in (angle, angle + DEGREES))
 
 
 def _triple(table: Table, key: str, values: tuple[float, ...]) -> tuple[float, float, float] | None:

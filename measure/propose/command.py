@@ -56,12 +56,15 @@ def propose(
     from flagdata.lake import Lake
     from measure.nulls.supply import NullOptions
     from measure.observe import recipe as recipes
-    from measure.propose import candidates, ledger
-    from measure.propose.effect_file import write
+    from measure.propose import candidates, effect_file, ledger
     from measure.propose.propose import propose as seek
     from measure.propose.terms import dictionary
     from measure.propose.words import words
 
+    folder = out / "proposal"
+    ledger.check(folder / "ledger.json")
+    if effect is None:
+        effect_file.check(folder)
     recipe = recipes.load(recipe_path)
     said = said_of_nulls(recipe, level=level, nulls=nulls, bank=bank)
     options = NullOptions(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)), **said)
@@ -72,10 +75,9 @@ def propose(
         observed.experiment, tried, known=[candidates.weighed(name) for name in known],
         controls=controls, options=options, stage=stage_bars(),
     )  # fmt: skip
-    folder = out / "proposal"
     spec = effect or ""
     if effect is None and outcome.strengths:
-        spec = write(outcome, folder).spec
+        spec = effect_file.write(outcome, folder).spec
     ledger.add(folder / "ledger.json", outcome, effect=spec)
     _tell(outcome, spec, folder, as_json=as_json, text=words(outcome))
 

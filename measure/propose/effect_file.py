@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from flagdata.errors import UsageError
+from flagdata.errors import ConflictError, UsageError
+from flagdata.outputs import check_files, write_files
 from measure.propose.outcome import Outcome, Strength
 from measure.propose.terms import MASS, Term, TermColumn
+
+_PROJECT = "pyproject.toml"
+_COMMAND = "propose"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,34 +40,56 @@ class EffectFile:
 def write(outcome: Outcome, folder: Path) -> EffectFile:
     """The effect file, its contract tests and its pyproject.toml, into a folder.
 
+    An earlier proposal from the same data that was changed since is kept; the new one gets the next free name.
+
     Raises:
         UsageError: an outcome without terms of the dictionary.
+        ConflictError: pyproject.toml is there and was not written by a proposal, or was changed since.
     """
     parts = [_part(strength) for strength in outcome.strengths]
     if not parts:
         raise UsageError("no term was taken", where="proposal", fix="write only what was proposed")
     short = outcome.proposed_from[:12]
     class_name = "".join(word.capitalize() for part in parts for word in part["name"].split("_"))
-    module = f"proposed_{short}"
+    module = next(name for name in _names(f"proposed_{short}") if _is_free(folder, name))
     forces, masses = [p for p in parts if not p["mass"]], [p for p in parts if p["mass"]]
     pieces = (("FieldEffect",) if forces else ()) + (("Flat",) if masses else ()) + (("Seen",) if forces else ())
     values: Mapping[str, Any] = {
         "forces": forces, "masses": masses, "pieces": ", ".join([*pieces, *(["heavier"] if masses else [])]),
         "title": _sentence([s.words for s in outcome.strengths]), "data": outcome.proposed_from, "strengths": parts,
-        "class_name": class_name, "module": module, "name": f"proposed-{short}",
+        "class_name": class_name, "module": module, "name": module.replace("_", "-"),
         "source": f"from zero to the fit and its interval beyond; fitted to data {short}",
     }  # fmt: skip
     environment = Environment(
         loader=PackageLoader("measure.propose", "templates"), undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True, keep_trailing_newline=True, autoescape=False,
     )  # fmt: skip
-    folder.mkdir(parents=True, exist_ok=True)
-    for template, name in (
-        ("effect.py.j2", f"{module}.py"), ("test_effect.py.j2", f"test_{module}.py"),
-        ("pyproject.toml.j2", "pyproject.toml"),
-    ):  # fmt: skip
-        (folder / name).write_text(environment.get_template(template).render(**values), encoding="utf-8")
+    templates = {
+        f"{module}.py": "effect.py.j2",
+        f"test_{module}.py": "test_effect.py.j2",
+        _PROJECT: "pyproject.toml.j2",
+    }
+    texts = {name: environment.get_template(template).render(**values) for name, template in templates.items()}
+    write_files(folder, texts, command=_COMMAND)
     return EffectFile(path=folder / f"{module}.py", class_name=class_name)
+
+
+def check(folder: Path) -> None:
+    """Refuse a folder in which `write` cannot write, before any term is sought; raises as `write`."""
+    check_files(folder, _PROJECT, command=_COMMAND)
+
+
+def _names(first: str) -> Iterator[str]:
+    yield first
+    yield from (f"{first}_{number}" for number in count(2))
+
+
+def _is_free(folder: Path, module: str) -> bool:
+    try:
+        check_files(folder, f"{module}.py", f"test_{module}.py", command=_COMMAND)
+    except ConflictError:
+        return False
+    return True
 
 
 def _part(strength: Strength) -> dict[str, Any]:

@@ -6,8 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
+from flagdata.documents import read_json
 from flagdata.errors import CorruptError
-from flagdata.files import write_text
+from flagdata.outputs import check_rewrite, rewrite
 from measure.propose.outcome import Outcome
 
 SCHEMA = "flagdata.ledger/1"
@@ -21,13 +22,21 @@ def entries(path: Path) -> list[dict[str, Any]]:
     """
     if not path.exists():
         return []
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise CorruptError(f"not JSON: {error}", where=str(path), fix="move it away") from error
-    if not isinstance(content, dict) or content.get("schema") != SCHEMA or not isinstance(content.get("entries"), list):
+    content = read_json(path, noun="ledger", fix="move it away")
+    if content.get("schema") != SCHEMA or not isinstance(content.get("entries"), list):
         raise CorruptError(f"not a ledger of schema {SCHEMA}", where=str(path), fix="move it away")
     return content["entries"]
+
+
+def check(path: Path) -> None:
+    """Refuse a path at which no entry can be added, before any term is sought.
+
+    Raises:
+        ConflictError, CorruptError: a file that is no ledger.
+        InputError: the folder cannot be written.
+    """
+    check_rewrite(path)
+    entries(path)
 
 
 def add(path: Path, outcome: Outcome, *, effect: str) -> None:
@@ -41,4 +50,4 @@ def add(path: Path, outcome: Outcome, *, effect: str) -> None:
     """
     made = [*entries(path), {"effect": effect, **outcome.as_dict()}]
     text = json.dumps({"schema": SCHEMA, "entries": made}, indent=1, allow_nan=False, ensure_ascii=False)
-    write_text(path, text + "\n")
+    rewrite(path, text + "\n")

@@ -6,19 +6,19 @@ identity alone, not on who asked, when, or beside what: an interrupted run is re
 
 from __future__ import annotations
 
-import os
-import tempfile
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
+from io import BytesIO
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.checksums import is_sealed, sealed
 from flagdata.errors import CorruptError
+from flagdata.outputs import rewrite
 from flagdata.provenance import canonical, digest
 from flagdata.rng import child_seed
 from measure.refine.simulator import Request, Simulator
@@ -163,23 +163,23 @@ def _together(found: list[Evaluated | None]) -> Evaluated:
 
 
 def _write(path: Path, made: Evaluated) -> None:
-    """Whole or not at all: written beside it, then renamed."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     frame = np.zeros((0, 0), np.uint8) if made.frame is None else made.frame
-    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    with os.fdopen(handle, "wb") as file:
-        np.savez_compressed(
-            file, embedding=made.embedding, frame=frame, seconds=np.array([made.seconds[stage] for stage in STAGES])
-        )
-    Path(name).replace(path)
+    buffer = BytesIO()
+    np.savez_compressed(
+        buffer, embedding=made.embedding, frame=frame, seconds=np.array([made.seconds[stage] for stage in STAGES])
+    )
+    rewrite(path, sealed(buffer.getvalue()))
 
 
 def _read(path: Path) -> Evaluated:
+    again = "delete it: it is evaluated anew"
     try:
+        if not is_sealed(path):
+            raise CorruptError("a kept evaluation is damaged, or of an older version", where=str(path), fix=again)
         with path.open("rb") as file, np.load(file, allow_pickle=False) as content:
             embedding, frame, seconds = content["embedding"], content["frame"], content["seconds"].tolist()
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-        raise CorruptError(f"a kept evaluation cannot be read: {error}", where=str(path), fix="delete it") from None
+    except (OSError, ValueError, KeyError) as error:
+        raise CorruptError(f"a kept evaluation cannot be read: {error}", where=str(path), fix=again) from None
     return Evaluated(
         embedding=embedding, frame=frame if frame.size else None, seconds=dict(zip(STAGES, seconds, strict=True))
     )

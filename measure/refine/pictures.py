@@ -71,11 +71,17 @@ def trace_picture(refinement: Refinement, clip: int = 0) -> str:
         count = [r.evaluations for r in refinement.rounds]
         winds = [r.intervals[0] for r in refinement.rounds]
         right.fill_between(
-            count, [w.low for w in winds], [w.high for w in winds], color=_OWN, alpha=0.25, linewidth=0,
-            label=f"{refinement.level:.0%} interval",
+            count, *np.clip([(w.span.low, w.span.high) for w in winds], space.wind.low, space.wind.high).T, color=_OWN,
+            alpha=0.25, linewidth=0, label=f"{refinement.level:.0%} interval",
         )  # fmt: skip
         right.plot(
-            count, [w.median for w in winds], color=_OWN, linewidth=1.4, marker="o", markersize=3, label="median"
+            count,
+            [np.nan if w.median is None else w.median for w in winds],
+            color=_OWN,
+            linewidth=1.4,
+            marker="o",
+            markersize=3,
+            label="median",
         )
     if "wind_speed" in target.truth:
         right.axhline(target.truth["wind_speed"], color=_TARGET, linewidth=1.0, linestyle="--", label="true wind")

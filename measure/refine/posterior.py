@@ -48,13 +48,11 @@ class Posterior:
         points: (draw, 17) of [−1, 1]¹⁷, with the first clip's wind.
         winds: (draw, clip) [m/s].
         effective: Kish's effective number of the weighted prior draws of the cloth.
-        at_edge: (clip,) share of the probability in the outermost twentieth of the wind's range, both ends.
     """
 
     points: NDArray[np.float64]
     winds: NDArray[np.float64]
     effective: float
-    at_edge: NDArray[np.float64]
 
 
 def posterior(
@@ -88,11 +86,7 @@ def posterior(
         out[:, clip] = grid[cell] + step * (rng.random(draws) - 0.5)
     points = prior[chosen]
     points[:, WIND] = 2 * (out[:, 0] - low) / (high - low) - 1
-    edge = 0.05 * (high - low)
-    return Posterior(
-        points=points, winds=out, effective=float(1 / np.square(weight).sum()),
-        at_edge=((out < low + edge) | (out > high - edge)).mean(axis=0),
-    )  # fmt: skip
+    return Posterior(points=points, winds=out, effective=float(1 / np.square(weight).sum()))
 
 
 def _likelihood(

@@ -14,6 +14,7 @@ of the network's posterior as a probability: that would count the clip twice.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -25,6 +26,7 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
+from measure.ends import PILED, WITHIN, limits_of
 from measure.refine import start
 from measure.refine.distance import ReplicateMetric
 from measure.refine.evaluator import STAGES, Evaluated, Evaluator, fingerprint
@@ -189,7 +191,7 @@ class _Run:
         seconds = {stage: sum(g.seconds[stage] for group in groups for g in group) for stage in STAGES}
         return Refinement(
             targets=self.targets, level=self.settings.level, intervals=self._intervals(found),
-            amortised=intervals_of(told[0], self._prior()[:, :4], self.settings.level, count=4),
+            amortised=self._spans(told[0], self._prior()[:, :4]),
             bending=bending_table(self.space, found, self.settings.level), rounds=tuple(rounds),
             traces=self._traces(np.concatenate(points, axis=1), groups, metrics, embedded, ends), floor=floor,
             reached=reached, stopped=stopped, posterior=found, evaluators=self.evaluators,
@@ -243,12 +245,22 @@ class _Run:
         return self.space.reported(self.space.prior(stream(self.settings.seed, OWN, "prior"), 4000))
 
     def _intervals(self, found: Posterior) -> tuple[Interval, ...]:
-        prior, level = self._prior(), self.settings.level
-        own = intervals_of(self.space.reported(found.points), prior, level)
+        prior = self._prior()
+        own = self._spans(self.space.reported(found.points), prior)
         for clip in range(1, len(self.targets)):
-            wind = intervals_of(found.winds[:, [clip]], prior[:, :1], level, count=1)[0]
+            wind = self._spans(found.winds[:, [clip]], prior[:, :1])[0]
             own = (*own, replace(wind, name=f"{wind.name}.{clip}"))
         return own
+
+    def _spans(self, draws: NDArray[np.float64], prior: NDArray[np.float64]) -> tuple[Interval, ...]:
+        density, limits = self.space.density, limits_of("density")
+        learned = next(target for target in self.estimator.targets if target.name == "density")
+        if density.low > learned.low or density.high < learned.high:  # narrower: the user states it
+            limits = density.low, density.high
+        return intervals_of(
+            draws, prior, self.settings.level, ranges=(self.space.wind, density),
+            limits=(limits_of("wind_speed"), limits),
+        )  # fmt: skip
 
     def _traces(
         self, points: NDArray[np.float64], groups: Sequence[Sequence[Evaluated]], metrics: Sequence[ReplicateMetric],
@@ -293,14 +305,14 @@ class _Run:
                     what=f"the cloth's posterior rests on {found.effective:.0f} effective draws of the prior",
                 )
             )  # fmt: skip
-        for target, share in zip(self.targets, found.at_edge.tolist(), strict=True):
-            if share > 0.1:
-                out.append(
-                    Finding(
-                        kind="wind-at-edge", severity=Severity.WARNING, value=share, where=target.name,
-                        what=f"{share:.0%} of the wind's probability lies at the ends of the range that is searched",
-                    )
-                )  # fmt: skip
+        out += [
+            Finding(
+                kind=f"{entry.name.replace('_', '-')}-at-end", severity=Severity.WARNING,
+                what=f"{PILED:.0%} of the draws of {entry.name} or more lie within {WITHIN:.0%} of an end of the range "
+                "that is searched, so that only a bound is given",
+            )
+            for entry in self._intervals(found) if entry.median is None
+        ]  # fmt: skip
         if not self.evaluators[0].simulator.draws_damping:
             out.append(
                 Finding(
@@ -336,5 +348,5 @@ def _nearest(
 def _settled(rounds: Sequence[Round], share: float) -> bool:
     if len(rounds) < 2:
         return False
-    before, now = (r.intervals[0].high - r.intervals[0].low for r in rounds[-2:])
-    return abs(now - before) <= share * before
+    before, now = (r.intervals[0].span.high - r.intervals[0].span.low for r in rounds[-2:])
+    return math.isfinite(before) and abs(now - before) <= share * before  # a bound never settles: its end is not known

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.findings import Finding
+from flagdata.tables import Range
+from measure.ends import Span, span
 from measure.refine.evaluator import Evaluator
 from measure.refine.posterior import Posterior
 from measure.refine.space import QUANTITIES
@@ -30,19 +33,35 @@ class Interval:
     Attributes:
         name: of `QUANTITIES`; of clips after the first, the wind's has the clip's number behind it.
         unit: SI.
-        median, low, high: of the posterior.
-        prior_share: its width over that of the prior's interval of the same level: near 1 where the clip tells nothing.
+        median: of the posterior; None where its draws pile up at an end of the range beyond which there may be more.
+        span: the central interval, or a bound on one side (`measure.ends`).
+        prior_share: width of the central interval over that of the prior's of the same level: near 1 where the clip
+            tells nothing.
     """
 
     name: str
     unit: str
-    median: float
-    low: float
-    high: float
+    median: float | None
+    span: Span
     prior_share: float
 
+    def phrase(self, digits: int, unit: str = "") -> str:
+        """Median and interval in words, or the bound, without the level.
+
+        Args:
+            unit: with the space before it.
+        """
+        shown = self.span.phrase(digits, unit)
+        return f"{self.median:.{digits}f}{unit} {shown}" if self.median is not None and not self.span.bound else shown
+
     def as_dict(self) -> dict[str, Any]:
-        return vars(self).copy()
+        """JSON values; an end that nothing bounds is null."""
+        low, high = self.span.ends()
+        return {
+            "name": self.name, "unit": self.unit, "median": self.median, "low": low, "high": high,
+            "level": self.span.level, "bound": None if self.span.bound is None else self.span.bound.value,
+            "prior_share": self.prior_share,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,9 +133,7 @@ class Refinement:
         digits = {quantity.name: quantity.digits for quantity in QUANTITIES}
         parts = []
         for entry, title in zip(self.intervals, ("wind", "area weight"), strict=False):
-            d = digits[entry.name]
-            span = f"[{entry.low:.{d}f}, {entry.high:.{d}f}]"
-            parts.append(f"{title} {entry.median:.{d}f} {entry.unit} {span} {self.level:.0%}")
+            parts.append(f"{title} {entry.phrase(digits[entry.name], f' {entry.unit}')} {entry.span.level * 100:.3g} %")
         return f"{', '.join(parts)}, n = {self.evaluations} simulated clips"
 
     def as_dict(self) -> dict[str, Any]:
@@ -136,23 +153,34 @@ class Refinement:
 
 
 def intervals_of(
-    draws: NDArray[np.float64], prior: NDArray[np.float64], level: float, *, count: int = len(QUANTITIES)
-) -> tuple[Interval, ...]:
-    """Central intervals of draws (n, quantity) beside the prior's.
+    draws: NDArray[np.float64], prior: NDArray[np.float64], level: float, *, ranges: Sequence[Range],
+    limits: Sequence[tuple[float, float]],
+) -> tuple[Interval, ...]:  # fmt: skip
+    """Intervals of draws (n, quantity) beside the prior's.
 
     Args:
-        count: of the first `QUANTITIES` that the columns are.
+        draws: of the first `QUANTITIES`.
+        prior: (m, quantity) of the same.
+        ranges: that are searched, of the first quantities; those without one have no end.
+        limits: values that the same can have at all.
     """
     ends = [(1 - level) / 2, 0.5, (1 + level) / 2]
     low, middle, high = np.quantile(draws, ends, axis=0)
     least, _, most = np.quantile(prior, ends, axis=0)
-    return tuple(
-        Interval(
-            name=quantity.name, unit=quantity.unit, median=float(middle[i]), low=float(low[i]), high=float(high[i]),
-            prior_share=float((high[i] - low[i]) / (most[i] - least[i])),
-        )
-        for i, quantity in enumerate(QUANTITIES[:count])
-    )  # fmt: skip
+    found = []
+    for i, quantity in enumerate(QUANTITIES[: draws.shape[1]]):
+        own = Span(low=float(low[i]), high=float(high[i]), level=level, bound=None, estimated=True)
+        if i < len(ranges):
+            first, last = ranges[i].low, ranges[i].high
+            places = (draws[:, i] - first) / (last - first)
+            own = span(draws[:, i], places, level=level, limits=limits[i], assumed=(first, last))
+        found.append(
+            Interval(
+                name=quantity.name, unit=quantity.unit, median=float(middle[i]) if own.estimated else None, span=own,
+                prior_share=float((high[i] - low[i]) / (most[i] - least[i])),
+            )
+        )  # fmt: skip
+    return tuple(found)
 
 
 def _finite(values: NDArray[np.float64]) -> list[float | None]:

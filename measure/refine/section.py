@@ -6,7 +6,7 @@ from markupsafe import Markup
 
 from measure.pages.render import render
 from measure.refine.pictures import STEPS, frames, moving, still, trace_picture
-from measure.refine.refinement import METHOD, Interval, Refinement
+from measure.refine.refinement import METHOD, Refinement
 from measure.refine.space import QUANTITIES
 
 
@@ -57,12 +57,8 @@ def _rows(refinement: Refinement) -> list[dict[str, str]]:
         rows.append(
             {
                 "about": quantity.about + (f", clip {int(clip) + 1}" if clip else ""), "unit": quantity.unit,
-                "refined": _text(entry, quantity.digits), "told": told,
-                "amortised": _text(before[entry.name], quantity.digits) if entry.name in before else "",
+                "refined": entry.phrase(quantity.digits), "told": told,
+                "amortised": before[entry.name].phrase(quantity.digits) if entry.name in before else "",
             }
         )  # fmt: skip
     return rows
-
-
-def _text(entry: Interval, digits: int) -> str:
-    return f"{entry.median:.{digits}f} [{entry.low:.{digits}f}, {entry.high:.{digits}f}]"

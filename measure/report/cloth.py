@@ -86,7 +86,9 @@ def colour_bar(shade: Shade, meaning: str) -> Markup:
     for value, label in scale.ticks(beside):
         parts.append(f'<path class="tick" d="M{scale(value):.1f} 10v4"/>')
         parts.append(f'<text x="{scale(value):.1f}" y="26" text-anchor="middle">{escape(label)}</text>')
-    parts.append(f'<text class="label" x="150" y="43" text-anchor="middle">{escape(meaning)} [{shown.unit}]</text>')
+    parts.append(
+        f'<text class="label" x="150" y="43" text-anchor="middle">{escape(meaning)} [{escape(shown.unit)}]</text>'
+    )
     ends = f"{scale.low:.3g} to {scale.high:.3g} {shown.unit}"
     return drawing(300, 48, f"Colours of the {meaning}", ends, "".join(parts))
 

@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from jinja2.utils import htmlsafe_json_dumps
@@ -37,11 +36,6 @@ class ResidualView:
     means: list[tuple[str, Markup]]
     time: Markup
     spectrum: Markup
-
-
-def write_page(verdict: Verdict, path: Path) -> None:
-    """Write the report of `verdict` to `path`."""
-    path.write_text(page(verdict), encoding="utf-8")
 
 
 def page(verdict: Verdict) -> str:

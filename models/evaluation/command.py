@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,8 @@ from flagdata.console import LocalPath, document, json_option, lake_option, prog
 from flagdata.errors import InputError
 
 if TYPE_CHECKING:
+    import pyarrow as pa
+
     from flagdata.dataset import Pairs, Source
     from flagdata.lake import Artifact
     from models.crops import Cropping
@@ -26,11 +28,15 @@ if TYPE_CHECKING:
     from models.training.inputs import Prepared
     from models.training.recipe import DataSpec
 
+_BEFORE: dict[str, tuple[str, ...]] = {"train": (), "validation": ("train",), "test": ("train", "validation")}
+"""Side → the sides that a network has learned from, or was selected by, before it is judged on it."""
+
 
 @click.command()
 @click.argument("models", metavar="MODEL...", nargs=-1, required=True)
 @click.option("--dataset", default="flagsim-wide", show_default=True, help="Data set whose clips are judged.")
-@click.option("--side", default="test", show_default=True, help="Side of the data set: train, validation or test.")
+@click.option("--side", type=click.Choice(("train", "validation", "test")), default="test", show_default=True,
+              help="Side of the data set.")  # fmt: skip
 @click.option("--at", metavar="REF", help="Tag, branch or version of the lake; by default its head.")
 @click.option("--out", type=LocalPath(), metavar="DIR", default=Path("evaluation"), show_default=True,
               help="Where the page, the table in Markdown and the JSON go.")  # fmt: skip
@@ -88,6 +94,7 @@ def evaluate(
     from models.evaluation import report
     from models.evaluation.evaluation import as_document
 
+    report.check(out, name=name)
     source = flagdata.open(lake_path)
     folder = cache if cache is not None else Path(f"{lake_path.rstrip('/')}.inputs")
     desk = _Desk(source, dataset, at, folder, workers or os.cpu_count() or 1, seed, area_weight)
@@ -100,6 +107,29 @@ def evaluate(
     else:
         click.echo(report.markdown(found))
         say(f"{page}\n{text}\n{data}")
+
+
+def refuse_learned(catalog: pa.Table, learned: Iterable[DataSpec], *, dataset: str, side: str) -> None:
+    """Make sure that no clip that is to be judged is of a sequence or session that a network learned from, or was
+    selected by, in whatever data set. The training side is judged as what it is.
+
+    Args:
+        catalog: rows of the lake.
+        learned: the data sets of each network.
+        dataset, side: to be judged.
+
+    Raises:
+        RefusedError: one is.
+    """
+    from flagdata.dataset.resolve import explicit_sides
+    from flagdata.dataset.splits import ExplicitSplit
+    from models.training.recipe import DataSpec
+
+    judged = {f"{side} of {dataset}": DataSpec(datasets=(dataset,)).where(side)}
+    for datasets in {data.datasets for data in learned}:
+        data = DataSpec(datasets=datasets)
+        before = {f"{own} of {', '.join(datasets)}": data.where(own) for own in _BEFORE[side]}
+        explicit_sides(catalog, ExplicitSplit(where={**judged, **before}))
 
 
 class _Desk:
@@ -126,6 +156,9 @@ class _Desk:
         learned: list[tuple[int, Predictions]] = []
         curves: set[str] = set()
         chosen = self._models(names)
+        catalog = self._source.lake.table(self._source.lake.view(self._at))
+        trained_on = [DataSpec.of_identity(_card(estimator)["recipe"]["data"]) for _, estimator in chosen]
+        refuse_learned(catalog, trained_on, dataset=self._dataset, side=side)
         for row, estimator in chosen:
             predictions = self._predictions(estimator, side)
             data = DataSpec.of_identity(_card(estimator)["recipe"]["data"])
@@ -152,7 +185,7 @@ class _Desk:
         from models import estimator
 
         lake = self._source.lake
-        rows = lake.rows(f"kind = '{Kind.NETWORK}'", at=self._at, columns=["artifact", "name"]).to_pylist()
+        rows = lake.rows({"kind": Kind.NETWORK}, at=self._at, columns=["artifact", "name"]).to_pylist()
         found: list[tuple[Artifact | None, Estimator]] = []
         for name in names:
             if name == "shipped" or name.startswith("shipped/"):
@@ -176,7 +209,8 @@ class _Desk:
         return self._pairs[side]
 
     def _of(self, data: DataSpec, side: str) -> Pairs:
-        return self._source.pairs(at=self._at, split=side, split_by=data.split("train", side))
+        data.check(self._source.lake, at=self._at)
+        return self._source.pairs(at=self._at, split=side, split_by=data.split("train", "validation", "test"))
 
     def _clips(self, side: str, estimator: Estimator) -> Prepared:
         from models.training.inputs import prepare_clips

@@ -31,7 +31,7 @@ _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none", "svg.hashsalt": "flagdata", "font.size": 9, "text.color": _INK, "axes.edgecolor": _QUIET,
     "axes.labelcolor": _INK, "xtick.color": _QUIET, "ytick.color": _QUIET, "axes.spines.top": False,
     "axes.spines.right": False, "axes.grid": True, "grid.color": _RULE, "grid.linewidth": 0.6, "axes.axisbelow": True,
-    "legend.frameon": False, "axes.titlesize": 9, "font.family": "DejaVu Sans",
+    "legend.frameon": False, "axes.titlesize": 9, "font.family": "DejaVu Sans", "text.parse_math": False,
 }  # fmt: skip
 _WIDTH = 9.2  # inches, 72 units each
 

@@ -10,11 +10,16 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from flagdata.errors import UsageError
+from flagdata.markdown import plain
+from flagdata.outputs import check_files, write_files
 from flagdata.provenance import code_version
 from models.evaluation import figures, paper, table
 from models.evaluation.bootstrap import LEVEL
 from models.evaluation.calibration import BAND
 from models.evaluation.evaluation import Evaluation, as_document
+
+_COMMAND = "evaluate"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,13 +49,31 @@ class Picture:
 
 
 def write(found: Evaluation, folder: Path, *, name: str = "evaluation") -> tuple[Path, Path, Path]:
-    """Write NAME.html, NAME.json and NAME.md into `folder`, which is made; returns their paths."""
-    folder.mkdir(parents=True, exist_ok=True)
-    written = (folder / f"{name}.html", folder / f"{name}.json", folder / f"{name}.md")
-    document = json.dumps(as_document(found), indent=2, allow_nan=False, ensure_ascii=False)
-    for path, text in zip(written, (page(found), document + "\n", markdown(found)), strict=True):
-        path.write_text(text, encoding="utf-8")
-    return written
+    """Write NAME.html, NAME.json and NAME.md into `folder`, which is made; returns their paths.
+
+    Raises:
+        ConflictError: one of them is there and was not written by an evaluation, or was changed since.
+    """
+    document = json.dumps(as_document(found), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    names = _names(name)
+    write_files(folder, dict(zip(names, (page(found), document, markdown(found)), strict=True)), command=_COMMAND)
+    page_path, document_path, text_path = (folder / each for each in names)
+    return page_path, document_path, text_path
+
+
+def check(folder: Path, *, name: str) -> None:
+    """Refuse a folder in which `write` cannot write, before anything is evaluated; raises as `write`.
+
+    Raises:
+        UsageError: a name that is more than the name of a file.
+    """
+    if name != Path(name).name:
+        raise UsageError(f"{name!r} is not a file's name", where="--name", fix="give a name, and the folder by --out")
+    check_files(folder, *_names(name), command=_COMMAND)
+
+
+def _names(name: str) -> tuple[str, str, str]:
+    return f"{name}.html", f"{name}.json", f"{name}.md"
 
 
 def page(found: Evaluation) -> str:
@@ -74,14 +97,15 @@ def page(found: Evaluation) -> str:
 
 
 def markdown(found: Evaluation) -> str:
-    """The tables and their warnings as Markdown; the charts are the page's."""
-    parts = [f"# Models compared on {found.data}", _counts(found)]
+    """The tables and their warnings as Markdown, names of models and data sets as text; the charts are the page's."""
+    parts = [f"# Models compared on {plain(found.data)}", _counts(found)]
     parts += [
-        f"**Warning:** {f'{finding.where}: ' if finding.where else ''}{finding.what}." for finding in found.findings
+        f"**Warning:** {plain(f'{finding.where}: {finding.what}' if finding.where else finding.what)}."
+        for finding in found.findings
     ]
     parts += [_grid(_models(found)), table.LEGEND, "## What the paper printed", paper.WARNING, _grid(_paper(found))]
     for title, made in (
-        (f"## Against {found.reference}, pair by pair", _differences(found)),
+        (f"## Against {plain(found.reference or '')}, pair by pair", _differences(found)),
         ("## Every target", _targets(found)),
         ("## Linear readout of the embedding", _linear(found)),
         ("## Learning curve", _learning(found)),
@@ -95,7 +119,7 @@ def markdown(found: Evaluation) -> str:
 
 def _grid(made: Grid) -> str:
     def text(cell: Sequence[str]) -> str:
-        return "<br>".join(cell).replace("|", "\\|").replace("\n", " ")
+        return "<br>".join(plain(line) for line in cell)
 
     lines = [made.head, ["---"] * len(made.head), *([text(cell) for cell in line.cells] for line in made.body)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -17,11 +17,12 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from flagdata.checksums import check_sums, files_of, write_sums
-from flagdata.errors import CorruptError, FlagdataError, RefusedError
+from flagdata.checksums import SUMS, check_sums, files_of, write_sums
+from flagdata.errors import ConflictError, CorruptError, FlagdataError, RefusedError
 from flagdata.lake.durable import flush_file
+from flagdata.locks import LOCK
 from models.learner import Learner
-from models.storage import WEIGHTS, read_card, read_tensors, write_card, write_tensors
+from models.storage import CARD, WEIGHTS, read_card, read_tensors, write_card, write_tensors
 from models.training.progress import Course
 
 _LOG = logging.getLogger("flagdata")
@@ -51,6 +52,24 @@ class Standing:
     course: Course
     batches: dict[str, Any]
     running: tuple[float, int] = (0.0, 0)
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse a folder in which checkpoints would be kept beside, or in place of, anything else.
+
+    Raises:
+        ConflictError: it holds something that no training wrote.
+    """
+    files = {Path(LOCK)} | {
+        Path(part) / name for part in (_LAST, _NEXT, _BEFORE) for name in (WEIGHTS, _BEST, _MOMENTS, CARD, SUMS)
+    }
+    known = files | {file.parent for file in files}
+    for path in sorted(folder.rglob("*")):
+        if path.relative_to(folder) not in known or path.is_symlink():
+            raise ConflictError(
+                "the run folder holds what no training wrote", where=str(path),
+                fix="give a new or empty folder by --run",
+            )  # fmt: skip
 
 
 def save(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> None:

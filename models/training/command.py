@@ -15,9 +15,10 @@ from flagdata.console import LocalPath, document, json_option, lake_option, prog
 from flagdata.errors import ConflictError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from flagdata.dataset import Pairs, Source
+    from flagdata.lake import Artifact
     from models.training.recipe import TrainingRecipe
 
 
@@ -107,20 +108,26 @@ def trained(
     import flagdata
     from flagdata.locks import alone_in
     from flagdata.provenance import digest
+    from models.storage import read_card
     from models.targets import Scaling
+    from models.training.checkpoint import check_folder
     from models.training.inputs import film_rows, prepare_clips, prepare_films, stated
     from models.training.publish import data_identity, network_artifact, publish
     from models.training.steps import Training
 
     recipe.check()
+    if run is not None:
+        check_folder(run)
     source = flagdata.open(lake_path)
+    source.lake.check_writable()
     train_pairs, validation_pairs = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))
     data = data_identity(source.lake, train_pairs, validation_pairs, at=at)
     wanted = network_artifact(recipe, data).id
-    known = source.lake.rows(f"artifact = '{wanted}'", at=branch, columns=["artifact"]).num_rows
+    known = source.lake.rows({"artifact": wanted}, at=branch, columns=["artifact"]).num_rows
     if known:
         say("this model was trained before")
-        return _report(source, wanted, branch)
+        row = source.lake.artifact(wanted, at=branch)
+        return _report(row, read_card(source.lake.object_path(str(row.object))))
     films = film_rows(train_pairs, sequences=recipe.data.sequences, seed=recipe.seed)
     if names := recipe.loss.targets:
         for side, table, rows in (
@@ -160,12 +167,12 @@ def trained(
             ranks.barrier()  # no rank leaves while another still talks to it
         if not first:
             return None
-        artifact = publish(source.lake, recipe, data, done, batches=training.batches.state(), branch=branch)
+        row, card = publish(source.lake, recipe, data, done, batches=training.batches.state(), branch=branch)
     finally:
         held.close()
         if several:
             ranks.destroy_process_group()
-    return _report(source, artifact.id, branch)
+    return _report(row, card)
 
 
 def _refuse(folder: Path) -> None:
@@ -175,11 +182,7 @@ def _refuse(folder: Path) -> None:
     )  # fmt: skip
 
 
-def _report(source: Source, artifact: str, branch: str) -> dict[str, Any]:
-    from models.storage import read_card
-
-    row = source.lake.artifact(artifact, at=branch)
-    card = read_card(source.lake.object_path(str(row.object)))
+def _report(row: Artifact, card: Mapping[str, Any]) -> dict[str, Any]:
     kept = ("name", "title", "seed", "parameters", "epochs", "best", "seconds", "data", "recipe_hash", "code_version")
     return {"artifact": row.id, "object": row.object, **{key: card[key] for key in kept}}
 
@@ -188,7 +191,9 @@ def sides_of(source: Source, recipe: TrainingRecipe, side: str, *, at: str | Non
     """The pairs of one side of a recipe's data set.
 
     Raises:
+        UnknownNameError: the lake has no such data set.
         NotFoundError, RefusedError: there are none, or the sides leak.
     """
+    recipe.data.check(source.lake, at=at)
     split = recipe.data.split("train", "validation", "test")
     return source.pairs(at=at, split=side, split_by=split, seed=recipe.seed)

@@ -16,8 +16,6 @@ from __future__ import annotations
 
 import io
 import logging
-import os
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
@@ -34,6 +32,7 @@ from flagdata.checksums import is_sealed, sealed
 from flagdata.dataset.pairs import Pairs
 from flagdata.errors import CorruptError, FlagdataError, InputError
 from flagdata.locks import alone_in
+from flagdata.outputs import rewrite
 from flagdata.provenance import canonical, digest
 from flagdata.rng import stream
 from flagdata.timebase import NANOSECONDS
@@ -72,7 +71,7 @@ class Files:
             path = self.paths[entry]
             try:
                 found.append(np.load(path, mmap_mode="r")[variant])
-            except (OSError, ValueError) as error:
+            except (OSError, ValueError, EOFError) as error:
                 raise CorruptError(
                     f"a prepared input cannot be read: {error}", where=str(path),
                     fix="delete the file and give the command again: it is made anew",
@@ -323,20 +322,14 @@ def _fill(
 
 
 def _write(path: Path, clips: Sequence[Tensor], front_end: FrontEnd) -> None:
-    """The front end's output of some clips, beside its place and then renamed: a file is whole or not there."""
+    """The front end's output of some clips, with its checksum; a file is whole or not there."""
     if front_end.maps == "frames":
         stored = np.stack([clip.round().to(torch.uint8).numpy() for clip in clips])
     else:
         stored = np.stack([front_end(clip[None])[0].to(torch.float16).numpy() for clip in clips])
-    path.parent.mkdir(parents=True, exist_ok=True)
-    scratch = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}.part")
-    try:
-        content = io.BytesIO()
-        np.save(content, stored)
-        scratch.write_bytes(sealed(content.getvalue()))
-        scratch.rename(path)
-    finally:
-        scratch.unlink(missing_ok=True)
+    content = io.BytesIO()
+    np.save(content, stored)
+    rewrite(path, sealed(content.getvalue()))
 
 
 def _first_sequences(pairs: Pairs, rows: NDArray[np.int64], *, count: int | None, seed: int) -> NDArray[np.bool_]:

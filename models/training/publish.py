@@ -49,8 +49,8 @@ def card_of(
 
 def publish(
     lake: Lake, recipe: TrainingRecipe, data: dict[str, Any], trained: Trained, *, batches: dict[str, Any], branch: str
-) -> Artifact:
-    """Commit a model; one that is there already is kept.
+) -> tuple[Artifact, dict[str, Any]]:
+    """Commit a model and return its row and card; one that is there already is kept.
 
     Raises:
         FlagdataError: the disk refuses it.
@@ -67,4 +67,4 @@ def publish(
         best = {"epochs": card["epochs"], "best": card["best"], "parameters": card["parameters"]}
         artifact = replace(artifact, object=transaction.put(staged), parameters=canonical(best))
         transaction.add(artifact)
-    return artifact
+    return transaction.result.artifacts[artifact.id], card

@@ -1,8 +1,7 @@
 """What is trained on what, as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is named.
 
 title, seed
-[data]       dataset: a data set's name, or a list of them, whose sides are told by names; sequences: of the training
-             side, all by default
+[data]       dataset: a data set's name, or a list of them; sequences: of the training side, all by default
 [input]      maps: "frames", "spectral-maps", "wave-maps", "flow-maps" or "flow-maps-3"; size [px], frames; scales,
              mirror: of crops; variants: crops of each film that are prepared
 [network]    name: of `models.registry.NETWORKS`; its other keys are the network's own
@@ -13,6 +12,7 @@ title, seed
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from enum import StrEnum
@@ -23,19 +23,26 @@ from typing import Any
 import torch
 
 from flagdata.dataset.splits import ExplicitSplit
-from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.errors import InputError, LimitError, UnknownNameError, UsageError
+from flagdata.lake import Lake
+from flagdata.lake.matching import Values
 from flagdata.provenance import recipe_hash
-from flagdata.recipes import Shelf, parsed
+from flagdata.recipes import Shelf, is_name, parsed
+from flagdata.schema import Kind
 from flagdata.tables import Table
 from models.crops import Cropping
-from models.frontend import FrontEnd, Maps
-from models.learner import Learner, Loss, build
+from models.frontend import RATE_LIMIT, FrontEnd, Maps
+from models.learner import NUMBER_LIMIT, Learner, Loss, build
 from models.registry import NETWORKS
 from models.targets import TARGETS
 
 TRAININGS = Shelf(folder="training", noun="training recipe")
 RECIPE_VERSION = 1
 """Raised whenever the same recipe and data give other weights."""
+FILM_LIMIT = 1 << 28
+"""Most values that are prepared of a film: 512 MiB of maps."""
+_LARGEST_STEP = 10.0
+"""Largest learning rate and weight decay; the catalog's are of 10⁻³ and 10⁻⁴."""
 _MAPS: tuple[Maps, ...] = ("frames", "spectral-maps", "wave-maps", "flow-maps", "flow-maps-3")
 
 
@@ -58,7 +65,7 @@ class Precision(StrEnum):
 @dataclass(frozen=True, kw_only=True)
 class DataSpec:
     """Attributes:
-    datasets: names of the data sets that are learned from together; their sides are told by names.
+    datasets: names of the data sets that are learned from together.
     sequences: of the training side that are used; None for all.
     """
 
@@ -71,13 +78,24 @@ class DataSpec:
         named = entry["dataset"]
         return cls(datasets=(named,) if isinstance(named, str) else tuple(named), sequences=entry["sequences"])
 
-    def where(self, side: str) -> str:
-        """SQL over the catalog that takes a side."""
-        return "(" + " or ".join(f"name like '{dataset}-{side}-%'" for dataset in self.datasets) + ")"
+    def where(self, side: str) -> Values:
+        """What rows of the catalog that are of a side have in their columns."""
+        return {"dataset": self.datasets, "side": side}
 
     def split(self, *sides: str) -> ExplicitSplit:
         """These sides of the data sets, by which pairs are read."""
         return ExplicitSplit(where={side: self.where(side) for side in sides})
+
+    def check(self, lake: Lake, *, at: str | None) -> None:
+        """Make sure that a lake has all of these data sets.
+
+        Raises:
+            UnknownNameError: one that it has not; the nearest is named.
+        """
+        known = set(lake.rows({"kind": Kind.CLIP}, at=at, columns=["dataset"])["dataset"].drop_null().to_pylist())
+        for dataset in self.datasets:
+            if dataset not in known:
+                raise UnknownNameError.of("data set", dataset, known, where=str(lake.path))
 
     def identity(self) -> dict[str, Any]:
         """JSON values; one data set is named by itself."""
@@ -187,8 +205,15 @@ class TrainingRecipe:
         Raises:
             InputError: options or clips that the network does not take.
         """
-        with torch.no_grad(), torch.device("meta"):
-            self.learner().network(torch.empty(2, *self.front_end.shape))
+        try:
+            with torch.no_grad(), torch.device("meta"):
+                self.learner().network(torch.empty(2, *self.front_end.shape))
+        except RuntimeError as error:
+            shape = "×".join(map(str, self.front_end.shape))
+            raise InputError(
+                f"the network {self.network.name} does not take {shape} {self.front_end.maps}: {error}",
+                where="[network]", fix="give it smaller strides, or larger clips",
+            ) from None  # fmt: skip
 
     @cached_property
     def hash(self) -> str:
@@ -225,7 +250,7 @@ def parse(text: str, *, name: str, where: str, folder: Path = Path()) -> Trainin
 def _data(table: Table) -> DataSpec:
     named = table.value("dataset")
     datasets = [named] if isinstance(named, str) else named
-    if not isinstance(datasets, list) or not datasets or not all(_is_name(dataset) for dataset in datasets):
+    if not isinstance(datasets, list) or not datasets or not all(is_name(dataset) for dataset in datasets):
         raise InputError(
             f"the data set is {named!r}", where=table.where,
             fix='name one, or several in a list: dataset = "flagsim-wide"',
@@ -235,19 +260,22 @@ def _data(table: Table) -> DataSpec:
     return DataSpec(datasets=tuple(datasets), sequences=sequences)
 
 
-def _is_name(value: object) -> bool:
-    return isinstance(value, str) and all(part.isalnum() for part in value.split("-"))
-
-
 def _input(table: Table) -> tuple[FrontEnd, Cropping, int]:
     maps = table.text("maps", "spectral-maps")
     if maps not in _MAPS:
         raise UnknownNameError.of("kind of maps", str(maps), _MAPS, where=table.where)
     size, frames = table.whole("size", 224, least=4), table.whole("frames", 30, least=4)
-    front_end = FrontEnd(maps=maps, size=size, frames=frames, rate=table.number("rate", 25.0, above=0.0))
+    front_end = FrontEnd(
+        maps=maps, size=size, frames=frames, rate=table.number("rate", 25.0, above=0.0, most=RATE_LIMIT)
+    )
     scales = table.numbers("scales") or Cropping.scales
     mirror = table.flag("mirror") if "mirror" in table else True
     variants = table.whole("variants", 4, least=1)
+    if (values := variants * math.prod(front_end.shape)) > FILM_LIMIT:
+        raise LimitError(
+            f"{variants} variants of {math.prod(front_end.shape)} values are {values:.3g} values of each film",
+            where=table.where, fix=f"at most {FILM_LIMIT} are kept: give fewer variants or a smaller size",
+        )  # fmt: skip
     table.done()
     return front_end, Cropping(frames=frames, size=size, scales=scales, mirror=mirror), variants
 
@@ -286,7 +314,7 @@ def _loss(table: Table) -> LossSpec:
         raise UsageError(f"a margin says nothing of {name.value}", where=table.where, fix="leave it out")
     spec = LossSpec(
         name=name, targets=targets, components=table.whole("components", 6, least=1),
-        margin=table.number("margin", 1.0, above=0.0),
+        margin=table.number("margin", 1.0, above=0.0, most=NUMBER_LIMIT),
     )  # fmt: skip
     table.done()
     return spec
@@ -297,10 +325,11 @@ def _optimiser(table: Table) -> OptimiserSpec:
     if schedule is not Schedule.STEPS and "drop-after" in table:
         raise UsageError(f"drop-after says nothing of {schedule.value}", where=table.where, fix="leave it out")
     spec = OptimiserSpec(
-        rate=table.number("rate", 1e-2, above=0.0), decay=table.number("decay", 2e-3, least=0.0),
+        rate=table.number("rate", 1e-2, above=0.0, most=_LARGEST_STEP),
+        decay=table.number("decay", 2e-3, least=0.0, most=_LARGEST_STEP),
         batch=table.whole("batch", 32, least=2), epochs=table.whole("epochs", 40, least=1), schedule=schedule,
         drop_after=table.whole("drop-after", 20, least=1),
-        clip_norm=table.number("clip-norm", 10.0, above=0.0) if "clip-norm" in table else None,
+        clip_norm=table.number("clip-norm", 10.0, above=0.0, most=NUMBER_LIMIT) if "clip-norm" in table else None,
         precision=table.choice("precision", Precision.FLOAT32), patience=table.whole("patience", 10, least=1),
     )  # fmt: skip
     table.done()

@@ -12,8 +12,9 @@ import math
 from pathlib import Path
 from typing import Any
 
-from flagdata.errors import ConflictError, InputError
-from flagdata.ingest.meshes import Obj, write_obj
+from flagdata.errors import InputError
+from flagdata.ingest.meshes import Obj, obj_text
+from flagdata.outputs import write_files
 from sim.air import QuadraticNormal
 from sim.arcsim.reading import SIMULATED, STAGES, ArcsimScene
 from sim.material import Material
@@ -37,20 +38,20 @@ def write_scene(file: ArcsimScene, folder: Path, *, name: str = "scene") -> Path
     """
     scene = file.scene
     air = _expressible(scene)
-    paths = [folder / f"{name}.json", folder / f"{name}.obj", folder / f"{scene.material.name}.json"]
-    if len({path.name for path in paths}) < len(paths):
+    content, mesh, material = f"{name}.json", f"{name}.obj", f"{scene.material.name}.json"
+    if content == material:
         raise InputError(
             f"scene and material are both named {name}", where=str(folder), fix="give the scene another name"
         )
-    for path in paths:
-        if path.exists():
-            raise ConflictError("there is a file already", where=str(path), fix="write to another folder")
-    folder.mkdir(parents=True, exist_ok=True)
-    content, mesh, material = paths
-    write_obj(mesh, Obj(positions=scene.position, faces=scene.mesh.faces, rest=scene.mesh.rest))
-    _write(material, _material(scene.material))
-    _write(content, _content(file, air, mesh=mesh.name, material=material.name))
-    return content
+    write_files(
+        folder,
+        {
+            mesh: obj_text(Obj(positions=scene.position, faces=scene.mesh.faces, rest=scene.mesh.rest)),
+            material: _json(_material(scene.material)),
+            content: _json(_content(file, air, mesh=mesh, material=material)),
+        },
+    )
+    return folder / content
 
 
 def _expressible(scene: Scene) -> QuadraticNormal:
@@ -111,5 +112,5 @@ def _material(material: Material) -> dict[str, Any]:
     }
 
 
-def _write(path: Path, content: dict[str, Any]) -> None:
-    path.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+def _json(content: dict[str, Any]) -> str:
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"

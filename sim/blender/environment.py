@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from flagdata.errors import FlagdataError, InputError, NotFoundError
+from flagdata.errors import FlagdataError, NotFoundError
 from sim.kernel.build import cache_folder
 
 SETTING = "FLAGDATA_BLENDER"
@@ -27,6 +27,8 @@ REQUIREMENT = "bpy==4.5.15"
 PYTHON = (3, 11)
 """The only version of Python that the module is built for."""
 
+_MARK = "flagdata-blender"
+"""Name of a file in an environment that this module makes."""
 _CHECK_TIMEOUT = 120.0  # s; importing Blender from a cold disk
 _TAIL = 2000  # characters of a failed command's output that an error quotes
 _PROBE = """
@@ -139,20 +141,23 @@ def create(folder: Path, *, python: str | None = None, say: Callable[[str], None
     Nothing but the folder is changed. pip's own settings (its index, its cache) apply.
 
     Args:
-        folder: an empty or absent folder, or a virtual environment.
+        folder: an empty or absent folder, or one in which this was begun before.
         python: an interpreter of Python 3.11; by default the running one, or `python3.11` of the search path.
         say: called with a sentence before each step that takes long.
 
     Raises:
-        InputError: the folder holds something else.
+        ConflictError: the folder holds something else, such as an environment for other work.
         NotFoundError: there is no Python 3.11.
         BlenderError: a step failed, or the module cannot be imported.
     """
     target = interpreter(folder)
-    if folder.exists() and not (folder / "pyvenv.cfg").is_file() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError("this is no virtual environment", where=str(folder), fix="name a folder that is not there yet")
+    from flagdata.outputs import check_folder, rewrite
+
+    if not _is_own(folder):
+        check_folder(folder)
     base = _python_for_blender(python)
     say(f"making an environment in {folder}")
+    rewrite(folder / _MARK, "the environment of flagdata blender-setup, which completes it when run again\n")
     _run(
         (base, "-m", "venv", str(folder)), folder,
         fix="install Python's venv (Debian: apt-get install python3.11-venv)",
@@ -165,6 +170,11 @@ def create(folder: Path, *, python: str | None = None, say: Callable[[str], None
     )  # fmt: skip
     check.cache_clear()
     return check(target)
+
+
+def _is_own(folder: Path) -> bool:
+    """Whether the environment in a folder is Blender's: marked so, or with Blender's module in it."""
+    return (folder / _MARK).is_file() or any(folder.glob("lib/python*/site-packages/bpy"))
 
 
 def _python_for_blender(named: str | None) -> str:

@@ -20,13 +20,14 @@ from flagdata.errors import ConflictError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.meshes import read_meshes
 from flagdata.record import Record
+from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
 from sim.datasets import jobs
 from sim.datasets.cast import Cast, Roll, casts
 from sim.datasets.cluster import Job, results
 from sim.datasets.films import Film, Sequences
 from sim.datasets.jobs import Filmed, Simulated
-from sim.datasets.recipe import DatasetRecipe, side_filter
+from sim.datasets.recipe import DatasetRecipe
 from sim.run.publish import publish
 
 COMMIT_FILMS = 32
@@ -78,23 +79,25 @@ class Build:
     device: str = "cpu"
     _new_sequences: int = field(default=0, init=False)
     _new_films: int = field(default=0, init=False)
+    _clips: int = field(default=0, init=False)
 
     def run(self) -> BuildReport:
         """Make what is missing.
 
         Raises:
-            ConflictError: the branch has films of this name by another recipe.
+            ConflictError: the branch has films of this name by another recipe, or these films under another name.
             RefusedError: too many sequences fail.
             WorkerError: workers kept dying, or all of them are gone.
             FlagdataError: a renderer, an asset or the disk failed.
         """
         begun = time.perf_counter()
+        self._refuse_other_names(self.films(Roll(cast=cast) for cast in casts(self.recipe)))
         rolls = self._simulate()
         films = self._film(rolls)
         failed = [f"{roll.cast.simulation.name} {index}: {why}" for roll in rolls for index, why in roll.failed.items()]
         return BuildReport(
             sequences=sum(roll.cast.simulation.count for roll in rolls), films=len(films),
-            new_sequences=self._new_sequences, new_films=self._new_films, clips=self._clips(films),
+            new_sequences=self._new_sequences, new_films=self._new_films, clips=self._clips,
             failed=tuple(failed), seconds=time.perf_counter() - begun,
         )  # fmt: skip
 
@@ -156,9 +159,13 @@ class Build:
     def _film(self, rolls: Iterable[Roll]) -> list[Film]:
         films = self.films(rolls)
         frames = self.recipe.simulation.time.frames
-        self._refuse_mixture({film.artifact(frames=frames).id for film in films})
+        self._refuse_other_names(films)
+        own = {film.artifact(frames=frames).id for film in films}
+        self._refuse_mixture(own)
         known = self._known()
         missing = [film for film in films if film.artifact(frames=frames).id not in known]
+        clips = self.lake.rows({"kind": Kind.CLIP}, at=self.branch, columns=["recording"])["recording"].to_pylist()
+        self._clips = sum(recording in own for recording in clips)
         with self.bars(len(films), f"{self.recipe.name}: render", "film") as advance:
             advance(len(films) - len(missing))
             waiting: list[Filmed] = []
@@ -175,22 +182,33 @@ class Build:
         return films
 
     def _refuse_mixture(self, own: set[str]) -> None:
-        """Make sure that what bears the data set's name is of this recipe: its sides are told by names."""
-        for side in self.recipe.sides:
-            where = f"kind = 'recording' and {side_filter(self.recipe, side.name)}"
-            others = set(self.lake.rows(where, at=self.branch, columns=["artifact"])["artifact"].to_pylist()) - own
-            if others:
-                raise ConflictError(
-                    f"{len(others)} recordings called {self.recipe.name}-{side.name}-… are of another recipe",
-                    where=f"branch {self.branch}", fix="give the recipe another name, or build on another branch",
-                )  # fmt: skip
+        """Make sure that all films of the data set's name are of this recipe."""
+        films = {"kind": Kind.RECORDING, "dataset": self.recipe.name}
+        others = set(self.lake.rows(films, at=self.branch, columns=["artifact"])["artifact"].to_pylist()) - own
+        if others:
+            raise ConflictError(
+                f"{len(others)} recordings of the data set {self.recipe.name!r} are of another recipe",
+                where=f"branch {self.branch}", fix="give the recipe another name, or build on another branch",
+            )  # fmt: skip
+
+    def _refuse_other_names(self, films: Sequence[Film]) -> None:
+        """Make sure that no film of this recipe is there under another data set's name, where it would stay."""
+        frames = self.recipe.simulation.time.frames
+        own = [film.artifact(frames=frames).id for film in films]
+        columns = ["artifact", "dataset"]
+        there = self.lake.rows({"artifact": own}, at=self.branch, columns=columns)["dataset"].to_pylist()
+        others = sorted({str(dataset) for dataset in there} - {self.recipe.name})
+        if others:
+            raise ConflictError(
+                f"films of this recipe are there already, in the data set {others[0]!r}",
+                where=f"branch {self.branch}", fix="use that data set, or give the recipe another seed",
+            )  # fmt: skip
 
     def _shots(self, films: Sequence[Film]) -> Iterator[Job]:
         rows = self.lake.rows("kind = 'meshes'", at=self.branch, columns=["artifact", "object"]).to_pylist()
         objects = {row["artifact"]: row["object"] for row in rows}
         for film in films:
-            self.lake.objects.check(objects[film.sequence])  # damage must not be filmed
-            sequence = read_meshes(self.lake.object_path(objects[film.sequence]))
+            sequence = read_meshes(self.lake.whole_object(objects[film.sequence]))  # damage must not be filmed
             yield jobs.film, (self.recipe, film, sequence, self.device)
 
     def _commit(self, filmed: Sequence[Filmed]) -> int:
@@ -207,15 +225,9 @@ class Build:
                 recording = _recording(done, record, stored=stored)
                 transaction.add(replace(recording, branch=self.branch))
                 for clip in clip_rows(record, recording):
-                    transaction.add(clip)
+                    self._clips += transaction.add(clip)
         self._new_films += len(filmed)
         return len(filmed)
-
-    def _clips(self, films: Sequence[Film]) -> int:
-        frames = self.recipe.simulation.time.frames
-        own = {film.artifact(frames=frames).id for film in films}
-        clips = self.lake.rows("kind = 'clip'", at=self.branch, columns=["recording"])["recording"].to_pylist()
-        return sum(recording in own for recording in clips)
 
 
 def _recording(done: Filmed, record: Record, *, stored: str) -> Artifact:

@@ -18,11 +18,14 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from flagdata.lake import Lake
+from flagdata.outputs import check_file, rewrite, write_file
 from flagdata.provenance import canonical, code_version
 from flagdata.record import Record
 from flagdata.rng import stream
-from sim.datasets.recipe import DatasetRecipe, side_filter
+from flagdata.schema import Kind
+from sim.datasets.recipe import DatasetRecipe
 
+_COMMAND = "build"
 _SHOWN = 24  # pictures of the contact sheet
 _COLUMNS = 6
 _PICTURE = 160  # px
@@ -47,17 +50,25 @@ class Distribution:
     counts: list[int] | None
 
 
+def check(path: Path | None) -> None:
+    """Refuse a path to which `write_card` cannot write, before anything is simulated; raises as `write_card`."""
+    if path is not None:
+        check_file(path, command=_COMMAND)
+
+
 def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path: Path | None = None) -> Path:
     """Write the card of a data set, read off the lake.
 
     Args:
-        path: the file; None for `cards/NAME-HASH.html` in the lake's folder.
+        path: the file; None for `cards/NAME-HASH.html` in the lake's folder, which is replaced.
 
     Returns:
         Where it is.
+
+    Raises:
+        ConflictError: `path` is there and is no card, or was changed since.
+        InputError: its folder is not there or cannot be written.
     """
-    target = path or lake.path / "cards" / f"{recipe.name}-{recipe.hash[:12]}.html"
-    target.parent.mkdir(parents=True, exist_ok=True)
     sides, rows = _sides(lake, recipe, branch)
     parameters = [json.loads(row["parameters"]) for row in rows]
     page = Environment(autoescape=True, undefined=StrictUndefined).from_string(
@@ -69,9 +80,13 @@ def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path:
         frames=recipe.simulation.time.frames, rate=recipe.simulation.time.rate, bar=_BAR,
         theta=distributions(parameters, rendered=False), zeta=distributions(parameters, rendered=True),
         names=_names(parameters), recipe_text=json.dumps(json.loads(canonical(recipe.identity())), indent=1),
-        filters={side.name: side_filter(recipe, side.name) for side in recipe.sides},
+        dataset=json.dumps(recipe.name, ensure_ascii=False),
     )  # fmt: skip
-    target.write_text(text, encoding="utf-8")
+    if path is not None:
+        write_file(path, text, command=_COMMAND)
+        return path
+    target = lake.path / "cards" / f"{recipe.name}-{recipe.hash[:12]}.html"
+    rewrite(target, text)
     return target
 
 
@@ -81,9 +96,9 @@ def _sides(lake: Lake, recipe: DatasetRecipe, branch: str) -> tuple[list[dict[st
     every: list[dict[str, Any]] = []
     columns = ["artifact", "name", "seed", "session", "parameters", "object", "object_bytes"]
     for side in recipe.sides:
-        where = side_filter(recipe, side.name)
-        rows = lake.rows(f"kind = 'recording' and {where}", at=branch, columns=columns).to_pylist()
-        clips = lake.rows(f"kind = 'clip' and {where}", at=branch, columns=["wind"])["wind"].drop_null().to_numpy()
+        own = {"dataset": recipe.name, "side": side.name}
+        rows = lake.rows({**own, "kind": Kind.RECORDING}, at=branch, columns=columns).to_pylist()
+        clips = lake.rows({**own, "kind": Kind.CLIP}, at=branch, columns=["wind"])["wind"].drop_null().to_numpy()
         sides.append(
             {
                 "name": side.name, "sequences": len({row["seed"] for row in rows}), "films": len(rows),

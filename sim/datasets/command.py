@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from flagdata.addresses import local_path
-from flagdata.console import LocalPath, document, json_option, lake_option, progress, say, table
+from flagdata.console import LocalPath, document, following, json_option, lake_option, progress, say, table
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -73,18 +73,22 @@ def build(
             _print_plan(planned)
         return
 
+    from sim.datasets import card as cards
     from sim.datasets.build import Build
-    from sim.datasets.card import write_card
     from sim.datasets.cluster import connected
 
+    cards.check(card)
     lake = _lake(lake_path) or _made(lake_path)
+    lake.check_writable()
     with connected(scheduler, workers=workers or _cores()) as client:
         report = Build(
             lake=lake, recipe=loaded, client=client, bars=progress, say=_beside_bar, branch=branch, device=device
         ).run()
-    written = write_card(lake, loaded, branch=branch, path=card)
+    written = None
+    with following(f"the data set {loaded.name}", "writing its card"):
+        written = str(cards.write_card(lake, loaded, branch=branch, path=card))
     if as_json:
-        document("build", {"lake": str(lake.path), "recipe": loaded.name, "card": str(written), **vars(report)})
+        document("build", {"lake": str(lake.path), "recipe": loaded.name, "card": written, **vars(report)})
         return
     for failure in report.failed:
         say(f"replaced: {failure}")
@@ -92,7 +96,8 @@ def build(
         f"{report.new_sequences} of {report.sequences} sequences and {report.new_films} of {report.films} films made "
         f"in {report.seconds:.0f} s; {report.clips} clips"
     )
-    click.echo(written)
+    if written is not None:
+        click.echo(written)
 
 
 def _beside_bar(text: str) -> None:

@@ -27,6 +27,7 @@ class Film:
 
     Attributes:
         name: of the recording; its number is its place in an order that was shuffled.
+        dataset: that it is built for.
         cast: of the sequence.
         index: of the sequence in its cast.
         sequence: artifact of the mesh sequence.
@@ -38,6 +39,7 @@ class Film:
     """
 
     name: str
+    dataset: str
     cast: Cast
     index: int
     sequence: str
@@ -57,7 +59,7 @@ class Film:
         """The recording's row without its result; its identity is complete."""
         return Artifact(
             kind=Kind.RECORDING, name=self.name, parents=(self.sequence,), seed=self.sequence_seed,
-            session=self.session, frame_count=frames,
+            session=self.session, dataset=self.dataset, side=self.cast.side.name, frame_count=frames,
             recipe={**self.filming, "seed": self.seed, "look": self.look, "begin": self.begin},
         )  # fmt: skip
 
@@ -85,9 +87,9 @@ class Sequences:
             seed = child_seed(recipe.seed, "film", self.side, number)
             look = seed if cast.session is None else child_seed(cast.simulation.seed, "look", again)
             yield Film(
-                name=f"{recipe.name}-{self.side}-{place:05d}", cast=cast, index=index, sequence=sequence, seed=seed,
-                sequence_seed=child_seed(cast.simulation.seed, "member", index), look=look,
-                begin=self._begin(cast, index), filming=self.filming,
+                name=f"{recipe.name}-{self.side}-{place:05d}", dataset=recipe.name, cast=cast, index=index,
+                sequence=sequence, sequence_seed=child_seed(cast.simulation.seed, "member", index), seed=seed,
+                look=look, begin=self._begin(cast, index), filming=self.filming,
             )  # fmt: skip
 
     def _begin(self, cast: Cast, index: int) -> int:

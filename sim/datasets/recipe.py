@@ -173,11 +173,6 @@ class DatasetRecipe:
         return recipe_hash(self.identity())
 
 
-def side_filter(recipe: DatasetRecipe, side: str) -> str:
-    """SQL over the catalog that takes one side: `ExplicitSplit(where={side: side_filter(recipe, side), …})`."""
-    return f"name like '{recipe.name}-{side}-%'"
-
-
 def _coding(camera: CameraSpec) -> dict[str, Any]:
     if camera.coding is Coding.JPEG:
         return {"jpeg_quality": plain(camera.jpeg_quality)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -28,6 +29,7 @@ class DirectionChange(WindEffect):
         strength(
             unit="rad",
             prior=(-0.8, 0.8),
+            admissible=(-2 * math.pi, 2 * math.pi),
             source="standard deviation of the direction over 10 min: 0.17–0.44 rad (Pasquill classes D to A)",
         ),
     ] = 0.0

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from flagdata.addresses import local_path
 from flagdata.errors import NotFoundError, UsageError
+from flagdata.files import check_input
 from flagdata.provenance import file_hash
 from sim.effects.effect import Effect
 
@@ -24,8 +25,7 @@ def load(spec: str) -> type[Effect]:
     if not text or not attribute.isidentifier():
         raise UsageError(f"{spec!r} names no effect", where="effect file", fix="give FILE.py:Class")
     path = local_path(text)
-    if not path.is_file():
-        raise NotFoundError("no such file", where=text, fix="check the path")
+    check_input(path)
     module = _module(path)
     effect = getattr(module, attribute, None)
     if effect is None:

@@ -10,12 +10,11 @@ from typing import Any
 from flagdata.errors import InputError, UnknownNameError
 from flagdata.recipes import Shelf, parsed
 from flagdata.rng import stream
-from flagdata.tables import Quantity, Range, Table, ends, plain
+from flagdata.tables import DEGREES, Quantity, Range, Table, ends, in_radians, plain
 from sim.assets import Assets
 from sim.render.parameters import RenderParameters
 
 PRIORS = Shelf(folder="renders", noun="render prior")
-_DEGREES = "-deg"  # suffix of a key whose values are in degrees
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,13 +135,13 @@ def read(content: Mapping[str, Any], *, name: str) -> RenderPrior:
         if not source:
             raise InputError("no source", where=part.where, fix='say where the ranges are from: source = "…"')
         for parameter, entry in RenderParameters.described().items():
-            key = parameter.replace("_", "-") + (_DEGREES if entry.unit == "rad" else "")
+            key = parameter.replace("_", "-") + (DEGREES if entry.unit == "rad" else "")
             if key not in part:
                 continue
             if parameter in quantities:
                 raise InputError(f"{key} is given twice", where=part.where, fix="keep one")
             given = part.quantity(key, 0.0)
-            quantities[parameter] = _radians(given) if entry.unit == "rad" else given
+            quantities[parameter] = in_radians(given) if entry.unit == "rad" else given
             sources[parameter] = source
         part.done()
     return RenderPrior(
@@ -153,12 +152,6 @@ def read(content: Mapping[str, Any], *, name: str) -> RenderPrior:
 
 def _at(quantity: Quantity, share: float) -> float:
     return quantity.at(share) if isinstance(quantity, Range) else quantity
-
-
-def _radians(quantity: Quantity) -> Quantity:
-    if isinstance(quantity, Range):
-        return Range(low=math.radians(quantity.low), high=math.radians(quantity.high), scale=quantity.scale)
-    return math.radians(quantity)
 
 
 def _to_line(angle: float) -> float:

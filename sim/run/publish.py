@@ -178,8 +178,7 @@ def publish(lake: Lake, recipe: Recipe, outcomes: Sequence[Outcome], *, step: fl
             staged = transaction.staging(".zarr")
             write_meshes(staged, outcome.sequence)
             transaction.add(_published(recipe, identity, outcome, step, stored=transaction.put(staged)))
-    result = transaction.result
-    return list(result.added) if result is not None else []
+    return list(transaction.result.added)
 
 
 def member_artifact(recipe: Recipe, identity: Mapping[str, Any], index: int, seed: int) -> Artifact:

@@ -1,7 +1,7 @@
 """Recipes as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is named.
 
-All values are SI. A *quantity* is a number, or `{ low = …, high = …, scale = "linear" | "log" }`, from which each
-member draws its own value.
+All values are SI, angles radians. A *quantity* is a number, or `{ low = …, high = …, scale = "linear" | "log" }`, from
+which each member draws its own value.
 
     title, seed, count, batch, precision
     [scene]      shape = "flag" | "hanging-cloth" | "arcsim" | "mesh"; width, height, columns, attachment;
@@ -11,7 +11,8 @@ member draws its own value.
     [material]   name (of catalogs/materials), names (of which each member draws one), file (TOML, or ArcSim JSON) or
                  table (what such a TOML file holds); density, density-factor, stretching-factor,
                  bending-factor, damping: quantities; bending-factors: a quantity drawn for each of the 15 coefficients
-    [wind]       speed, toward: quantities; force = "quadratic-normal" | "stokes"; density, drag | viscosity
+    [wind]       speed [m/s], toward (where the air goes to, from +x towards +y) [rad], or toward-deg in degrees:
+                 quantities; vertical [m/s]; force = "quadratic-normal" | "stokes"; density, drag | viscosity
     [contact]    thickness, stiffness, friction; without the table, layers pass through each other
     [limits]     low, high, sweeps; without the table, strain has no limits
     [integrator] name = "symplectic" | "implicit"; step; air-shape (of the implicit)
@@ -31,9 +32,9 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.addresses import local_path
-from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.provenance import canonical, digest
-from flagdata.recipes import Shelf, parsed
+from flagdata.recipes import Shelf, parsed, read_recipe
 from flagdata.tables import SEED_LIMIT, Quantity, Range, Table
 from sim import material
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal, Stokes
@@ -240,9 +241,7 @@ def _bases(table: Table, folder: Path, scene: SceneSpec) -> tuple[Material, ...]
 def _material_file(path: Path) -> Material:
     if path.suffix == ".json":
         return read_material(path)
-    if not path.is_file():
-        raise NotFoundError("no such material file", where=str(path), fix="check the path")
-    return Material.from_mapping(parsed(path.read_text(encoding="utf-8"), where=str(path)), name=path.stem)
+    return Material.from_mapping(parsed(read_recipe(path).text, where=str(path)), name=path.stem)
 
 
 def _wind(table: Table, scene: SceneSpec) -> WindSpec:
@@ -263,7 +262,7 @@ def _wind(table: Table, scene: SceneSpec) -> WindSpec:
     if "speed" not in table:
         raise InputError("no wind speed is given", where=table.where, fix="add speed = 4.0 (m/s), or a range")
     spec = WindSpec(
-        speed=table.quantity("speed", 0.0, least=0.0, most=100.0), toward=table.quantity("toward", 0.0),
+        speed=table.quantity("speed", 0.0, least=0.0, most=100.0), toward=table.angle("toward", 0.0),
         vertical=table.number("vertical", 0.0), force=force,
     )  # fmt: skip
     table.done()

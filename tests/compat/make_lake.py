@@ -2,7 +2,8 @@
 
 Run it once for each `schema.FORMAT_VERSION`, with the code of that version, and commit the result as lake_v<N>.tar.xz;
 an archive is never made again once its version has been released. The lake has a record with frames and wind, a mesh
-sequence, a clip of the record, a tag, a branch with a row of its own, a withdrawn row, and a merged catalog.
+sequence, a clip of the record, a tag, a branch with a row of its own, a withdrawn row, and a merged catalog. Since
+format 3 record and clip are of a data set.
 """
 
 import sys
@@ -44,13 +45,14 @@ def fill(lake: Lake) -> None:
         name = tx.put(path)
         recording = Artifact(
             kind=Kind.RECORDING, name="field", object=name, source_hash="a" * 64, start=START, end=START + 39 * PERIOD,
-            frame_first=0, frame_count=40, rate=25.0, session="s1", day="2026-05-01", recipe={"crop": [0, 0, 300, 300]},
+            frame_first=0, frame_count=40, rate=25.0, session="s1", day="2026-05-01", dataset="compat", side="train",
+            recipe={"crop": [0, 0, 300, 300]},
         )  # fmt: skip
         tx.add(recording)
         clip = Artifact(
             kind=Kind.CLIP, name="field clip 0", object=name, parents=(recording.id,), recording=recording.id,
             start=START, end=START + 29 * PERIOD, frame_first=0, frame_count=30, wind=4.5, wind_sigma=0.25,
-            quality=("low-coverage",), report='[{"kind": "low-coverage"}]',
+            dataset="compat", side="train", quality=("low-coverage",), report='[{"kind": "low-coverage"}]',
         )  # fmt: skip
         tx.add(clip)
     lake.tag("v1")

@@ -74,6 +74,12 @@ def test_the_objects_of_an_old_lake_are_read(old: Lake) -> None:
     assert meshes.attributes == {"wind": 4.0}
 
 
+def test_rows_of_an_old_lake_are_of_a_data_set_where_their_format_could_say_so(old: Lake) -> None:
+    for row in old.rows(at="v1").to_pylist():
+        stated = ("compat", "train") if row["format_version"] >= 3 else (None, None)
+        assert (row["dataset"], row["side"]) == stated
+
+
 def test_an_old_lake_takes_new_rows_and_its_tags_stay(old: Lake) -> None:
     with old.transaction("new") as tx:
         assert tx.add(Artifact(kind=Kind.MODEL, name="new"))
@@ -86,15 +92,19 @@ def test_an_old_lake_takes_new_rows_and_its_tags_stay(old: Lake) -> None:
 @pytest.fixture
 def narrow(tmp_path: Path) -> Lake:
     """A lake whose catalog was made before the columns `wind_staleness`, `clock_model` and `report` existed."""
-    lake = Lake.create(tmp_path / "narrow")
+    early = Artifact(kind=Kind.WIND, name="early", created=datetime(2020, 1, 1, tzinfo=UTC))
+    return lake_without(tmp_path / "narrow", {"wind_staleness", "clock_model", "report"}, early)
+
+
+def lake_without(path: Path, missing: set[str], *artifacts: Artifact) -> Lake:
+    """A lake with these rows, tagged v1, whose catalog was made before some columns existed."""
+    lake = Lake.create(path)
     table = lake.path / "catalog"
     for path in sorted(table.rglob("*"), reverse=True):
         path.rmdir() if path.is_dir() else path.unlink()
-    missing = {"wind_staleness", "clock_model", "report"}
     schema = pa.schema([f for f in catalog_schema() if f.name not in missing])
     deltalake.DeltaTable.create(str(table), schema)
-    row = Artifact(kind=Kind.WIND, name="early", created=datetime(2020, 1, 1, tzinfo=UTC)).row()
-    rows = pa.Table.from_pylist([{name: row[name] for name in schema.names}], schema=schema)
+    rows = pa.Table.from_pylist([artifact.row() for artifact in artifacts], schema=schema)
     deltalake.write_deltalake(str(table), rows, mode="append")
     lake.refs.put("tags", "v1", Lake.open(lake.path).view(None))
     return Lake.open(lake.path)
@@ -118,6 +128,23 @@ def test_the_first_commit_adds_the_missing_columns_and_the_tag_still_shows_the_o
     ]
     assert narrow.rows(at="v1", columns=["name", "report"]).to_pylist() == [{"name": "early", "report": None}]
     assert doctor(Lake.open(narrow.path), grace=NOW) == ()
+
+
+def test_films_built_before_the_catalog_had_data_sets_are_found_by_theirs_before_and_after_a_commit(
+    tmp_path: Path,
+) -> None:
+    films = [
+        Artifact(kind=Kind.RECORDING, name=name, seed=seed, recipe={"film": 2}, format_version=2)
+        for seed, name in enumerate(("X-train-00000", "X-train-test-00000", "X-test-00000"))
+    ]
+    lake = lake_without(tmp_path / "built", {"dataset", "side"}, *films)
+    wanted = {"dataset": "X", "side": "train"}
+    assert lake.rows(wanted)["name"].to_pylist() == ["X-train-00000"]
+    assert lake.rows("dataset = 'X-train'")["name"].to_pylist() == ["X-train-test-00000"]
+    with lake.transaction("late") as tx:
+        tx.add(Artifact(kind=Kind.WIND, name="late"))
+    assert lake.rows(wanted)["name"].to_pylist() == ["X-train-00000"]
+    assert doctor(lake, grace=NOW) == ()
 
 
 def test_a_withdrawal_from_a_narrow_catalog_leaves_the_rest(narrow: Lake) -> None:

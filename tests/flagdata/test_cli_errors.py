@@ -62,6 +62,15 @@ def test_what_the_system_refuses_is_named_with_its_file(run) -> None:
     assert err.splitlines()[:2] == ["flagdata: the system refused: Permission denied", "  where: /data/x"]
 
 
+def test_a_file_that_ends_too_early_is_no_interruption_by_the_user(run) -> None:
+    code, _, err = run(EOFError("No data left in file"))
+    assert code == 1
+    assert "unforeseen error: EOFError: No data left in file" in err
+    assert "interrupted" not in err
+    code, _, err = run(KeyboardInterrupt())
+    assert (code, err.strip()) == (1, "flagdata: interrupted")
+
+
 def test_memory_that_runs_out_is_a_limit(run) -> None:
     assert json.loads(run(MemoryError(), "--json")[1])["kind"] == LimitError.kind
 

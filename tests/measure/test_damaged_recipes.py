@@ -17,14 +17,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from flagdata.documents import NESTING_LIMIT
 from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError
 from flagdata.ingest.anemometer.recipe import parse as parse_sensor
-from flagdata.recipes import NESTING_LIMIT, parsed
+from flagdata.recipes import parsed
 from measure.cases.recipe import parse_case
 from measure.challenge.recipe import parse as parse_challenge
 from measure.closing.toml import dumps
 from measure.nulls import bank
 from measure.observe.recipe import load as load_experiment
+from models.training.recipe import parse as parse_training
 from sim.arcsim import read_material, read_scene
 from sim.datasets.reading import parse as parse_dataset
 from sim.material import Material
@@ -60,6 +62,38 @@ rate = 25.0
 wind = { speed = 4.0 }
 """
 
+TRAINING = """
+title = "small"
+seed = 1
+[data]
+dataset = ["made", "other"]
+sequences = 4
+[input]
+maps = "wave-maps"
+size = 24
+frames = 12
+scales = [1.0, 0.9]
+mirror = true
+variants = 2
+[network]
+name = "wave"
+dimension = 4
+widths = [6, 6, 6]
+strides = [2, 2, 2]
+[loss]
+name = "posterior"
+targets = ["wind_speed"]
+components = 2
+[optimiser]
+rate = 1e-2
+decay = 1e-4
+batch = 4
+epochs = 3
+schedule = "cosine"
+clip-norm = 5.0
+patience = 9
+"""
+
 
 def experiment(text: str, folder: Path) -> object:
     path = folder / "experiment.toml"
@@ -86,6 +120,7 @@ FORMS: dict[str, tuple[str, Callable[[str, Path], object]]] = {
     ),
     "render prior": (first("renders"), lambda text, _: read_prior(parsed(text, where="recipe"), name="recipe")),
     "experiment": (EXPERIMENT, experiment),
+    "training": (TRAINING, lambda text, _: parse_training(text, name="recipe", where="recipe").check()),
 }  # fmt: skip
 
 
@@ -100,6 +135,7 @@ def within(seconds: float, work: Callable[[], object]) -> None:
 @pytest.mark.parametrize("form", FORMS)
 def test_a_recipe_with_changed_bytes_is_read_or_refused(form: str, tmp_path: Path) -> None:
     text, read = FORMS[form]
+    read(text, tmp_path)  # sound before it is changed, and its modules imported
 
     @QUICK
     @given(damage=damages)

@@ -62,9 +62,9 @@ def fill(lake: Lake, name: str = "made", *, period: int = PERIOD, strongest: flo
                 stored = transaction.put(staged)
                 record = Record.open(lake.object_path(stored))
                 recording = Artifact(
-                    kind=Kind.RECORDING, name=f"{name}-{side}-{index:05d}", seed=seed, object=stored,
-                    recipe={"film": index, "side": side}, start=START, end=START + (FILM_FRAMES - 1) * period,
-                    frame_count=FILM_FRAMES, rate=1e9 / period,
+                    kind=Kind.RECORDING, name=f"{name}-{side}-{index:05d}", dataset=name, side=side, seed=seed,
+                    object=stored, recipe={"film": index, "side": side}, start=START,
+                    end=START + (FILM_FRAMES - 1) * period, frame_count=FILM_FRAMES, rate=1e9 / period,
                 )  # fmt: skip
                 transaction.add(recording)
                 for clip in clip_rows(record, recording, frames=12):

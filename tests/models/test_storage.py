@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import shutil
 from pathlib import Path
 
 import pytest
+import torch
 
 from flagdata.checksums import SUMS, content_hash
 from flagdata.errors import CorruptError
 from models import estimator
 from models.estimator import CLOUD, SHIPPED
-from models.storage import CARD, WEIGHTS, check_model
+from models.storage import CARD, WEIGHTS, check_model, write_tensors
 
 FILES = (CARD, WEIGHTS, CLOUD, "gate.safetensors", SUMS)
 
@@ -60,3 +62,10 @@ def test_a_model_that_nothing_vouches_for_is_refused_with_how_to_state_it(shippe
     with pytest.raises(CorruptError, match="SHA256SUMS") as caught:
         estimator.load(shipped)
     assert "sha256sum * > SHA256SUMS" in caught.value.fix
+
+
+def test_a_full_disk_is_an_error_of_the_system_with_its_number() -> None:
+    """safetensors has an exception of its own for it, which nothing above would know."""
+    with pytest.raises(OSError) as caught:
+        write_tensors(Path("/dev/full"), {"weight": torch.zeros(1000)})
+    assert caught.value.errno == errno.ENOSPC

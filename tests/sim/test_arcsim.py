@@ -182,7 +182,7 @@ def test_a_scene_that_is_written_comes_back(
     assert (material.name, material.density, material.damping) == ("gray-interlock", scene.material.density, 1e-3)
     np.testing.assert_array_equal(material.stretching, scene.material.stretching)
     np.testing.assert_array_equal(material.bending, scene.material.bending)
-    with pytest.raises(ConflictError, match="already"):
+    with pytest.raises(ConflictError, match="exists"):
         write_scene(file, tmp_path / "run")
 
 

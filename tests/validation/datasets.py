@@ -28,9 +28,9 @@ from flagdata.lake import Lake
 from flagdata.lake.health import doctor, object_names, verify
 from flagdata.record import Record
 from flagdata.rng import stream
-from flagdata.schema import CATALOG
+from flagdata.schema import CATALOG, Kind
 from sim.datasets.reading import load
-from sim.datasets.recipe import DatasetRecipe, side_filter
+from sim.datasets.recipe import DatasetRecipe
 from tests.sim.datasets.leakage import FEATURES, Surroundings, accuracies, dealt_anew, features_of
 
 RECIPE = "flagsim-small"
@@ -124,7 +124,7 @@ def compare(one: Lake, other: Lake) -> dict[str, Any]:
 
 def loading(lake: Path, recipe: DatasetRecipe) -> dict[str, Any]:
     """The README's lines for real clips, on each side: pairs, refusals, clips a second."""
-    split = ExplicitSplit(where={side.name: side_filter(recipe, side.name) for side in recipe.sides})
+    split = ExplicitSplit(where={side.name: {"dataset": recipe.name, "side": side.name} for side in recipe.sides})
     found: dict[str, Any] = {}
     for side in recipe.sides:
         pairs = flagdata.open(lake).pairs(split=side.name, split_by=split, tolerance=Tolerance(clock_sigma=0.5), seed=0)
@@ -189,7 +189,7 @@ def _drawn(around: Surroundings, name: str) -> bool:
 def surroundings(lake: Lake, recipe: DatasetRecipe) -> Surroundings:
     """Of all films of a data set, by the catalog; a name among the parameters is 0 or 1 for each there is."""
     columns = ["name", "seed", "object", "object_bytes", "parameters"]
-    rows = lake.rows(f"kind = 'recording' and name like '{recipe.name}-%'", columns=columns).to_pylist()
+    rows = lake.rows({"kind": Kind.RECORDING, "dataset": recipe.name}, columns=columns).to_pylist()
     features = [
         features_of(row["name"], Record.open(lake.object_path(row["object"])), order=order, size=row["object_bytes"])
         for order, row in enumerate(rows)

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 import flagdata
 from flagdata.dataset import Pairs
 from flagdata.rng import stream
+from flagdata.schema import Kind
 from models import estimator
 from models.training.recipe import DataSpec
 
@@ -48,7 +49,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     spec = DataSpec(datasets=(_DATASET,))
     split = spec.split("train", "test")
     train, test = (source.pairs(split=side, split_by=split) for side in ("train", "test"))
-    rows = source.lake.rows(f"kind = 'recording' and {spec.where('test')}", columns=["artifact", "parameters"])
+    rows = source.lake.rows({"kind": Kind.RECORDING, **spec.where("test")}, columns=["artifact", "parameters"])
     material = {row["artifact"]: json.loads(row["parameters"])["material"] for row in rows.to_pylist()}
     found = model.estimate(torch.cat([model.inputs(test[k].clip.numpy()) for k in range(len(test))]), seed=seed,
                            draws=DRAWS)  # fmt: skip

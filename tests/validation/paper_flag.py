@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from measure.cases.observe import observe
-from measure.cases.page import as_json, write_page
+from measure.cases.page import as_json, write
 from measure.cases.recipe import load_case
 from measure.cases.study import study
 from measure.cases.verdict import judge
@@ -26,7 +26,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     seen = observe(case, _DATA, keep=_WORK / "kept")
     found = study(case, seen, keep=_WORK / "kept")
     verdict = judge(case, seen, found)
-    page = write_page(_WORK, case=case, seen=seen, study=found, verdict=verdict)
+    page = write(_WORK, case=case, seen=seen, study=found, verdict=verdict)
     target = out.parent / "cases" / "paper-flag.html"
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_bytes(page.read_bytes())

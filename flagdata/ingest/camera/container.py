@@ -18,7 +18,8 @@ import numpy as np
 from av.container import InputContainer
 from av.video.stream import VideoStream
 
-from flagdata.errors import InputError, LimitError, NotFoundError, TimeError, UsageError
+from flagdata.errors import InputError, LimitError, TimeError, UsageError
+from flagdata.files import check_input
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.clock import COUNTERS, Counter, restart, restarted
 from flagdata.ingest.camera.options import CameraOptions, Limits, exact
@@ -63,29 +64,13 @@ def _advice(path: Path) -> str:
     return "give a video that a player opens: MP4, MOV, MTS, AVI or MKV, or a folder of PNG or JPEG images"
 
 
-def check_path(path: Path) -> None:
-    """Refuse a path that leads nowhere.
-
-    Raises:
-        NotFoundError
-    """
-    try:
-        path.stat()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        shown = str(path) if len(str(path)) <= 300 else f"{str(path)[:300]}…"
-        raise NotFoundError(f"there is no such file ({reason})", where=repr(shown), fix="check the path") from error
-
-
 def check_file(path: Path, limits: Limits) -> None:
     """Refuse what is not a file with something in it, and animated pictures whose first bytes state an absurd size.
 
     Raises:
         NotFoundError, InputError, LimitError
     """
-    check_path(path)
-    if not path.is_file():
-        raise InputError("it is neither a file nor a folder", where=str(path), fix="give a video file")
+    check_input(path, noun="video file")
     try:
         with path.open("rb") as stream:
             head = stream.read(24)
@@ -93,8 +78,6 @@ def check_file(path: Path, limits: Limits) -> None:
         raise InputError(
             f"the file cannot be read ({error.strerror})", where=str(path), fix="check its rights"
         ) from error
-    if not head:
-        raise InputError("the file is empty", where=str(path), fix="copy it from the camera again")
     size = (0, 0)
     if head[:4] == b"GIF8" and len(head) >= 10:
         size = struct.unpack("<HH", head[6:10])

@@ -10,9 +10,9 @@ from types import TracebackType
 
 from flagdata.addresses import local_path
 from flagdata.errors import LimitError, RefusedError, UsageError
+from flagdata.files import is_folder
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.chapters import chapter_of
-from flagdata.ingest.camera.container import check_path
 from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
 from flagdata.ingest.camera.grid import EveryFrame, GridReport, Pick, Resampler, Sampler
 from flagdata.ingest.camera.motion import CropProposal, cut_off, propose
@@ -320,8 +320,7 @@ def open_camera(path: Path | str, options: CameraOptions | None = None) -> Camer
 
 def open_source(path: Path, options: CameraOptions) -> Source:
     """The reader for `path`: a folder is an image sequence, anything else a video file."""
-    check_path(path)
-    return SequenceSource(path, options) if path.is_dir() else VideoSource(path, options)
+    return SequenceSource(path, options) if is_folder(path) else VideoSource(path, options)
 
 
 def propose_crop(path: Path | str, options: CameraOptions | None = None) -> CropProposal:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import math
 from collections.abc import Iterator
 from contextlib import suppress
 from fractions import Fraction
@@ -21,6 +22,7 @@ from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import gif
 from flagdata.ingest.camera.avchd import recording_time
+from flagdata.ingest.camera.clock import COUNTERS
 from flagdata.ingest.camera.container import (
     BY_DECODE_ORDER,
     UNTIMED,
@@ -147,8 +149,8 @@ class VideoSource:
             for run in range(runs):
                 target = self._timing.origin + self._timing.span * run // runs
                 pictures: list[Picture] = []
-                # A raw stream cannot seek: its runs follow one another.
-                if not self.facts.sequence:
+                # Where no seek finds its place, the runs follow one another.
+                if self._seekable:
                     with suppress(av.error.FFmpegError):
                         container.seek(target, stream=stream)
                 # A spot that cannot be decoded is no loss to a sample; what came before it counts.
@@ -161,6 +163,13 @@ class VideoSource:
                             break
                 if pictures:
                     yield pictures
+
+    @property
+    def _seekable(self) -> bool:
+        """Whether the file has stamps, and they increase all through it."""
+        length = COUNTERS.get(self.facts.container, math.inf)
+        whole = self._timing.end is None and self._timing.origin + self._timing.span < length
+        return whole and not self.facts.sequence
 
     def _decode(self) -> Iterator[tuple[int | None, av.VideoFrame]]:
         """(stamp, frame) in order of presentation."""

@@ -68,8 +68,7 @@ def ingest_markers(
             transaction.add(artifact)
             made[name] = (artifact, report)
     return tuple(
-        present[name] if name in present else result_of(lake, transaction, *made[name], named[name], branch=branch)
-        for name in recordings
+        present[name] if name in present else result_of(transaction, *made[name], named[name]) for name in recordings
     )
 
 

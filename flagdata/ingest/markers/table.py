@@ -20,7 +20,8 @@ import pyarrow.csv
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, LimitError, NotFoundError, UsageError
+from flagdata.errors import InputError, LimitError, UsageError
+from flagdata.files import check_input
 from flagdata.ingest.headings import check_columns, delimiter_of
 from flagdata.lake.markers import MarkerSequence
 from flagdata.timebase import NANOSECONDS
@@ -91,12 +92,7 @@ def read_table(path: Path, options: MarkerOptions | None = None) -> Mapping[str,
         UsageError: a rate that the table needs, or has no use for.
     """
     options = options or MarkerOptions()
-    if not path.is_file():
-        raise NotFoundError("no such file", where=str(path), fix="check the path")
-    if path.stat().st_size > SIZE_LIMIT:
-        raise LimitError(
-            f"a table of {path.stat().st_size} bytes", where=str(path), fix=f"at most {SIZE_LIMIT} are read"
-        )
+    check_input(path, noun="table", limit=SIZE_LIMIT)
     names = _columns(path)
     _check_columns(names, options, str(path))
     table = _rows(path, names)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.meshes.pieces import in_pieces
 from flagdata.lake.meshes import Mesh, MeshSequence, RaggedMeshSequence
 
 # Median edge length in space over that in the material. Cloth stretches and crumples by some per cent; a factor of two
@@ -41,7 +42,7 @@ def check_units(sequence: MeshSequence | RaggedMeshSequence, *, where: str) -> N
 
 
 def findings(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
-    """What is odd and was kept: faces turned over or without area in the material, vertices that no face uses."""
+    """What is odd and was kept: faces turned over or without area in the material, vertices of no face, and pieces."""
     flipped = degenerate = loose = 0
     first: dict[str, int] = {}
     frames = range(1) if isinstance(sequence, MeshSequence) else range(len(sequence))
@@ -66,7 +67,7 @@ def findings(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
         ("faces-without-area", degenerate, "faces have no area in the material"),
         ("loose-vertices", loose, "vertices belong to no face"),
     )
-    return tuple(
+    odd = tuple(
         Finding(
             kind=kind, severity=Severity.WARNING, what=f"{count} {what}", count=count, where=f"frame {first[kind]}",
             fix="look at the export's texture coordinates",
@@ -74,6 +75,7 @@ def findings(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
         for kind, count, what in told
         if count
     )  # fmt: skip
+    return (*odd, *in_pieces(sequence))
 
 
 def _edge_ratio(mesh: Mesh) -> float:

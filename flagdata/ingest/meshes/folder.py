@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.errors import ConflictError, InputError, LimitError, NotFoundError
-from flagdata.ingest.meshes.obj import Obj, read_obj, write_obj
+from flagdata.documents import SIZE_LIMIT, from_json
+from flagdata.errors import InputError, LimitError, NotFoundError
+from flagdata.files import check_input
+from flagdata.ingest.meshes.obj import Obj, obj_text, read_obj
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
 from flagdata.timebase import NANOSECONDS
 
@@ -27,16 +29,14 @@ def read_json(path: Path) -> dict[str, Any]:
     Raises:
         NotFoundError: no such file.
         InputError: not such a file.
+        LimitError: larger than any scene.
     """
-    if not path.is_file():
-        raise NotFoundError("no such file", where=str(path), fix="check the path")
+    check_input(path, limit=SIZE_LIMIT)
     text = path.read_text(encoding="utf-8", errors="replace")
     # A string, kept, or a comment up to the end of its line, dropped.
     bare = re.sub(r'"(?:[^"\\]|\\.)*"|//[^\n]*', lambda m: m[0] if m[0].startswith('"') else "", text)
     try:
-        content = json.loads(bare)
-    except RecursionError:
-        raise InputError("lists or objects nested too deep", where=str(path), fix="correct the file") from None
+        content = from_json(bare)
     except ValueError as error:
         raise InputError(f"not JSON: {error}", where=str(path), fix="correct the file") from None
     if not isinstance(content, dict):
@@ -169,7 +169,7 @@ def _sequence(
 
 
 def write_folder(path: Path, sequence: MeshSequence | RaggedMeshSequence, *, scene: Mapping[str, Any]) -> None:
-    """Write a sequence as an ArcSim output folder.
+    """Write a sequence as a new ArcSim output folder, which appears with the last of its files.
 
     Args:
         scene: what conf.json says; its `frame_time` must be the sequence's.
@@ -178,21 +178,22 @@ def write_folder(path: Path, sequence: MeshSequence | RaggedMeshSequence, *, sce
         ConflictError: there is something at `path` already.
         InputError: frames that are not evenly spaced by the scene's frame_time.
     """
-    if path.exists():
-        raise ConflictError("there is something already", where=str(path), fix="write to a new folder")
+    from flagdata.outputs import check_folder, fresh_folder
+
+    check_folder(path)
     frame_time = scene.get("frame_time")
     expected = np.array([round(i * float(frame_time or 0.0) * NANOSECONDS) for i in range(len(sequence))])
     if not frame_time or np.abs(sequence.time - sequence.time[0] - expected).max() > 1:
         raise InputError(
             f"frames are not {frame_time!r} s apart", where="scene, frame_time", fix="give the sequence's frame time"
         )
-    path.mkdir(parents=True)
-    for index in range(len(sequence)):
-        frame = sequence.frame(index)
-        mesh = Obj(
-            positions=frame.positions.astype(np.float64),
-            faces=frame.faces.astype(np.int64),
-            rest=frame.rest.astype(np.float64),
-        )
-        write_obj(path / f"{index:04d}_00.obj", mesh)
-    (path / _CONFIGURATION).write_text(json.dumps(dict(scene), indent=1) + "\n", encoding="utf-8")
+    with fresh_folder(path) as folder:
+        for index in range(len(sequence)):
+            frame = sequence.frame(index)
+            mesh = Obj(
+                positions=frame.positions.astype(np.float64),
+                faces=frame.faces.astype(np.int64),
+                rest=frame.rest.astype(np.float64),
+            )
+            (folder / f"{index:04d}_00.obj").write_text(obj_text(mesh), encoding="utf-8")
+        (folder / _CONFIGURATION).write_text(json.dumps(dict(scene), indent=1) + "\n", encoding="utf-8")

@@ -1,8 +1,8 @@
 """Wavefront OBJ as cloth simulators write it: positions, material coordinates, triangles, velocities.
 
 Beside `v`, `vt` and `f`, ArcSim writes `nv` (velocity of the vertex before it) and `ny` (its plastic rest position).
-Quads and polygons are split into fans. Normals, groups, materials and comments are passed over, as in any OBJ reader;
-lines of an unknown keyword are refused.
+Quads and polygons are split into triangles, see `polygons`. Normals, groups, materials and comments are passed over, as
+in any OBJ reader; lines of an unknown keyword are refused.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, LimitError, NotFoundError
+from flagdata.errors import InputError
+from flagdata.files import check_input
+from flagdata.ingest.meshes.polygons import convex, ears, fans, in_plane
 
 SIZE_LIMIT = 1 << 30
 """Largest file that is read [B]."""
@@ -47,20 +49,16 @@ def read_obj(path: Path) -> Obj:
     Raises:
         NotFoundError: no such file.
         LimitError: larger than `SIZE_LIMIT`.
-        InputError: a malformed line, indices that do not exist, no faces, or a vertex with two material coordinates (a
-            seam), each with its line.
+        InputError: a malformed line, indices that do not exist, no faces, a vertex with two material coordinates (a
+            seam), or a polygon without area or with edges that cross in the material, each with its line.
     """
-    if not path.is_file():
-        raise NotFoundError("no such mesh file", where=str(path), fix="check the path")
-    if path.stat().st_size > SIZE_LIMIT:
-        raise LimitError(
-            f"a mesh file of {path.stat().st_size} bytes", where=str(path), fix=f"at most {SIZE_LIMIT} are read"
-        )
+    check_input(path, noun="mesh file", limit=SIZE_LIMIT)
     positions: list[list[float]] = []
     texture: list[list[float]] = []
     velocities: dict[int, list[float]] = {}
     corners: list[tuple[int, int]] = []
-    corner_lines: list[int] = []
+    sizes: list[int] = []
+    face_lines: list[int] = []
     with path.open(encoding="utf-8", errors="replace") as lines:
         for number, line in enumerate(lines, start=1):
             words = line.split("#", 1)[0].split()
@@ -77,15 +75,19 @@ def read_obj(path: Path) -> Obj:
                     raise InputError("a velocity before any vertex", where=where, fix="write nv after its v")
                 velocities[len(positions) - 1] = _numbers(values, 3, where)
             elif keyword == "f":
-                polygon = [_corner(word, where) for word in values]
-                if len(polygon) < 3:
+                if len(values) < 3:
                     raise InputError("a face of fewer than three corners", where=where, fix="give at least three")
-                for i in range(1, len(polygon) - 1):
-                    corners += [polygon[0], polygon[i], polygon[i + 1]]
-                    corner_lines.append(number)
+                corners += [_corner(word, len(positions), len(texture), where) for word in values]
+                sizes.append(len(values))
+                face_lines.append(number)
             elif keyword not in _PASSED_OVER:
                 raise InputError(f"unknown keyword {keyword!r}", where=where, fix="is this a Wavefront OBJ file?")
-    return _assembled(path, positions, texture, velocities, corners, corner_lines)
+    if not corners:
+        raise InputError("a mesh without faces", where=str(path), fix="export triangles")
+    faces = _Faces(
+        path=path, corners=np.array(corners, dtype=np.int64), sizes=np.array(sizes), lines=np.array(face_lines)
+    )
+    return _assembled(faces, np.array(positions).reshape(-1, 3), np.array(texture).reshape(-1, 2), velocities)
 
 
 def _numbers(values: list[str], count: int, where: str) -> list[float]:
@@ -98,63 +100,116 @@ def _numbers(values: list[str], count: int, where: str) -> list[float]:
     return numbers
 
 
-def _corner(word: str, where: str) -> tuple[int, int]:
-    """Vertex and texture index of a face's corner, from 1; 0 where there is no texture index."""
+def _corner(word: str, vertices: int, textures: int, where: str) -> tuple[int, int]:
+    """Vertex and texture index of a face's corner, from 1; 0 where there is no texture index.
+
+    Indices below zero count back from the last vertex before the line; those that lead nowhere are returned as -1.
+    """
     parts = word.split("/")
     try:
         vertex = int(parts[0])
         texture = int(parts[1]) if len(parts) > 1 and parts[1] else 0
     except ValueError:
         raise InputError(f"{word!r} is not a corner", where=where, fix="write v, v/vt or v/vt/vn") from None
+    if vertex < 0:
+        vertex = max(vertices + 1 + vertex, 0) or -1
+    if texture < 0:
+        texture = max(textures + 1 + texture, 0) or -1
     return vertex, texture
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Faces:
+    """Faces of a file as they stand there.
+
+    Attributes:
+        corners: (corner, 2) vertex and texture indices, from 1, of one face after another.
+        sizes: (face,) how many corners each has.
+        lines: (face,) its line in the file.
+    """
+
+    path: Path
+    corners: NDArray[np.int64]
+    sizes: NDArray[np.int64]
+    lines: NDArray[np.int64]
+
+    def refuse(self, corners: NDArray[np.bool_], what: str, *, fix: str) -> None:
+        """Refuse the first face that has one of some corners.
+
+        Raises:
+            InputError: there is one.
+        """
+        if corners.any():
+            face = int(np.repeat(np.arange(len(self.sizes)), self.sizes)[int(corners.argmax())])
+            raise InputError(what, where=f"{self.path}, line {self.lines[face]}", fix=fix)
+
+    def triangles(self, points: NDArray[np.float64]) -> NDArray[np.int64]:
+        """(triangle, 3) places of corners: each face split in the plane of its corners, (corner, 2) or (corner, 3).
+
+        Raises:
+            InputError: a face of four corners or more has no area there, or edges that cross.
+        """
+        places, _ = fans(self.sizes)
+        ends = np.cumsum(self.sizes)
+        splits = np.cumsum(self.sizes - 2)
+        for size in np.unique(self.sizes[self.sizes > 3]):
+            faces = np.flatnonzero(self.sizes == size)
+            polygons = points[(ends[faces] - size)[:, None] + np.arange(size)]
+            flat = polygons if points.shape[1] == 2 else np.stack([in_plane(polygon) for polygon in polygons])
+            for index in np.flatnonzero(~convex(flat)):
+                face = faces[index]
+                try:
+                    split = ears(flat[index])
+                except ValueError as error:
+                    raise InputError(
+                        f"a face of {size} corners {error}", where=f"{self.path}, line {self.lines[face]}",
+                        fix="triangulate the mesh in the program that made it",
+                    ) from None  # fmt: skip
+                places[splits[face] - (size - 2) : splits[face]] = split + (ends[face] - size)
+        return places
+
+
 def _assembled(
-    path: Path,
-    positions: list[list[float]],
-    texture: list[list[float]],
-    velocities: dict[int, list[float]],
-    corners: list[tuple[int, int]],
-    corner_lines: list[int],
+    faces: _Faces, positions: NDArray[np.float64], texture: NDArray[np.float64], velocities: dict[int, list[float]]
 ) -> Obj:
-    if not corners:
-        raise InputError("a mesh without faces", where=str(path), fix="export triangles")
-    pairs = np.array(corners, dtype=np.int64)
     counts = np.array([len(positions), len(texture)])
-    pairs = np.where(pairs < 0, counts + 1 + pairs, pairs)  # negative indices count from the end
-    wrong = (pairs[:, 0] < 1) | (pairs > counts).any(axis=1) | (pairs[:, 1] < 0)
-    if wrong.any():
-        line = corner_lines[int(np.flatnonzero(wrong)[0]) // 3]
-        raise InputError("a corner names what is not there", where=f"{path}, line {line}", fix="correct the face")
-    vertex, uv = pairs[:, 0] - 1, pairs[:, 1] - 1
-    if (uv >= 0).all():
+    wrong = (faces.corners[:, 0] < 1) | (faces.corners > counts).any(axis=1) | (faces.corners[:, 1] < 0)
+    faces.refuse(wrong, "a corner names what is not there", fix="correct the face")
+    vertex, uv = faces.corners[:, 0] - 1, faces.corners[:, 1] - 1
+    textured = bool((uv >= 0).all())
+    if textured:
         rest = np.full((len(positions), 2), np.nan)
-        rest[vertex[::-1]] = np.array(texture)[uv[::-1]]  # the first mention counts, so that a seam is told where it is
-        seam = (np.array(texture)[uv] != rest[vertex]).any(axis=1)
-        if seam.any():
-            line = corner_lines[int(np.flatnonzero(seam)[0]) // 3]
-            raise InputError(
-                "a vertex has two material coordinates: a seam, which is not supported",
-                where=f"{path}, line {line}", fix="split the vertices along the seam, or export one panel",
-            )  # fmt: skip
-        unused = np.isnan(rest).any(axis=1)
-        rest[unused] = 0.0
+        rest[vertex[::-1]] = texture[uv[::-1]]  # the first mention counts, so that a seam is told where it is
+        faces.refuse(
+            (texture[uv] != rest[vertex]).any(axis=1),
+            "a vertex has two material coordinates: a seam, which is not supported",
+            fix="split the vertices along the seam, or export one panel",
+        )
+        rest[np.isnan(rest).any(axis=1)] = 0.0  # no face uses them
+        triangles = faces.triangles(rest[vertex])
     elif (uv < 0).all():
-        rest = np.array(positions)[:, :2]
+        rest = positions[:, :2]
+        triangles = faces.triangles(positions[vertex])
     else:
-        raise InputError("some corners have material coordinates, others not", where=str(path), fix="give all or none")
+        raise InputError(
+            "some corners have material coordinates, others not", where=str(faces.path), fix="give all or none"
+        )
     speed = None
     if velocities:
         speed = np.zeros((len(positions), 3))
         speed[list(velocities)] = list(velocities.values())
-    return Obj(
-        positions=np.array(positions), faces=vertex.reshape(-1, 3), rest=rest, velocities=speed,
-        textured=bool((uv >= 0).all()),
-    )  # fmt: skip
+    return Obj(positions=positions, faces=vertex[triangles], rest=rest, velocities=speed, textured=textured)
 
 
 def write_obj(path: Path, mesh: Obj) -> None:
-    """Write a mesh as ArcSim does: all `vt`, each `v` with its `nv` where there are velocities, `f` as v/vt.
+    """Write a mesh into a new file, see `obj_text`; raises as `flagdata.outputs.write_file`."""
+    from flagdata.outputs import write_file
+
+    write_file(path, obj_text(mesh))
+
+
+def obj_text(mesh: Obj) -> str:
+    """A mesh as ArcSim writes it: all `vt`, each `v` with its `nv` where there are velocities, `f` as v/vt.
 
     Nine significant digits: float32 values come back exactly.
     """
@@ -165,4 +220,4 @@ def write_obj(path: Path, mesh: Obj) -> None:
             vx, vy, vz = mesh.velocities[index]
             lines.append(f"nv {vx:.9g} {vy:.9g} {vz:.9g}")
     lines += [f"f {a}/{a} {b}/{b} {c}/{c}" for a, b, c in mesh.faces + 1]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return "\n".join(lines) + "\n"

@@ -15,6 +15,7 @@ from flagdata.errors import UsageError
 from flagdata.findings import Finding, quality_flags
 from flagdata.ingest.meshes.checks import check_units, findings
 from flagdata.ingest.meshes.folder import read_folder
+from flagdata.ingest.meshes.pieces import welded
 from flagdata.ingest.source import Source
 from flagdata.ingest.store import REPORT_SCHEMA, IngestResult, Labels, find, result_of
 from flagdata.lake import Artifact, Lake
@@ -80,7 +81,8 @@ def ingest_meshes(
     metre = float(unit(options.unit).to_si(1.0))
     sequence = read_folder(path, rate=options.rate, metre=metre, progress=progress)
     check_units(sequence, where=str(path))
-    found = findings(sequence)
+    sequence, merged = welded(sequence)
+    found = (*merged, *findings(sequence))
     source.check_unchanged()
     parameters = scene_wind(sequence.attributes.get("scene"))
     report = _report(sequence, found, reasons)
@@ -104,7 +106,7 @@ def ingest_meshes(
             report=json.dumps(report, allow_nan=False, ensure_ascii=False),
         )
         transaction.add(artifact)
-    return result_of(lake, transaction, artifact, report, labels, branch=branch)
+    return result_of(transaction, artifact, report, labels)
 
 
 def scene_wind(scene: Any) -> dict[str, float] | None:

@@ -13,8 +13,8 @@ from flagdata.align.drift import clock_line
 from flagdata.align.lag import LagSearch, estimate_offset
 from flagdata.align.methods import Evidence
 from flagdata.align.motion import MotionSeries
-from flagdata.align.plot import draw
-from flagdata.errors import InputError
+from flagdata.align.plot import check, draw
+from flagdata.errors import ConflictError, InputError
 from flagdata.rng import stream
 from flagdata.signals import WindAverage
 
@@ -48,7 +48,18 @@ def test_a_measured_drift_adds_its_own_panel(scene: Scenes, tmp_path: Path) -> N
     assert size(tmp_path / "long.png") == (1200, 1056)
 
 
-@pytest.mark.parametrize("name", ["lag.xyz", "nowhere/lag.png"])
-def test_files_that_cannot_be_drawn_say_so(scene: Scenes, tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match="cannot be written"):
-        draw(evidence(scene(seed=3, turbulence=0.005)), tmp_path / name, title="steady")
+@pytest.mark.parametrize(("name", "said"), [("lag.xyz", "no picture of format"), ("nowhere/lag.png", "no such folder")])
+def test_files_that_cannot_be_drawn_say_so_before_anything_is_searched(tmp_path: Path, name: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        check(tmp_path / name)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
+def test_an_earlier_picture_is_replaced_and_another_file_is_not(suffix: str, scene: Scenes, tmp_path: Path) -> None:
+    path, found = tmp_path / f"lag{suffix}", evidence(scene(seed=3, turbulence=0.005))
+    draw(found, path, title="steady")
+    draw(found, path, title="still steady")
+    path.write_bytes(b"theirs")
+    with pytest.raises(ConflictError):
+        draw(found, path, title="steady")
+    assert path.read_bytes() == b"theirs"

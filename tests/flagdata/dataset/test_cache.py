@@ -135,6 +135,15 @@ def test_several_processes_share_a_cache_that_is_too_small_for_all(tmp_path):
     assert 0 < DecodedCache(tmp_path, limit=limit).size() <= limit
 
 
+@pytest.mark.parametrize("theirs", ["notes.txt", "film.clip"])
+def test_a_cache_has_a_folder_of_its_own(theirs, tmp_path):
+    """Clips are evicted, and two files besides them are written over: none of them may be a user's."""
+    DecodedCache(tmp_path, limit=10**6)
+    (tmp_path / theirs).write_text("mine")
+    with pytest.raises(UsageError, match="among other files"):
+        DecodedCache(tmp_path, limit=10**6)
+
+
 def test_a_cache_has_a_limit_and_lies_outside_the_lake(tmp_path, field_lake):
     with pytest.raises(UsageError, match="limit above zero"):
         DecodedCache(tmp_path, limit=0)

@@ -21,15 +21,15 @@ SIDES = ("train", "validation", "test")
 @pytest.fixture(scope="module")
 def tangled(tmp_path_factory, write_record, made):
     """A lake of 80 recordings, and each one's film. They are tangled by sessions over several days, days over several
-    sessions, films that were ingested twice, and seeds rendered twice; every row points at one small record."""
+    sessions, films that were ingested twice, and seeds rendered twice; each has a record of two frames."""
     lake = Lake.create(tmp_path_factory.mktemp("tangled") / "lake")
     generator = np.random.default_rng(7)
     films = {}
     with lake.transaction("tangle") as transaction:
-        path = transaction.staging(".mcap")
-        write_record(path, made(number=0))
-        stored = transaction.put(path)
         for number in range(80):
+            path = transaction.staging(".mcap")
+            write_record(path, made(number=number, frames=2))
+            stored = transaction.put(path)
             simulated = number % 3 == 0
             film, day = int(generator.integers(0, 45)), int(generator.integers(0, 40))
             camera = Artifact(

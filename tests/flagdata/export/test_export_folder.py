@@ -16,8 +16,8 @@ import pytest
 
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
 from flagdata.export import FORMATS, Export, export
-from flagdata.export.target import fresh_folder
 from flagdata.lake import Artifact, Lake
+from flagdata.outputs import fresh_folder
 from flagdata.schema import Kind
 
 CLIPS = "kind = 'clip'"
@@ -107,10 +107,11 @@ def test_a_target_made_meanwhile_is_not_replaced(tmp_path: Path) -> None:
         with fresh_folder(tmp_path / "out") as folder:
             (folder / "file").write_bytes(b"x")
             (tmp_path / "out").mkdir()
+            (tmp_path / "out" / "mine.txt").write_text("mine")
 
     with pytest.raises(ConflictError):
         raced()
-    assert list((tmp_path / "out").iterdir()) == []
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["mine.txt"]
 
 
 @pytest.mark.parametrize(

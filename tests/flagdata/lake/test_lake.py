@@ -129,20 +129,17 @@ def test_a_merge_brings_a_branch_s_own_rows_to_main_once(lake: Lake, put_text: P
         lake.merge("other", "no")
 
 
-def test_a_merge_without_the_parents_is_refused_and_adds_nothing(lake: Lake, put_text: Put) -> None:
+def test_a_merge_brings_all_that_the_branch_shows_what_it_began_from_too(lake: Lake, put_text: Put) -> None:
     lake.branch("one")
     parent = put_text(lake, "parent", branch="one")
     lake.branch("two", at="one")
     put_text(lake, "child", branch="two", parents=(parent.id,))
-    with pytest.raises(NotFoundError, match="parent"):
-        lake.merge("two", "too early")
-    assert lake.rows().num_rows == 0
-    lake.merge("one", "first")
-    lake.merge("two", "then")
+    assert len(lake.merge("two", "both").added) == 2
     assert lake.rows()["name"].to_pylist() == ["parent", "child"]
+    assert lake.merge("one", "nothing is left of it").commit is None
 
 
-def test_a_merge_brings_parents_before_their_children_whatever_begins_earlier(lake: Lake) -> None:
+def test_a_merge_brings_parents_and_children_whatever_begins_earlier(lake: Lake) -> None:
     lake.branch("try")
     wind = Artifact(kind=Kind.WIND, name="log", start=200, end=300)
     recording = Artifact(kind=Kind.RECORDING, name="made of it", start=100, end=300, parents=(wind.id,))

@@ -88,3 +88,21 @@ def test_what_was_computed_is_computed_once_for_the_same_inputs(tmp_path: Path) 
     assert len(list(tmp_path.iterdir())) == 2  # and nothing unfinished
     cached(None, {"a": 1}, method, make)
     assert len(made) == 3
+
+
+def test_an_intermediate_result_that_is_damaged_is_computed_anew_with_a_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    method = (sys.modules["measure.cases.cached"],)
+    values = np.arange(50.0)
+
+    def result() -> np.ndarray:
+        return cached(tmp_path, {"a": 1}, method, lambda: {"x": values})["x"]
+
+    result()
+    (path,) = tmp_path.iterdir()
+    whole = path.read_bytes()
+    path.write_bytes(whole[:100] + bytes([whole[100] ^ 1]) + whole[101:])
+    assert np.array_equal(result(), values)
+    assert path.read_bytes() == whole
+    assert [str(path) in message for message in caplog.messages] == [True]

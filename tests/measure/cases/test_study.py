@@ -16,7 +16,7 @@ from measure.cases.edge import EdgeTrack, Seen
 from measure.cases.evidence import NEVER, Kind
 from measure.cases.limit_cycle import StripMotion
 from measure.cases.observe import Clip, Observations, Thresholds, measure_clip
-from measure.cases.page import as_json, summary, write_page
+from measure.cases.page import as_json, summary, write
 from measure.cases.recipe import Case, ClipSpec, Group, parse_case
 from measure.cases.simulated import Flutter
 from measure.cases.thresholds import Threshold
@@ -151,7 +151,7 @@ def test_the_verdict_and_its_page_tell_what_the_numbers_are(
     verdict = judge(case, seen, found)
     assert verdict.conclusion in set(Conclusion)
     assert verdict.best in verdict.remaining
-    page = write_page(tmp_path, case=case, seen=seen, study=found, verdict=verdict).read_text()
+    page = write(tmp_path, case=case, seen=seen, study=found, verdict=verdict).read_text()
     assert "no flutter" in page
     assert page.count("data:image/png;base64,") == 5
     assert "http" not in page.replace("http-equiv", "")  # refers to no other file

@@ -96,7 +96,7 @@ def test_a_set_reads_as_an_experiment_on_the_fitters_own_mesh(tiny: ChallengeFol
 
 
 def test_a_folder_that_is_not_empty_is_left_alone(tiny: ChallengeFolder, make_tiny) -> None:
-    with pytest.raises(ConflictError, match="not empty"):
+    with pytest.raises(ConflictError, match="exists"):
         make_tiny(tiny.path)
 
 

@@ -15,15 +15,18 @@ from measure.estimate.series import Agreement, Beside
 def series(wind: list[float], logged: list[float], *, refused: bool = False) -> Series:
     off = np.array(wind) - np.array(logged)
     agreement = Agreement(
-        count=len(wind), bias=float(off.mean()), rmse=float(np.sqrt((off**2).mean())), interval=(1.0, 2.0), covered=0.5
-    )
+        count=len(wind), bounded=0, bias=float(off.mean()), rmse=float(np.sqrt((off**2).mean())), interval=(1.0, 2.0),
+        covered=0.5,
+    )  # fmt: skip
     values = np.array(wind, dtype=np.float64)
     beside = Beside(
         time=np.arange(len(wind), dtype=float), wind=values, low=values - 1.0, high=values + 1.0, p=np.ones(len(wind)),
         logged=np.array(logged), minute=np.array(logged), window=agreement,
     )  # fmt: skip
-    verdict = SimpleNamespace(strange=np.array([True, *[False] * (len(wind) - 1)]), refused=refused, false_alarm=0.05)
-    measured: Any = SimpleNamespace(verdict=verdict, windows=wind, model="wave")
+    verdict = SimpleNamespace(
+        strange=np.array([True, *[False] * (len(wind) - 1)]), refused=refused, refusing=2, window_p=wind
+    )
+    measured: Any = SimpleNamespace(verdict=verdict, model="wave")
     return Series(measured=cast(Any, measured), beside=beside)
 
 

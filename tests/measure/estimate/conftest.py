@@ -99,7 +99,7 @@ def written(folder: Path, targets: tuple[str, ...]) -> Path:
     write_tensors(folder / WEIGHTS, learner.state_dict())
     write_sums(folder)
     bare = estimator.load(folder)
-    clips = np.stack([pictures(FRAMES, seed=seed) for seed in range(48)])
+    clips = np.stack([pictures(FRAMES, seed=seed) for seed in range(88)])
     with torch.no_grad():
         summaries = bare.embeddings(bare.inputs(clips))[0].numpy()
     cloud = Familiarity.of(summaries[:28], summaries[28:])

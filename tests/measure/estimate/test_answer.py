@@ -2,41 +2,85 @@
 
 from __future__ import annotations
 
+import json
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from flagdata.errors import InputError
 from flagdata.rng import stream
+from measure.ends import Bound, Span
 from measure.estimate.answer import Quantity, information, quantities, sentence
 
+
+def whole(low: float, high: float) -> Span:
+    """An interval with two ends."""
+    return Span(low=low, high=high, level=0.9, bound=None, estimated=True)
+
+
 WIND = Quantity(
-    name="wind_speed", unit="m/s", value=4.3, sigma=0.27, low=3.9, high=4.8, assumed=(0.0, 10.0), information=1.9
+    name="wind_speed", unit="m/s", value=4.3, sigma=0.27, span=whole(3.9, 4.8), assumed=(0.0, 10.0), information=1.9
 )
 WEIGHT = Quantity(
-    name="density", unit="kg/m²", value=0.13, sigma=0.014, low=0.11, high=0.16, assumed=(0.1, 0.17), information=0.3
+    name="density", unit="kg/m²", value=0.13, sigma=0.014, span=whole(0.11, 0.16), assumed=(0.1, 0.17), information=0.3
 )
 UNTOLD = Quantity(
-    name="density", unit="kg/m²", value=0.135, sigma=0.02, low=0.1, high=0.17, assumed=(0.1, 0.17), information=0.001
+    name="density", unit="kg/m²", value=0.135, sigma=0.02, span=whole(0.1, 0.17), assumed=(0.1, 0.17), information=0.001
 )
+STRONG = Quantity(
+    name="wind_speed", unit="m/s", value=None, sigma=None, assumed=(0.0, 10.0), information=3.0,
+    span=Span(low=9.4, high=math.inf, level=0.95, bound=Bound.LEAST, estimated=False),
+)  # fmt: skip
+CALM = Quantity(
+    name="wind_speed", unit="m/s", value=0.2, sigma=0.1, assumed=(0.0, 10.0), information=3.0,
+    span=Span(low=0.0, high=0.5, level=0.95, bound=Bound.MOST, estimated=True),
+)  # fmt: skip
 
 
 def test_the_answer_is_one_line() -> None:
-    assert sentence([WIND, WEIGHT], level=0.9) == "wind 4.3 m/s [3.9, 4.8] 90 %, area weight 0.13 kg/m² [0.11, 0.16]"
+    assert sentence([WIND, WEIGHT]) == "wind 4.3 m/s [3.9, 4.8] 90 %, area weight 0.13 kg/m² [0.11, 0.16]"
 
 
 def test_what_the_film_did_not_tell_is_said_so() -> None:
-    assert sentence([WIND, UNTOLD], level=0.9) == (
+    assert sentence([WIND, UNTOLD]) == (
         "wind 4.3 m/s [3.9, 4.8] 90 %; area weight: not told by this clip; 0.10 to 0.17 kg/m² is what was assumed"
     )
-    assert sentence([UNTOLD], level=0.9).startswith("area weight: not told")
+    assert sentence([UNTOLD]).startswith("area weight: not told")
+
+
+def test_a_wind_at_the_end_of_what_the_model_knows_is_bounded_on_one_side_with_the_reason() -> None:
+    assert sentence([STRONG, WEIGHT]) == (
+        "wind at least 9.4 m/s, 95 % (the model's range ends at 10.0 m/s), "
+        "area weight 0.13 kg/m² [0.11, 0.16] 90 %"
+    )  # fmt: skip
+    assert sentence([CALM, UNTOLD]).startswith("wind at most 0.5 m/s, 95 %; area weight: not told")
+    finding = STRONG.finding()
+    assert finding is not None
+    assert finding.kind == "wind-speed-at-end"
+    assert "ends at 10.0 m/s" in finding.what
+    assert CALM.finding() is WIND.finding() is None
+
+
+def test_an_end_that_nothing_bounds_is_null_in_json_and_no_value_is_given() -> None:
+    told = json.loads(json.dumps(STRONG.as_dict(), allow_nan=False))
+    assert (told["value"], told["sigma"], told["interval"]) == (None, None, [9.4, None])
+    assert (told["bound"], told["level"]) == ("at-least", 0.95)
+    assert (WIND.as_dict()["bound"], WIND.as_dict()["level"]) == (None, 0.9)
+
+
+def test_draws_at_both_ends_of_the_range_are_not_told() -> None:
+    nothing = Span(low=0.0, high=math.inf, level=1.0, bound=Bound.NOTHING, estimated=False)
+    assert not replace(STRONG, span=nothing).told
 
 
 def test_the_weight_of_a_small_flag_is_told_to_a_gram() -> None:
     small = Quantity(
-        name="density", unit="kg/m²", value=0.0325, sigma=0.003, low=0.028, high=0.038, assumed=(0.025, 0.0425),
+        name="density", unit="kg/m²", value=0.0325, sigma=0.003, span=whole(0.028, 0.038), assumed=(0.025, 0.0425),
         information=0.4,
     )  # fmt: skip
-    assert small.phrase(level=0.9, first=False) == "area weight 0.033 kg/m² [0.028, 0.038]"
+    assert small.phrase(first=False) == "area weight 0.033 kg/m² [0.028, 0.038]"
 
 
 def test_information_is_the_divergence_of_gaussians() -> None:
@@ -49,19 +93,25 @@ def test_information_is_the_divergence_of_gaussians() -> None:
     assert information(prior, prior) == pytest.approx(0, abs=1e-12)
 
 
+def found(
+    draws: np.ndarray, prior: np.ndarray, name: str, *, assumed: tuple[float, float], level: float = 0.9
+) -> Quantity:
+    low, high = assumed
+    return quantities(
+        draws, prior, [name], level=level, assumed=np.array([assumed]), places=(draws - low) / (high - low), stated={}
+    )[0]
+
+
 def test_a_posterior_that_is_the_prior_tells_nothing_and_a_narrow_one_does() -> None:
     rng = stream(2, "told")
     prior = rng.uniform(0.1, 0.17, size=(5000, 1))
-    assumed = np.array([[0.1, 0.17]])
-    same = quantities(rng.uniform(0.1, 0.17, size=(400, 1)), prior, ["density"], level=0.9, assumed=assumed)
-    assert not same[0].told
-    narrow = quantities(rng.normal(0.13, 0.01, size=(400, 1)), prior, ["density"], level=0.9, assumed=assumed)
-    assert narrow[0].told
+    assert not found(rng.uniform(0.1, 0.17, size=(400, 1)), prior, "density", assumed=(0.1, 0.17)).told
+    assert found(rng.normal(0.13, 0.01, size=(400, 1)), prior, "density", assumed=(0.1, 0.17)).told
 
 
 def test_the_interval_holds_its_share_of_the_draws() -> None:
     draws = np.linspace(0, 1, 1001)[:, None]
-    found = quantities(draws, draws, ["wind_speed"], level=0.8, assumed=np.array([[0.0, 10.0]]))[0]
-    assert (found.low, found.high) == (pytest.approx(0.1), pytest.approx(0.9))
+    own = found(draws, draws, "wind_speed", assumed=(0.0, 1.0), level=0.8).span
+    assert (own.low, own.high) == (pytest.approx(0.1), pytest.approx(0.9))
     with pytest.raises(InputError, match="between 0 and 1"):
-        quantities(draws, draws, ["wind_speed"], level=1.0, assumed=np.array([[0.0, 10.0]]))
+        found(draws, draws, "wind_speed", assumed=(0.0, 1.0), level=1.0)

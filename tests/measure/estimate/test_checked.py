@@ -39,7 +39,7 @@ def test_a_still_film_is_refused_with_the_checks_own_reason_and_fix(model: Estim
     asked = CheckedGate(model=model, calibrated=gate, false_alarm=0.05)
     still = np.repeat(clip(42)[:1], 12, axis=0)
     reasons = asked.judge(still, model.summaries(model.inputs(still[None]))[0].numpy())
-    found = verdict([[reasons]], false_alarm=0.05, level=asked.level(0.05))
+    found = verdict([[reasons]], false_alarm=0.05, level=asked.level)
     assert found.refused
     assert found.reasons[0].kind == "no-motion"
     assert "crop" in found.reasons[0].fix

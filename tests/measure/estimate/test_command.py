@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import json
 import re
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 import pytest
@@ -136,6 +137,15 @@ def test_a_refused_film_ends_with_3_and_shows_no_estimate(strange: Path, tmp_pat
     assert told["kind"] == "refused"
     marked = run(strange, *SIZED, "--anyway")
     assert marked.stdout.startswith("refused by the gate, not to be relied on: ")
+
+
+@pytest.mark.parametrize("form", [(), ("--json",), ("--csv",)])
+def test_a_still_film_is_given_no_number_even_anyway(tmp_path: Path, form: tuple[str, ...]) -> None:
+    still = write_video(tmp_path / "still.mkv", pictures(1, height=40, width=56).repeat(40, axis=0))
+    done = run(still, *SIZED, "--anyway", *form, code=3)
+    assert "no number is given, not even with --anyway: nothing moves in the picture" in done.stdout + done.stderr
+    assert "m/s" not in done.stdout + done.stderr
+    assert not form or "quantities" not in done.stdout
 
 
 def test_the_report_is_one_file_that_refers_to_no_other(film: Path, model_folder: Path, tmp_path: Path) -> None:
@@ -287,3 +297,31 @@ def test_a_hanging_cloth_is_measured_by_a_model_of_it(film: Path, cloth_folder: 
 def test_a_hanging_cloth_is_not_refined_by_simulating_flags(film: Path, cloth_folder: Path) -> None:
     said = run(film, "--model", cloth_folder, "--flag-size", "1.0x1.0", "--anyway", "--refine", "28", "--json", code=2)
     assert "hanging-cloth" in said.stdout + said.stderr
+
+
+def refused_by_the_disk(*_: object, **__: object) -> NoReturn:
+    raise OSError(errno.EIO, "Input/output error")
+
+
+def test_a_measurement_that_is_committed_is_reported_whatever_becomes_of_its_files(
+    lake: Path, model_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each file that the disk refuses is a warning of its own; without a commit it is an error."""
+    monkeypatch.setattr("flagdata.outputs.fresh_folder", refused_by_the_disk)
+    monkeypatch.setattr("flagdata.outputs.write_file", refused_by_the_disk)
+    files = ("--report", tmp_path / "report.html", "--zarr", tmp_path / "series.zarr")
+    options = ("made-1", "--lake", lake, *SIZED, "--model", model_folder, "--anyway", *files, "--json")
+    done = run(*options)
+    assert json.loads(done.stdout)["artifact"] == measurements(lake)[0]["artifact"]
+    for what in ("its Zarr folder", "its report"):
+        assert f"is published, but writing {what} failed: the system refused: Input/output error" in done.stderr
+    run(*options, "--read-only", code=1)
+
+
+def test_what_a_report_shows_is_read_before_the_commit(
+    lake: Path, model_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("measure.estimate.nearest.nearest", refused_by_the_disk)
+    options = ("made-1", "--lake", lake, *SIZED, "--model", model_folder, "--anyway")
+    run(*options, "--report", tmp_path / "report.html", code=1)
+    assert measurements(lake) == []

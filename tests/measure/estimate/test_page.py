@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from html import unescape
 
 import numpy as np
 import pytest
@@ -14,8 +15,8 @@ from measure.estimate.nearest import Neighbour
 from measure.estimate.page import Context, Section, page
 from measure.estimate.series import beside
 from models.estimator import Estimator
-from tests.measure.estimate.conftest import FRAMES, even, pictures
-from tests.measure.estimate.test_measuring import measured
+from tests.measure.estimate.conftest import FRAMES, Pictures, even, pictures
+from tests.measure.estimate.test_measuring import far, measured
 from tests.measure.estimate.test_series import START, gusts, log, saying
 
 PLAIN = Context(provenance={"film": "<flag>.mkv"}, known={}, neighbours=(), compared=0, rate=25.0)
@@ -38,6 +39,24 @@ def test_the_answer_stands_first_and_every_quantity_has_a_row(found: Measurement
     assert found.sentence in text
     assert text.index(found.sentence) < text.index("What the film says")
     assert [text.count(f"<td>{name}</td>") for name in ("wind", "area weight", "bending", "anisotropy")] == [1] * 4
+
+
+def test_a_bound_is_shown_as_one_without_a_value(model: Estimator) -> None:
+    strong = measured(even(3 * FRAMES), far(model, 0, 1.0))
+    strong = replace(strong, verdict=replace(strong.verdict, p=0.5))
+    text = unescape(" ".join(drawn(strong).split()))
+    assert f"<b>{strong.sentence}</b>" in text
+    assert re.search(r"<td>wind</td> <td></td><td>at least \d\.\d\d \(95 %\)</td>", text)
+    assert "range ends at 10.0 m/s" in text
+    assert "inf" not in re.sub(r"data:[^\"]*|inference|information|inform", "", text)
+
+
+def test_a_film_in_which_nothing_moves_is_shown_without_estimates_even_anyway(model: Estimator) -> None:
+    still = measured(Pictures(times=np.arange(24) / 25.0, images=pictures(1).repeat(24, axis=0)), model)
+    text = drawn(still, anyway=True)
+    assert "nothing moves in the picture" in text
+    assert "What the film says" not in text
+    assert "m/s" not in re.sub(r"data:[^\"]*", "", text)
 
 
 def test_names_from_outside_are_escaped(found: Measurement) -> None:

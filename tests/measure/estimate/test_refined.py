@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from measure.ends import Bound, Span
 from measure.estimate.refined import scaled
 from measure.refine.refinement import Interval, Refinement, Round
 
@@ -16,7 +17,8 @@ NOTHING: Any = None
 
 
 def interval(name: str, median: float, half: float) -> Interval:
-    return Interval(name=name, unit="", median=median, low=median - half, high=median + half, prior_share=0.5)
+    own = Span(low=median - half, high=median + half, level=0.9, bound=None, estimated=True)
+    return Interval(name=name, unit="", median=median, span=own, prior_share=0.5)
 
 
 @pytest.fixture
@@ -39,12 +41,22 @@ def test_a_flag_four_times_as_long_has_twice_the_wind_four_times_the_weight_and_
     """Froude number U²/(gL), mass ratio ρ_s/(ρ_air L) and B/(ρ_air U² L³) are those of the simulated flag."""
     larger = scaled(found, 4.0)
     by_name = {entry.name: entry for entry in larger.intervals}
-    assert (by_name["wind_speed"].median, by_name["wind_speed"].high) == (8.0, 9.0)
-    assert by_name["wind_speed.1"].low == 10.0
+    assert (by_name["wind_speed"].median, by_name["wind_speed"].span.high) == (8.0, 9.0)
+    assert by_name["wind_speed.1"].span.low == 10.0
     assert by_name["density"].median == pytest.approx(0.48)
     assert by_name["bending_scale"].median == pytest.approx(-4.0 + math.log10(256))
-    assert by_name["bending_scale"].high - by_name["bending_scale"].low == pytest.approx(0.4)
+    assert by_name["bending_scale"].span.high - by_name["bending_scale"].span.low == pytest.approx(0.4)
     np.testing.assert_allclose(larger.bending, 256e-4)
+
+
+def test_a_bound_scales_and_stays_one(found: Refinement) -> None:
+    least = Span(low=9.4, high=math.inf, level=0.95, bound=Bound.LEAST, estimated=False)
+    strong = replace(found.intervals[0], median=None, span=least)
+    larger = scaled(replace(found, intervals=(strong, *found.intervals[1:])), 4.0)
+    assert larger.intervals[0].span == replace(least, low=18.8)
+    told = larger.intervals[0].as_dict()
+    assert (told["median"], told["low"], told["high"], told["bound"]) == (None, 18.8, None, "at-least")
+    assert larger.intervals[0].phrase(2, " m/s") == "at least 18.80 m/s"
 
 
 def test_what_has_no_size_stays(found: Refinement) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +12,15 @@ import pytest
 from flagdata.rng import stream
 from flagdata.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
+from measure.ends import Bound, Span
+from measure.estimate.answer import Quantity
 from measure.estimate.measuring import Measurement
 from measure.estimate.series import Beside, agreement, beside, spectrum
 from models.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, even
 from tests.measure.estimate.test_measuring import measured
 
+STRONG = 9.4
 START = 1_700_000_000 * NANOSECONDS
 
 
@@ -38,17 +43,22 @@ def log(times: np.ndarray, speed: np.ndarray) -> WindSeries:
 
 
 def saying(model: Estimator, wind: np.ndarray, *, step: float) -> Measurement:
-    """A measurement whose windows, one each `step`, say these winds ± 0.5 m/s."""
+    """A measurement whose windows, one each `step`, say these winds ± 0.5 m/s, at least `STRONG` where they are NaN."""
     found = measured(even(2 * FRAMES), model)
     first = found.windows[0]
-    quantity = first.quantities[0]
+    quantity = replace(first.quantities[0], information=1.0)
+
+    def said(v: float) -> Quantity:
+        if math.isnan(v):
+            least = Span(low=STRONG, high=math.inf, level=0.95, bound=Bound.LEAST, estimated=False)
+            return replace(quantity, value=None, sigma=None, span=least)
+        return replace(
+            quantity, value=v, span=Span(low=v - 0.5, high=v + 0.5, level=0.9, bound=None, estimated=True)
+        )  # fmt: skip
+
     windows = tuple(
-        replace(
-            first, start=k * step, end=k * step + 0.44,
-            quantities=(replace(quantity, value=float(v), low=float(v) - 0.5, high=float(v) + 0.5),),
-        )
-        for k, v in enumerate(wind)
-    )  # fmt: skip
+        replace(first, start=k * step, end=k * step + 0.44, quantities=(said(v),)) for k, v in enumerate(wind.tolist())
+    )
     return replace(found, windows=windows, verdict=replace(found.verdict, window_p=(0.5,) * len(wind)))
 
 
@@ -64,6 +74,36 @@ def test_bias_and_rmse_are_those_that_were_put_in(model: Estimator) -> None:
     assert shifted is not None
     assert shifted.covered == 0
     assert agreement(found, np.full(100, np.nan), seed=0) is None
+
+
+def test_windows_with_a_bound_count_where_intervals_are_compared_and_among_no_errors(model: Estimator) -> None:
+    """Every second wind is 12 m/s, of which the model knows that it is 9.4 m/s or more; the others are read 0.3 m/s too
+    high."""
+    wind = np.where(np.arange(100) % 2, 12.0, gusts(100))
+    series = beside(saying(model, np.where(wind == 12.0, np.nan, wind + 0.3), step=1.0), start=START, wind=None)
+    told = agreement(series, wind, seed=0)
+    assert told is not None
+    assert (told.count, told.bounded, told.covered) == (100, 50, 1.0)
+    assert (told.bias, told.rmse) == (pytest.approx(0.3), pytest.approx(0.3))
+    assert "50 give a bound and no value" in told.sentence
+    weak = agreement(series, np.minimum(wind, 9.0), seed=0)
+    assert weak is not None
+    assert weak.covered == 0.5
+    assert spectrum(series.time, series.wind, wind) is None  # no two windows in a row have values
+
+
+def test_a_series_of_bounds_alone_has_no_error_and_json_without_infinities(model: Estimator) -> None:
+    strong = saying(model, np.full(200, np.nan), step=1.0)
+    series = beside(strong, start=START, wind=log(np.arange(-70, 210, 1.0), np.full(280, 12.0)))
+    assert series.window is not None
+    assert (series.window.bias, series.window.covered) == (None, 1.0)
+    assert series.delay is not None
+    assert series.delay.offset is None
+    json.dumps(series.as_dict(), allow_nan=False)
+    header, first = list(series.rows())[:2]
+    assert dict(zip(header, first, strict=True)) | {"time": "", "p": ""} == {
+        "time": "", "wind": "", "low": "9.4", "high": "inf", "p": "", "anemometer": "12", "anemometer_minute": "12",
+    }  # fmt: skip
 
 
 def test_the_window_sees_its_own_wind_and_the_minute_the_mean_before_it(model: Estimator) -> None:

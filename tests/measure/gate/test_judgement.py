@@ -77,6 +77,19 @@ def test_a_fault_is_refused_and_named(model: Estimator, gate: Gate, fault: str, 
     assert all(finding.fix and finding.kind.startswith("gate-") for finding in judged.findings())
 
 
+def test_where_nothing_moves_no_reason_is_about_what_moves(model: Estimator, gate: Gate) -> None:
+    """A still picture with the noise of a camera: "height 0" would be the size of nothing."""
+    noise = np.random.default_rng(7).normal(0, 6, (12, 112, 112))
+    still = np.clip(clip(42)[:1] + noise, 0, 255).astype(np.uint8)
+    kinds = [one.kind for one in judge(still, model, gate).reasons]
+    assert "no-motion" in kinds
+    assert not {"scale", "cut-off", "several-flags", "unlike-cloth"} & set(kinds)
+    without = judge(np.repeat(still[:1], 12, axis=0), model, gate)
+    assert [one.kind for one in without.reasons] == ["no-motion"]
+    assert "nothing moves in the picture" in without.sentence
+    assert without.reasons[0].blank
+
+
 def test_too_few_frames_and_a_black_film_are_refused_before_anything_is_measured(model: Estimator, gate: Gate) -> None:
     short = judge(clip(1)[:10], model, gate)
     assert [one.kind for one in short.reasons] == ["too-few-frames"]

@@ -151,12 +151,28 @@ def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tm
 @pytest.mark.parametrize(
     ("text", "kind", "what"),
     [
-        ("", InputError, "no recording"),
+        ("title = 'none'", InputError, "no recording"),
         ("[[recording]]\nsorce = 'a'", InputError, "no source"),
         ("[[recording]]\nsource = 'a'\nnoize = 1", UnknownNameError, "did you mean 'noise'"),
         ("[[recording]]\nsource = 'a'\nwind = { speed = 1, velocity = [1, 0, 0] }", UsageError, "2 winds"),
         ("[[recording]]\nsource = 'a'\nwind = { velocity = [1, 0] }", InputError, "2 numbers"),
         ("[[recording]]\nsource = 'a'\nwind = { log = 'b', speed = 1 }", UsageError, "2 winds"),
+        (
+            "[[recording]]\nsource = 'a'\nwind = { speed = 5, toward = 90 }",
+            InputError,
+            "90 rad, more than a whole turn",
+        ),
+        ("[[recording]]\nsource = 'a'\nwind = { log = 'b', north = 270 }", InputError, "270 rad"),
+        (
+            "[[recording]]\nsource = 'a'\nwind = { speed = 5, direction-sigma = 10 }",
+            InputError,
+            "direction-sigma is 10 rad",
+        ),
+        (
+            "[[recording]]\nsource = 'a'\nwind = { speed = 5, direction-sigma = -0.1 }",
+            InputError,
+            "direction-sigma is -0.1",
+        ),
         ("[cloth]\nwidth = 1\n[[recording]]\nsource = 'a'", UsageError, "half a size"),
         ("[pins]\nat = 'hoist'\npoints = [[0, 0]]\n[[recording]]\nsource = 'a'", UsageError, "both at and points"),
         ("[pins]\nat = 'hoists'\n[[recording]]\nsource = 'a'", UnknownNameError, "did you mean 'hoist'"),
@@ -174,6 +190,17 @@ def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tm
 def test_what_does_not_fit_is_refused_with_its_place(tmp_path: Path, text: str, kind: type[FlagdataError], what: str):
     with pytest.raises(kind, match=what):
         load(_recipe(tmp_path, text))
+
+
+def test_angles_of_a_wind_may_be_in_degrees(tmp_path: Path):
+    degrees = "wind = { speed = 2, toward-deg = 90, direction-sigma-deg = 180 }"
+    (constant,) = load(_recipe(tmp_path, f"[[recording]]\nsource = 'a'\n{degrees}")).recordings
+    assert constant.wind is not None
+    assert constant.wind.velocity == pytest.approx((0.0, 2.0, 0.0), abs=1e-12)
+    assert constant.wind.direction == pytest.approx(math.pi)
+    (logged,) = load(_recipe(tmp_path, "[[recording]]\nsource = 'a'\nwind = { log = 'b', north-deg = 90 }")).recordings
+    assert logged.wind is not None
+    assert logged.wind.placement.north == pytest.approx(math.pi / 2)
 
 
 def test_a_source_that_is_not_there_is_named(tmp_path: Path):

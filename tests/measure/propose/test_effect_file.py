@@ -52,6 +52,19 @@ def heavy() -> Outcome:
     return proposal(mass_near_75_30=(2.0, "1"), mass_stripe_60=(0.5, "1"), left_of_motion_everywhere=(0.4, "1/s"))
 
 
+def test_a_proposal_that_was_changed_is_kept_and_the_new_one_gets_a_name_of_its_own(
+    two: Outcome, heavy: Outcome, tmp_path: Path
+) -> None:
+    first = write(two, tmp_path).path
+    assert write(heavy, tmp_path).path == first  # as it was written: replaced
+    first.write_text("mine = 1\n")
+    second = write(two, tmp_path)
+    assert (first.name, second.path.name) == ("proposed_ab12ab12ab12.py", "proposed_ab12ab12ab12_2.py")
+    assert first.read_text() == "mine = 1\n"
+    assert load(second.spec).strengths() == ("upward_lower", "toward_pole_lower_fly")
+    assert "proposed_ab12ab12ab12_2:" in (tmp_path / "pyproject.toml").read_text()
+
+
 def test_the_file_is_the_sum_of_its_terms(two: Outcome, tmp_path: Path) -> None:
     made = load(write(two, tmp_path).spec)
     assert made.strengths() == ("upward_lower", "toward_pole_lower_fly")

@@ -56,13 +56,17 @@ def test_another_view_seed_or_model_is_another_evaluation(evaluator: Evaluator, 
     assert fingerprint(estimator) == evaluator.model
 
 
-def test_a_damaged_file_is_named(evaluator: Evaluator, points: np.ndarray) -> None:
+def test_a_damaged_file_is_named_whichever_bit_of_it_changed(evaluator: Evaluator, points: np.ndarray) -> None:
     evaluator.evaluate(points[:1], 1)
     assert evaluator.folder is not None
     kept = next(evaluator.folder.rglob("*.npz"))
-    kept.write_bytes(kept.read_bytes()[:40])
-    with pytest.raises(CorruptError, match="cannot be read"):
-        replace(evaluator, _kept={}).evaluate(points[:1], 1)
+    whole = kept.read_bytes()
+    places = np.linspace(0, len(whole) - 1, 40).astype(int).tolist()
+    for content in (whole[:40], *(whole[:k] + bytes([whole[k] ^ 1]) + whole[k + 1 :] for k in places)):
+        kept.write_bytes(content)
+        with pytest.raises(CorruptError, match="damaged") as caught:
+            replace(evaluator, _kept={}).evaluate(points[:1], 1)
+        assert caught.value.where == str(kept)
 
 
 def test_an_unknown_view_is_drawn_anew_for_each_clip(simulator: Simulator, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import torch
 
-from flagdata.errors import CorruptError, FlagdataError, InputError, RefusedError, UsageError
+from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, RefusedError, UsageError
 from models.crops import Cropping
 from models.estimator import Estimator
 from models.evaluation.predict import predict
@@ -109,6 +109,7 @@ def test_a_training_that_was_stopped_reaches_the_weights_of_one_that_was_not(
     whole = training(tmp_path / "whole", recipe(loss)).complete()
     with pytest.raises(KeyboardInterrupt):
         training(tmp_path / "broken", recipe(loss), bars=stopped_after(clips)).complete()
+    checkpoint.check_folder(tmp_path / "broken")
     taken_up = training(tmp_path / "broken", recipe(loss)).complete()
     for name, value in whole.learner.state_dict().items():
         assert torch.equal(value, taken_up.learner.state_dict()[name]), name
@@ -378,3 +379,14 @@ def test_two_ranks_take_the_steps_of_one(tmp_path: Path) -> None:
     alone, shared = (json.loads((tmp_path / f"weights-{count}.json").read_text()) for count in (1, 2))
     for name, values in alone.items():
         np.testing.assert_allclose(shared[name], values, rtol=1e-5, atol=1e-6, err_msg=name)
+
+
+@pytest.mark.parametrize("theirs", ["notes.txt", "next/thesis.tex", "before/last/a", "last/card.json/b"])
+def test_a_run_folder_with_anything_else_in_it_is_refused(theirs: str, tmp_path: Path) -> None:
+    """Checkpoints replace the folders next, last and before: none of them may be a user's."""
+    checkpoint.check_folder(tmp_path / "new")
+    path = tmp_path / "run" / theirs
+    path.parent.mkdir(parents=True)
+    path.write_text("mine")
+    with pytest.raises(ConflictError, match="no training wrote"):
+        checkpoint.check_folder(tmp_path / "run")

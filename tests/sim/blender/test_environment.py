@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from flagdata.errors import InputError, NotFoundError
+from flagdata.errors import ConflictError, NotFoundError
 from sim.blender import environment, launch
 from sim.blender.command import blender_setup
 from sim.blender.environment import BlenderError
@@ -98,11 +98,22 @@ def test_a_file_that_is_no_program_is_an_error(tmp_path: Path) -> None:
         environment.check(tmp_path / "python")
 
 
-def test_a_folder_of_other_files_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(InputError, match="no virtual environment"):
+@pytest.mark.parametrize("name", ["mine.txt", "pyvenv.cfg"])
+def test_a_folder_of_other_files_and_an_environment_for_other_work_are_left_alone(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(ConflictError, match="exists"):
         environment.create(tmp_path, say=print)
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_an_environment_that_was_begun_or_has_blender_in_it_is_completed(tmp_path: Path) -> None:
+    """What says so: the search for a Python is reached, and finds none of this name."""
+    (tmp_path / "begun").mkdir()
+    (tmp_path / "begun" / "flagdata-blender").touch()
+    (tmp_path / "older" / "lib" / "python3.11" / "site-packages" / "bpy").mkdir(parents=True)
+    for folder in ("begun", "older"):
+        with pytest.raises(NotFoundError, match="python-of-no-machine"):
+            environment.create(tmp_path / folder, python="python-of-no-machine", say=print)
 
 
 def test_blender_is_made_with_no_other_python_than_its_own(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from flagdata.lake.health import doctor, object_names, verify
 from flagdata.record import Record
 from sim.datasets.recipe import DatasetRecipe
 
-SIDES = {"train": "name like 'tiny-train-%'", "test": "name like 'tiny-test-%'"}
+SIDES = {side: {"dataset": "tiny", "side": side} for side in ("train", "test")}
 SEQUENCES, FILMS = 6, 15
 
 
@@ -161,7 +161,7 @@ def test_the_card_says_what_was_built(built: Path, make: Callable[..., DatasetRe
 
 
 def test_two_recipes_of_one_name_are_not_mixed(recipe_file: Path, builds: Any, built: Path, tmp_path: Path) -> None:
-    # The sides are told by names: a changed recipe must have another name, or a branch of its own.
+    # A side is what the catalog states of it: a changed recipe must have another name, or a branch of its own.
     (tmp_path / "scene.toml").write_text((recipe_file.parent / "scene.toml").read_text())
     changed = tmp_path / "tiny.toml"
     changed.write_text(recipe_file.read_text().replace("read-noise = 1.0", "read-noise = 2.0"))

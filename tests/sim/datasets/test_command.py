@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import json
+from contextlib import nullcontext
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
 from flagdata.cli import main
 from sim.datasets import jobs
+from sim.datasets.build import BuildReport
 from sim.datasets.cast import casts
 from sim.datasets.reading import load
 
@@ -92,3 +96,20 @@ def test_a_folder_that_is_no_lake_is_left_alone(
     assert code == 1
     assert "there is no lake here" in err
     assert [entry.name for entry in tmp_path.iterdir()] == ["letter.txt"]
+
+
+def test_a_data_set_that_is_built_is_reported_although_its_card_cannot_be_written(
+    recipe_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report = BuildReport(sequences=6, films=15, new_sequences=6, new_films=15, clips=15, failed=(), seconds=1.0)
+
+    def refused(*_: object, **__: object) -> NoReturn:
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr("sim.datasets.cluster.connected", lambda *_, **__: nullcontext())
+    monkeypatch.setattr("sim.datasets.build.Build.run", lambda _: report)
+    monkeypatch.setattr("sim.datasets.card.write_card", refused)
+    code, out, err = said(capsys, recipe_file, "--lake", tmp_path / "lake", "--json")
+    assert code == 0
+    assert (json.loads(out)["films"], json.loads(out)["card"]) == (15, None)
+    assert "the data set tiny is published, but writing its card failed" in err

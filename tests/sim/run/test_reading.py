@@ -54,6 +54,36 @@ def test_what_is_left_out_has_its_default_in_the_identity() -> None:
     assert read(MINIMAL + "[contact]\n").identity() != recipe.identity()
 
 
+def test_an_angle_is_in_radians_or_in_degrees_where_its_key_says_so() -> None:
+    radians = read(MINIMAL + "toward = 1.5707963267948966\n")
+    degrees = read(MINIMAL + "toward-deg = 90\n")
+    assert degrees.wind.toward == pytest.approx(1.5707963267948966)
+    assert degrees.identity() == radians.identity()
+    around = read(MINIMAL + "toward-deg = { low = -180.0, high = 180.0 }\n").wind.toward
+    assert isinstance(around, Range)
+    assert (around.low, around.high) == (pytest.approx(-np.pi), pytest.approx(np.pi))
+    # A whole turn, as it is rounded in a file.
+    assert read(MINIMAL + "toward = 6.2832\n").wind.toward == 6.2832
+
+
+@pytest.mark.parametrize(
+    ("line", "what", "fix"),
+    [
+        ("toward = 90.0", "90 rad, more than a whole turn", "toward-deg = 90"),
+        ("toward = -45", "-45 rad", "toward-deg = -45"),
+        ("toward = { low = 0.0, high = 360.0 }", "360 rad", "toward-deg"),
+        ("toward = 1.0\ntoward-deg = 57.3", "given twice", "keep"),
+    ],
+)
+def test_an_angle_that_is_clearly_in_degrees_is_refused_with_the_key_for_it(line: str, what: str, fix: str) -> None:
+    with pytest.raises(InputError, match=what) as caught:
+        read(f"{MINIMAL}{line}\n")
+    assert "[wind]" in (caught.value.where or "")
+    assert fix in (caught.value.fix or "")
+    with pytest.raises(InputError, match="angle is 90"):
+        read(MINIMAL + "[effects.direction-change]\nangle = 90.0\n")
+
+
 @pytest.mark.parametrize(
     ("text", "error", "word"),
     [

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.errors import InputError, LimitError, NotFoundError
+from flagdata.errors import InputError, LimitError
+from flagdata.files import check_input
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.containers import netcdf, spreadsheet
 from flagdata.ingest.anemometer.options import Limits
@@ -83,10 +84,7 @@ def first_bytes(path: Path) -> bytes:
         NotFoundError: there is none.
         InputError: it is a folder, cannot be read or is empty.
     """
-    if not path.exists():
-        raise NotFoundError(f"no file {path.name}", where=str(path), fix="check the path")
-    if path.is_dir():
-        raise InputError("this is a folder, not a log", where=str(path), fix="give one file")
+    check_input(path, noun="log")
     try:
         with opened(path) as stream:
             head = stream.read(HEAD)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from flagdata.findings import Severity
-from flagdata.ingest.camera import CameraOptions
+from flagdata.ingest.camera import CameraOptions, propose_crop
 from flagdata.ingest.camera.clock import Counter, restart
 from tests.flagdata.ingest.camera.reading import grid_of, read
 
@@ -84,6 +84,19 @@ def test_a_wrap_within_reordered_frames_runs_on(
     assert [number_of(f.image) for f in frames] == list(range(20))
     assert grid_of(frames, start) == list(range(20))
     assert not set(found) & {"clock-reset", "frames-missing", "stamps-disordered"}
+
+
+def test_the_motion_of_a_film_is_found_though_no_seek_finds_its_place(
+    tmp_path: Path, take: Callable[..., Path]
+) -> None:
+    joined = tmp_path / "joined.ts"
+    joined.write_bytes(take(5000, 20).read_bytes() + take(4000, 12).read_bytes())
+    # Cells of 16 px: those of 1, 2, 4, 8 and 16, which change within 20 frames, are the first five of the upper row.
+    for film in (joined, take((FULL - 10 * PERIOD) / 90_000, 20)):
+        box = propose_crop(film).box
+        assert box.x == 0
+        assert box.y == 0
+        assert 64 <= box.width <= 96
 
 
 def test_stamps_run_on_across_the_end_of_their_counter_in_both_directions() -> None:

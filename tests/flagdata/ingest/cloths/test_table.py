@@ -16,7 +16,7 @@ ROWS = ("a.mp4,Faux Fur,0.39,2.1e-5,W1,,", "b.mp4,Faux Fur,0.39,2.1e-5,W2,,", "c
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     for name in "abc":
-        (tmp_path / f"{name}.mp4").touch()
+        (tmp_path / f"{name}.mp4").write_bytes(b"a film")
     return tmp_path
 
 

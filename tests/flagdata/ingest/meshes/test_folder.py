@@ -78,7 +78,7 @@ def test_a_rate_goes_before_the_scenes(make_folder: Callable[..., Path]) -> None
         ({"0000_00.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"}, None, InputError, "no texture coordinates"),
         ({"0000_00.obj": UNIT.replace("v 0 1 0", "v 0 nan 0")}, None, InputError, "finite"),
         ({"0000_00.obj": UNIT.replace("f 1/1 2/2 3/3", "f 1/1 2/2 9/3")}, None, InputError, "not there"),
-        ({"0000_00.obj": ""}, None, InputError, "without faces"),
+        ({"0000_00.obj": ""}, None, InputError, "is empty"),
     ],
 )
 def test_what_is_wrong_is_refused(

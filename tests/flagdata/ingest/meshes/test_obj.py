@@ -74,7 +74,7 @@ def test_a_malformed_line_is_refused_by_its_number(tmp_path: Path, text: str, wo
 
 @pytest.mark.parametrize(
     ("text", "word"),
-    [("v 0 0 0\n", "without faces"), ("", "without faces"), (TRIANGLE + "f 1/1 2/2 3\n", "some corners")],
+    [("v 0 0 0\n", "without faces"), ("", "is empty"), (TRIANGLE + "f 1/1 2/2 3\n", "some corners")],
 )
 def test_a_mesh_that_is_none_is_refused(tmp_path: Path, text: str, word: str) -> None:
     with pytest.raises(InputError, match=word):

@@ -1,0 +1,109 @@
+"""TOML and JSON to values, within limits: the one boundary where the text of a recipe or a card is parsed."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from flagdata.errors import CorruptError
+
+SIZE_LIMIT = 64 << 20
+"""Longest text that is parsed [characters]; a cloth model's mesh is in its recipe. Lists within a list take most memory
+for their length, 30 bytes a character: 2 GB at most."""
+NESTING_LIMIT = 100
+"""Most tables and lists within one another."""
+_PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
+_DEEP_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{NESTING_LIMIT}}}", re.MULTILINE)
+
+
+class LimitsError(ValueError):
+    """Text that is longer or nested deeper than the limits."""
+
+
+def from_toml(text: str) -> dict[str, Any]:
+    """The tables of a TOML text.
+
+    Raises:
+        LimitsError: longer than `SIZE_LIMIT`, or nested deeper than `NESTING_LIMIT`.
+        ValueError: not TOML, or a number that is not finite or of thousands of digits.
+    """
+    _check_size(text)
+    if _DEEP_KEY.search(text):  # tomllib takes time and memory with the square of a key's parts
+        raise _deep()
+    try:
+        content = tomllib.loads(text)
+    except RecursionError:
+        raise _deep() from None
+    except ValueError as error:  # Python itself refuses numbers of very many digits
+        raise ValueError(f"not TOML: {error}") from None
+    _check(content)
+    return content
+
+
+def from_json(text: str | bytes) -> Any:
+    """The value of a JSON text.
+
+    Raises:
+        LimitsError: longer than `SIZE_LIMIT`, or nested deeper than `NESTING_LIMIT`.
+        ValueError: not JSON, or a number that is not finite or of thousands of digits.
+    """
+    _check_size(text)
+    try:
+        content = json.loads(text)
+    except RecursionError:
+        raise _deep() from None
+    _check(content)
+    return content
+
+
+def read_json(path: Path, *, noun: str, fix: str = "restore it from a copy") -> dict[str, Any]:
+    """The object in a JSON file that flagdata wrote.
+
+    Args:
+        noun: what the file is called in the error message.
+
+    Raises:
+        CorruptError: it is no JSON object within the limits.
+    """
+    try:
+        if path.stat().st_size > SIZE_LIMIT:
+            raise LimitsError(f"a file of {path.stat().st_size} bytes, at most {SIZE_LIMIT} are read")
+        content = from_json(path.read_bytes())
+    except (OSError, ValueError) as error:
+        raise CorruptError(f"the {noun} cannot be read: {error}", where=str(path), fix=fix) from None
+    if not isinstance(content, dict):
+        raise CorruptError(f"the {noun} is no JSON object", where=str(path), fix=fix)
+    return content
+
+
+def _check_size(text: str | bytes) -> None:
+    if len(text) > SIZE_LIMIT:
+        raise LimitsError(f"a text of {len(text)} characters, at most {SIZE_LIMIT} are read")
+
+
+def _check(content: Any) -> None:
+    """Make sure that all numbers are finite, and that tables and lists are not nested too deep."""
+    level: list[Any] = [content]
+    for _ in range(NESTING_LIMIT):
+        level = [item for value in level for item in _inside(value)]
+        if not level:
+            return
+        for value in level:
+            if isinstance(value, float) and not math.isfinite(value):
+                raise ValueError(f"a number that is not finite, {value}")
+    raise _deep()
+
+
+def _inside(value: Any) -> Iterable[Any]:
+    if isinstance(value, dict):
+        return value.values()
+    return value if isinstance(value, list) else ()
+
+
+def _deep() -> LimitsError:
+    return LimitsError(f"tables or lists more than {NESTING_LIMIT} deep")

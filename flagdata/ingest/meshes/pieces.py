@@ -1,0 +1,109 @@
+"""Cloth whose triangles share no vertices: exact duplicates are merged, and what stays in pieces is reported.
+
+Exporters that give each triangle vertices of its own (split normals, STL, glTF) leave a cloth that holds together only
+by the eye: it has no inner edge and no hinge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from hashlib import blake2b
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from flagdata.findings import Finding, Severity
+from flagdata.lake.meshes import Mesh, MeshSequence, RaggedMeshSequence
+
+
+def welded(
+    sequence: MeshSequence | RaggedMeshSequence,
+) -> tuple[MeshSequence | RaggedMeshSequence, tuple[Finding, ...]]:
+    """The sequence with vertices merged whose material coordinates and whole trajectories agree to the bit.
+
+    As it is, without a finding, where there are none; where merging leaves no surface (a face with one corner twice, an
+    edge of more than two faces, as of cloth exported with a front and a back); and where the sequence's own scene names
+    vertices by number. A sequence that is remeshed has no trajectories.
+    """
+    if isinstance(sequence, RaggedMeshSequence) or "scene" in sequence.attributes:
+        return sequence, ()
+    twin = _twins(sequence)
+    faces = twin[sequence.faces]
+    kept = twin == np.arange(len(twin))
+    if kept.all() or not _is_surface(faces):
+        return sequence, ()
+    number = np.cumsum(kept) - 1
+    merged = replace(
+        sequence, positions=np.ascontiguousarray(sequence.positions[:, kept]), rest=sequence.rest[kept],
+        faces=number[faces].astype(np.int32),
+    )  # fmt: skip
+    gone = int((~kept).sum())
+    return merged, (
+        Finding(
+            kind="vertices-merged", severity=Severity.NOTE, count=gone,
+            what=f"{gone} of {len(kept)} vertices have the texture coordinates of another one and its place in every "
+            f"frame, and were merged with it; the {int(kept.sum())} that stay are numbered anew, in their order",
+        ),
+    )  # fmt: skip
+
+
+def in_pieces(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
+    """A finding where the cloth is in several pieces in some frame, of the frame with most of them."""
+    frames = range(1) if isinstance(sequence, MeshSequence) else range(len(sequence))
+    pieces = [len(np.unique(_piece(sequence.frame(index))[sequence.frame(index).faces])) for index in frames]
+    worst = int(np.argmax(pieces))
+    if pieces[worst] < 2:
+        return ()
+    mesh = sequence.frame(worst)
+    touching, alike = _touching(mesh), _touching(mesh, texture=True)
+    between = (
+        f"; {touching} of its vertices lie where a vertex of another piece lies, {alike} of these with the same "
+        "texture coordinates"
+    )
+    return (
+        Finding(
+            kind="cloth-in-pieces", severity=Severity.WARNING, count=pieces[worst], where=f"frame {worst}",
+            what=f"the cloth is in {pieces[worst]} pieces that share no vertex" + (between if touching else ""),
+            fix="merge vertices by distance before the export, or export one sheet",
+        ),
+    )  # fmt: skip
+
+
+def _piece(mesh: Mesh) -> NDArray[np.int64]:
+    """(vertex,) label of the connected piece of each vertex."""
+    rows, columns = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
+    graph = coo_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=(len(mesh.rest), len(mesh.rest)))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def _touching(mesh: Mesh, *, texture: bool = False) -> int:
+    """How many vertices of faces lie exactly at one of another piece in space, and in the texture as well if asked."""
+    used = np.unique(mesh.faces)
+    piece = _piece(mesh)[used]
+    place = np.concatenate([mesh.positions, mesh.rest], axis=1) if texture else mesh.positions
+    group = np.unique(place[used], axis=0, return_inverse=True)[1].ravel()
+    both = np.unique(np.stack([group, piece], axis=1), axis=0)
+    return int((np.bincount(both[:, 0])[group] > 1).sum())
+
+
+def _twins(sequence: MeshSequence) -> NDArray[np.int64]:
+    """(vertex,) the first vertex of the faces that is the same throughout; a vertex by itself is its own."""
+    own = np.arange(len(sequence.rest))
+    used = np.unique(sequence.faces)
+    start = np.concatenate([sequence.rest, sequence.positions[0]], axis=1)[used]
+    _, group, size = np.unique(start, axis=0, return_inverse=True, return_counts=True)
+    group = group.ravel()
+    first: dict[tuple[int, bytes], int] = {}
+    for index in np.flatnonzero(size[group] > 1).tolist():
+        # The sum makes zeros of both signs one.
+        course = blake2b((sequence.positions[:, used[index]] + np.float32(0)).tobytes(), digest_size=16).digest()
+        own[used[index]] = first.setdefault((int(group[index]), course), int(used[index]))
+    return own
+
+
+def _is_surface(faces: NDArray[np.int64]) -> bool:
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    _, counts = np.unique(edges, axis=0, return_counts=True)
+    return bool((edges[:, 0] != edges[:, 1]).all() and counts.max() <= 2)

@@ -1,0 +1,143 @@
+"""How branches came to be: forks, merges, rows that they hide, deletions, as the refs and the notes of the log say.
+
+All branches share one sequence of versions. A commit on a branch notes its name; a merge also notes which branch it
+took in, and at which version. So for a branch at a version it is known which commits of which branches went into it,
+and for two branches what they last had in common. A name that was deleted and used again is another branch: each is
+told by the version that deleted the one before it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from flagdata.documents import from_json
+from flagdata.errors import CorruptError, NotFoundError
+from flagdata.lake.refs import MAIN, Slice, View, view_from
+
+Entry = Mapping[str, Any]
+Life = tuple[str, int]
+"""A branch, and the version that deleted the last one of its name; -1 for the first."""
+
+
+def noted_hidden(entry: Entry) -> frozenset[str]:
+    """Ids of the rows of its base that a commit hides on its branch.
+
+    Raises:
+        CorruptError: the note cannot be read.
+    """
+    with _reading(entry):
+        return frozenset(str(artifact) for artifact in from_json(entry.get("hidden", "[]")))
+
+
+def noted_view(entry: Entry) -> View:
+    """What the tag showed that a commit deleted, or what the branch began from.
+
+    Raises:
+        CorruptError: the note cannot be read.
+    """
+    with _reading(entry):
+        return view_from(from_json(entry["view"]))
+
+
+def _noted_merge(entry: Entry) -> Slice:
+    with _reading(entry):
+        return Slice(branch=entry["merged"], version=int(entry["merged_version"]))
+
+
+@contextmanager
+def _reading(entry: Entry) -> Iterator[None]:
+    try:
+        yield
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise CorruptError(
+            f"what version {entry['version']} notes of branches cannot be read",
+            where="the catalog's log",
+            fix="run flagdata verify; restore the log entry from a copy",
+        ) from None
+
+
+class Lineage:
+    """What is known of branches at the head.
+
+    Args:
+        history: of the catalog, in any order.
+        forks: what each branch that there is began from.
+    """
+
+    def __init__(self, history: Iterable[Entry], forks: Mapping[str, View]) -> None:
+        self._entries: dict[str, list[Entry]] = {}
+        for entry in sorted(history, key=lambda entry: entry["version"]):
+            if "branch" in entry:
+                self._entries.setdefault(entry["branch"], []).append(entry)
+        self._forks = {**forks, MAIN: ()}
+
+    def fork(self, part: Slice) -> View | None:
+        """What the branch that had a name at a version began from; nothing for main, and `None` where its ref is lost:
+        it is not there, though nobody deleted it."""
+        later = (entry for entry in self._entries.get(part.branch, ()) if entry["version"] > part.version)
+        for entry in later:
+            if "deleted" in entry:
+                return noted_view(entry)
+        return self._forks.get(part.branch)
+
+    def view(self, part: Slice) -> View:
+        """What a branch shows at a version.
+
+        Raises:
+            NotFoundError: its ref is lost.
+        """
+        fork = self.fork(part)
+        if fork is None:
+            raise NotFoundError(f"there is no branch {part.branch!r}", fix="run flagdata doctor")
+        return (part, *fork)
+
+    def life(self, part: Slice) -> Life:
+        """Which of the branches of that name had it at a version."""
+        deleted = (e["version"] for e in self._entries.get(part.branch, ()) if "deleted" in e)
+        return (part.branch, max((version for version in deleted if version <= part.version), default=-1))
+
+    def commits(self, part: Slice) -> Sequence[Entry]:
+        """The commits of a branch up to a version, oldest first; those of an earlier one of that name are not its."""
+        begin = self.life(part)[1]
+        return [e for e in self._entries.get(part.branch, ()) if begin < e["version"] <= part.version]
+
+    def hidden(self, part: Slice) -> frozenset[str]:
+        """Ids of rows of its base that a branch does not show, since they were withdrawn from it."""
+        return frozenset(artifact for entry in self.commits(part) for artifact in noted_hidden(entry))
+
+    def knows(self, part: Slice, other: Slice) -> bool:
+        """Whether all commits that went into `other` went into `part` too."""
+        known = self._known(part)
+        return all(known.get(life, -1) >= version for life, version in self._known(other).items())
+
+    def merge_base(self, one: Slice, other: Slice) -> Slice | None:
+        """What two branches last had in common: of the branches whose commits went into both, the one that took in most
+        of the others; `None` where they share no commit."""
+        first, second = self._known(one), self._known(other)
+        common = {life: min(first[life], second[life]) for life in first.keys() & second.keys()}
+        points = [Slice(branch=branch, version=version) for (branch, _), version in common.items()]
+
+        def rank(point: Slice) -> tuple[int, int]:
+            known = self._known(point)
+            return sum(known.get(life, -1) >= version for life, version in common.items()), point.version
+
+        return max(points, key=rank, default=None)
+
+    def _known(self, part: Slice) -> dict[Life, int]:
+        """Each branch whose commits went into `part` → the newest of these."""
+        newest: dict[Life, int] = {}
+        begun: set[Life] = set()
+        parts = [part]
+        while parts:
+            part = parts.pop()
+            life = self.life(part)
+            fresh = [e for e in self.commits(part) if e["version"] > newest.get(life, -1)]
+            parts += [_noted_merge(entry) for entry in fresh if "merged" in entry]
+            if fresh:
+                newest[life] = fresh[-1]["version"]
+            if life not in begun:
+                begun.add(life)
+                parts += self.fork(part) or ()
+        return newest

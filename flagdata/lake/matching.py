@@ -1,0 +1,45 @@
+"""Rows that have given values. A program selects by values this way: no value is ever pasted into SQL."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import reduce
+from operator import and_
+from typing import Any, TypeAlias
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from flagdata.errors import UnknownNameError, UsageError
+from flagdata.schema import CATALOG
+
+Values: TypeAlias = Mapping[str, Any]
+"""Column → the value wanted, `None` where the column must be empty, or several values (list, tuple, set), one of which
+a row must have."""
+Where: TypeAlias = str | Values
+"""A filter over the catalog: the user's SQL expression as in `flagdata.query`, or the values that columns must have."""
+
+
+def matching(rows: pa.Table, values: Values) -> pa.Table:
+    """The rows with these values in these columns, in their order; all rows where no column is named.
+
+    Raises:
+        UnknownNameError: no such column.
+        UsageError: a value that the column cannot hold.
+    """
+    conditions = [_condition(column, value) for column, value in values.items()]
+    return rows.filter(reduce(and_, conditions)) if conditions else rows
+
+
+def _condition(column: str, value: object) -> pc.Expression:
+    if column not in CATALOG:
+        raise UnknownNameError.of("column", column, CATALOG)
+    wanted = list(value) if isinstance(value, list | tuple | set | frozenset) else [value]
+    try:
+        known = pa.array([one for one in wanted if one is not None], CATALOG[column].type)
+    except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError, OverflowError) as error:
+        raise UsageError(
+            f"the column {column} cannot hold {value!r}: {error}", where=column, fix=f"give {CATALOG[column].type}"
+        ) from None
+    condition = pc.field(column).isin(known)
+    return condition | pc.field(column).is_null() if None in wanted else condition

@@ -1,0 +1,181 @@
+"""The three-way merge: what a branch changed since it and the other last had the same, and nothing else.
+
+A row that both had and that the other has withdrawn since stays withdrawn; a row that both had and that the branch has
+withdrawn is withdrawn. So it is where no merge is recorded (lakes of older versions of flagdata, or the same source
+ingested on both): a withdrawal that is later than the branch's own row stands. What is made anew on the branch after
+the other withdrew it comes back, and is named.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Collection
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+import pyarrow as pa
+
+from flagdata.errors import ConflictError, NotFoundError, UsageError
+from flagdata.lake.catalog import persist
+from flagdata.lake.durable import disk_errors
+from flagdata.lake.leases import keeping_collectors_out
+from flagdata.lake.matching import matching
+from flagdata.lake.refs import Slice
+from flagdata.lake.removals import removals
+from flagdata.lake.withdrawal import take_off
+from flagdata.provenance import code_version
+from flagdata.schema import catalog_schema
+
+if TYPE_CHECKING:
+    from flagdata.lake.lake import Lake
+
+
+@dataclass(frozen=True, kw_only=True)
+class MergeResult:
+    """What a merge did; ids are sorted.
+
+    Attributes:
+        version: of the table after it; the head it found when the branch had nothing new.
+        commit: commit id, `None` when the branch had nothing new.
+        added: ids of rows that it brought.
+        existing: ids of new rows of the branch that were there already.
+        withdrawn: ids of rows that it took off, since the branch had withdrawn them.
+        left_out: id of a row of the branch that stays withdrawn → the version that withdrew it.
+        brought_back: id of a row that it brought, though it had been withdrawn → the version that withdrew it.
+    """
+
+    version: int
+    commit: str | None
+    added: tuple[str, ...] = ()
+    existing: tuple[str, ...] = ()
+    withdrawn: tuple[str, ...] = ()
+    left_out: dict[str, int]
+    brought_back: dict[str, int]
+
+
+def merge(lake: Lake, branch: str, message: str, *, into: str) -> MergeResult:
+    """See `Lake.merge`."""
+    if not message.strip():
+        raise UsageError("the commit has no message", fix="say in a few words what it brings in")
+    lake.check_writable()
+    if branch == into:
+        raise UsageError(f"{branch!r} cannot be merged into itself", fix="name two branches")
+    with disk_errors("merging", lake.path), keeping_collectors_out(lake.staging):
+        return persist(lambda: _attempt(lake, branch, message, into), where=lake.catalog.path)
+
+
+def _attempt(lake: Lake, branch: str, message: str, into: str) -> MergeResult:
+    head = lake.catalog.head()
+    mine, other = (lake.table(lake.refs.view(name, head)) for name in (into, branch))
+    ours, theirs = Slice(branch=into, version=head), Slice(branch=branch, version=head)
+    lineage = lake.lineage()
+    if lineage.knows(ours, theirs):
+        return MergeResult(version=head, commit=None, left_out={}, brought_back={})
+    base = lineage.merge_base(ours, theirs)
+    before = _ids(lake.table(lineage.view(base))) if base is not None else frozenset()
+    here, there = _ids(mine), _ids(other)
+    new = there - before
+    left_out, brought_back = _decided(lake, ours, theirs, new - here, since=-1 if base is None else base.version)
+    added, withdrawn = new - here - left_out.keys(), (before - there) & here
+    fresh = _rows(other, added)
+    _check_objects(lake, fresh)
+    _check_parents(mine, other, added=added, withdrawn=withdrawn, branch=branch, into=into)
+
+    commit = f"c{secrets.token_hex(8)}"
+    info = {
+        "commit": commit, "message": message, "branch": into, "rows": str(len(added)), "merged": branch,
+        "merged_version": str(head), "code_version": code_version(),
+    }  # fmt: skip
+    if withdrawn:
+        info["withdrawn"] = str(len(withdrawn))
+    version = take_off(lake, withdrawn, branch=into, base=head, info=info, fresh=_published(fresh, into))
+    return MergeResult(
+        version=version, commit=commit, added=tuple(sorted(added)), existing=tuple(sorted(new & here)),
+        withdrawn=tuple(sorted(withdrawn)), left_out=left_out,
+        brought_back={artifact: found for artifact, found in brought_back.items() if artifact in added},
+    )  # fmt: skip
+
+
+def _ids(table: pa.Table) -> frozenset[str]:
+    return frozenset(table["artifact"].to_pylist())
+
+
+def _rows(table: pa.Table, artifacts: Collection[str]) -> pa.Table:
+    return matching(table, {"artifact": sorted(artifacts)})
+
+
+def _published(rows: pa.Table, branch: str) -> pa.Table:
+    """Rows as committed on a branch now."""
+    changed = {"branch": branch, "created": datetime.now(UTC)}
+    for name, value in changed.items():
+        field = catalog_schema().field(name)
+        column = pa.array([value] * rows.num_rows, type=field.type)
+        rows = rows.set_column(rows.schema.get_field_index(name), field, column)
+    return rows
+
+
+def _decided(
+    lake: Lake, ours: Slice, theirs: Slice, candidates: frozenset[str], *, since: int
+) -> tuple[dict[str, int], dict[str, int]]:
+    """Of new rows of the branch that ours withdrew after `since`: those that stay withdrawn, since the branch had them
+    when that was done, and those that are newer. Each with the version that withdrew it last."""
+    lineage = lake.lineage()
+    left_out: dict[str, int] = {}
+    brought_back: dict[str, int] = {}
+    first = max(since, lineage.life(ours)[1])
+    for removal in reversed(list(removals(lake, since=first) if candidates else ())):
+        found = removal.artifacts & candidates if removal.branch == ours.branch else frozenset()
+        if found:
+            then = Slice(branch=theirs.branch, version=max(removal.version, lineage.life(theirs)[1]))
+            had = found & _ids(lake.table(lineage.view(then)))
+            for artifact in found:
+                left_out.pop(artifact, None)
+                brought_back.pop(artifact, None)
+            left_out |= dict.fromkeys(had, removal.version)
+            brought_back |= dict.fromkeys(found - had, removal.version)
+    return left_out, brought_back
+
+
+def _check_objects(lake: Lake, rows: pa.Table) -> None:
+    for name in sorted(set(rows["object"].drop_null().to_pylist())):
+        lake.objects.existing(name)
+
+
+def _check_parents(
+    mine: pa.Table, other: pa.Table, *, added: frozenset[str], withdrawn: frozenset[str], branch: str, into: str
+) -> None:
+    """Whether each row finds what it was made from.
+
+    Raises:
+        ConflictError: one would lack a parent that was withdrawn on the other side.
+        NotFoundError: one lacks a parent on its own branch already.
+    """
+    columns = ["artifact", "kind", "name", "parents"]
+    here, there = (table.select(columns).to_pylist() for table in (mine, other))
+    after = (_ids(mine) - withdrawn) | added
+    known = _ids(other)
+    for row in there:
+        for parent in row["parents"]:
+            if row["artifact"] in added and parent not in after:
+                what = f"{row['kind']} {row['name']!r} ({row['artifact']}) was made from {parent}"
+                if parent not in known:
+                    raise NotFoundError(
+                        f"{what}, a parent that is not there", where=f"branch {branch}", fix="run flagdata doctor"
+                    )
+                raise ConflictError(
+                    f"{what}, which was withdrawn from {into!r}",
+                    where=f"branch {branch}",
+                    fix=f"flagdata withdraw {parent} --with-descendants --branch {branch}, or ingest its source again"
+                    f" with --branch {into}",
+                )
+    for row in here:
+        for parent in row["parents"]:
+            if parent in withdrawn and row["artifact"] in after:
+                raise ConflictError(
+                    f"{row['kind']} {row['name']!r} ({row['artifact']}) was made from {parent}, which was withdrawn"
+                    f" from {branch!r}",
+                    where=f"branch {into}",
+                    fix=f"flagdata withdraw {parent} --with-descendants --branch {into}, or ingest its source again"
+                    f" with --branch {branch}",
+                )

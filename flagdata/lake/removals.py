@@ -1,0 +1,68 @@
+"""Commits that took rows off: withdrawals, merges that carry them over, deletions of branches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import TYPE_CHECKING
+
+from flagdata.errors import FlagdataError, NotFoundError
+from flagdata.lake.lineage import noted_hidden
+from flagdata.lake.marking import mark
+from flagdata.lake.refs import MAIN
+
+if TYPE_CHECKING:
+    from flagdata.lake.lake import Lake
+
+
+@dataclass(frozen=True, kw_only=True)
+class Removal:
+    """One such commit.
+
+    Attributes:
+        artifacts: ids of the rows that its branch does not show any more.
+        objects: id of each row that left the table → its object's name; later versions do not show it, unless another
+            branch does or it came again.
+    """
+
+    version: int
+    branch: str
+    message: str
+    artifacts: frozenset[str]
+    objects: dict[str, str]
+
+
+def removals(lake: Lake, *, since: int = -1) -> Iterator[Removal]:
+    """All of them after the version `since`, newest first."""
+    for entry in lake.catalog.history():
+        if "withdrawn" in entry and entry["version"] > since:
+            before, after = (lake.catalog.rows(v) for v in (entry["version"] - 1, entry["version"]))
+            stayed = set(zip(after["artifact"].to_pylist(), after["branch"].to_pylist(), strict=True))
+            rows = before.select(["artifact", "branch", "object"]).to_pylist()
+            left = {row["artifact"]: row["object"] for row in rows if (row["artifact"], row["branch"]) not in stayed}
+            yield Removal(
+                version=entry["version"],
+                branch=entry.get("branch", MAIN),
+                message=entry.get("message", ""),
+                artifacts=frozenset(left) | noted_hidden(entry),
+                objects={artifact: name for artifact, name in left.items() if name is not None},
+            )
+
+
+def explained(lake: Lake, name: str, missing: NotFoundError) -> NotFoundError:
+    """Why an object is missing: it was collected after a version withdrew what it held; `missing` where no version did,
+    or where the catalog cannot be asked."""
+    try:
+        if name in mark(lake, grace=timedelta(0)).objects:
+            return missing
+        for removal in removals(lake):
+            if name in removal.objects.values():
+                return NotFoundError(
+                    f"{name} was withdrawn by version {removal.version} ({removal.message}), and gc has deleted it",
+                    where=missing.where,
+                    fix=f"use a tag, or a version from {removal.version} on; ingesting the source again restores it",
+                )
+    except FlagdataError:
+        return missing
+    return missing

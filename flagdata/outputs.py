@@ -1,0 +1,279 @@
+"""Files and folders under names that a user gave: whole or not there at all, and never on top of what is not ours.
+
+One policy for all commands:
+
+- A name is checked before work begins (`check_file`, `check_folder`): a command fails in its first second.
+- What is written goes under a scratch name beside it, `.flagdata-<hex>.partial`, is flushed to the disk, and takes its
+  name in one step. What fails is removed; what a killed process leaves behind does not hinder the next one.
+- A name that is taken is refused, with two exceptions that are replaced: a file that the same command wrote and that is
+  unchanged since, as its signature shows (`flagdata.signature`), and a folder that holds only what its manifest lists,
+  unchanged (`flagdata.manifest`). An empty folder is free.
+- Links are never followed, and nothing but a regular file is ever replaced.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import uuid
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from flagdata.errors import ConflictError, InputError
+from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder
+from flagdata.manifest import remove_listed, unlisted, write_manifest
+from flagdata.signature import is_signed, signed
+
+_NAMED = 3  # files that a refusal names
+_NO_LINKS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EMLINK)
+
+
+def check_file(path: Path, *, command: str | None = None) -> None:
+    """Refuse a name that a new file cannot take.
+
+    Args:
+        command: what writes it, without "flagdata"; its own unchanged file may be replaced. None replaces nothing.
+
+    Raises:
+        ConflictError: something is there.
+        InputError: the folder is not there or cannot be written.
+    """
+    with disk_errors("looking at the output's name", path):
+        if not path.absolute().parent.is_dir():
+            raise InputError("no such folder", where=str(path.parent), fix="create it first, or name another")
+        _check_writable(path.absolute().parent)
+        _check_free(path, command)
+
+
+def check_folder(path: Path, *, schema: str | None = None) -> None:
+    """Refuse a name that a new folder cannot take; an empty folder is free.
+
+    Args:
+        schema: of the manifest that `fresh_folder` writes. A folder that holds only what such a manifest lists, as it
+            was written, may be replaced. None replaces nothing.
+
+    Raises:
+        ConflictError: something is there.
+        InputError: the folder above cannot be written.
+    """
+    with disk_errors("looking at the output's name", path):
+        if path.is_symlink() or (path.exists() and not path.is_dir()):
+            raise _taken(path)
+        _check_writable(_nearest(path.absolute().parent))
+        if not path.exists() or not any(path.iterdir()):
+            return
+        if schema is None:
+            raise _taken(path)
+        if others := unlisted(path, schema=schema):
+            more = f" and {len(others) - _NAMED:,} more" if len(others) > _NAMED else ""
+            raise ConflictError(
+                f"the folder holds what this command did not write there, or what was changed since: "
+                f"{', '.join(others[:_NAMED])}{more}",
+                where=str(path), fix="move away what you want to keep and remove the folder, or name another one",
+            )  # fmt: skip
+
+
+def check_files(folder: Path, *names: str, command: str | None = None) -> None:
+    """Refuse a folder in which one of these files cannot be written; the folder may be there or not.
+
+    Raises:
+        ConflictError: one of them is there and is not the command's own; the folder is no folder.
+        InputError: the folder cannot be written.
+    """
+    with disk_errors("looking at the outputs' names", folder):
+        _check_writable(_nearest(folder.absolute()))
+        for name in names:
+            _check_free(folder / name, command)
+
+
+def check_rewrite(path: Path) -> None:
+    """Refuse a file that `rewrite` cannot replace; that it is the program's own, the caller makes sure of.
+
+    Raises:
+        ConflictError: it is a folder or a link.
+        InputError: the folder cannot be written.
+    """
+    with disk_errors("looking at the output's name", path):
+        _check_writable(_nearest(path.absolute().parent))
+        if path.is_symlink() or (path.exists() and not path.is_file()):
+            raise _taken(path, " and is no file")
+
+
+def write_file(path: Path, content: str | bytes, *, command: str | None = None) -> None:
+    """Write a file: new, or in place of the command's own; signed where a command is named.
+
+    Raises:
+        ConflictError: something else is there.
+        FlagdataError: the disk refuses it; nothing has changed.
+    """
+    with fresh_file(path, command=command) as scratch:
+        scratch.write_bytes(_bytes(path.name, content, command))
+
+
+def write_files(folder: Path, contents: Mapping[str, str | bytes | None], *, command: str | None = None) -> None:
+    """Write files into a folder, which is made; all of them are on the disk before the first takes its name.
+
+    Args:
+        contents: by name; None removes the command's own file of that name from an earlier run.
+
+    Raises:
+        ConflictError: one of the names holds something else; nothing is written.
+        FlagdataError: the disk refuses it.
+    """
+    check_files(folder, *contents, command=command)
+    with disk_errors("writing the output", folder), _removed() as scratch:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in contents.items():
+            if content is not None:
+                scratch[name] = _scratch(folder)
+                scratch[name].write_bytes(_bytes(name, content, command))
+                flush_file(scratch[name])
+        for name in contents:
+            if name in scratch:
+                _publish(scratch[name], folder / name, command)
+            else:
+                _check_free(folder / name, command)
+                (folder / name).unlink(missing_ok=True)
+
+
+def rewrite(path: Path, content: str | bytes) -> None:
+    """Replace a file of the program's own by its next state, such as a ledger that was read and has grown by an entry;
+    a reader sees the old one or the new one. The folder is made where it is missing. That it is the program's own, the
+    caller has made sure of.
+
+    Raises:
+        ConflictError, InputError: as `check_rewrite`.
+        FlagdataError: the disk refuses it; the file is as it was.
+    """
+    check_rewrite(path)
+    with disk_errors("writing the file", path), _removed() as scratch:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        scratch[path.name] = _scratch(path.parent)
+        scratch[path.name].write_bytes(_bytes(path.name, content, None))
+        flush_file(scratch[path.name])
+        scratch[path.name].replace(path)
+
+
+@contextmanager
+def fresh_file(path: Path, *, command: str | None = None) -> Iterator[Path]:
+    """A scratch path beside `path`, nothing at it yet; what the block writes there becomes `path` when it ends.
+
+    Raises:
+        ConflictError: `path` is taken, before or after the block.
+        FlagdataError: no space, no permission.
+    """
+    check_file(path, command=command)
+    with disk_errors("writing the output", path), _removed() as scratch:
+        scratch[path.name] = _scratch(path.absolute().parent)
+        yield scratch[path.name]
+        flush_file(scratch[path.name])
+        _publish(scratch[path.name], path, command)
+
+
+@contextmanager
+def fresh_folder(path: Path, *, schema: str | None = None) -> Iterator[Path]:
+    """A scratch folder beside `path` that becomes `path` when the block ends.
+
+    Args:
+        schema: the folder gets a manifest of this schema at the end, and replaces an earlier one of the same schema.
+
+    Raises:
+        ConflictError: `path` is taken, before or after the block.
+        FlagdataError: no space, no permission, no folder.
+    """
+    check_folder(path, schema=schema)
+    parent = path.absolute().parent
+    with disk_errors("writing the output", path), _removed() as scratch:
+        parent.mkdir(parents=True, exist_ok=True)
+        scratch[path.name] = _scratch(parent)
+        scratch[path.name].mkdir()
+        yield scratch[path.name]
+        if schema is not None:
+            write_manifest(scratch[path.name], {"schema": schema})
+        for entry in [*scratch[path.name].rglob("*"), scratch[path.name]]:
+            flush_file(entry)
+        check_folder(path, schema=schema)
+        try:
+            if schema is not None and path.exists():
+                remove_listed(path, schema=schema)
+            scratch[path.name].rename(path)  # POSIX refuses a folder that has meanwhile been filled
+        except OSError as error:
+            if error.errno not in (errno.EEXIST, errno.ENOTEMPTY):
+                raise
+            raise _taken(path) from None
+        with confirming("the output", path):
+            flush_folder(parent)
+
+
+def _check_free(path: Path, command: str | None) -> None:
+    if not path.is_symlink() and not path.exists():
+        return
+    if not path.is_symlink() and path.is_file() and command is not None and is_signed(path, command=command):
+        return
+    raise _taken(path, "" if command is None else f", and flagdata {command} did not write it, or it was changed since")
+
+
+def _taken(path: Path, why: str = "") -> ConflictError:
+    return ConflictError(f"{path} exists{why}", fix="name another, or move this one away first")
+
+
+def _check_writable(folder: Path) -> None:
+    if not folder.is_dir():
+        raise ConflictError("this is no folder", where=str(folder), fix="name another, or move this one away first")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(
+            "the folder cannot be written", where=str(folder), fix="name another, or give yourself the permission"
+        )
+
+
+def _nearest(folder: Path) -> Path:
+    """The folder, or the nearest above it that is there."""
+    return next(above for above in (folder, *folder.parents) if above.exists() or above.is_symlink())
+
+
+def _scratch(folder: Path) -> Path:
+    return folder / f".flagdata-{uuid.uuid4().hex}.partial"
+
+
+@contextmanager
+def _removed() -> Iterator[dict[str, Path]]:
+    """Scratch paths by the name that each is for; what is left of them is removed at the end."""
+    scratch: dict[str, Path] = {}
+    try:
+        yield scratch
+    finally:
+        for path in scratch.values():
+            shutil.rmtree(path, ignore_errors=True)
+            with suppress(OSError):  # gone, since it has its name; or a disk that refuses everything
+                path.unlink()
+
+
+def _bytes(name: str, content: str | bytes, command: str | None) -> bytes:
+    data = content.encode() if isinstance(content, str) else content
+    return data if command is None else signed(data, name=name, command=command)
+
+
+def _publish(scratch: Path, path: Path, command: str | None) -> None:
+    """Give a file its name, in one step."""
+    if command is not None and path.exists():
+        _check_free(path, command)
+        scratch.replace(path)
+    else:
+        _take(scratch, path)
+    with confirming("the output", path):
+        flush_folder(path.absolute().parent)
+
+
+def _take(scratch: Path, path: Path) -> None:
+    """Give a file a name that is free."""
+    try:
+        os.link(scratch, path)
+    except FileExistsError:
+        raise _taken(path) from None
+    except OSError as error:
+        if error.errno not in _NO_LINKS:
+            raise
+        _check_free(path, None)  # a file system without hard links: a name taken in this very moment would be lost
+        scratch.rename(path)

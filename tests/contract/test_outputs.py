@@ -1,0 +1,156 @@
+"""What a user names goes through `flagdata.outputs`: of the other modules, those listed alone write or remove files.
+
+The test reads the source. A module that needs to write something else is added here, with the reason why what it writes
+is never a user's.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("flagdata", "sim", "models", "measure")
+
+SHARED = {"flagdata/outputs.py", "flagdata/manifest.py"}
+LAKE = "writes inside a lake or its staging, under names of its own"
+INSIDE = "writes into a scratch folder that the caller made with flagdata.outputs"
+SCRATCH = "writes into a temporary folder of its own"
+ALLOWED = {
+    "flagdata/lake/durable.py": LAKE,
+    "flagdata/lake/leases.py": LAKE,
+    "flagdata/lake/lake.py": LAKE,
+    "flagdata/lake/log.py": LAKE,
+    "flagdata/lake/markers.py": LAKE,
+    "flagdata/lake/meshes.py": LAKE,
+    "flagdata/lake/objects.py": LAKE,
+    "flagdata/lake/refs.py": LAKE,
+    "flagdata/lake/catalog.py": LAKE,
+    "flagdata/lake/transaction.py": LAKE,
+    "measure/closing/artifacts.py": LAKE,
+    "measure/estimate/artifact.py": LAKE + "; or into a scratch folder (--zarr)",
+    "models/training/publish.py": LAKE,
+    "sim/datasets/build.py": LAKE,
+    "flagdata/checksums.py": "states the checksums inside a folder that its caller made",
+    "flagdata/locks.py": "the lock in a run folder or a cache",
+    "flagdata/record/output.py": "writes a record into staging or to a scratch path, and only where nothing is",
+    "flagdata/record/salvage.py": "removes the record that it has itself just made",
+    "flagdata/commands/ingest_sources.py": "removes the crop picture that it has itself just written",
+    "flagdata/export/csv_text.py": INSIDE,
+    "flagdata/export/mcap.py": INSIDE,
+    "flagdata/export/mp4.py": INSIDE,
+    "flagdata/export/parquet.py": INSIDE,
+    "flagdata/export/webdataset.py": INSIDE,
+    "flagdata/export/wind_csv.py": INSIDE,
+    "flagdata/ingest/meshes/folder.py": INSIDE,
+    "flagdata/commands/query.py": INSIDE,
+    "measure/challenge/folder.py": INSIDE,
+    "measure/demo/field.py": INSIDE,
+    "measure/demo/page.py": INSIDE,
+    "measure/demo/tracked.py": INSIDE,
+    "sim/blender/worker.py": SCRATCH,
+    "sim/datasets/record.py": SCRATCH,
+    "sim/datasets/plan.py": SCRATCH,
+    "measure/nulls/supply.py": SCRATCH,
+    "flagdata/dataset/cache.py": "a cache: files named by 64 hex digits and its own two, whichever folder it is in",
+    "measure/nulls/bank.py": "makes the folder of a bank that `challenge bank` has claimed; batches by put_if_absent",
+    "sim/kernel/build.py": "flagdata's own cache folder",
+    "models/training/checkpoint.py": "the run folder of a training",
+    "models/storage.py": "writes into folders that its callers make: staging, a run folder, shipped models",
+    "models/evaluation/predictions.py": "an interface in Python: the caller names a file of arrays",
+}
+
+ALWAYS = {
+    "write_text", "write_bytes", "unlink", "rmtree", "rmdir", "savefig", "to_zarr", "imwrite", "copyfile", "copytree",
+    "copy2", "move", "rename", "renames", "removedirs", "touch", "symlink_to", "hardlink_to", "mkdir", "makedirs",
+    "ParquetWriter", "write_table", "save_file", "savez", "savez_compressed", "write_csv", "write_parquet",
+    "sink_parquet", "TemporaryDirectory", "mkdtemp", "mkstemp",
+}  # fmt: skip
+"""Calls that write, rename or remove, by the last part of their name."""
+CALLED = {*ALWAYS, "open", "open_group", "OSFile", "FileIO", "replace", "link", "save"}
+TO_MEMORY = {"savefig", "savez", "savez_compressed", "save", "write_csv"}
+"""Of these, those that also write to a buffer: a call whose target is a name bound to BytesIO or StringIO."""
+
+
+def modules() -> Iterator[Path]:
+    for package in PACKAGES:
+        yield from sorted((ROOT / package).rglob("*.py"))
+
+
+def buffers(tree: ast.AST) -> set[str]:
+    """Names that are bound to a buffer in memory somewhere in the module."""
+    found: set[str] = set()
+    for node in ast.walk(tree):
+        value = getattr(node, "value", None)
+        if not isinstance(value, ast.Call) or last_name(value) not in ("BytesIO", "StringIO"):
+            continue
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        found |= {target.id for target in targets if isinstance(target, ast.Name)}
+    return found
+
+
+def last_name(call: ast.Call) -> str:
+    made = call.func
+    return made.attr if isinstance(made, ast.Attribute) else made.id if isinstance(made, ast.Name) else ""
+
+
+def writes(call: ast.Call, memory: set[str]) -> bool:
+    name = last_name(call)
+    words = [*call.args, *(keyword.value for keyword in call.keywords)]
+    if name in TO_MEMORY and any(isinstance(word, ast.Name) and word.id in memory for word in words):
+        return False
+    if name in ("open", "open_group", "OSFile", "FileIO"):
+        modes = [word.value for word in words if isinstance(word, ast.Constant) and isinstance(word.value, str)]
+        return any(mode.strip("bt+") in ("w", "a", "x", "w-") and mode for mode in modes)
+    if name in ("replace", "link"):  # Path.replace takes one argument, str.replace two, dataclasses.replace keywords
+        module = isinstance(call.func, ast.Attribute) and isinstance(call.func.value, ast.Name) and call.func.value.id
+        return module == "os" or (name == "replace" and len(call.args) == 1 and not call.keywords)
+    if name == "save" and isinstance(call.func, ast.Attribute):
+        return bool(call.args) and not isinstance(call.func.value, ast.Name | ast.Attribute)
+    return name in ALWAYS
+
+
+def writing(path: Path) -> list[str]:
+    text = path.read_text(encoding="utf-8")
+    if not any(f"{name}(" in text for name in CALLED):
+        return []
+    tree = ast.parse(text)
+    memory = buffers(tree)
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    return [f"line {call.lineno}: {last_name(call)}" for call in calls if writes(call, memory)]
+
+
+FOUND = {path.relative_to(ROOT).as_posix(): lines for path in modules() if (lines := writing(path))}
+
+
+def test_no_other_module_writes_renames_or_removes_files() -> None:
+    assert {path: lines for path, lines in FOUND.items() if path not in SHARED | ALLOWED.keys()} == {}
+
+
+def test_every_module_that_is_allowed_to_does() -> None:
+    assert sorted(ALLOWED.keys() - FOUND.keys()) == []
+
+
+@pytest.mark.parametrize(
+    ("line", "found"),
+    [
+        ("path.write_text('a')", True),
+        ("figure.savefig(path)", True),
+        ("shutil.rmtree(folder)", True),
+        ("scratch.replace(path)", True),
+        ("os.replace(a, b)", True),
+        ("open(path, 'w')", True),
+        ("path.open('xb')", True),
+        ("path.open()", False),
+        ("path.open('rb')", False),
+        ("text.replace('a', 'b')", False),
+        ("replace(recipe, seed=1)", False),
+        ("buffer = io.BytesIO()\nfigure.savefig(buffer)", False),
+    ],
+)
+def test_calls_that_write_are_recognised(line: str, found: bool, tmp_path: Path) -> None:
+    (tmp_path / "module.py").write_text(line)
+    assert bool(writing(tmp_path / "module.py")) is found

@@ -1,0 +1,127 @@
+"""One command with one failing call: what it reported against what it did, and what it left."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+from flagdata.findings import Severity
+from flagdata.lake import Lake
+from flagdata.lake.health import doctor, object_names, verify, verify_catalog
+from tests.failing.injector import Done, Fault, Injector
+
+_PUBLISHING = ("link ", "linkat ", "rename ", "renameat ", "renameat2 ")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """A command that writes.
+
+    Attributes:
+        arguments: {folder} stands for the folder that it works in, other names in braces for the scene's ids.
+        state: what it changes in that folder; equal states have equal content.
+        lake: the lake that must stay healthy, in that folder; it may be absent.
+        one_step: whether it changes all or nothing; else what it has done before an error stays, and a repeat goes on.
+    """
+
+    arguments: tuple[str, ...]
+    state: Callable[[Path], object]
+    lake: str = "lake"
+    one_step: bool = True
+
+    def given(self, folder: Path, ids: Mapping[str, str]) -> list[str]:
+        return [argument.format(folder=folder, **ids) for argument in self.arguments]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Whole:
+    """A command without a fault: the state before and after it, and its calls."""
+
+    before: object
+    after: object
+    done: Done
+
+    @property
+    def published(self) -> int:
+        """The number of the call that published last."""
+        return max((n for n, call in enumerate(self.done.trace) if call.startswith(_PUBLISHING)), default=0)
+
+
+class Trials:
+    """Trials of one command, each in a copy of the scene's folder.
+
+    Raises:
+        AssertionError: the command fails or changes nothing without any fault.
+    """
+
+    def __init__(
+        self, command: Command, scene: Path, ids: Mapping[str, str], injector: Injector, scratch: Path
+    ) -> None:
+        self._command, self._scene, self._ids = command, scene, ids
+        self._injector, self._scratch = injector, scratch
+        self._count = 0
+        folder = self._copy()
+        before = command.state(folder)
+        done = injector.run(folder, command.given(folder, ids), traced=True)
+        self.whole = Whole(before=before, after=command.state(folder), done=done)
+        assert done.code == 0, done.stderr
+        assert self.whole.after != before, "it changed nothing"
+        shutil.rmtree(folder)
+
+    def wrong(self, fault: Fault, *, repeated: bool) -> dict[str, Any] | None:
+        """What is wrong with a command that met this fault; None where all is right.
+
+        Args:
+            repeated: whether a command that failed is given once more, without the fault.
+        """
+        command, folder = self._command, self._copy()
+        done = self._injector.run(folder, command.given(folder, self._ids), fault)
+        state = command.state(folder)
+        problems = [*self._report_against(done, state), *_health(folder / command.lake)]
+        if repeated and done.code:
+            again = self._injector.run(folder, command.given(folder, self._ids))
+            if again.code or command.state(folder) != self.whole.after:
+                problems.append(f"the repeat fails or ends otherwise: {again.stderr}")
+            problems += [f"after the repeat: {problem}" for problem in _health(folder / command.lake)]
+        shutil.rmtree(folder)
+        if not problems:
+            return None
+        call = self.whole.done.trace[fault.call] if fault.call < len(self.whole.done.trace) else "?"
+        return {
+            "call": fault.call, "of": self.whole.done.calls, "stays": fault.stays, "was": call, "code": done.code,
+            "after_publication": fault.call > self.whole.published, "problems": problems, "stderr": done.stderr,
+        }  # fmt: skip
+
+    def _report_against(self, done: Done, state: object) -> list[str]:
+        problems: list[str] = []
+        if (done.code == 0) != (state == self.whole.after):
+            what = (
+                "all is" if state == self.whole.after else "nothing is" if state == self.whole.before else "a part is"
+            )
+            problems.append(f"exit code {done.code}, and {what} published")
+        elif done.code and self._command.one_step and state != self.whole.before:
+            problems.append("a part is published")
+        if done.code not in (0, 1):
+            problems.append(f"exit code {done.code}")
+        if done.code and "fix:" not in done.stderr:
+            problems.append("no fix is named")
+        return problems + [word for word in ("Traceback", "unforeseen", "interrupted") if word in done.stderr]
+
+    def _copy(self) -> Path:
+        self._count += 1
+        folder = self._scratch / str(self._count)
+        shutil.copytree(self._scene, folder, symlinks=True)
+        return folder
+
+
+def _health(path: Path) -> list[str]:
+    """What is wrong with a lake, if there is one."""
+    if not (path / "lake.json").exists():
+        return []
+    lake = Lake.open(path)
+    found = (*doctor(lake, grace=timedelta(0)), *verify_catalog(lake), *verify(lake, object_names(lake)))
+    return [f"unhealthy: {finding.kind}: {finding.what}" for finding in found if finding.severity is Severity.ERROR]

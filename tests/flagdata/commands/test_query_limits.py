@@ -1,0 +1,84 @@
+"""Queries without an end are stopped: after a time, and at a size."""
+
+from __future__ import annotations
+
+import time
+
+import pyarrow as pa
+import pytest
+
+from flagdata import query
+from flagdata.commands.query import as_document
+from flagdata.commands.query import query as command
+from flagdata.errors import LimitError, UsageError
+from flagdata.query import Request, Selection
+from flagdata.schema import catalog_schema
+
+EMPTY = catalog_schema().empty_table()
+ENDLESS = {
+    "recursive": "with recursive t(n) as (select 1 union all select n + 1 from t) select count(*) from t",
+    "cross join": "select count(*) from range(1000000000000) a, range(1000000000000) b",
+    "stream": "select * from range(1000000000000) a, range(1000000000000) b where a.range = b.range + 1",
+}
+LATE = 10.0  # s: far more than a block of 2,048 rows takes, far less than any of these
+
+
+@pytest.mark.parametrize("sql", ENDLESS.values(), ids=ENDLESS)
+def test_sql_without_an_end_is_stopped(sql: str) -> None:
+    begun = time.monotonic()
+    with pytest.raises(LimitError, match=r"longer than 0\.2 s.*--time-limit"):
+        Selection(EMPTY, Request(sql=sql, time_limit=0.2)).table()
+    assert time.monotonic() - begun < LATE
+
+
+def test_a_filter_without_an_end_is_stopped() -> None:
+    rows = pa.concat_tables([EMPTY, pa.Table.from_pylist([{"kind": "clip"}], schema=EMPTY.schema)])
+    where = "(select count(*) from range(1000000000000) a, range(1000000000000) b) > 0"
+    with pytest.raises(LimitError, match=r"longer than 0\.2 s"):
+        Selection(rows, Request(where=where, time_limit=0.2)).table()
+
+
+def test_the_time_is_that_of_all_that_is_asked_of_a_selection() -> None:
+    selection = Selection(EMPTY, Request(sql="select range a from range(1000000000000)", limit=1, time_limit=1.5))
+    assert selection.table().num_rows == 1
+    for _ in range(2):  # the second has no time left at all
+        with pytest.raises(LimitError, match=r"longer than 1\.5 s"):
+            selection.total()
+
+
+@pytest.mark.parametrize(
+    ("name", "limit", "sql"),
+    [
+        ("CELL_LIMIT", 1000, "select range a from range(1001)"),
+        ("BYTE_LIMIT", 1 << 20, "select repeat('a', 1024) from range(1025)"),
+    ],
+)
+def test_sql_that_gives_more_than_can_be_held_is_refused(
+    name: str, limit: int, sql: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(query, name, limit)
+    with pytest.raises(LimitError, match=r"gives more than .* --csv and --arrow"):
+        as_document(Selection(EMPTY, Request(sql=sql)), at=None, version=0)
+    assert Selection(EMPTY, Request(sql=sql, limit=1000)).table().num_rows == 1000
+    assert sum(batch.num_rows for batch in Selection(EMPTY, Request(sql=sql)).batches()) > 1000
+
+
+def test_what_fails_while_rows_are_read_is_the_users_error() -> None:
+    sql = "select cast(case when range < 200000 then '1' else 'x' end as int) from range(200001)"
+    with pytest.raises(UsageError, match="DuckDB cannot run it"):
+        Selection(EMPTY, Request(sql=sql)).table()
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_time_limit_is_a_length_of_time(seconds: float) -> None:
+    with pytest.raises(UsageError, match="time limit"):
+        Request(sql="select 1", time_limit=seconds)
+
+
+def test_no_length_of_time_is_too_long() -> None:
+    assert Selection(EMPTY, Request(sql="select 1 a", time_limit=1e300)).table()["a"].to_pylist() == [1]
+
+
+def test_the_commands_default_is_the_librarys() -> None:
+    (option,) = [parameter for parameter in command.params if parameter.name == "time_limit"]
+    assert option.default == query.TIME_LIMIT

@@ -1,0 +1,74 @@
+"""What is no file with an end is refused before it is opened, wherever a user names a file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from flagdata.errors import InputError, LimitError, NotFoundError
+from flagdata.files import check_input
+from flagdata.ingest.anemometer.documents.opening import first_bytes
+from flagdata.ingest.camera import open_camera
+from flagdata.ingest.classify import guesses
+from flagdata.ingest.cloths import read_cloths
+from flagdata.ingest.markers import read_table
+from flagdata.ingest.meshes import read_obj
+from flagdata.ingest.meshes.folder import read_json
+from flagdata.ingest.source import Source
+from flagdata.recipes import read_recipe
+
+# Neither waits for a writer nor goes on for ever, so that a reader that opens them fails here and does not hang.
+DEVICE, KERNEL = Path("/dev/null"), Path("/proc/version")
+
+
+def test_a_file_is_checked_before_it_is_opened(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_bytes(b"1234")
+    check_input(path, limit=4)
+    with pytest.raises(LimitError, match="a table of 4 bytes"):
+        check_input(path, noun="table", limit=3)
+    with pytest.raises(InputError, match="a folder, not a table"):
+        check_input(tmp_path, noun="table")
+    path.write_bytes(b"")
+    with pytest.raises(InputError, match="the table is empty"):
+        check_input(path, noun="table")
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="a pipe or device, not a table"):
+        check_input(tmp_path / "pipe", noun="table")
+    for nowhere in (tmp_path / "none", tmp_path / ("x" * 5000), Path("a\0b")):
+        with pytest.raises(NotFoundError, match="no such table"):
+            check_input(nowhere, noun="table")
+
+
+def film_of_a_table(film: Path, folder: Path) -> object:
+    table = folder / "cloths.csv"
+    table.write_text(f"film,fabric,area_weight\n{film},felt,0.2\n")
+    return read_cloths(table)
+
+
+READERS: dict[str, Callable[[Path, Path], object]] = {
+    "source": lambda path, _: Source.of(path),
+    "classify": lambda path, _: guesses(path),
+    "camera": lambda path, _: open_camera(path),
+    "log": lambda path, _: first_bytes(path),
+    "cloths": lambda path, _: read_cloths(path),
+    "film of cloths": film_of_a_table,
+    "markers": lambda path, _: read_table(path),
+    "mesh": lambda path, _: read_obj(path),
+    "scene": lambda path, _: read_json(path),
+    "recipe": lambda path, _: read_recipe(path),
+}
+
+
+@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize(("path", "what"), [(DEVICE, "a pipe or device"), (KERNEL, "is empty")])
+def test_every_reader_of_inputs_refuses_devices_and_files_of_the_kernel(
+    reader: str, path: Path, what: str, tmp_path: Path
+) -> None:
+    if not path.exists():
+        pytest.skip(f"this system has no {path}")
+    with pytest.raises(InputError, match=what):
+        READERS[reader](path, tmp_path)
