@@ -32,11 +32,10 @@ _DIRECTION = _words(
     "direction dir dirn wd wdir winddir winddirection wnddir dd ddd bearing azimuth richtung windrichtung "
     "direccion richting direzione"
 )
-_AXES: dict[str, Kind] = {
-    **dict.fromkeys(("u", "ux", "x", "east", "eastward"), "x"),
-    **dict.fromkeys(("v", "uy", "y", "north", "northward"), "y"),
-    **dict.fromkeys(("w", "uz", "z", "up", "vertical", "upward"), "z"),
-}  # fmt: skip
+_AXES: tuple[tuple[Kind, frozenset[str]], ...] = (
+    ("x", _words("u ux x east eastward")), ("y", _words("v uy y north northward")),
+    ("z", _words("w uz z up vertical upward")),
+)  # fmt: skip
 _TIME = _words(
     "time timestamp datetime stamp clock hour uhrzeit zeit heure hora tijd ora tmstamp epoch unixtime utc gmt "
     "localtime zeitstempel date_time sampletime recordtime timestring millis elapsed"
@@ -117,19 +116,20 @@ def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:
         return "direction"
     if joined & _SPEED:
         return "speed"
-    axes = [_AXES[word] for word in words if word in _AXES]
+    axes = [kind for word in words for kind, known in _AXES if word in known]
     if axes and len(words) <= 3 and (unit is None or UNITS[unit].si == "m/s"):
         return axes[0]
     if joined & _WIND and (UNITS[unit].si == "m/s" if unit is not None else set(words) <= _WIND):
         return "speed"
     if set(words) & _SITES and not set(words) & (_TEMPERATURE | _HUMIDITY | _PRESSURE | _TIME | _DATE):
         return "site"
-    for known, kind in (
+    ordinary: tuple[tuple[frozenset[str], Kind], ...] = (
         (_TEMPERATURE, "temperature"), (_HUMIDITY, "humidity"), (_PRESSURE, "pressure"), (_TIME, "time"),
         (_DATE, "date"),
-    ):  # fmt: skip
+    )  # fmt: skip
+    for known, kind in ordinary:
         if joined & known:
-            return kind  # type: ignore[return-value]
+            return kind
     return "other"
 
 
