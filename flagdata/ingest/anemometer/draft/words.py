@@ -116,7 +116,7 @@ def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:
         return "direction"
     if joined & _SPEED:
         return "speed"
-    axes = [kind for word in words for kind, known in _AXES if word in known]
+    axes: list[Kind] = [axis for word in words for axis, known in _AXES if word in known]
     if axes and len(words) <= 3 and (unit is None or UNITS[unit].si == "m/s"):
         return axes[0]
     if joined & _WIND and (UNITS[unit].si == "m/s" if unit is not None else set(words) <= _WIND):
