@@ -175,6 +175,16 @@ class Catalog:
         return rows
 
     @_one_at_a_time
+    def objects(self) -> frozenset[str]:
+        """Names of the objects that rows of any version point to.
+
+        Raises:
+            CorruptError: the log or a file of the table cannot be read.
+        """
+        tables = (self._files[name] if name in self._files else self._read(name) for name in self._entries.files())
+        return frozenset(name for table in tables for name in table["object"].drop_null().to_pylist())
+
+    @_one_at_a_time
     def append(self, rows: pa.Table, *, base: int, info: Mapping[str, str]) -> int:
         """Publish `rows` as version `base + 1`; durable when it returns, or a warning says that it may not be.
 

@@ -36,7 +36,7 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
     stored = list(lake.objects)
     states: list[LeaseState] = []
     unowned: list[tuple[Path, float]] = []
-    if lake.staging not in foreign:
+    if lake.staging not in foreign and any(lake.staging.glob("*")):  # in an empty one, a lock would have to be made
         with collecting(lake.staging):
             states = leases(lake.staging)
             unowned = [(path, last_written(path)) for path in unleased(lake.staging)]
@@ -186,23 +186,23 @@ def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign:
 def _collected(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
     """A note where gc has deleted what was withdrawn, so that older versions show rows without data."""
     needed = {name for table in marked.refs.values() for name in table["object"].drop_null().to_pylist()}
-    gone = {
-        removal.version: sum(name not in needed and name not in stored for name in removal.objects.values())
-        for removal in removals(lake)
-    }
-    versions = [version for version, count in gone.items() if count]
-    if not versions:
+    try:
+        gone = lake.catalog.objects() - needed - frozenset(stored)
+        last = next((r for r in removals(lake) if not gone.isdisjoint(r.objects.values())), None) if gone else None
+    except FlagdataError as error:  # a file of which older versions are made
+        kind = "catalog-file-unreadable"
+        return [Finding(kind=kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)]
+    if last is None:
         return []
-    told = ", ".join(str(version) for version in sorted(versions)[-3:])
     return [
         Finding(
             kind="withdrawn-collected",
             severity=Severity.NOTE,
-            what=f"gc deleted the data of withdrawn artifacts: {sum(gone.values())} in all, withdrawn by version {told}"
-            f"{' and others' if len(versions) > 3 else ''}",
-            where=f"versions before {max(versions)}",
-            count=sum(gone.values()),
-            fix=f"none needed; all tags, and versions from {max(versions)} on, are whole without them",
+            what=f"gc deleted what was withdrawn: {len(gone)} of the objects that older versions show; the last were"
+            f" withdrawn by version {last.version} ({last.message})",
+            where=f"versions before {last.version}",
+            count=len(gone),
+            fix=f"none needed; all tags, and versions from {last.version} on, are whole without them",
         )
     ]
 

@@ -124,9 +124,8 @@ def _decided(
     left_out: dict[str, int] = {}
     brought_back: dict[str, int] = {}
     first = max(since, lineage.life(ours)[1])
-    for removal in reversed(list(removals(lake, since=first) if candidates else ())):
-        found = removal.artifacts & candidates if removal.branch == ours.branch else frozenset()
-        if found:
+    for removal in reversed(list(removals(lake, since=first, branch=ours.branch) if candidates else ())):
+        if found := removal.artifacts & candidates:
             then = Slice(branch=theirs.branch, version=max(removal.version, lineage.life(theirs)[1]))
             had = found & _ids(lake.table(lineage.view(then)))
             for artifact in found:

@@ -33,10 +33,10 @@ class Removal:
     objects: dict[str, str]
 
 
-def removals(lake: Lake, *, since: int = -1) -> Iterator[Removal]:
-    """All of them after the version `since`, newest first."""
+def removals(lake: Lake, *, since: int = -1, branch: str | None = None) -> Iterator[Removal]:
+    """Those after the version `since`, of one branch or of all, newest first; each is read when it is asked for."""
     for entry in lake.catalog.history():
-        if "withdrawn" in entry and entry["version"] > since:
+        if "withdrawn" in entry and entry["version"] > since and branch in (None, entry.get("branch")):
             before, after = (lake.catalog.rows(v) for v in (entry["version"] - 1, entry["version"]))
             stayed = set(zip(after["artifact"].to_pylist(), after["branch"].to_pylist(), strict=True))
             rows = before.select(["artifact", "branch", "object"]).to_pylist()

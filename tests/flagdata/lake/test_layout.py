@@ -278,6 +278,16 @@ def test_each_verb_that_writes_refuses_a_lake_that_can_only_be_read_before_it_wo
     assert "write permission" in said
 
 
+def test_doctor_makes_no_file_in_a_copy_that_came_without_its_empty_folders(lake: Lake) -> None:
+    for empty in ("staging", "mcap", "zarr", "model"):
+        for file in (lake.path / empty).iterdir():
+            file.unlink()
+        (lake.path / empty).rmdir()
+    before = sorted(lake.path.rglob("*"))
+    assert doctor(lake, grace=NOW) == ()
+    assert sorted(lake.path.rglob("*")) == before
+
+
 def test_what_only_looks_opens_a_lake_that_can_only_be_read(
     lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -10,12 +10,13 @@ from pathlib import Path
 import pytest
 
 from flagdata.cli import main
-from flagdata.errors import ConflictError, NotFoundError, UsageError
+from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
 from flagdata.export import Export, prepare
 from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor
+from flagdata.lake.lineage import noted_hidden, noted_view
 from flagdata.lake.marking import mark
 from flagdata.schema import Kind
 
@@ -231,6 +232,23 @@ def test_versions_whose_data_gc_deleted_are_named_by_doctor_and_by_what_needs_th
     assert {f.kind for f in doctor(lake, grace=DAY)} == {"withdrawn-collected", "dangling-row"}
     put_text(lake, "gone")
     assert lake.object_path(str(gone.object)).exists()
+
+
+def test_a_file_that_only_older_versions_need_does_not_end_doctor(lake: Lake, put_text: Put) -> None:
+    artifact = put_text(lake, "a")
+    (old,) = (lake.path / "catalog").glob("*.parquet")
+    lake.withdraw([artifact.id], "no")
+    old.write_text("damaged")
+    assert "catalog-file-unreadable" in {finding.kind for finding in doctor(Lake.open(lake.path), grace=NOW)}
+
+
+@pytest.mark.parametrize("note", [{"hidden": "{"}, {"hidden": "3"}, {"hidden": "9" * 5000}])
+def test_a_note_of_the_log_that_cannot_be_read_is_damage(note: dict[str, str]) -> None:
+    with pytest.raises(CorruptError, match="version 7"):
+        noted_hidden({"version": 7, **note})
+    for view in ({}, {"view": "[1]"}, {"view": '[{"branch": "b"}]'}):
+        with pytest.raises(CorruptError, match="version 7"):
+            noted_view({"version": 7, **view})
 
 
 def test_the_verbs_say_what_a_merge_and_a_deletion_did(

@@ -269,7 +269,7 @@ def test_a_wind_series_is_a_table_and_a_data_set(lake: Path, model_folder: Path,
         (("FILM", "--refine", "28"), 2, "whose size is not known"),
         (("FILM", "--cache", "clips"), 2, "--cache without --refine"),
         (("--query", "true", "--flag-size", "1.5x1.0", "--refine", "28", "--lake", "LAKE"), 2, "is of one film"),
-        (("FILM", "--report", "nowhere/report.html"), 2, "create it first"),
+        (("FILM", "--report", "nowhere/report.html"), 1, "create it first"),
         (("FILM", "--lake", "nowhere"), 1, "no lake here"),
     ],
 )
