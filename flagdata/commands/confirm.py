@@ -73,7 +73,7 @@ def with_answers(read: Callable[[Answers], T], *, asks: bool) -> T:
         ZoneMissingError, OpenFactsError: there is nobody to ask.
         RefusedError: an answer that only a recipe can give.
     """
-    from flagdata.ingest.anemometer.draft.questions import Open, OpenFactsError
+    from flagdata.ingest.anemometer.draft.questions import ZONE, OpenFactsError
 
     answers: dict[str, object] = {}
     while True:
@@ -82,7 +82,7 @@ def with_answers(read: Callable[[Answers], T], *, asks: bool) -> T:
         except ZoneMissingError:
             if not asks:
                 raise
-            questions: tuple[Open, ...] = (Open(key="zone", question=_ZONE, example="+02:00"),)
+            questions: tuple[Open, ...] = (ZONE,)
         except OpenFactsError as error:
             if not asks:
                 raise
@@ -93,7 +93,7 @@ def with_answers(read: Callable[[Answers], T], *, asks: bool) -> T:
             answers[name] = (*before, answer) if isinstance(before, tuple) else (answer,) if name in _LISTS else answer
 
 
-_ZONE = "zone of the logger's clock (Europe/Amsterdam, +02:00, UTC)"
+_DOUBT = "(yes; no; or a number that stands for no value)"
 _LISTS = frozenset({"missing", "expect"})
 
 
@@ -112,8 +112,9 @@ def _answer(question: Open) -> tuple[str, object]:
         "date_order": lambda text: text if text in ("dmy", "mdy", "ymd") else _wrong(text, "dmy, mdy or ymd"),
         "platform": lambda text: text if text in ("fixed", "moving", "corrected") else _wrong(text, "one of the three"),
     }
+    asked = f"{question.question} {_DOUBT}" if question.key == "expect" else question.question
     while True:
-        text: str = click.prompt(question.question, err=True, prompt_suffix="> ").strip()
+        text: str = click.prompt(asked, err=True, prompt_suffix="> ").strip()
         try:
             if question.key == "expect":
                 return _expected(question, text)

@@ -53,8 +53,10 @@ class Drafted:
 
     def preview(self) -> str:
         """How the file was understood, for people: reasons, rows beside what was read of them, findings."""
-        lines = [f"{self.path.name} is a table that no recipe describes. It was understood so:"]
-        for log, _ in self.readings:
+        lines = [f"{self.path.name} is a table that no recipe describes. This is how it is read:"]
+        for number, (log, _) in enumerate(self.readings, start=1):
+            if len(self.readings) > 1:
+                lines.append(f"anemometer {number} of {len(self.readings)}: {log.series.sensor.name}")
             lines += [f"  {reason}" for reason in log.reasons]
             for row in log.rows:
                 lines.append(f"    line {row.line}  {row.text[:_WIDE]}  →  {iso(row.time)}  {row.wind}")
@@ -78,11 +80,11 @@ class UnconfirmedError(RefusedError):
     def of(cls, drafted: Drafted) -> UnconfirmedError:
         """The error for some drafted readings, with both ways out."""
         return cls(
-            "how this file is to be read was drafted by the program, and nobody has confirmed it",
+            "parts of how this file is read are inferred or assumed, and nobody has confirmed them",
             where=str(drafted.path), accept=drafted.accept, preview=drafted.preview(),
-            fix=f"compare the rows that are shown with what you know of the wind; if they are right, add --accept "
-            f"{drafted.accept}; if not, describe the file by a recipe: --sensor FILE.toml (flagdata ingest --sniff "
-            "prints the draft as one)",
+            fix=f"compare the rows above with what you know of the wind; if they are right, repeat the command with "
+            f"--accept {drafted.accept}; if not, describe the file by a recipe: --sensor FILE.toml (flagdata ingest "
+            "--sniff prints a recipe to begin with)",
         )  # fmt: skip
 
     def as_dict(self) -> dict[str, str | None]:

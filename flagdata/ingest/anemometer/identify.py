@@ -134,8 +134,11 @@ def unknown(source: TextFile) -> Guess:
     said = next((guess for guess in _guesses(source) if guess.fix), None)
     if said is not None:
         return said
-    text = "text, but neither a table with a time and a wind, nor sentences of a known log in its first lines"
-    fix = "if it is a log, export it as a table with one row a reading, or describe it by a recipe: --sensor FILE.toml"
+    text = "its text is neither a table with a time and a wind, nor lines of an instrument that is known"
+    columns = '--columns "time[FORMAT],wind_speed[UNIT]"'
+    fix = (
+        f"if it is a log, say what its columns are, in order: {columns}; or describe it by a recipe: --sensor FILE.toml"
+    )
     return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix)
 
 

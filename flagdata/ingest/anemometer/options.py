@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal, TypeAlias
@@ -128,11 +127,6 @@ class WindOptions:
         content = {name: value for name, value in content.items() if name not in _LATER or self._is_given(name)}
         content["date"] = self.date.isoformat() if self.date else None
         return content
-
-
-def in_shell(text: str) -> str:
-    """A value of an option as its user types it: quoted, but for letters and digits alone."""
-    return text if text.isalnum() else shlex.quote(text) if "'" in text else f"'{text}'"
 
 
 def check_zero_offset(value: object, *, where: str) -> None:

@@ -174,9 +174,8 @@ def _order(seen: _Seen) -> str:
     span = int(np.ptp(seen.reading.time))
     far = len(back) and -int(steps.min()) > max(_SLOW, _FAR * span)
     if far:
-        return (
-            f"the time goes back by {-int(steps.min()) / NANOSECONDS:g} s, as where several devices follow one another"
-        )
+        by = f"{-int(steps.min()) / NANOSECONDS:g} s"
+        return f"the time goes back by {by}, as after a clock was set back, or where devices follow one another"
     return f"the time does not increase in {share:.0%} of the rows" if share > _RARE else ""
 
 
@@ -211,7 +210,7 @@ CHECKS: Mapping[str, tuple[Callable[[_Seen], str], str]] = {
     "tens": (_tens, "Are these degrees, and no tens of degrees or sectors?"),
     "fixed": (_fixed, "Did the vane never turn?"),
     "calm": (_calm, "Is 0 the north, and not calm air or a variable wind?"),
-    "order": (_order, "Are the stamps right?"),
+    "order": (_order, "Are all rows of one device, in their order? (--clock corrects a clock that was set)"),
     "future": (_future, "Is the clock right?"),
     "old": (_old, "Is the clock right?"),
     "coarse": (_coarse, "Are these readings or means that long apart?"),

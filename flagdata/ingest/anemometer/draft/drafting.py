@@ -12,13 +12,13 @@ from typing import Literal
 
 from flagdata import compass
 from flagdata.ingest.anemometer.draft.given import GivenColumns, given_columns
-from flagdata.ingest.anemometer.draft.questions import Open
+from flagdata.ingest.anemometer.draft.questions import ZONE, Open
 from flagdata.ingest.anemometer.draft.shape import Shape, is_missing, is_number, shape_of
 from flagdata.ingest.anemometer.draft.times import TimeFields, find_time, of_columns
 from flagdata.ingest.anemometer.draft.toml import ChannelText, recipe_text
 from flagdata.ingest.anemometer.draft.words import MOVING, Meaning, fits, meaning
 from flagdata.ingest.anemometer.instants import counted, yearless
-from flagdata.ingest.anemometer.options import WindOptions, in_shell
+from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.units import canonical
 
 Origin = Literal["stated", "inferred", "assumed", "given"]
@@ -61,7 +61,7 @@ class Fact:
     evidence: str = ""
 
     def line(self) -> str:
-        return f"{self.what:<16}{self.value:<34}{self.origin}{f' ({self.evidence})' if self.evidence else ''}"
+        return f"{self.what:<16}{self.value:<36}  {self.origin}{f' ({self.evidence})' if self.evidence else ''}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,7 +152,7 @@ def _sites(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
 
 def _cutting(shape: Shape, lines: Sequence[str]) -> Fact:
     named = {" ": "blanks", "\t": "tabs"}.get(shape.delimiter, repr(shape.delimiter))
-    value = f"cells divided by {named}, decimal {shape.decimal!r}"
+    value = f"divided by {named}, decimal {shape.decimal!r}"
     plain = shape.delimiter in ",\t" and shape.decimal == "." and shape.preamble == 0 and shape.header == 1
     where = f"line {shape.preamble + 1} names the columns" if shape.header else "no line names the columns"
     return Fact(what="cells", value=value, origin="stated" if plain else "inferred", evidence=where)
@@ -177,7 +177,7 @@ def _time(
         )
         orders = {form.replace("%d", "%m") for form in time.forms}
         if len(orders) == 1:
-            parts.open.append(Open(key="date_order", question=question, example="dmy (or mdy, ymd)"))
+            parts.open.append(Open(key="date_order", question=question, example="ORDER (dmy, mdy or ymd)"))
         else:
             example = f"'{shape.reference(time.columns[0])}=time[FORMAT], and all other columns'"
             parts.open.append(Open(key="columns", question=question, example=example))
@@ -192,11 +192,11 @@ def _time(
     if counted.is_elapsed(time.form):
         if options.start is None:
             question = f"{shown} counts from a start: at what instant was the first row?"
-            parts.open.append(Open(key="start", question=question, example="2026-05-01T12:00:00+02:00"))
+            parts.open.append(Open(key="start", question=question, example="TIME (as 2026-05-01T12:00:00+02:00)"))
         return time
     if (counted.is_time_of_day(time.form) or yearless.is_yearless(time.form)) and options.date is None:
         question = f"{shown} has no whole date: of what day is the first row?"
-        parts.open.append(Open(key="date", question=question, example="2026-05-01"))
+        parts.open.append(Open(key="date", question=question, example="DATE (as 2026-05-01)"))
     epoch = time.form.startswith("epoch")
     if time.zoned or epoch:
         parts.facts.append(
@@ -207,8 +207,7 @@ def _time(
     elif time.utc:
         parts.facts.append(Fact(what="zone", value="UTC", origin="stated", evidence="the heading"))
     else:
-        question = "zone of the logger's clock (Europe/Amsterdam, +02:00, UTC)"
-        parts.open.append(Open(key="zone", question=question, example="Europe/Amsterdam"))
+        parts.open.append(ZONE)
     return time
 
 
@@ -232,6 +231,7 @@ def _of_wind(
         speeds = [i for i in speeds if meanings[i].named]
     labels = {shape.names[i] or f"column {i + 1}": i for i in speeds}
     chosen = labels.get(options.wind or "", speeds[0] if len(speeds) == 1 else None)
+    given = options.wind is not None and not (len(labels) > 1 and options.wind in labels)
     if options.wind is not None and options.wind not in labels:
         every = {name: i for i, name in enumerate(shape.names) if name}
         chosen = every.get(options.wind)
@@ -240,15 +240,14 @@ def _of_wind(
     components = {_AXES[kind]: axes[kind] for kind in ("x", "y", "z") if kind in axes and axes[kind] in numeric}
     if chosen is None and not speeds and {"wind_x", "wind_y"} <= set(components):
         for channel, index in components.items():
-            _measured(parts, shape, meanings, channel, index, options)
+            _measured(parts, shape, meanings, channel, index, options, given=False)
         earth = any(word in shape.names[components["wind_x"]].lower() for word in ("east", "u10"))
         _beside(parts, shape, meanings)
         return (shape.names[components["wind_x"]],), earth
     if chosen is None:
         listed = ", ".join(labels) or ", ".join(shape.shown(i) for i in range(len(shape.names)))
         question = f"which column is the wind's speed? {listed}" if not labels else f"which anemometer? {listed}"
-        example = in_shell(next(iter(labels), "COLUMN"))
-        parts.open.append(Open(key="wind", question=question, example=example))
+        parts.open.append(Open(key="wind", question=question, example="COLUMN"))
         return tuple(labels), False
     against = meanings[chosen].against
     moving = [
@@ -256,20 +255,21 @@ def _of_wind(
     ]
     if moving and options.platform is None:
         question = (
-            f"{moving[0]!r} speaks of a platform that moves: fixed (it stands still), moving (the wind is apparent), "
-            "or corrected (the wind is over ground)?"
+            f"the heading {moving[0]!r} speaks of a platform that moves: which is it, fixed (it does not move), "
+            "moving (the wind is apparent), or corrected (the wind is over ground)?"
         )
-        parts.open.append(Open(key="platform", question=question, example="moving"))
-    _measured(parts, shape, meanings, "wind_speed", chosen, options)
+        parts.open.append(Open(key="platform", question=question, example="PLATFORM"))
+    _measured(parts, shape, meanings, "wind_speed", chosen, options, given=given)
     _direction(parts, shape, meanings, chosen)
     _beside(parts, shape, meanings)
     return tuple(labels), False
 
 
 def _measured(
-    parts: _Parts, shape: Shape, meanings: Sequence[Meaning], channel: str, index: int, options: WindOptions
-) -> None:
-    """A column of wind with its unit."""
+    parts: _Parts, shape: Shape, meanings: Sequence[Meaning], channel: str, index: int, options: WindOptions, *,
+    given: bool,
+) -> None:  # fmt: skip
+    """A column of wind with its unit; `given` where the user named it, and it is not one of several by its heading."""
     own = meanings[index]
     parts.used.add(index)
     unit, origin, evidence = own.unit, _STATED, "the heading"
@@ -278,11 +278,11 @@ def _measured(
         if own.unit not in (None, unit):
             evidence = f"--unit; the heading says {own.unit}"
     if unit is None or not fits(channel, unit):
-        question = f"unit of {shape.shown(index)} (m/s, km/h, mph, kn)"
-        parts.open.append(Open(key="unit", question=question, example="m/s"))
+        question = f"what is the unit of {shape.shown(index)} (m/s, km/h, mph, kn)?"
+        parts.open.append(Open(key="unit", question=question, example="UNIT"))
         unit = "?"
     if own.plain not in _PLAIN[channel]:
-        origin = "given" if options.wind is not None and channel == "wind_speed" else "inferred"
+        origin = "given" if given else "inferred"
         evidence += "" if own.named else "; it does not name the wind"
     parts.channels[channel] = ChannelText(column=shape.reference(index), unit=unit)
     parts.facts.append(Fact(what=channel, value=f"{shape.shown(index)} in {unit}", origin=origin, evidence=evidence))

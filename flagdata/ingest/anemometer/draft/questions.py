@@ -15,7 +15,7 @@ class Open:
     Attributes:
         key: the option that answers it.
         question: in words.
-        example: of an answer.
+        example: what stands behind the option; never an answer, but for the key of a doubt.
     """
 
     key: str
@@ -23,8 +23,13 @@ class Open:
     example: str
 
     def fix(self) -> str:
-        """The option that answers it, with the example."""
-        return f"--{self.key.replace('_', '-')} {self.example}"
+        """The option that answers it."""
+        return f"--{self.key.replace('_', '-')} {self.example}{' (if yes)' if self.key == 'expect' else ''}"
+
+
+ZONE = Open(
+    key="zone", question="what is the zone of the logger's clock (Europe/Amsterdam, +02:00, UTC)?", example="ZONE"
+)
 
 
 class OpenFactsError(RefusedError):
@@ -40,7 +45,8 @@ class OpenFactsError(RefusedError):
     def of(cls, questions: Sequence[Open], *, where: str) -> OpenFactsError:
         """The error for some questions, which names what answers each."""
         return cls(
-            "; ".join(one.question for one in questions), where=where, questions=tuple(questions),
-            fix=f"answer it: {' '.join(one.fix() for one in questions)}; or describe the file by a recipe: "
+            f"the file does not say: {'; '.join(one.question for one in questions)}",
+            where=where, questions=tuple(questions),
+            fix=f"answer by {' '.join(one.fix() for one in questions)}; or describe the file by a recipe: "
             "--sensor FILE.toml",
         )  # fmt: skip

@@ -343,7 +343,7 @@ def _over_ground(
             channels["wind_speed"] = channels.pop(f"{kind}_wind_speed")
         if options.azimuth is not None:
             channels["wind_direction"] = np.mod(channels.pop(relative) + options.azimuth, 2 * np.pi)
-        text = f"fixed platform, as told: {'ground-referenced' if stated else kind} wind is wind over ground"
+        text = f"fixed platform, as given: {'ground-referenced' if stated else kind} wind is wind over ground"
         return channels, Finding(kind="fixed-platform", severity=Severity.NOTE, what=text)
     if stated:
         moves = (speed is not None and speed > MOVING) or options.platform in ("moving", "corrected")

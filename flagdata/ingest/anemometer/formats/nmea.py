@@ -350,7 +350,7 @@ def _platform(
     if moving and moving > MOVING:
         known = f"a platform that moves at {moving:.1f} kn"
     elif options.platform in ("moving", "corrected"):
-        known = "a moving platform, as told"
+        known = "a moving platform, as given"
     else:
         known = "a platform of unknown motion"
         fix = "if the sensor stands on a mast, say so: --platform fixed"
@@ -383,9 +383,9 @@ def _fixed(
             what = "the stream states wind over ground itself" if stated else "the stream has no directions"
             raise UsageError(f"an azimuth was given, but {what}", where=where, fix="leave out --azimuth")
         out["wind_direction"] = np.mod(out.pop(angle) + options.azimuth, 2 * np.pi)
-    text = f"fixed platform, as told: {kind} wind is wind over ground"
+    text = f"fixed platform, as given: {kind} wind is wind over ground"
     if stated:
-        text = f"fixed platform, as told: the wind over ground is that of {_sources(stream, 'wind')}"
+        text = f"fixed platform, as given: the wind over ground is that of {_sources(stream, 'wind')}"
     return out, (Finding(kind="fixed-platform", severity=Severity.NOTE, what=text),)
 
 

@@ -248,9 +248,9 @@ def report(
                 "say which of the two clocks is right, so either may be off by that much"
             )
         elif choice == "first":
-            doubt = f"as told, the clock before it is right: the {rows} rows from there on continue it"
+            doubt = f"as given, the clock before it is right: the {rows} rows from there on continue it"
         else:
-            doubt = f"as told, the clock after the last jump is right: the {jump.row} rows before this one fit it"
+            doubt = f"as given, the clock after the last jump is right: the {jump.row} rows before this one fit it"
         found.append(
             Finding(
                 kind=f"clock-set-{'back' if jump.size < 0 else 'on'}",

@@ -54,7 +54,7 @@ class Sorting:
         """What is said of it; `line` (n,) in the order of the file."""
         n, (before, after) = len(self.order), self.irregular
         why = (
-            "as told"
+            "as given"
             if self.told
             else f"{after} steps then differ from the usual {self.step / NANOSECONDS:g} s, {before} do in the file: a "
             "clock that was set back would have brought stamps again"

@@ -113,7 +113,7 @@ def settle(
             )  # fmt: skip
         return _fixed(reading)
     if told == "corrected":
-        text = "wind over ground was computed from a moving platform's motion before it was logged, as told"
+        text = "wind over ground was computed from a moving platform's motion before it was logged, as given"
         if "wind_speed" not in reading.channels and "theoretical_wind_speed" in reading.channels:
             text += "; what the file calls true wind is kept as wind_speed"
             names = {"theoretical_wind_speed": "wind_speed"}
@@ -126,7 +126,7 @@ def settle(
         finding = Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text)
         return reading.with_findings((finding,))
     names = [name for name in _RENAMED if name in reading.channels and _RENAMED[name] not in reading.channels]
-    known = "a moving platform, as told" if shown is None else f"a platform that {shown.text}"
+    known = "a moving platform, as given" if shown is None else f"a platform that {shown.text}"
     text = f"wind relative to {known}: no ground truth"
     if "wind_speed" in names:
         text += "; what the file calls wind speed is kept as apparent_wind_speed"
@@ -153,7 +153,7 @@ def check_corrected(reading: Reading, told: Platform | None, *, where: str) -> N
 def _fixed(reading: Reading) -> Reading:
     """Apparent wind of a sensor that stands still as the wind, where the log has none over ground."""
     channels = dict(reading.channels)
-    text = "fixed platform, as told"
+    text = "fixed platform, as given"
     if "wind_speed" not in channels and "apparent_wind_speed" in channels:
         channels["wind_speed"] = channels.pop("apparent_wind_speed")
         text += ": apparent wind is wind over ground, its direction still from the sensor's own mark"

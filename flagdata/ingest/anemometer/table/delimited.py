@@ -14,7 +14,7 @@ from flagdata.ingest.anemometer.draft.doubts import doubts
 from flagdata.ingest.anemometer.draft.drafting import Draft, draft
 from flagdata.ingest.anemometer.draft.questions import Open, OpenFactsError
 from flagdata.ingest.anemometer.draft.words import meaning
-from flagdata.ingest.anemometer.options import WindOptions, in_shell
+from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
@@ -74,11 +74,11 @@ def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:
         raise UsageError("no table in its first lines", where=where, fix=fix)
     if len(found.winds) > 1 and options.wind is None:
         question = f"the file holds {len(found.winds)} anemometers: {', '.join(found.winds)}; which one?"
-        raise OpenFactsError.of([Open(key="wind", question=question, example=in_shell(found.winds[0]))], where=where)
+        raise OpenFactsError.of([Open(key="wind", question=question, example="COLUMN")], where=where)
     if found.open:
         raise OpenFactsError.of(found.open, where=where)
     recipe = recipes.parse(found.recipe, where=f"the draft for {where}")
-    recipe = replace(recipe, expect=frozenset(options.expect))
+    recipe = replace(recipe, expect=frozenset((*options.expect, *(("order",) if options.clock is not None else ()))))
     azimuth = _WEST if found.of_earth and options.azimuth is None else options.azimuth
     reading = read_by_recipe(source, recipe, options, azimuth=azimuth)
     odd = doubts(

@@ -209,3 +209,34 @@ def test_nothing_is_read_while_something_is_open(log_file: Write) -> None:
         read_log(path)
     assert {question.key for question in refused.value.questions} == {"unit", "zone"}
     assert "--unit" in refused.value.fix
+
+
+@pytest.mark.parametrize(
+    ("heading", "form", "key"),
+    [
+        ("time,wind_speed", ISO + ",{v}", "unit"),
+        ("time,wind_speed (m/s)", "2026-05-01 12:00:{s:02d},{v}", "zone"),
+        ("time,AWS (kn),Heading (deg)", ISO + ",{v},{d}", "wind"),
+        ("time,wind A (m/s),wind B (m/s)", ISO + ",{v},{v}", "wind"),
+    ],
+)
+def test_no_printed_line_answers_an_open_question(heading: str, form: str, key: str) -> None:
+    (question,) = [one for one in drafted(heading, form).open if one.key == key]
+    assert question.question.endswith("?") or question.key == "wind"
+    assert question.fix() == f"--{key} {'COLUMN' if key == 'wind' else key.upper()}"
+
+
+def test_one_of_several_anemometers_is_inferred_though_its_label_is_chosen() -> None:
+    several = "time,wind 2m (m/s),wind 10m (m/s)"
+    assert origin(drafted(several, ISO + ",{v},{v}", wind="wind 10m (m/s)"), "wind_speed") == "inferred"
+    assert origin(drafted("time,AWS (kn)", ISO + ",{v}", wind="AWS (kn)", platform="fixed"), "wind_speed") == "given"
+
+
+def test_a_choice_of_the_clock_answers_the_doubt_about_the_order(log_file: Write) -> None:
+    seconds = [*range(300), *range(180, 480)]
+    rows = "".join(f"2026-05-01T12:{s // 60:02d}:{s % 60:02d}Z,{4 + s % 7 / 10:.1f}\n" for s in seconds)
+    path = log_file("time,wind_speed (m/s)\n" + rows)
+    with pytest.raises(OpenFactsError, match="goes back by 119 s"):
+        read_log(path)
+    time = read_log(path, WindOptions(clock="last")).series.time
+    assert np.diff(time).min() > 0

@@ -235,7 +235,7 @@ BAD: list[tuple[str, str, str, str]] = [
     ("no-time-column", 'columns = ["t"]\n', "", "no time column"),
     ("gain-zero", 'unit = "m/s"', 'unit = "m/s"\ngain = 0', "gain of 0"),
     ("gain-text", 'unit = "m/s"', 'unit = "m/s"\ngain = "2"', "not a number"),
-    ("gain-nan", 'unit = "m/s"', 'unit = "m/s"\ngain = nan', "not a number"),
+    ("gain-nan", 'unit = "m/s"', 'unit = "m/s"\ngain = nan', "not finite"),
     ("range-empty", 'unit = "m/s"', 'unit = "m/s"\nrange = [5, 1]', "range"),
     ("range-of-three", 'unit = "m/s"', 'unit = "m/s"\nrange = [5, 1, 2]', "two numbers"),
     ("convention", 'unit = "m/s"', 'unit = "m/s"\nconvention = "towards"', "convention"),
