@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.formats.described import names
 from flagdata.ingest.anemometer.formats.exports import Assigned, column_findings, known_unit, stamp_format
-from flagdata.ingest.anemometer.formats.windographer import NAMES as MAST_NAMES
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, FileLayout, Recipe, TimeLayout
@@ -180,7 +180,7 @@ def _stamp_name(names: list[str]) -> str | None:
 
 
 def _channel(name: str) -> str | None:
-    for pattern, channel in (*_NAMES, *MAST_NAMES):
+    for pattern, channel in (*_NAMES, *names("windographer")):
         if re.fullmatch(pattern, name, re.IGNORECASE):
             return channel
     return None
