@@ -19,7 +19,7 @@ from flagdata.ingest.anemometer.draft.toml import ChannelText, recipe_text
 from flagdata.ingest.anemometer.draft.words import MOVING, Meaning, fits, meaning
 from flagdata.ingest.anemometer.instants import counted, yearless
 from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.units import canonical
+from flagdata.units import canonical, spelled
 
 Origin = Literal["stated", "inferred", "assumed", "given"]
 _BESIDE = {
@@ -40,6 +40,8 @@ _PLAIN = {
 """Words of a heading that state a quantity in full; others are understood, and what is understood is inferred."""
 _LISTED = 5
 """Sites that a question names."""
+_WIDE = 40
+"""Characters of a line that is not read, where it is shown."""
 _POINTS = 0.9
 """Share of the cells that must be points of the compass."""
 
@@ -121,12 +123,12 @@ def draft(lines: Sequence[str], options: WindOptions) -> Draft | None:
     if given is None and not winds and time is None:
         return None
     if given is None:
-        _sites(parts, shape, meanings)
+        _mixed(parts, shape, meanings)
     parts.facts.insert(0, _cutting(shape, lines))
     label = options.wind or (winds[0] if winds else "anemometer")
     left = [i for i in range(len(shape.names)) if i not in parts.used and shape.names[i]]
     unused = tuple(shape.shown(i) for i in left)
-    rivals = tuple(shape.names[i] for i in left if meanings[i].kind in _OF_WIND)
+    rivals = tuple(shape.label(i) for i in left if meanings[i].kind in _OF_WIND)
     return Draft(
         facts=tuple(parts.facts), open=tuple(parts.open), unused=unused, winds=winds, rivals=rivals,
         of_earth=of_earth,
@@ -138,14 +140,14 @@ def draft(lines: Sequence[str], options: WindOptions) -> Draft | None:
     )  # fmt: skip
 
 
-def _sites(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
-    """Ask where a column names several sites, whose rows must not be mixed."""
+def _mixed(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
+    """Ask where a column names several sites or units, whose rows must not be mixed."""
     for index, one in enumerate(meanings):
         values = sorted(set(shape.column(index)) - {""})
-        if one.kind == "site" and index not in parts.used and 1 < len(values) < len(shape.rows):
-            question = (
-                f"rows are of {len(values)} sites by {shape.shown(index)}: {', '.join(values[:_LISTED])}; which one?"
-            )
+        of_units = bool(values) and all(fits("wind_speed", spelled(value) or "") for value in values)
+        if (one.kind == "site" or of_units) and index not in parts.used and 1 < len(values) < len(shape.rows):
+            several = f"{len(values)} {'units' if of_units else 'sites'}"
+            question = f"rows are of {several} by {shape.shown(index)}: {', '.join(values[:_LISTED])}; which one?"
             example = f"FILE.toml, with [rows] column = {shape.reference(index)!r}, value = {values[0]!r}"
             parts.open.append(Open(key="sensor", question=question, example=example))
 
@@ -155,6 +157,9 @@ def _cutting(shape: Shape, lines: Sequence[str]) -> Fact:
     value = f"divided by {named}, decimal {shape.decimal!r}"
     plain = shape.delimiter in ",\t" and shape.decimal == "." and shape.preamble == 0 and shape.header == 1
     where = f"line {shape.preamble + 1} names the columns" if shape.header else "no line names the columns"
+    if shape.preamble:
+        fullest = max(range(shape.preamble), key=lambda at: sum(map(str.isdigit, lines[at])))
+        where += f"; {shape.preamble} lines above are not read, as line {fullest + 1} {lines[fullest][:_WIDE]!r}"
     return Fact(what="cells", value=value, origin="stated" if plain else "inferred", evidence=where)
 
 
@@ -218,7 +223,7 @@ def _given(parts: _Parts, shape: Shape, given: GivenColumns) -> tuple[str, ...]:
         parts.channels[channel] = ChannelText(column=shape.reference(index), unit=unit, towards=towards)
         parts.facts.append(Fact(what=channel, value=f"{shape.shown(index)} in {unit}", origin="given"))
     first = next(iter(given.channels.values()))[0]
-    return (shape.names[first] or f"column {first + 1}",)
+    return (shape.label(first),)
 
 
 def _of_wind(
@@ -227,13 +232,14 @@ def _of_wind(
     """Labels of the anemometers; the facts of the one that is read are added to `parts`."""
     numeric = {i for i in range(len(meanings)) if _numeric(shape.column(i))}
     speeds = [i for i, one in enumerate(meanings) if one.kind == "speed" and not one.against and i in numeric]
-    if any(meanings[i].named for i in speeds):
+    moves = any(set(one.against) & MOVING for one in meanings)
+    if moves or any(meanings[i].named for i in speeds):
         speeds = [i for i in speeds if meanings[i].named]
-    labels = {shape.names[i] or f"column {i + 1}": i for i in speeds}
+    labels = {shape.label(i): i for i in speeds}
     chosen = labels.get(options.wind or "", speeds[0] if len(speeds) == 1 else None)
     given = options.wind is not None and not (len(labels) > 1 and options.wind in labels)
     if options.wind is not None and options.wind not in labels:
-        every = {name: i for i, name in enumerate(shape.names) if name}
+        every = {shape.label(i): i for i in range(len(shape.names))}
         chosen = every.get(options.wind)
         labels = {options.wind: chosen} if chosen is not None else labels
     axes = {one.kind: i for i, one in reversed(list(enumerate(meanings))) if one.kind in _AXES and not one.against}
@@ -243,7 +249,7 @@ def _of_wind(
             _measured(parts, shape, meanings, channel, index, options, given=False)
         earth = any(word in shape.names[components["wind_x"]].lower() for word in ("east", "u10"))
         _beside(parts, shape, meanings)
-        return (shape.names[components["wind_x"]],), earth
+        return (shape.label(components["wind_x"]),), earth
     if chosen is None:
         listed = ", ".join(labels) or ", ".join(shape.shown(i) for i in range(len(shape.names)))
         question = f"which column is the wind's speed? {listed}" if not labels else f"which anemometer? {listed}"

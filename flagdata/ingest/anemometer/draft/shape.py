@@ -57,9 +57,17 @@ class Shape:
         """The cells of a column."""
         return [row[index] for row in self.rows]
 
+    def label(self, index: int) -> str:
+        """What the user calls a column: its heading, with its number where others have the same or it has none."""
+        name, number = self.names[index], f"column {index + 1}"
+        return number if not name else name if self.names.count(name) == 1 else f"{name} ({number})"
+
     def shown(self, index: int) -> str:
         """What messages call a column."""
-        return repr(self.names[index]) if self.names[index] else f"number {index + 1}"
+        name = self.names[index]
+        if not name:
+            return f"number {index + 1}"
+        return repr(name) if self.names.count(name) == 1 else f"{name!r} (number {index + 1})"
 
     def reference(self, index: int) -> str | int:
         """What a recipe calls a column: its heading where that is its own, else its number."""
@@ -120,7 +128,7 @@ def _sniffed(lines: Sequence[str]) -> str | None:
         file.write("\n".join([*lines, ""]))
         file.flush()
         try:
-            query = "select Delimiter from sniff_csv(?, header = false, all_varchar = true)"
+            query = "select Delimiter from sniff_csv(?, header = false, all_varchar = true, null_padding = true)"
             row = duckdb.execute(query, [str(Path(file.name))]).fetchone()
         except duckdb.Error:
             return None

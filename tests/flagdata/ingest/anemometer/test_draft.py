@@ -119,6 +119,23 @@ def test_rows_of_several_sites_are_not_mixed() -> None:
     assert "sensor" in asked(found)
 
 
+def test_rows_in_several_units_are_not_mixed() -> None:
+    made = ["time,wind,unit", *(f"2026-05-01T12:00:{k:02d}Z,4.{k % 7},{('km/h', 'm/s')[k % 9 > 0]}" for k in range(30))]
+    found = draft(made, WindOptions(unit="m/s"))
+    assert found is not None
+    assert "sensor" in asked(found)
+
+
+def test_one_short_row_among_many_hides_no_table() -> None:
+    shape = shape_of([*lines("time,wind,x", ISO + ",{v},1", 60), "2026-05-01T12:01:00Z,4.0"])
+    assert shape is not None
+    assert shape.delimiter == ","
+
+
+def test_parts_of_a_fact_stay_apart() -> None:
+    assert "decimal '.' inferred" in drafted("time wind x", ISO + " {v} 1").facts[0].line()
+
+
 def test_points_of_the_compass_of_several_languages_are_asked() -> None:
     assert "columns" in asked(drafted("time,wind_speed (m/s),wind_direction", ISO + ",{v},SO"))
 
