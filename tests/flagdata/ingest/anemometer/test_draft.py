@@ -132,10 +132,6 @@ def test_one_short_row_among_many_hides_no_table() -> None:
     assert shape.delimiter == ","
 
 
-def test_parts_of_a_fact_stay_apart() -> None:
-    assert "decimal '.' inferred" in drafted("time wind x", ISO + " {v} 1").facts[0].line()
-
-
 def test_points_of_the_compass_of_several_languages_are_asked() -> None:
     assert "columns" in asked(drafted("time,wind_speed (m/s),wind_direction", ISO + ",{v},SO"))
 
