@@ -20,7 +20,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 from flagdata.errors import FlagdataError, InputError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer.instants import counted
@@ -31,8 +31,6 @@ from flagdata.schema import CHANNELS
 from flagdata.signals import Sensor
 from flagdata.timebase import zone
 from flagdata.units import unit
-
-T = TypeVar("T")
 
 SENSORS = Shelf(folder="sensors", noun="sensor recipe")
 

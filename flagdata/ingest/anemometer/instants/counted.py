@@ -31,12 +31,8 @@ from flagdata.timebase import NANOSECONDS, iso
 _EPOCH = {"epoch-us": 1_000, "epoch-ns": 1}
 _SERIAL = {"excel-days": 25_569, "datenum": 719_529}
 """Number of the day 1970-01-01."""
-SERIAL_DAYS = tuple((form, day + 7_305, day + 25_567) for form, day in _SERIAL.items())
-"""Formats of serial days, each with its numbers of 1 January 1990 and of 2040, between which logs lie."""
 _YEARS = "decimal-years"
-_FIRST_YEAR, _LAST_YEAR, _LATEST = 1990, 2100, 2040
-WORDS = {"years": _YEARS, "excel": "excel-days", "excel-day": "excel-days", "matlab": "datenum"}
-"""Other words for formats of this module."""
+_FIRST_YEAR, _LAST_YEAR = 1990, 2100
 _ELAPSED = {
     "elapsed-s": NANOSECONDS, "elapsed-ms": 1_000_000, "elapsed-us": 1_000, "elapsed-min": 60 * NANOSECONDS,
     "elapsed-h": 3600 * NANOSECONDS, "elapsed-d": DAY,
@@ -48,23 +44,6 @@ UNITS = tuple(_ELAPSED)
 """Formats of counts since a start."""
 FORMS = (*_EPOCH, *_SERIAL, _YEARS, *_ELAPSED)
 """Formats of this module that are names."""
-
-
-def serial_days(value: NDArray[np.float64]) -> str | None:
-    """The format of serial days or decimal years that numbers are likely in, of which they rise by fractions.
-
-    `None` for no such.
-
-    Args:
-        value: (n,) of the rows.
-    """
-    steps = np.diff(value)
-    if len(steps) < 2 or not np.all(np.isfinite(steps)) or bool((steps < 0).any()) or not np.any(value % 1 != 0):
-        return None
-    if float(np.median(steps)) > 0.5:  # seconds of the day rise by one
-        return None
-    bounds = (*SERIAL_DAYS, (_YEARS, _FIRST_YEAR - 1, _LATEST))
-    return next((form for form, low, high in bounds if bool(np.all((value > low) & (value < high)))), None)
 
 
 def _of_years(value: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -26,8 +26,6 @@ _RISES = 0.7
 """Least share of rises among the changes of a sum."""
 _HIGH = 6.0
 """Times the median rise that a sum has reached before one fall at least."""
-_SAME = 3
-"""Rows from which a number that never changes is no reading."""
 WHAT = "its values only grow, but for falls to near 0: the distance that the wind has run, or another count"
 
 
@@ -46,20 +44,6 @@ def grows(values: NDArray[np.float64]) -> bool:
     if len(falls) and bool((known[falls + 1] > _NEW * known[falls]).any()):
         return False
     return bool(known.max() > _GROWN * _LEAST / 2 * np.median(steps[steps > 0]))
-
-
-def unlike_speed(values: NDArray[np.float64]) -> str:
-    """Why numbers without a unit may be no speed: they only grow, or never change; "" where nothing says so.
-
-    Args:
-        values: (n,) as written, NaN where missing.
-    """
-    known = values[np.isfinite(values)]
-    if grows(values):
-        return WHAT
-    if len(known) >= _SAME and known[0] != 0 and bool(np.all(known == known[0])):
-        return f"it holds nothing but {known[0]:g}, as a setting or a count does"
-    return ""
 
 
 def sums(values: NDArray[np.float64]) -> bool:

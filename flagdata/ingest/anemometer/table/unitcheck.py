@@ -40,7 +40,6 @@ _STEPS: tuple[tuple[str, tuple[float, ...]], ...] = (
     ("mph", (1.0, 0.5, 0.1)), ("kn", (1.0, 0.5, 0.1)), ("km/h", (1.0, 0.1)), ("m/s", (1.0, 0.5, 0.1)),
 )  # fmt: skip
 _SHOWN = ("m/s", "km/h", "mph", "kn")
-_GUSTS = (1.0, 3.2)
 _FACTOR = 6e-4
 """Relative error of the factors that loggers convert with (0.447, 0.514, 1.609)."""
 
@@ -185,15 +184,6 @@ def contradiction(
         smaller = "0.1 m/s" if median < 10 * FASTEST / 3 else "0.01 m/s"
         reason += f"; whole numbers may also be in {smaller} (--unit '{smaller}')"
     return _finding(channel, stated, Evidence(unit=other, reason=reason))
-
-
-def gust_factor(mean: NDArray[np.float64], gust: NDArray[np.float64]) -> float | None:
-    """The median ratio of gusts to means [1], both in SI, where it is none that wind has; else `None`."""
-    both = np.isfinite(mean) & np.isfinite(gust) & (mean > 1.0)
-    if both.sum() < 10:
-        return None
-    ratio = float(np.median(gust[both] / mean[both]))
-    return None if _GUSTS[0] <= ratio <= _GUSTS[1] else ratio
 
 
 def _too_fast(median: float, high: float, name: str) -> str:

@@ -112,7 +112,7 @@ class RowReader:
         encoding = "utf-8" if self._source.encoding == "utf-8-sig" else self._source.encoding
         first, shape = 1, None
         for data in self._source.raw_blocks():
-            shape = shape or self._shape(data, width)
+            shape = shape or self._shape(data)
             lines = lines_of(data, shape) if shape is not None and shape.cells >= width else None
             if lines is None:
                 with io.TextIOWrapper(io.BytesIO(data), encoding=encoding, newline=None) as stream:
@@ -127,7 +127,7 @@ class RowReader:
                 yield where, found
             first += len(lines.start)
 
-    def _shape(self, data: bytes, width: int) -> Shape | None:
+    def _shape(self, data: bytes) -> Shape | None:
         """The shape of the file's regular lines by its first row; `None` where the block has no row."""
         at = -1
         for _ in range(self.first_line - 1):
