@@ -39,19 +39,17 @@ Order: TypeAlias = slice | NDArray[np.int64]
 
 @dataclass(frozen=True, kw_only=True)
 class Given:
-    """What the user says about time beside the zone, and the heading of the wind.
+    """What the user says about time beside the zone.
 
     Attributes:
         start: the first row's instant [UTC ns].
         date: its day.
         clock: whose stamps are right where they run back.
-        heading: of the wind, which may give the time of day of rows that are stamped by their date alone.
     """
 
     start: int | None = None
     date: dt.date | None = None
     clock: ClockChoice | None = None
-    heading: str = ""
 
 
 @dataclass
