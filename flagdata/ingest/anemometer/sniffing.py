@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-GuessKind = Literal["anemometer", "camera", "meshes", "record", "other"]
+GuessKind = Literal["anemometer", "camera", "meshes", "markers", "record", "other"]
 
 
 @dataclass(frozen=True, kw_only=True)
