@@ -49,7 +49,8 @@ class Drafted:
 
     def sentences(self) -> tuple[str, ...]:
         """One row of each reading as a sentence."""
-        return tuple(_sentence(log) for log, _ in self.readings)
+        several = len(self.readings) > 1
+        return tuple(_sentence(log, f" at {log.series.sensor.name!r}" if several else "") for log, _ in self.readings)
 
     def preview(self) -> str:
         """How the file was understood, for people: reasons, rows beside what was read of them, findings."""
@@ -62,7 +63,9 @@ class Drafted:
                 lines.append(f"    line {row.line}  {row.text[:_WIDE]}  →  {iso(row.time)}  {row.wind}")
             series = log.series
             lines.append(f"  {len(series)} rows from {iso(int(series.time[0]))} to {iso(int(series.time[-1]))}")
-            lines += [f"  {f.severity}: {f.what}" for f in log.findings if f.severity is not Severity.ERROR]
+            for found in log.findings:
+                if found.severity is not Severity.ERROR:
+                    lines.append(f"  {found.severity}: {found.what}{f'; {found.fix}' if found.fix else ''}")
         return "\n".join(lines)
 
 
@@ -138,6 +141,6 @@ def confirmed(
     return confirm(Drafted(path=path, source_hash=source_hash, readings=drafts))
 
 
-def _sentence(log: WindLog) -> str:
+def _sentence(log: WindLog, where: str) -> str:
     row = log.rows[0]
-    return f"On {iso(row.time)[:10]} at {iso(row.time)[11:].removesuffix('Z')} UTC the wind was {row.wind}."
+    return f"On {iso(row.time)[:10]} at {iso(row.time)[11:].removesuffix('Z')} UTC the wind{where} was {row.wind}."

@@ -45,7 +45,7 @@ class OpenFactsError(RefusedError):
     def of(cls, questions: Sequence[Open], *, where: str) -> OpenFactsError:
         """The error for some questions, which names what answers each."""
         return cls(
-            f"the file does not say: {'; '.join(one.question for one in questions)}",
+            f"the file leaves this open: {'; '.join(one.question for one in questions)}",
             where=where, questions=tuple(questions),
             fix=f"answer by {' '.join(one.fix() for one in questions)}; or describe the file by a recipe: "
             "--sensor FILE.toml",
