@@ -53,6 +53,8 @@ class TimeFields:
 def find_time(shape: Shape, meanings: Sequence[Meaning], order: str | None) -> TimeFields | None:
     """The time of a table, by its headings and its cells; `None` where no column reads as one.
 
+    A time of day is none beside a date that does not read: its days would be lost.
+
     Args:
         order: of dates of numbers alone, as the user gives it.
     """
@@ -63,7 +65,8 @@ def find_time(shape: Shape, meanings: Sequence[Meaning], order: str | None) -> T
     choices += [(i, i + 1) for i in unnamed if i + 1 in unnamed]
     for columns in choices:
         found = of_columns(shape, columns, order)
-        if found is not None:
+        dated = not dates or any(i in dates for i in columns)
+        if found is not None and (dated or not any(map(counted.is_time_of_day, found.forms))):
             utc = any(meanings[i].utc for i in columns)
             return TimeFields(
                 columns=columns, forms=found.forms, zoned=found.zoned, utc=utc, evidence=found.evidence
