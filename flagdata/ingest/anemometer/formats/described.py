@@ -137,14 +137,17 @@ def _heading(data: Mapping[str, Any], lines: Sequence[str]) -> _Heading | None:
         rows: int = file["preamble"]
         known = len(lines) > rows and re.search(mark, lines[rows - 1])
         return _Heading(at=rows - 1, rows=rows, delimiter=DELIMITERS[file["delimiter"]]) if known else None
-    for at, line in enumerate(lines[: match.get("within", 1)]):
-        line = line[:_LONGEST].lstrip("\ufeff# ")
+    above = [line[:_LONGEST] for line in lines[: match.get("within", 1)]]
+    if not re.search(mark, "\n".join(above)):
+        return None
+    for at, line in enumerate(above):
+        line = line.lstrip("\ufeff# ")
         delimiter = "\t" if "\t" in line else ";" if line.count(";") > 1 or "," not in line else ","
         cells = cut(line, delimiter)
         if match.get("groups") and at:
-            cells = _grouped(cut(lines[at - 1][:_LONGEST], delimiter), cells)
+            cells = _grouped(cut(above[at - 1], delimiter), cells)
         held = all(any(_fits(one, cell) for cell in cells) for one in match["header"])
-        if held and re.search(mark, "\n".join(lines[: at + 1])):
+        if held and re.search(mark, "\n".join(above[: at + 1])):
             below = cut(lines[at + 1], delimiter) if match.get("units") and at + 1 < len(lines) else []
             return _named(match, lines, at, delimiter, cells, below)
     return None
