@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flagdata.errors import UsageError
+from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer.draft.doubts import doubts
@@ -81,6 +81,8 @@ def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:
     recipe = replace(recipe, expect=frozenset((*options.expect, *(("order",) if options.clock is not None else ()))))
     azimuth = _WEST if found.of_earth and options.azimuth is None else options.azimuth
     reading = read_by_recipe(source, recipe, options, azimuth=azimuth)
+    if _LEFT_OUT & {finding.kind for finding in reading.findings}:
+        _refuse_new_names(source, recipe, where)
     odd = doubts(
         reading, recipe, assumed=frozenset(fact.what for fact in found.facts if fact.origin == "assumed"),
         left_out=sum(one.count for one in reading.findings if one.kind in _LEFT_OUT), now=time.time_ns(),
@@ -93,6 +95,17 @@ def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:
     return replace(
         reading.with_findings(unused), drafted=found.recipe, stated=found.stated, understood=understood
     )  # fmt: skip
+
+
+def _refuse_new_names(source: TextFile, recipe: Recipe, where: str) -> None:
+    """Refuse a table whose columns change places on the way, by a line that names them in another order."""
+    heading = source.head(recipe.file.preamble + 1)[-1].strip()
+    cut = recipe.file.delimiter if recipe.file.delimiter != " " else None
+    names = sorted(heading.split(cut))
+    for number, line in enumerate(source.each_line(), start=1):
+        if len(line) == len(heading) and line != heading and sorted(line.split(cut)) == names:
+            what = "this line names the columns anew, in another order"
+            raise InputError(what, where=f"{where}, line {number}", fix="split the file before it")
 
 
 def _unused(found: Draft) -> tuple[Finding, ...]:

@@ -253,3 +253,19 @@ def test_a_choice_of_the_clock_answers_the_doubt_about_the_order(log_file: Write
         read_log(path)
     time = read_log(path, WindOptions(clock="last")).series.time
     assert np.diff(time).min() > 0
+
+
+@pytest.mark.parametrize(("again", "refused"), [("time,temp (C),wind speed (m/s)", True), ("", False)])
+def test_columns_that_change_places_on_the_way_are_refused(log_file: Write, again: str, refused: bool) -> None:
+    heading = "time,wind speed (m/s),temp (C)"
+    first, second = (
+        lines(heading, ISO + ",{v},12.5", 60),
+        lines(again or heading, ISO.replace("T12", "T13") + ",{v},9", 60),
+    )
+    path = log_file("\n".join([*first, *second]) + "\n")
+    if refused:
+        with pytest.raises(InputError, match="names the columns anew") as caught:
+            read_log(path)
+        assert (caught.value.where or "").endswith("line 62")
+    else:
+        assert len(read_log(path).series) == 120

@@ -35,6 +35,15 @@ def begins(found: WindLog, row: int) -> None:
     assert found.series.time.tolist() == (first + 600 * S * np.arange(len(found.series))).tolist()
 
 
+@pytest.mark.parametrize("every", [30, 72])
+def test_stamps_of_24_hours_among_those_with_am_and_pm_are_read_and_counted(read: Read, every: int) -> None:
+    text = log(range(144), lambda at: "%Y-%m-%d,%H:%M" if at % every == 0 else "%Y-%m-%d,%I:%M %p")
+    found = read(text, zone="UTC", columns="date[%Y-%m-%d],time[%I:%M %p],wind_speed[m/s]")
+    begins(found, 0)
+    finding = told(found, "mixed-clocks")
+    assert (finding.severity, finding.count) == (Severity.WARNING, -(-144 // every))
+
+
 def test_an_hour_above_12_with_pm_is_of_24() -> None:
     found = parse(
         ["2026-05-01 13:05PM", "2026-05-01 01:05 pm", "2026-05-01 12:05AM", "2026-05-01 0:05"], "%Y-%m-%d %H:%M%p"
