@@ -6,17 +6,11 @@ wherever it stands; what a wind might be, such as 99 m/s, only where it is at le
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata import compass
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.text.cells import Cell, Numbers
 
-NO_ANGLE = (999.0, 999.9, 990.0, 9999.0)
-"""Codes for "no direction" or "variable" that are no angle (WMO-No. 306, FM 15, and loggers that follow it)."""
 _NINES = (99_999.0, 9999.9, 9999.0, 999.99, 999.9, 999.0, 99.99, 99.9, 99.0)
 _OFTEN = (
     8888.0, 7999.0, 6999.0, 888.8, 888.0, 88.8, 65_535.0, 6553.5, 655.35, 65_534.0, 32_767.0, 3276.7, 327.67, 255.0,
@@ -28,28 +22,8 @@ _ENDLESS = 1e5
 """No speed in any unit is as large; codes such as 1e20 are."""
 _OTHERS = 10
 """Other values that show how fast the wind is."""
-_LOW, _HIGH = -181.0, 401.0
-"""Angles as written lie between, in degrees or in gon."""
 _FEW = 2
 """Different codes of one column."""
-_WORDS, _SHARE = 3, 0.6
-"""Different words for no value in a column, and the largest share of its rows that they fill."""
-
-
-def words(cells: Sequence[str], parsed: Numbers) -> tuple[str, ...]:
-    """The few words that stand for no value in a column of numbers ("Calm", "VRB"); none where it holds other text.
-
-    Args:
-        cells: (n,) of the column.
-        parsed: what was read of them.
-    """
-    spoken = [cell for cell, state in zip(cells, parsed.state, strict=True) if state == Cell.UNREADABLE]
-    listed = sorted(set(spoken))
-    filled = int((parsed.state == Cell.NUMBER).sum()) + len(spoken)
-    plain = all(any(letter.isalpha() for letter in word) and not any(map(str.isdigit, word)) for word in listed)
-    of_no_direction = all(word.lower() in compass.CALM for word in listed) and len(spoken) < filled
-    few = of_no_direction or (len(listed) <= _WORDS and 2 * len(listed) <= len(spoken) <= _SHARE * filled)
-    return tuple(listed) if few and plain else ()
 
 
 def speeds(values: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -83,20 +57,6 @@ def below_zero(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     few = 0 < len(codes) <= (_FEW if len(codes) and codes.max() <= -88 else 1)
     told = few and codes.max() <= -1 and below.sum() > len(codes) and len(others) >= _OTHERS
     return below if told else np.zeros(len(values), dtype=bool)
-
-
-def angles(values: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(n,) which directions are a code for none or a variable one.
-
-    Args:
-        values: (n,) as written [deg, or tens of degrees], NaN where missing.
-    """
-    known = np.isfinite(values)
-    found = known & (np.isin(values, NO_ANGLE) | (values <= -999))
-    beyond = known & ~found & ((values < _LOW) | (values > _HIGH))
-    if len(np.unique(values[beyond])) <= _FEW and beyond.sum() < (known & ~found).sum() / 2:
-        found |= beyond
-    return found | within_a_turn(np.where(found, np.nan, values))
 
 
 def within_a_turn(

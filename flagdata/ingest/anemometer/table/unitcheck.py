@@ -33,8 +33,6 @@ IMPOSSIBLE = 75.0
 """Median [m/s] that no wind has, by which a unit is doubted of however few rows."""
 _FASTEST_OF_ALL = 120.0
 """Number that few speeds of a log reach in any unit."""
-_ENOUGH = 10
-"""Values from which their range is evidence."""
 DAY = 86_400.0
 _STEPS: tuple[tuple[str, tuple[float, ...]], ...] = (
     ("mph", (1.0, 0.5, 0.1)), ("kn", (1.0, 0.5, 0.1)), ("km/h", (1.0, 0.1)), ("m/s", (1.0, 0.5, 0.1)),
@@ -110,39 +108,6 @@ def _rounding(known: NDArray[np.float64]) -> float:
         if np.all(np.abs(scaled - np.round(scaled)) < 1e-4):
             return 10.0**-digits
     return 1e-6
-
-
-def likely(values: NDArray[np.float64], *, daily: bool) -> Evidence | None:
-    """The unit that unlabelled values are most likely in, as far as they tell; see `no_wind` for those of no wind.
-
-    Args:
-        daily: whether each row is of a day, so that it may be the wind's run.
-    """
-    found = from_resolution(values)
-    if found is not None:
-        return found
-    known = values[np.isfinite(values)]
-    if len(known) < _ENOUGH:
-        return None
-    median, high = float(np.median(known)), float(np.quantile(known, 0.99))
-    if high > FASTEST or median > WINDY:
-        slower = median * unit("km/h").scale > STORMY
-        reason = _too_fast(median, high, "m/s")
-        return Evidence(unit="km/day" if slower and daily else "km/h", reason=reason)
-    return None
-
-
-def no_wind(values: NDArray[np.float64]) -> str:
-    """Why unlabelled values, which are not of whole days, are likely no speeds of the wind; "" where they may be."""
-    known = values[np.isfinite(values)]
-    if len(known) < _ENOUGH or from_resolution(values) is not None:
-        return ""
-    low, median, high = float(known.min()), float(np.median(known)), float(known.max())
-    if low >= 0 and _FASTEST_OF_ALL < high <= 360:
-        return "its numbers lie between 0 and 360, as directions do"
-    if median * unit("km/h").scale > STORMY:
-        return f"half of its numbers are above {median:.3g}, beyond every wind in m/s, km/h or mph"
-    return ""
 
 
 def contradiction(
