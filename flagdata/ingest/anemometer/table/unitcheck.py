@@ -1,14 +1,12 @@
 """Which unit the numbers of a wind speed speak for, and whether they contradict the one that is stated.
 
-Three kinds of evidence:
+Two kinds of evidence:
 
 - *Resolution.* A logger that measures in whole mph (or tenths of m/s, knots …) and writes another unit writes multiples
   of the converted step: 1.6, 3.2, 4.8 km/h. That n distinct values all lie on such a grid of step g by chance, within a
   tolerance t, has the probability (2 t / g)^n; below `CHANCE` it is evidence of the unit they are written in.
 - *Range.* The windiest station known, Cape Denison, has an annual mean of 19.4 m/s (Mawson 1915): a log of a day or
   more whose median is above `WINDY` is more likely in another unit.
-- *Gust factor.* Gusts of 3 s within 10 minutes are 1.23 (at sea) to 1.66 (on land) times the mean (Harper et al. 2010,
-  WMO/TD-No. 1555, table 1.1), in light wind up to 3 times; another ratio shows that the two are in different units.
 """
 
 from __future__ import annotations
