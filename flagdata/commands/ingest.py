@@ -84,7 +84,7 @@ from flagdata.errors import UsageError
     "With sort no clock was set: the rows are out of order.",
 )  # fmt: skip
 @click.option("--zero-offset", metavar="M/S", help="Wind: speed to subtract; report, or estimate from idle stretches.")
-@click.option("--encoding", metavar="CODEC", help="Wind: encoding of the text, where it cannot be told.")
+@click.option("--encoding", metavar="CODEC", help="Wind: encoding of the text, where the file does not show it.")
 @click.option(
     "--unit", metavar="UNIT",
     help="Wind: unit of a speed whose heading has none (m/s, km/h, mph, kn). Meshes, markers: of positions, else m.",

@@ -1,4 +1,4 @@
-"""What `flagdata ingest` was told: the options of each kind of source, and which mean nothing for a source."""
+"""What the user gives `flagdata ingest`: the options of each kind of source, and which mean nothing for a source."""
 
 from __future__ import annotations
 
@@ -238,7 +238,7 @@ def check_applies(kinds: Sequence[str | None], options: Given, *, given: frozens
     """Refuse options that mean nothing for any source, or that time or name more than one, before anything is written.
 
     Args:
-        kinds: of the sources; one that could not be told may be any.
+        kinds: of the sources; one that is not recognised may be any.
     """
     foreign = dict(FOREIGN)
     if options.zoned_start:

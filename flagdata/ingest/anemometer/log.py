@@ -42,7 +42,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
 
     Raises:
         InputError, TimeError, LimitError: the file cannot be read as this format; names the line and the fix.
-        UsageError: options that do not fit the format, or a format that cannot be told from the file.
+        UsageError: options that do not fit the format, or a file of no known format.
         NotFoundError: no such file, or no such recipe.
     """
     path = local_path(path)
@@ -75,8 +75,12 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         if not hint:
             raise
         raise ZoneMissingError(error.what, where=error.where, fix=f"{error.fix}; {hint}") from None
-    told = {finding.kind for finding in reading.findings}
-    if statement is not None and options.zone is not None and told.isdisjoint({"zone-contradicts", "zone-not-needed"}):
+    reported = {finding.kind for finding in reading.findings}
+    if (
+        statement is not None
+        and options.zone is not None
+        and reported.isdisjoint({"zone-contradicts", "zone-not-needed"})
+    ):
         says = f"line {statement.line} ({statement.text!r}) says"
         reading = reading.with_findings(zones.contradiction(says, statement.name, options.zone, reading.time))
     if "platform" not in reader.uses:

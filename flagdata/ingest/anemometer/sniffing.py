@@ -23,7 +23,7 @@ class Guess:
         notes: what was left out, and what is odd.
         doubts: what must be said before it can be read, each with how to say it.
         needs: what `ingest` will ask for beside, each with how to say it.
-        winds: labels of the anemometers, where a draft tells them.
+        winds: labels of the anemometers, where a draft names several.
     """
 
     format: str

@@ -1,7 +1,7 @@
 """Logs whose rows carry no time at all, put on the clock that the user gives: a start and a rate.
 
 A serial print, a tunnel's recording or a boat's stream of wind sentences without a clock can be used where its owner
-knows when it began and how many readings a second the instrument sends. Rows that were lost are not seen: each loss
+knows when it began and how many readings a second the instrument sends. Rows that were lost are not noticed: each loss
 moves all that follows.
 """
 
@@ -163,7 +163,7 @@ def dated(source: TextFile, date: dt.date) -> TextFile:
 def _counted(source: TextFile, text: Sequence[str], rate: float, start: int, found: Sequence[Finding] = ()) -> TextFile:
     """The file with these lines, and the finding that says whose clock they are on beside others."""
     often = f"at {rate:g} Hz" if rate >= 1 else f"every {1 / rate:g} s"
-    what = f"its rows carry no time: counted {often} from {iso(start)}, as given; rows that were lost are not seen"
+    what = f"its rows carry no time: counted {often} from {iso(start)}, as given; rows that were lost are not noticed"
     return TableText.of(source, text, [Finding(kind=RATE_GIVEN, severity=Severity.WARNING, what=what), *found])
 
 

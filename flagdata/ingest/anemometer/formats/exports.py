@@ -78,7 +78,7 @@ class Export:
         name: of the format.
         file, time, sensor, checks: see recipe.Recipe.
         assigned: its columns.
-        described_by: the maker's description that the reader follows, where no file of the instrument was seen.
+        described_by: the maker's description that the reader follows, where no file of the instrument was at hand.
         averaged: whether a row is the average over the distance of the stamps.
         starts: whether the stamp of an average is that of its beginning.
     """
@@ -108,10 +108,10 @@ def stamp_format(texts: Sequence[str], options: WindOptions, where: str) -> tupl
         texts: stamps of the first rows, date before time.
 
     Raises:
-        TimeError: no date and time in them, or nothing that tells the day from the month.
+        TimeError: no date and time in them, or nothing that decides between day and month.
     """
     filled = [text.strip() for text in texts if text.strip()]
-    decision = decide(filled, told=options.date_order, where=where)
+    decision = decide(filled, given=options.date_order, where=where)
     found = [match for text in filled if (match := _REST.search(text))]
     rest = next(iter(found), None)
     if rest is None:

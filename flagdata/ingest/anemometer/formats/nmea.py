@@ -2,7 +2,7 @@
 
 Wind sentences carry no time. Each gets one by interpolating, over line numbers, between the time sentences (ZDA, RMC,
 GGA, GLL, or the time of a TAG block), or that of its burst (`bursts`), and the flag TIME_UNSURE. MWV,R is wind past the
-platform; MWV,T is "theoretical": what the instrument computed as if the platform stood still; both are relative to the
+platform; MWV,T is "theoretical": what the instrument computed as if the platform did not move; both are relative to the
 bow. They stay in channels of their own, and neither is ground truth unless the user says the platform is fixed. VWR,
 VWT and MDA are what older instruments and weather stations send for MWV,R, MWV,T and MWD; beside these they are the
 same wind again.
@@ -424,8 +424,8 @@ def no_wind(lines: Sequence[str], format_name: str) -> str:
 
 
 def _others_seen(kinds: Counter[str]) -> str:
-    seen = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common(6))
-    return f"; there are {seen}" if seen else ""
+    counted = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common(6))
+    return f"; there are {counted}" if counted else ""
 
 
 def _findings(stream: _Stream, placed: Placed) -> tuple[Finding, ...]:

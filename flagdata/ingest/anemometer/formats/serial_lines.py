@@ -93,7 +93,7 @@ class Instrument:
         channels: names of schema.CHANNELS, in the order of a sample's values.
         parse: a line without its stamp → sample or defect.
         sensor: the instrument.
-        described_by: the maker's description that `parse` follows, where no file of the instrument was seen.
+        described_by: the maker's description that `parse` follows, where no file of the instrument was at hand.
         split: a line → stamp ("" where there is none; ISO 8601 or Unix time) and the rest.
     """
 

@@ -7,7 +7,7 @@
 
 Source: Thies Clima, Ultrasonic Anemometer 2D, manual 021537/06/10, 7.4.3 and 11, and Technical Manual, 6.2: the
 checksum is the exclusive or of what stands between STX and "*"; F stands in place of digits where there is no value.
-The unit of speeds is a setting (command OS), which only telegram 3 tells. Written by the manuals; no real log was at
+The unit of speeds is a setting (command OS), which only telegram 3 states. Written by the manuals; no real log was at
 hand.
 """
 
@@ -59,9 +59,9 @@ def as_table(source: TextFile) -> TableText | None:
         "wind direction [deg]",
         "sonic temperature [degC]",
     )
-    told = [place for place in range(len(names)) if any(cells[place] for cells in rows)]
+    filled = [place for place in range(len(names)) if any(cells[place] for cells in rows)]
     return table(
-        source, [names[place] for place in told], ([cells[place] for place in told] for cells in rows),
+        source, [names[place] for place in filled], ([cells[place] for place in filled] for cells in rows),
         kind="thies-telegrams", what="telegrams of a Thies ultrasonic anemometer", left_out=other,
     )  # fmt: skip
 

@@ -55,7 +55,7 @@ def _of_years(value: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def is_elapsed(form: str) -> bool:
-    """Whether a format counts from a start that the file does not tell."""
+    """Whether a format counts from a start that the file does not state."""
     return form in _ELAPSED
 
 
@@ -173,7 +173,7 @@ def since_start(
 
 
 def _refuse_restarts(count: NDArray[np.int64], *, line: NDArray[np.int64], where: str) -> None:
-    """Refuse a count that starts again, as after a reset: when the second stretch began, nothing tells."""
+    """Refuse a count that starts again, as after a reset: the file does not say when the second stretch began."""
     if len(count) < 3:
         return
     steps = np.diff(count)
@@ -182,13 +182,10 @@ def _refuse_restarts(count: NDArray[np.int64], *, line: NDArray[np.int64], where
     back = [row for row in back.tolist() if row + 1 < len(count) and count[row] <= count[row + 1] < count[row - 1]]
     if back:
         row, times = back[0], f"{len(back)} times" if len(back) > 1 else "once"
-        fix = (
-            "make a file of each stretch and give each its own --start; where a column tells the stretches apart, name "
-            "it as site in --columns, and read each with its --start: --wind VALUE"
-        )
+        fix = "make a file of each stretch and give each its own --start"
         raise TimeError(
-            f"the count starts again {times}, first at line {line[row]}, and nothing tells how long after", where=where,
-            fix=fix,
+            f"the count starts again {times}, first at line {line[row]}, and the file does not say how long after",
+            where=where, fix=fix,
         )  # fmt: skip
 
 

@@ -75,7 +75,7 @@ def stated(lines: Sequence[str]) -> Statement | None:
 
 
 def hint(statement: Statement | None, lines: Sequence[str]) -> str:
-    """What the first lines tell a user who named no zone: a statement, else an abbreviation; "" for neither."""
+    """What the first lines say to a user who named no zone: a statement, else an abbreviation; "" for neither."""
     return abbreviations.advice(lines) if statement is None else statement.advice()
 
 

@@ -1,4 +1,4 @@
-"""Speeds below what the instrument can tell, written "<0.3": somewhere between 0 and that.
+"""Speeds below what the instrument can measure, written "<0.3": somewhere between 0 and that.
 
 A cup that does not turn reads 0, and so such a cell is read; it is flagged DEAD_ZONE, and the number becomes the
 sensor's threshold where its recipe states none, so that averages over the ground truth's window know what a 0 may hide.

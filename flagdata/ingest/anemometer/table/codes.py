@@ -1,4 +1,4 @@
-"""Codes that stand for "no value" among the numbers of a log, told by being far from all others, and one value alone.
+"""Codes that stand for "no value" among the numbers of a log, recognised as far from all others, and one value alone.
 
 A wind changes from reading to reading; a code is written the same each time. What no log can mean as a wind is a code
 wherever it stands; what a wind might be, such as 99 m/s, only where it is at least twice everything else.
@@ -55,8 +55,8 @@ def below_zero(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     others = values[np.isfinite(values) & ~below]
     codes = np.unique(values[below])
     few = 0 < len(codes) <= (_FEW if len(codes) and codes.max() <= -88 else 1)
-    told = few and codes.max() <= -1 and below.sum() > len(codes) and len(others) >= _OTHERS
-    return below if told else np.zeros(len(values), dtype=bool)
+    alone = few and codes.max() <= -1 and below.sum() > len(codes) and len(others) >= _OTHERS
+    return below if alone else np.zeros(len(values), dtype=bool)
 
 
 def within_a_turn(

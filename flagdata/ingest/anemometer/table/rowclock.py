@@ -118,7 +118,7 @@ class RowClock:
             text = "the newest row comes first: read from the end"
             found = (Finding(kind="newest-first", severity=Severity.NOTE, count=len(wall), what=text),)
         if counted.is_elapsed(self.form) or (counted.needs_date(self.form) and not yearless.numbered(self.form)):
-            return order, found  # the order of the rows is what tells their days
+            return order, found  # the order of the rows is what gives their days
         if self._twelve(wall[order]):
             return order, found
         sorting = disorder.sorting(wall[order], choice)

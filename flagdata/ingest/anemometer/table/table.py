@@ -255,12 +255,12 @@ def read_table(
         text = f"{why}: {zone_name} is not used"
         findings.append(Finding(kind="zone-not-needed", severity=Severity.NOTE, what=text))
         zone_name = None
-    told, zone_name = zone_name, zone_name or recipe.time.zone
+    named, zone_name = zone_name, zone_name or recipe.time.zone
     time, found = gathered.clock.instants(order, line=line, zone_name=zone_name, where=where, given=given)
     findings.extend(found)
     findings.extend(_rounded(gathered.clock))
-    if told is not None and recipe.time.zone is not None:
-        findings.extend(zones.contradiction("the heading, or the recipe, says", recipe.time.zone, told, time))
+    if named is not None and recipe.time.zone is not None:
+        findings.extend(zones.contradiction("the heading, or the recipe, says", recipe.time.zone, named, time))
     host_time = None
     if gathered.host is not None:
         host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where, given=Given())
@@ -348,7 +348,7 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str)
     far = f"; {distant} of them are {years}: a clock that was not set" if distant else ""
     if count == 0 and not bad and recipe.rows is not None:
         raise InputError(
-            f"no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which tells sites apart", where=where,
+            f"no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which names the site", where=where,
             fix="name a site as the file writes it, or the wind's column by its heading; ingest --sniff lists them",
         )  # fmt: skip
     if count == 0:

@@ -21,7 +21,7 @@ from flagdata.ingest.anemometer.text.source import GZIP, TextFile, opened
 
 _CHUNK = 1 << 20
 HEAD = 65_536
-"""Bytes looked at to tell what a file is."""
+"""Bytes looked at to find what a file is."""
 
 # First bytes → what it is, what to do. Signatures as in the formats' own specifications.
 _SIGNATURES: tuple[tuple[int, bytes, str, str], ...] = (
@@ -188,10 +188,10 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
                     f"not valid {codec}: {error.__class__.__name__}",
                     where=f"{where}, line {done + 1}", fix="name the encoding it is in, e.g. --encoding cp1252",
                 ) from None  # fmt: skip
-            told = _by_words(path)
-            if told is not None:
-                text = f"not valid UTF-8, read as {told}, in which its headings are words of wind"
-                return told, (Finding(kind="encoding-assumed", severity=Severity.NOTE, what=text),)
+            codec = _by_words(path)
+            if codec is not None:
+                text = f"not valid UTF-8, read as {codec}, in which its headings are words of wind"
+                return codec, (Finding(kind="encoding-assumed", severity=Severity.NOTE, what=text),)
             return "latin-1", (
                 Finding(
                     kind="encoding-assumed", severity=Severity.WARNING, where=f"line {done + 1}",
