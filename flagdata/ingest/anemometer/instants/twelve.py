@@ -103,8 +103,8 @@ def _unknown(whose: str, line: int, where: str, *, first: bool = True) -> TimeEr
         else "export the log with a clock of 24 hours, or with AM and PM"
     )
     return TimeError(
-        f"the hours run from 1 to 12 without AM or PM, and the file does not say of which half of the day {whose} first "
-        "rows are",
+        f"the hours run from 1 to 12 without AM or PM, and the file does not say of which half of the day {whose} "
+        "first rows are",
         where=f"{where}, line {line}", fix=fix,
     )  # fmt: skip
 
