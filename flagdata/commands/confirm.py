@@ -1,21 +1,24 @@
-"""How a drafted reading is confirmed on the command line: by its hash, or by answers at a terminal."""
+"""How a drafted reading is completed and confirmed on the command line: by its hash, or by answers at a terminal."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 import click
 
 from flagdata.console import say
-from flagdata.errors import FlagdataError, ZoneMissingError
+from flagdata.errors import FlagdataError, RefusedError, ZoneMissingError
 
 if TYPE_CHECKING:
     from flagdata.ingest.anemometer.confirm import Drafted
+    from flagdata.ingest.anemometer.draft.questions import Open
 
 T = TypeVar("T")
+Answers = Mapping[str, object]
+"""Fields of `WindOptions` that were typed, by name."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ class OnCommandLine:
         if not self.asks or self.accept is not None:
             raise UnconfirmedError.of(drafted)
         for sentence in drafted.sentences():
-            if not _answer(f'"{sentence}" Is that right? (yes/no)', ("yes", "no")) == "yes":
+            if _choice(f'"{sentence}" Is that right? (yes/no)', ("yes", "no")) != "yes":
                 raise UnconfirmedError.of(drafted)
         return "at a terminal"
 
@@ -59,40 +62,94 @@ def at_terminal() -> bool:
     return sys.stdin.isatty() and sys.stderr.isatty()
 
 
-def with_zone(read: Callable[[str | None], T], *, asks: bool) -> T:
-    """What `read` gives; where it lacks the zone of a clock, with the one that is typed at a terminal.
+def with_answers(read: Callable[[Answers], T], *, asks: bool) -> T:
+    """What `read` gives; the questions that it lacks answers to are asked at a terminal, until none is left.
 
     Args:
-        read: called with the zone that was typed, `None` at first.
+        read: called with the answers so far.
         asks: whether somebody sits at a terminal.
 
     Raises:
-        ZoneMissingError: there is nobody to ask.
+        ZoneMissingError, OpenFactsError: there is nobody to ask.
+        RefusedError: an answer that only a recipe can give.
     """
-    try:
-        return read(None)
-    except ZoneMissingError as error:
-        if not asks:
-            raise
-        say(f"{error.where}: {error.what}" if error.where else error.what)
-    return read(_typed_zone())
+    from flagdata.ingest.anemometer.draft.questions import ZONE, OpenFactsError
 
-
-def _typed_zone() -> str:
-    from flagdata.timebase import zone
-
+    answers: dict[str, object] = {}
     while True:
-        question = "zone of the logger's clock (Europe/Amsterdam, +02:00, UTC)"
-        text: str = click.prompt(question, err=True, prompt_suffix="> ")
         try:
-            zone(text, where="zone")
+            return read(answers)
+        except ZoneMissingError:
+            if not asks:
+                raise
+            questions: tuple[Open, ...] = (ZONE,)
+        except OpenFactsError as error:
+            if not asks:
+                raise
+            questions = error.questions
+        for question in questions:
+            name, answer = _answer(question)
+            before = answers.get(name)
+            answers[name] = (*before, answer) if isinstance(before, tuple) else (answer,) if name in _LISTS else answer
+
+
+_DOUBT = "(yes; no; or a number that stands for no value)"
+_LISTS = frozenset({"missing", "expect"})
+
+
+def _answer(question: Open) -> tuple[str, object]:
+    """The option that a typed answer is of, and its value."""
+    from flagdata import timebase
+    from flagdata.units import canonical
+
+    if question.key == "sensor":
+        raise RefusedError(question.question, fix=question.fix())
+    checks: dict[str, Callable[[str], object]] = {
+        "zone": lambda text: timebase.zone(text, where="zone") and text,
+        "unit": lambda text: canonical(text, where="unit"),
+        "start": lambda text: timebase.parse(text, where="start"),
+        "date": _date,
+        "date_order": lambda text: text if text in ("dmy", "mdy", "ymd") else _wrong(text, "dmy, mdy or ymd"),
+        "platform": lambda text: text if text in ("fixed", "moving", "corrected") else _wrong(text, "one of the three"),
+    }
+    asked = f"{question.question} {_DOUBT}" if question.key == "expect" else question.question
+    while True:
+        text: str = click.prompt(asked, err=True, prompt_suffix="> ").strip()
+        try:
+            if question.key == "expect":
+                return _expected(question, text)
+            return question.key, checks.get(question.key, str)(text)
+        except RefusedError:
+            raise
         except FlagdataError as error:
             say(f"{error.what}; {error.fix}")
-            continue
-        return text
 
 
-def _answer(question: str, words: tuple[str, ...]) -> str:
+def _expected(question: Open, text: str) -> tuple[str, object]:
+    """What a doubt is answered with: "yes" for right as it is, a number that stands for no value, or a recipe."""
+    if text.lower() == "yes":
+        return "expect", question.example
+    if text.replace(",", ".").lstrip("+-").replace(".", "", 1).isdigit():
+        return "missing", text.replace(",", ".")
+    raise RefusedError(
+        f"{question.question} {text}", fix="describe the file by a recipe, and name it by --sensor FILE.toml"
+    )
+
+
+def _date(text: str) -> object:
+    import datetime as dt
+
+    try:
+        return dt.date.fromisoformat(text)
+    except ValueError:
+        return _wrong(text, "a date as 2026-05-01")
+
+
+def _wrong(text: str, wanted: str) -> object:
+    raise FlagdataError(f"{text!r} is no answer", fix=f"type {wanted}")
+
+
+def _choice(question: str, words: tuple[str, ...]) -> str:
     while True:
         text: str = click.prompt(question, err=True, prompt_suffix="> ").strip().lower()
         if text in words:

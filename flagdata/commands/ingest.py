@@ -84,7 +84,7 @@ from flagdata.errors import UsageError
     "With sort no clock was set: the rows are out of order.",
 )  # fmt: skip
 @click.option("--zero-offset", metavar="M/S", help="Wind: speed to subtract; report, or estimate from idle stretches.")
-@click.option("--encoding", metavar="CODEC", help="Wind: encoding of the text, where it cannot be told.")
+@click.option("--encoding", metavar="CODEC", help="Wind: encoding of the text, where the file does not show it.")
 @click.option(
     "--unit", metavar="UNIT",
     help="Wind: unit of a speed whose heading has none (m/s, km/h, mph, kn). Meshes, markers: of positions, else m.",
@@ -100,6 +100,13 @@ from flagdata.errors import UsageError
     "day, day_of_year, hour, minute, second, wind_speed, wind_direction, wind_direction_to, wind_x, wind_y, wind_z, "
     "apparent_wind_speed, apparent_wind_direction, air_temperature, relative_humidity, air_pressure, site. What is "
     "measured has its unit in brackets. A name that is not known is refused with the list of all.",
+)  # fmt: skip
+@click.option(
+    "--missing", multiple=True, metavar="TEXT", help="Wind: a cell that stands for no value, such as -99.9; repeatable."
+)
+@click.option(
+    "--expect", multiple=True, metavar="KEY",
+    help="Wind: a doubt about a draft that you have answered with yes, by the key that the refusal names; repeatable.",
 )  # fmt: skip
 @click.option(
     "--accept", metavar="HASH",
@@ -137,6 +144,8 @@ def ingest(
     unit: str | None,
     wind: str | None,
     columns: str | None,
+    missing: tuple[str, ...],
+    expect: tuple[str, ...],
     accept: str | None,
     as_json: bool,
     lake_path: str,
@@ -175,7 +184,7 @@ def ingest(
             format_name=None if format_name in ("camera", "meshes", "markers") else format_name, sensor=sensor,
             zone_name=zone, date=date, date_order=date_order, platform=platform, talker=talker, azimuth=azimuth,
             clock=clock, zero_offset=zero_offset, encoding=encoding, unit=unit, start=start, wind=wind, columns=columns,
-            rate=rate if "rate" in given else None,
+            rate=rate if "rate" in given else None, missing=missing, expect=expect,
         ),
         meshes=mesh_options(rate=rate if "rate" in given else None, length=length_unit(unit)),
         markers=marker_options(rate=rate if "rate" in given else None, length=length_unit(unit)),

@@ -1,4 +1,4 @@
-"""What `flagdata ingest` was told: the options of each kind of source, and which mean nothing for a source."""
+"""What the user gives `flagdata ingest`: the options of each kind of source, and which mean nothing for a source."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 CAMERA_ONLY = ("true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
 WIND_ONLY = (
     "sensor", "date", "date_order", "platform", "talker", "azimuth", "clock", "zero_offset", "encoding", "wind",
-    "columns", "accept",
+    "columns", "missing", "expect", "accept",
 )  # fmt: skip
 LENGTHS = ("unit",)
 """Options that meshes and markers share with the wind's speed."""
@@ -120,6 +120,8 @@ def wind_options(
     wind: str | None,
     rate: str | None,
     columns: str | None,
+    missing: tuple[str, ...] = (),
+    expect: tuple[str, ...] = (),
 ) -> WindIngest:
     """Those of an anemometer; `rate` is `None` where none is given.
 
@@ -165,6 +167,8 @@ def wind_options(
             rate=None if rate in (None, "native") else _rate(rate, "readings a second, or the time between two: 10min"),
             wind=wind,
             columns=columns,
+            missing=missing,
+            expect=expect,
         )
     )
 
@@ -234,7 +238,7 @@ def check_applies(kinds: Sequence[str | None], options: Given, *, given: frozens
     """Refuse options that mean nothing for any source, or that time or name more than one, before anything is written.
 
     Args:
-        kinds: of the sources; one that could not be told may be any.
+        kinds: of the sources; one that is not recognised may be any.
     """
     foreign = dict(FOREIGN)
     if options.zoned_start:

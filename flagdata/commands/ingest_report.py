@@ -1,4 +1,4 @@
-"""What `flagdata ingest` tells people: the report of an ingest, and what a source seems to be."""
+"""What `flagdata ingest` prints for people: the report of an ingest, and what a source seems to be."""
 
 from __future__ import annotations
 
@@ -11,20 +11,18 @@ if TYPE_CHECKING:
     from flagdata.ingest.store import IngestResult
 
 _ONCE = frozenset({"why", "note"})
-"""What is told of one artifact alone where another of the same source has it, too."""
-_ANEMOMETERS = 4
-"""Of one table that are described each; beyond these their number is told."""
+"""What is printed of one artifact alone where another of the same source has it, too."""
 
 
 def print_results(results: Sequence[IngestResult]) -> None:
     """What one source became, for people, on stdout."""
-    told: set[tuple[str, str]] = set()
+    printed: set[tuple[str, str]] = set()
     for result in results:
-        _print_result(result, told)
+        _print_result(result, printed)
 
 
-def _print_result(result: IngestResult, told: set[tuple[str, str]]) -> None:
-    """One artifact; of what was told of another of the same source, reasons and notes are not told again."""
+def _print_result(result: IngestResult, printed: set[tuple[str, str]]) -> None:
+    """One artifact; reasons and notes that were printed of another of the same source are left out."""
     artifact, report = result.artifact, result.report
     if not result.created:
         click.echo(f"already in the lake: {artifact.id}  {artifact.kind} {artifact.name} (from {artifact.source_name})")
@@ -32,10 +30,10 @@ def _print_result(result: IngestResult, told: set[tuple[str, str]]) -> None:
     click.echo(f"{artifact.id}  {artifact.kind} {artifact.name} (from {artifact.source_name})")
     again = 0
     for label, text in _lines(report):
-        if label in _ONCE and (label, text) in told:
+        if label in _ONCE and (label, text) in printed:
             again += 1
             continue
-        told.add((label, text))
+        printed.add((label, text))
         click.echo(f"  {label:<8} {text}")
     if again:
         click.echo(f"  {'':<8} and {again} reasons and notes as above")
@@ -100,15 +98,8 @@ def _device_lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
     return lines
 
 
-def _few(reasons: Sequence[str]) -> list[str]:
-    """Reasons, of which those that tell how each of many anemometers is read stand for the first few alone."""
-    each = [reason for reason in reasons if reason.startswith("anemometer ")]
-    shown = [reason for reason in reasons if reason not in each[_ANEMOMETERS:]]
-    return shown if len(each) <= _ANEMOMETERS else [*shown, f"{len(each) - _ANEMOMETERS} anemometers more: see --json"]
-
-
 def _how_sure(guess: Mapping[str, Any]) -> str:
-    """What speaks for a guess: the format's own score, or how far a draft tells what the columns are."""
+    """What speaks for a guess: the format's own score, or whether a draft has questions."""
     if guess["draft"] and guess["kind"] == "anemometer":
         return "by its columns, with questions" if guess["doubts"] else "by its columns"
     return f"{guess['score']:.0%} match"
@@ -120,7 +111,7 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
     for guess in entry["guesses"]:
         recipe = f", recipe {guess['recipe']}" if guess["recipe"] else ""
         click.echo(f"  {guess['kind']}: {guess['format']}{recipe} ({_how_sure(guess)})")
-        for reason in _few(guess["reasons"]):
+        for reason in guess["reasons"]:
             click.echo(f"    because {reason}")
         if guess["fix"] and guess["kind"] != "camera" and not guess["doubts"]:
             click.echo(f"    to do: {guess['fix']}")

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
-from flagdata.commands.confirm import with_zone
+from flagdata.commands.confirm import Answers, with_answers
 from flagdata.commands.ingest_options import Given, check_applies
 from flagdata.commands.ingest_report import print_results, print_sniffed
 from flagdata.console import document, fail, progress, say
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from flagdata.ingest.store import IngestResult
     from flagdata.lake import Lake
 
-Told = TypeVar("Told")
+Recognised = TypeVar("Recognised")
 Done = TypeVar("Done")
 
 
@@ -38,7 +38,7 @@ def ingest_sources(
 
     Args:
         given: parameters that stand on the command line.
-        format_name: of all sources; None to tell it by their content.
+        format_name: of all sources; None to recognise it by the content.
 
     Raises:
         FlagdataError: an option that means nothing for any source, or a single source that failed.
@@ -46,7 +46,7 @@ def ingest_sources(
     from flagdata.ingest.classify import classify
 
     recipe, columns = options.wind.wind.recipe, options.wind.wind.columns
-    kinds = _told(
+    kinds = _recognised(
         sources, lambda source: classify(source, format_name=format_name, recipe=recipe, columns=columns)
     )  # fmt: skip
     check_applies([None if isinstance(kind, FlagdataError) else kind.kind for kind in kinds], options, given=given)
@@ -68,14 +68,14 @@ def ingest_sources(
 
 
 def sniff_sources(sources: Sequence[Path], options: Given, *, given: frozenset[str], as_json: bool) -> None:
-    """Report what each source seems to be; exits with 1 where one of several cannot be told.
+    """Report what each source seems to be; exits with 1 where one of several is not recognised.
 
     Raises:
         FlagdataError: as `ingest_sources`.
     """
     from flagdata.ingest.classify import guesses
 
-    ranked = _told(sources, lambda source: _completed(source, guesses(source), options))
+    ranked = _recognised(sources, lambda source: _completed(source, guesses(source), options))
     check_applies([None if isinstance(r, FlagdataError) else r[0].kind for r in ranked], options, given=given)
     entries, failures = _each(
         sources, ranked, lambda source, found: _look(source, found, options), print_sniffed, as_json=as_json
@@ -134,22 +134,22 @@ def _guess(guess: Guess) -> dict[str, Any]:
     }
 
 
-def _told(sources: Sequence[Path], tell: Callable[[Path], Told]) -> list[Told | FlagdataError]:
-    """What each source is, or why that cannot be told."""
+def _recognised(sources: Sequence[Path], recognise: Callable[[Path], Recognised]) -> list[Recognised | FlagdataError]:
+    """What each source is, or why it is not recognised."""
 
-    def told(source: Path) -> Told | FlagdataError:
+    def of(source: Path) -> Recognised | FlagdataError:
         try:
-            return tell(source)
+            return recognise(source)
         except FlagdataError as error:
             return error
 
-    return [told(source) for source in sources]
+    return [of(source) for source in sources]
 
 
 def _each(
     sources: Sequence[Path],
-    told: Sequence[Told | FlagdataError],
-    act: Callable[[Path, Told], Done],
+    recognised: Sequence[Recognised | FlagdataError],
+    act: Callable[[Path, Recognised], Done],
     show: Callable[[Done], None],
     *,
     as_json: bool,
@@ -157,7 +157,7 @@ def _each(
     """Act on every source in turn and show it; one that fails leaves the others to go on, unless it is the only one."""
     results: list[Done] = []
     failures: list[tuple[Path, FlagdataError]] = []
-    for source, found in zip(sources, told, strict=True):
+    for source, found in zip(sources, recognised, strict=True):
         try:
             if isinstance(found, FlagdataError):
                 raise found
@@ -199,7 +199,7 @@ def _one(lake: Lake, source: Path, kind: Guess, options: Given) -> tuple[IngestR
     if kind.kind == "meshes":
         return (_meshes(lake, source, kind, options),)
     if kind.kind != "camera":
-        return with_zone(lambda zone: _winds(lake, source, _in_zone(options, zone)), asks=options.confirm.asks)
+        return with_answers(lambda answers: _winds(lake, source, _with(options, answers)), asks=options.confirm.asks)
     with progress(None, label=source.name, unit="frame") as advance, _CropPicture(options.crop_picture) as picture:
         result = ingest_camera(
             lake, source, options.camera, labels=options.labels, branch=options.branch, reasons=kind.reasons,
@@ -208,11 +208,9 @@ def _one(lake: Lake, source: Path, kind: Guess, options: Given) -> tuple[IngestR
     return (result,)
 
 
-def _in_zone(options: Given, zone: str | None) -> Given:
-    """The options with the zone that was typed, if one was."""
-    if zone is None:
-        return options
-    return replace(options, wind=replace(options.wind, wind=replace(options.wind.wind, zone=zone)))
+def _with(options: Given, answers: Answers) -> Given:
+    """The options with the answers that were typed."""
+    return replace(options, wind=replace(options.wind, wind=replace(options.wind.wind, **dict(answers))))  # type: ignore[arg-type]
 
 
 def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]:
@@ -245,7 +243,7 @@ def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]
     dead = [(label, one) for label, one in zip(found, done, strict=True) if not isinstance(one, IngestResult)]
     if not results:
         raise dead[0][1]
-    told = [
+    left_out = [
         Finding(
             kind="anemometer-left-out", severity=Severity.WARNING, what=f"the anemometer {label!r}: {error.what}",
             where=error.where, fix=error.fix,
@@ -253,7 +251,7 @@ def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]
         for label, error in dead
     ]  # fmt: skip
     first = results[0]
-    report = {**first.report, "findings": [*first.report["findings"], *told]}
+    report = {**first.report, "findings": [*first.report["findings"], *left_out]}
     return (replace(first, report=report), *results[1:])
 
 

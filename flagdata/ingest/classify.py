@@ -47,7 +47,7 @@ def classify(
     """What a source is to be ingested as: a guess of kind "camera", "anemometer", "meshes" or "markers".
 
     Args:
-        format_name: the user's word for it: "camera", "meshes", "markers" or an anemometer format; goes before the
+        format_name: what the user says it is: "camera", "meshes", "markers" or an anemometer format; goes before the
             content.
         recipe: a sensor recipe the user named, for any source that is no camera's, meshes or markers by its content.
         columns: what the columns of a table are, by the user's word; likewise.
@@ -78,8 +78,7 @@ def classify(
     if by_content or best.kind == "anemometer":
         return best
     raise InputError(
-        "neither a camera file nor an anemometer log nor a folder of meshes nor a marker table: "
-        f"{'; '.join(best.reasons)}",
+        f"no video, wind log, folder of meshes or table of markers: {'; '.join(best.reasons)}",
         where=str(path),
         fix=best.fix or "see flagdata ingest --sniff",
     )

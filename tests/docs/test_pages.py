@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from flagdata.cli import main
+from flagdata.errors import InputError
+from flagdata.ingest.anemometer import WindOptions
+from flagdata.ingest.anemometer.identify import opened
+from flagdata.ingest.anemometer.sniffing import Head
 from flagdata.lake import Lake
 from flagdata.rng import stream
 from measure.demo.field import SENSOR, START, FieldRecipe, film, write_log
@@ -118,6 +125,39 @@ def test_every_command_of_a_page_that_stands_alone_runs(
         for number, row in enumerate(files(page)["fabrics.csv"].splitlines()[1:]):
             write_flag(tmp_path / row.split(",")[0], np.full(35, 3.0 + number), RECIPE)
     assert any(run_page(page))
+
+
+def test_the_transcripts_of_a_draft_are_what_the_program_prints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    enter(tmp_path, monkeypatch, "sensors.md")
+    Lake.create(tmp_path / "field.lake")
+    at_terminal, script = blocks("sensors.md", "text")
+    first, *refused, accepted = script.splitlines()
+    for command, code in ((first, 3), (accepted, 0)):
+        with pytest.raises(SystemExit) as ended:
+            main(shlex.split(command)[2:])
+        assert ended.value.code == code
+    printed = "".join(capsys.readouterr())
+    transcribed = [*refused, *(line for line in at_terminal.splitlines() if line.startswith("  "))]
+    assert [line for line in transcribed if line not in printed and not line.startswith("…")] == []
+
+
+def test_the_format_of_the_page_reads_its_own_lines(tmp_path: Path) -> None:
+    names: dict[str, Any] = {}
+    exec(compile(files("wind-formats.md")["calmlog.py"], "calmlog.py", "exec"), names)
+    path = tmp_path / "calm.log"
+    path.write_text("CALM 2026-05-01T12:00:00Z 4.2\nCALM 2026-05-01T12:00:01Z 4.3\n", encoding="utf-8")
+    source = opened(path, WindOptions())
+    reader = names["CalmLog"]()
+    assert reader.recognise(Head(lines=tuple(source.head()))).format == "calmlog"
+    assert reader.recognise(Head(lines=("time,speed",))) is None
+    reading = reader.read(source, WindOptions())
+    assert reading.channels["wind_speed"].tolist() == [4.2, 4.3]
+    assert np.diff(reading.time).tolist() == [1_000_000_000]
+    path.write_text("CALM 2026-05-01T12:00:00Z 4.2\nnonsense\n", encoding="utf-8")
+    with pytest.raises(InputError, match="line 2"):
+        reader.read(opened(path, WindOptions()), WindOptions())
 
 
 def test_no_page_with_commands_is_forgotten() -> None:

@@ -19,6 +19,7 @@ from flagdata.ingest.anemometer.recipe import (
 from flagdata.signals import Sensor
 from sim.effects import EFFECTS, SENSOR_EFFECTS
 from tests.docs.pages import DOCS
+from tests.flagdata.ingest.anemometer.test_silent_errors import KINDS
 
 COMMANDS = dict(generate_cli.commands())
 
@@ -55,16 +56,22 @@ def test_every_effect_and_each_of_its_parameters_is_on_the_page(name: str) -> No
 
 @pytest.mark.parametrize("table", [FileLayout, TimeLayout, ChannelLayout, Sensor, QualityRules, CheckLayout])
 def test_every_key_of_a_sensor_recipe_is_on_the_page(table: type) -> None:
-    page = (DOCS / "sensors.md").read_text(encoding="utf-8")
+    page = (DOCS / "wind-recipes.md").read_text(encoding="utf-8")
     rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
     keys = {key.strip(" `") for row in rows for key in row.split(",")}
     assert {field.name.replace("_", "-") for field in fields(table)} <= keys
 
 
 def test_every_table_of_a_sensor_recipe_is_on_the_page() -> None:
-    page = (DOCS / "sensors.md").read_text(encoding="utf-8")
+    page = (DOCS / "wind-recipes.md").read_text(encoding="utf-8")
     tables = {"file": "[file]", "time": "[time]", "channels": "[channels.NAME]", "sensor": "[sensor]",
-              "rows": "[rows]", "quality": "[quality]", "checks": "[[check]]"}  # fmt: skip
+              "rows": "[rows]", "quality": "[quality]", "checks": "[[check]]",
+              "expect": "[expect]"}  # fmt: skip
     for field in fields(Recipe):
-        shown = f"### `{tables[field.name]}`" if field.name in tables else f"| `{field.name}` |"
+        shown = f"## `{tables[field.name]}`" if field.name in tables else f"| `{field.name}` |"
         assert shown in page, field.name
+
+
+def test_every_kind_of_silent_error_is_on_its_page() -> None:
+    page = " ".join((DOCS / "results" / "wind-logs-unseen.md").read_text(encoding="utf-8").split())
+    assert [name for name in KINDS if name not in page] == []

@@ -49,18 +49,23 @@ class Drafted:
 
     def sentences(self) -> tuple[str, ...]:
         """One row of each reading as a sentence."""
-        return tuple(_sentence(log) for log, _ in self.readings)
+        several = len(self.readings) > 1
+        return tuple(_sentence(log, f" at {log.series.sensor.name!r}" if several else "") for log, _ in self.readings)
 
     def preview(self) -> str:
         """How the file was understood, for people: reasons, rows beside what was read of them, findings."""
-        lines = [f"{self.path.name} is a table that no recipe describes. It was understood so:"]
-        for log, _ in self.readings:
+        lines = [f"{self.path.name} is a table that no recipe describes. This is how it is read:"]
+        for number, (log, _) in enumerate(self.readings, start=1):
+            if len(self.readings) > 1:
+                lines.append(f"anemometer {number} of {len(self.readings)}: {log.series.sensor.name}")
             lines += [f"  {reason}" for reason in log.reasons]
             for row in log.rows:
                 lines.append(f"    line {row.line}  {row.text[:_WIDE]}  →  {iso(row.time)}  {row.wind}")
             series = log.series
             lines.append(f"  {len(series)} rows from {iso(int(series.time[0]))} to {iso(int(series.time[-1]))}")
-            lines += [f"  {f.severity}: {f.what}" for f in log.findings if f.severity is not Severity.ERROR]
+            for found in log.findings:
+                if found.severity is not Severity.ERROR:
+                    lines.append(f"  {found.severity}: {found.what}{f'; {found.fix}' if found.fix else ''}")
         return "\n".join(lines)
 
 
@@ -78,11 +83,11 @@ class UnconfirmedError(RefusedError):
     def of(cls, drafted: Drafted) -> UnconfirmedError:
         """The error for some drafted readings, with both ways out."""
         return cls(
-            "how this file is to be read was drafted by the program, and nobody has confirmed it",
+            "parts of how this file is read are inferred or assumed, and nobody has confirmed them",
             where=str(drafted.path), accept=drafted.accept, preview=drafted.preview(),
-            fix=f"compare the rows that are shown with what you know of the wind; if they are right, add --accept "
-            f"{drafted.accept}; if not, describe the file by a recipe: --sensor FILE.toml (flagdata ingest --sniff "
-            "prints the draft as one)",
+            fix=f"compare the rows above with what you know of the wind; if they are right, repeat the command with "
+            f"--accept {drafted.accept}; if not, describe the file by a recipe: --sensor FILE.toml (flagdata ingest "
+            "--sniff prints a recipe to begin with)",
         )  # fmt: skip
 
     def as_dict(self) -> dict[str, str | None]:
@@ -136,6 +141,6 @@ def confirmed(
     return confirm(Drafted(path=path, source_hash=source_hash, readings=drafts))
 
 
-def _sentence(log: WindLog) -> str:
+def _sentence(log: WindLog, where: str) -> str:
     row = log.rows[0]
-    return f"On {iso(row.time)[:10]} at {iso(row.time)[11:].removesuffix('Z')} UTC the wind was {row.wind}."
+    return f"On {iso(row.time)[:10]} at {iso(row.time)[11:].removesuffix('Z')} UTC the wind{where} was {row.wind}."

@@ -14,20 +14,17 @@ from flagdata.addresses import local_path
 from flagdata.errors import InputError, NothingMeasuredError, TimeError, UsageError, ZoneMissingError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import recipe as recipes
-from flagdata.ingest.anemometer.documents.opening import open_text
+from flagdata.ingest.anemometer import untimed
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
+from flagdata.ingest.anemometer.identify import opened, recognised, unknown
 from flagdata.ingest.anemometer.instants import zones
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.plan import understood
 from flagdata.ingest.anemometer.preview import shown_rows
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
-from flagdata.ingest.anemometer.recognition import recognise
-from flagdata.ingest.anemometer.restating import bulletins, spelled_stamps, untimed
-from flagdata.ingest.anemometer.restating.restate import restate
 from flagdata.ingest.anemometer.samples import calm_zeros, future, platform, possible, quality, steady, zero
 from flagdata.ingest.anemometer.samples.order import in_order
-from flagdata.ingest.anemometer.sniff import unknown
-from flagdata.ingest.anemometer.sniffing import SURE, as_taken
+from flagdata.ingest.anemometer.table.delimited import Delimited, drafted
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import CHANNELS, UNUSABLE
 from flagdata.signals import WindLog, WindSeries
@@ -45,16 +42,14 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
 
     Raises:
         InputError, TimeError, LimitError: the file cannot be read as this format; names the line and the fix.
-        UsageError: options that do not fit the format, or a format that cannot be told from the file.
+        UsageError: options that do not fit the format, or a file of no known format.
         NotFoundError: no such file, or no such recipe.
     """
     path = local_path(path)
     options = options or WindOptions()
     recipe = recipes.load(options.recipe) if options.recipe is not None else None
-    encoding = options.encoding or (recipe.file.encoding if recipe else None)
-    source = open_text(path, limits=options.limits, encoding=encoding)
+    source = opened(path, options, recipe.file.encoding if recipe else None)
     if options.rate is not None:
-        source = untimed.timed(source, rate=options.rate, start=options.start, columns=options.columns)
         options = replace(options, start=None, rate=None)
     if recipe is None and options.columns is None and untimed.clocked(source):
         if options.date is None:
@@ -65,11 +60,6 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
             fix = f"give the day of the first: --date {example}, and its --zone"
             raise TimeError(what, where=str(path), fix=fix)
         source, options = untimed.dated(source, options.date), replace(options, date=None)
-    elif recipe is None and options.columns is None and spelled_stamps.spelled(source.head()):
-        source, options = spelled_stamps.restamped(source, options.date_order), replace(options, date_order=None)
-    if recipe is None and bulletins.matches(source.head()):
-        source, options = bulletins.dated(source, options.date), replace(options, date=None)
-    source = restate(source, recipe)
     name, options, reasons = _choose(source, options)
     reader: Format = FORMATS[name]()
     unused = options.given() - reader.uses
@@ -85,8 +75,12 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         if not hint:
             raise
         raise ZoneMissingError(error.what, where=error.where, fix=f"{error.fix}; {hint}") from None
-    told = {finding.kind for finding in reading.findings}
-    if statement is not None and options.zone is not None and told.isdisjoint({"zone-contradicts", "zone-not-needed"}):
+    reported = {finding.kind for finding in reading.findings}
+    if (
+        statement is not None
+        and options.zone is not None
+        and reported.isdisjoint({"zone-contradicts", "zone-not-needed"})
+    ):
         says = f"line {statement.line} ({statement.text!r}) says"
         reading = reading.with_findings(zones.contradiction(says, statement.name, options.zone, reading.time))
     if "platform" not in reader.uses:
@@ -119,7 +113,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     reasons = reading.understood or reasons
     text = reading.drafted or (_text(options.recipe) if options.recipe is not None else None)
     stated = reading.stated and _DOUBTS.isdisjoint(finding.kind for finding in findings)
-    rows = shown_rows(source, reading) if reading.drafted and not stated else ()
+    rows = shown_rows(source, reading) if reading.drafted else ()
     return WindLog(
         series=series, format=name, findings=findings, reasons=reasons, plan=understood(name, text),
         drafted=reading.drafted, stated=stated, rows=rows,
@@ -182,15 +176,12 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
         return name, options, (f"the recipe {options.recipe} was named",)
     if options.columns is not None:
         return "delimited", options, ("its columns were named",)
-    guesses = as_taken(recognise(source))
-    if not guesses or (guesses[0].score < SURE and not guesses[0].doubts):
-        guesses = guesses or (unknown(source),)
-        seen = "; ".join(reason for guess in guesses for reason in guess.reasons)
-        raise InputError(
-            f"not a log of a known format{': ' + seen if seen else ''}", where=str(source.path),
-            fix=guesses[0].fix
-            or "describe it by a recipe (--recipe FILE.toml of ingest, --sensor FILE.toml of close-loop), or name "
-            "its format (--as of ingest)",
-        )  # fmt: skip
+    guesses = recognised(source)
+    if not guesses:
+        if drafted(source, options) is None:
+            other = unknown(source)
+            what = f"not a log of a known format: {'; '.join(other.reasons)}"
+            raise InputError(what, where=str(source.path), fix=other.fix or "describe it by a recipe")
+        return Delimited.name, options, ()
     best = guesses[0]
     return best.format, replace(options, recipe=best.recipe), best.reasons

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal, TypeAlias
@@ -12,7 +11,7 @@ from flagdata.errors import UsageError
 from flagdata.ingest.anemometer.instants.clock import ClockChoice
 from flagdata.units import unit
 
-_LATER = frozenset({"clock", "unit", "start", "wind", "rate", "columns"})
+_LATER = frozenset({"clock", "unit", "start", "wind", "rate", "columns", "missing", "expect"})
 ZeroOffset: TypeAlias = float | Literal["report", "estimate"]
 """What to do with a reading that is not zero in calm air: subtract this many m/s, report what the idle stretches show
 and change nothing, or subtract what they show."""
@@ -64,6 +63,8 @@ class WindOptions:
         rate: readings a second [Hz] of a file whose rows carry no time; needs `start`.
         wind: which anemometer of a file that holds several, by the label that `sniff` gives it.
         columns: what the columns of a table are, in one line (see `stated_columns`).
+        missing: further spellings of "no value" of a table that no recipe describes.
+        expect: doubts about a draft that its user has answered (keys of `draft.doubts`).
         zero_offset: see `ZeroOffset`; `None` is the recipe's, which is "report" unless it says otherwise.
         limits: see `Limits`.
     """
@@ -83,6 +84,8 @@ class WindOptions:
     rate: float | None = None
     wind: str | None = None
     columns: str | None = None
+    missing: tuple[str, ...] = ()
+    expect: tuple[str, ...] = ()
     zero_offset: ZeroOffset | None = None
     limits: Limits = field(default_factory=Limits)
 
@@ -109,7 +112,11 @@ class WindOptions:
         every format alike.
         """
         apart = {"format", "recipe", "limits", "encoding", "zero_offset", "clock", "platform", "rate"}
-        return frozenset(f.name for f in fields(self) if f.name not in apart and getattr(self, f.name) is not None)
+        return frozenset(f.name for f in fields(self) if f.name not in apart and self._is_given(f.name))
+
+    def _is_given(self, name: str) -> bool:
+        value = getattr(self, name)
+        return bool(value) if isinstance(value, tuple) else value is not None
 
     def as_dict(self) -> Mapping[str, Any]:
         """Everything that shapes the result, for a recipe hash; limits do not (they only refuse).
@@ -117,14 +124,9 @@ class WindOptions:
         Options that came later are there only where they are given, so that older artifacts keep their hash.
         """
         content = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "limits"}
-        content = {name: value for name, value in content.items() if name not in _LATER or value is not None}
+        content = {name: value for name, value in content.items() if name not in _LATER or self._is_given(name)}
         content["date"] = self.date.isoformat() if self.date else None
         return content
-
-
-def in_shell(text: str) -> str:
-    """A value of an option as its user types it: quoted, but for letters and digits alone."""
-    return text if text.isalnum() else shlex.quote(text) if "'" in text else f"'{text}'"
 
 
 def check_zero_offset(value: object, *, where: str) -> None:

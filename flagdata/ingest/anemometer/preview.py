@@ -16,15 +16,17 @@ _FIRST = 2
 
 
 def shown_rows(source: TextFile, reading: Reading) -> tuple[LogRow, ...]:
-    """The first two rows, the slowest, the fastest and the last, in the order of the file.
+    """The first two rows with a speed, the slowest, the fastest and the last, in the order of the file.
 
     Args:
         source: the text that was read.
         reading: its rows, put in order and judged; at least one.
     """
     speed = _speed(reading)
-    chosen = {*range(min(_FIRST, len(reading.time))), len(reading.time) - 1}
-    if np.isfinite(speed).any():
+    known = np.flatnonzero(np.isfinite(speed))
+    first = known if len(known) else np.arange(len(reading.time))
+    chosen = {*map(int, first[:_FIRST]), len(reading.time) - 1}
+    if len(known):
         chosen |= {int(np.nanargmin(speed)), int(np.nanargmax(speed))}
     texts = _lines(source, {int(reading.line[row]) for row in chosen})
     return tuple(
@@ -38,7 +40,8 @@ def shown_rows(source: TextFile, reading: Reading) -> tuple[LogRow, ...]:
 
 def wind_of(reading: Reading, row: int) -> str:
     """The wind of a row for people: speed in m/s and direction in degrees, or components, and its flags."""
-    parts = [f"{reading.channels[name][row]:.2f} m/s" for name in _SPEEDS if name in reading.channels]
+    speeds = [reading.channels[name][row] for name in _SPEEDS if name in reading.channels]
+    parts = [f"{speed:.2f} m/s" if np.isfinite(speed) else "no speed," for speed in speeds]
     if not parts:
         parts = [
             f"{name.removeprefix('wind_')} {reading.channels[name][row]:+.2f}"

@@ -11,15 +11,15 @@ A recipe is parsed here and nowhere else; unknown keys are refused with the near
     [sensor]                  name, height, distance-constant, averaging, threshold, resolution, accuracy,
                               accuracy-relative (all SI)
     [quality]                 zero-offset, stale-after, frame-rate-of, fault-where-zero
+    [expect]                  confirmed: doubts about a draft that its user has answered (keys of draft/doubts.py)
     [[check]]                 column, values, about: cells that must be one of these texts, else the row is a fault
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 from flagdata.errors import FlagdataError, InputError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer.instants import counted
@@ -28,10 +28,9 @@ from flagdata.ingest.anemometer.options import ZeroOffset, check_zero_offset
 from flagdata.recipes import Shelf, parsed
 from flagdata.schema import CHANNELS
 from flagdata.signals import Sensor
+from flagdata.tables import Table
 from flagdata.timebase import zone
 from flagdata.units import unit
-
-T = TypeVar("T")
 
 SENSORS = Shelf(folder="sensors", noun="sensor recipe")
 
@@ -214,6 +213,7 @@ class Recipe:
     quality: QualityRules = field(default_factory=QualityRules)
     checks: tuple[CheckLayout, ...] = ()
     rows: RowsLayout | None = None
+    expect: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         if not self.time.columns and not self.file.host:
@@ -255,7 +255,7 @@ def parse(text: str, *, where: str) -> Recipe:
     """
     data = parsed(text, where=where)
     try:
-        return _Reader(data, where).recipe()
+        return _recipe(Table(data, where=where))
     except UnknownNameError as error:
         raise UnknownNameError(error.what, where=_inside(where, error.where), fix=error.fix) from None
     except FlagdataError as error:
@@ -263,166 +263,131 @@ def parse(text: str, *, where: str) -> Recipe:
 
 
 def _inside(file: str, place: str | None) -> str:
-    return file if place in (None, file) else f"{file}: {place}"
+    return place if place is not None and place.startswith(file) else f"{file}: {place}" if place else file
 
 
-class _Reader:
-    """Takes known keys out of TOML tables; what is left over is unknown."""
+def _recipe(table: Table) -> Recipe:
+    _known(table, "name about source file time rows channels sensor quality check expect")
+    text = {key: _text(table, key) for key in ("name", "about", "source")}
+    channels, rows, expect = table.table("channels"), table.table("rows"), table.table("expect")
+    _known(rows, "column value")
+    _known(expect, "confirmed")
+    return Recipe(
+        name=text["name"], about=text["about"], source=text["source"],
+        file=_file(table.table("file")),
+        time=_time(table.table("time")),
+        channels={name: _channel(channels.table(name)) for name in channels.names()},
+        sensor=_sensor(table.table("sensor")),
+        quality=_quality(table.table("quality")),
+        rows=RowsLayout(column=_column(rows), value=_text(rows, "value")) if rows.names() else None,
+        expect=frozenset(expect.texts("confirmed")),
+        checks=tuple(map(_check, table.tables("check"))),
+    )  # fmt: skip
 
-    def __init__(self, data: Mapping[str, Any], where: str) -> None:
-        self.data = data
-        self.where = where
 
-    def recipe(self) -> Recipe:
-        self._known(self.data, "the recipe", "name about source file time rows channels sensor quality check")
-        text = {key: self._text(self.data, key, "the recipe") for key in ("name", "about", "source")}
-        channels = self._table(self.data, "channels")
-        return Recipe(
-            name=text["name"], about=text["about"], source=text["source"],
-            file=self._file(self._table(self.data, "file")),
-            time=self._time(self._table(self.data, "time")),
-            channels={name: self._channel(name, self._table(channels, name)) for name in channels},
-            sensor=self._sensor(self._table(self.data, "sensor")),
-            quality=self._quality(self._table(self.data, "quality")),
-            rows=self._rows(self._table(self.data, "rows")),
-            checks=tuple(self._check(table) for table in self._typed(self.data, "check", list, [])),
-        )  # fmt: skip
+def _file(table: Table) -> FileLayout:
+    _known(table, "delimiter decimal encoding preamble header comment missing host")
+    delimiter = table.text("delimiter", ",") or ","
+    return FileLayout(
+        delimiter=DELIMITERS.get(delimiter, delimiter),
+        decimal=table.text("decimal", "."),  # type: ignore[arg-type]
+        encoding=table.text("encoding", None),
+        preamble=table.whole("preamble", 0, least=0),
+        header=table.whole("header", 1, least=0),
+        comment=table.text("comment", "") or "",
+        missing=tuple(str(code).strip().lower() for code in _list(table, "missing")),
+        host=table.text("host", "") or "",
+    )
 
-    def _file(self, table: Mapping[str, Any]) -> FileLayout:
-        self._known(table, "[file]", "delimiter decimal encoding preamble header comment missing host")
-        delimiter = self._typed(table, "delimiter", str, ",")
-        return FileLayout(
-            delimiter=DELIMITERS.get(delimiter, delimiter),
-            decimal=self._typed(table, "decimal", str, "."),  # type: ignore[arg-type]
-            encoding=self._typed(table, "encoding", str, None),
-            preamble=self._typed(table, "preamble", int, 0),
-            header=self._typed(table, "header", int, 1),
-            comment=self._typed(table, "comment", str, ""),
-            missing=tuple(str(code).strip().lower() for code in self._typed(table, "missing", list, [])),
-            host=self._typed(table, "host", str, ""),
-        )
 
-    def _time(self, table: Mapping[str, Any]) -> TimeLayout:
-        self._known(table, "[time]", "columns format zone")
-        return TimeLayout(
-            columns=tuple(self._column(c, "[time] columns") for c in self._typed(table, "columns", list, [])),
-            format=self._text(table, "format", "[time]"),
-            zone=self._typed(table, "zone", str, None),
-        )
+def _time(table: Table) -> TimeLayout:
+    _known(table, "columns format zone")
+    return TimeLayout(
+        columns=tuple(_column_of(one, table.where) for one in _list(table, "columns")),
+        format=_text(table, "format"),
+        zone=table.text("zone", None),
+    )
 
-    def _rows(self, table: Mapping[str, Any]) -> RowsLayout | None:
-        self._known(table, "[rows]", "column value")
-        if not table:
-            return None
-        if "column" not in table:
-            raise InputError("no column", where="[rows]", fix="name the column or give its number (from 1)")
-        return RowsLayout(column=self._column(table["column"], "[rows]"), value=self._text(table, "value", "[rows]"))
 
-    def _channel(self, name: str, table: Mapping[str, Any]) -> ChannelLayout:
-        where = f"[channels.{name}]"
-        self._known(table, where, "column unit gain offset range convention rotation optional suffix")
-        if "column" not in table:
-            raise InputError("no column", where=where, fix="name the column or give its number (from 1)")
-        bounds = self._typed(table, "range", list, None)
-        if bounds is not None and (len(bounds) != 2 or not all(isinstance(b, (int, float)) for b in bounds)):
-            raise InputError("range is not two numbers", where=where, fix="give [lowest, highest]")
-        return ChannelLayout(
-            column=self._column(table["column"], where),
-            unit=self._text(table, "unit", where),
-            gain=self._number(table, "gain", 1.0),
-            offset=self._number(table, "offset", 0.0),
-            range=(float(bounds[0]), float(bounds[1])) if bounds else None,
-            convention=self._typed(table, "convention", str, "from"),  # type: ignore[arg-type]
-            rotation=self._number(table, "rotation", 0.0),
-            optional=self._typed(table, "optional", bool, False),
-            suffix=self._typed(table, "suffix", str, ""),
-        )
+def _channel(table: Table) -> ChannelLayout:
+    _known(table, "column unit gain offset range convention rotation optional suffix")
+    bounds = table.numbers("range")
+    if "range" in table and len(bounds) != 2:
+        raise InputError("range is not two numbers", where=table.where, fix="give [lowest, highest]")
+    return ChannelLayout(
+        column=_column(table),
+        unit=_text(table, "unit"),
+        gain=table.number("gain", 1.0),
+        offset=table.number("offset", 0.0),
+        range=(bounds[0], bounds[1]) if bounds else None,
+        convention=table.text("convention", "from"),  # type: ignore[arg-type]
+        rotation=table.number("rotation", 0.0),
+        optional=table.flag("optional"),
+        suffix=table.text("suffix", "") or "",
+    )
 
-    def _sensor(self, table: Mapping[str, Any]) -> Sensor:
-        self._known(
-            table, "[sensor]",
-            "name height distance-constant averaging threshold resolution accuracy accuracy-relative",
-        )  # fmt: skip
-        numbers = {key: self._number(table, key, None) for key in table if key != "name"}
-        for key, value in numbers.items():
-            if value is None or value < 0:
-                raise InputError(f"{key} is negative", where="[sensor]", fix="give it in SI units, 0 or more")
-        return Sensor(
-            name=self._text(table, "name", "[sensor]"),
-            height=numbers.get("height"),
-            distance_constant=numbers.get("distance-constant"),
-            averaging=numbers.get("averaging"),
-            threshold=numbers.get("threshold"),
-            resolution=numbers.get("resolution"),
-            accuracy=numbers.get("accuracy"),
-            accuracy_relative=numbers.get("accuracy-relative"),
-        )
 
-    def _quality(self, table: Mapping[str, Any]) -> QualityRules:
-        self._known(table, "[quality]", "zero-offset stale-after frame-rate-of fault-where-zero")
-        lists = {key: self._typed(table, key, list, []) for key in ("frame-rate-of", "fault-where-zero")}
-        for key, channels in lists.items():
-            for name in channels:
-                if name not in CHANNELS:
-                    raise UnknownNameError.of("channel", str(name), CHANNELS, where=f"[quality] {key}")
-        return QualityRules(
-            zero_offset=table.get("zero-offset", "report"),
-            stale_after=self._number(table, "stale-after", None),
-            frame_rate_of=tuple(lists["frame-rate-of"]),
-            fault_where_zero=tuple(lists["fault-where-zero"]),
-        )
+def _sensor(table: Table) -> Sensor:
+    numbers = (
+        "height", "distance-constant", "averaging", "threshold", "resolution", "accuracy", "accuracy-relative",
+    )  # fmt: skip
+    _known(table, " ".join(("name", *numbers)))
+    given = {key.replace("-", "_"): table.number(key, 0.0, least=0.0) for key in numbers if key in table}
+    return Sensor(name=_text(table, "name"), **given)
 
-    def _check(self, table: Mapping[str, Any]) -> CheckLayout:
-        where = "[[check]]"
-        if not isinstance(table, dict):
-            raise InputError("check is not a table", where=where, fix="write it as [[check]]")
-        self._known(table, where, "column values about")
-        if "column" not in table:
-            raise InputError("no column", where=where, fix="name the column or give its number (from 1)")
-        return CheckLayout(
-            column=self._column(table["column"], where),
-            values=tuple(str(value).strip() for value in self._typed(table, "values", list, [])),
-            about=self._text(table, "about", where),
-        )
 
-    def _known(self, table: Mapping[str, Any], where: str, known: str) -> None:
-        for key in table:
-            if key not in known.split():
-                raise UnknownNameError.of("key", key, known.split(), where=where)
+def _quality(table: Table) -> QualityRules:
+    _known(table, "zero-offset stale-after frame-rate-of fault-where-zero")
+    lists = {key: table.texts(key) for key in ("frame-rate-of", "fault-where-zero")}
+    for key, channels in lists.items():
+        for name in channels:
+            if name not in CHANNELS:
+                raise UnknownNameError.of("channel", name, CHANNELS, where=f"[quality] {key}")
+    return QualityRules(
+        zero_offset=table.value("zero-offset") if "zero-offset" in table else "report",
+        stale_after=table.number("stale-after", 0.0) if "stale-after" in table else None,
+        frame_rate_of=lists["frame-rate-of"],
+        fault_where_zero=lists["fault-where-zero"],
+    )
 
-    def _table(self, data: Mapping[str, Any], key: str) -> Mapping[str, Any]:
-        return self._typed(data, key, dict, {})
 
-    def _typed(self, table: Mapping[str, Any], key: str, kind: type[Any], default: Any) -> Any:
-        if key not in table:
-            return default
-        value = table[key]
-        if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-            raise InputError(f"{key} = {value!r} is not a {kind.__name__}", where=self.where, fix="correct its type")
-        return value
+def _check(table: Table) -> CheckLayout:
+    _known(table, "column values about")
+    values = tuple(str(value).strip() for value in _list(table, "values"))
+    return CheckLayout(column=_column(table), values=values, about=_text(table, "about"))
 
-    def _number(self, table: Mapping[str, Any], key: str, default: float | None) -> Any:
-        value = table.get(key, default)
-        if value is default:
-            return default
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not number or not abs(value) <= sys.float_info.max:
-            raise InputError(f"{key} = {value!r} is not a number", where=self.where, fix="give a finite number")
-        return float(value)
 
-    def _text(self, table: Mapping[str, Any], key: str, where: str) -> str:
-        value = table.get(key)
-        if not isinstance(value, str) or not value.strip():
-            raise InputError(f"no {key}", where=where, fix=f'add {key} = "…"')
-        return value
+def _known(table: Table, keys: str) -> None:
+    """Refuse other keys before any value is looked at."""
+    for key in keys.split():
+        _ = key in table
+    table.done()
 
-    def _column(self, value: object, where: str) -> str | int:
-        if isinstance(value, bool) or not isinstance(value, (str, int)):
-            raise InputError(f"column {value!r} is neither a name nor a number", where=where, fix="correct it")
-        if isinstance(value, int) and value < 1:
-            raise InputError(f"column number {value}", where=where, fix="columns are counted from 1")
-        if isinstance(value, int) and value > COLUMNS_LIMIT:
-            raise InputError(
-                f"column number {str(value)[:20]}", where=where, fix=f"at most {COLUMNS_LIMIT} columns are read"
-            )
-        return value
+
+def _list(table: Table, key: str) -> list[Any]:
+    value = table.value(key) if key in table else []
+    if not isinstance(value, list):
+        raise InputError(f"{key} = {value!r} is not a list", where=table.where, fix="write it as [ … ]")
+    return value
+
+
+def _text(table: Table, key: str) -> str:
+    value = table.text(key, None)
+    if value is None or not value.strip():
+        raise InputError(f"no {key}", where=table.where, fix=f'add {key} = "…"')
+    return value
+
+
+def _column(table: Table) -> str | int:
+    if "column" not in table:
+        raise InputError("no column", where=table.where, fix="name the column or give its number (from 1)")
+    return _column_of(table.value("column"), table.where)
+
+
+def _column_of(value: object, where: str) -> str | int:
+    if isinstance(value, bool) or not isinstance(value, (str, int)):
+        raise InputError(f"column {value!r} is neither a name nor a number", where=where, fix="correct it")
+    if isinstance(value, int) and not 1 <= value <= COLUMNS_LIMIT:
+        fix = f"columns are counted from 1, at most {COLUMNS_LIMIT} are read"
+        raise InputError(f"column number {str(value)[:20]}", where=where, fix=fix)
+    return value

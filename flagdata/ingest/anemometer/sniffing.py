@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -24,7 +23,7 @@ class Guess:
         notes: what was left out, and what is odd.
         doubts: what must be said before it can be read, each with how to say it.
         needs: what `ingest` will ask for beside, each with how to say it.
-        winds: labels of the anemometers, where a draft tells them.
+        winds: labels of the anemometers, where a draft names several.
     """
 
     format: str
@@ -57,13 +56,3 @@ class Head:
 
 
 HEAD_LINES = 1000
-
-
-def as_taken(guesses: Sequence[Guess]) -> tuple[Guess, ...]:
-    """Guesses in the order in which they are tried.
-
-    A table in doubt goes before others that are not sure: its own reader refuses it, and knows what the user has said.
-    """
-    if guesses and guesses[0].score < SURE:
-        return tuple(sorted(guesses, key=lambda guess: not guess.doubts))
-    return tuple(guesses)

@@ -293,5 +293,5 @@ def test_what_is_neither_camera_nor_wind_says_what_to_do(run, tmp_path: Path) ->
     for name in ("flag.obj", "letter.txt"):
         code, _, err = run(tmp_path / name)
         assert code == 1
-        assert "neither a camera file nor an anemometer log" in err
+        assert "no video, wind log, folder of meshes or table of markers" in err
         assert "fix:" in err

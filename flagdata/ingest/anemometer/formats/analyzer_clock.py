@@ -17,7 +17,7 @@ from collections.abc import Iterable
 _OWN = re.compile(r"(?:DEBUG|INFO|WARN|WARNING|ERROR|FATAL)\s+(\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:\.\d{1,6})?)Z\s+\[")
 _MESSAGE = re.compile(r"(\d{4}-\d\d-\d\d)[T -](\d\d:\d\d:\d\d(?:\.\d{1,6})?)(?=[\s,])")
 _FEWEST = 3
-"""Pairs of a line of the program and the message below it, from which on they tell the zone."""
+"""Pairs of a line of the program and the message below it, from which on they show the zone."""
 _APART = dt.timedelta(seconds=1)
 """What the two stamps of each pair may differ by."""
 

@@ -22,14 +22,14 @@ _SILENT = 10
 _LEAST = 10 * NANOSECONDS
 """Distance of marks [ns] below which lines come as a stream."""
 _MARKS, _SHARE = 3, 0.9
-"""Marks from which bursts are told, and the share of their intervals that hold each kind of wind once at most."""
+"""Marks from which bursts are recognised, and the share of their intervals that hold each kind of wind once at most."""
 _ORDER = 1_000_000
-"""What tells the order of the winds of one burst [ns]: they have one mark."""
+"""What gives the order of the winds of one burst [ns]: they have one mark."""
 
 
 @dataclass
 class Bursts:
-    """What tells where bursts begin: the kind of a stream's first sentence, and the lines with that kind."""
+    """What shows where bursts begin: the kind of a stream's first sentence, and the lines with that kind."""
 
     first: str = ""
     starts: list[int] = field(default_factory=list)

@@ -125,7 +125,7 @@ class Canboat:
 
 
 def _zone(given: str | None, time: Instants, in_utc: bool) -> tuple[Finding, ...]:
-    """What is said of the zone where lines of canboat's own program tell that the messages are in UTC."""
+    """What is said of the zone where lines of canboat's own program show that the messages are in UTC."""
     if not in_utc:
         return ()
     if given is not None:
@@ -175,17 +175,17 @@ class _Dated(TextFile):
         """See `TextFile.blocks`."""
         day, before = self.date, ""
         for first, lines in super().blocks(size):
-            told: list[str] = []
+            stamped: list[str] = []
             for line in lines:
                 frame = _GATEWAY.fullmatch(line.strip())
                 if frame is None:
-                    told.append(line)
+                    stamped.append(line)
                     continue
                 if before[:2] > "18" and frame["stamp"][:2] < "06":
                     day += dt.timedelta(days=1)
                 before = frame["stamp"]
-                told.append(f"{day.isoformat()} {line.strip()}")
-            yield first, told
+                stamped.append(f"{day.isoformat()} {line.strip()}")
+            yield first, stamped
 
 
 def _dated(source: TextFile, options: WindOptions) -> TextFile:
@@ -223,7 +223,7 @@ def _is_message(line: str) -> bool:
 
 
 class _Network:
-    """Messages as they come in: wind of one device or all, and what else tells about the platform.
+    """Messages as they come in: wind of one device or all, and what else describes the platform.
 
     Attributes:
         devices: number of wind messages of each address.
@@ -343,7 +343,7 @@ def _over_ground(
             channels["wind_speed"] = channels.pop(f"{kind}_wind_speed")
         if options.azimuth is not None:
             channels["wind_direction"] = np.mod(channels.pop(relative) + options.azimuth, 2 * np.pi)
-        text = f"fixed platform, as told: {'ground-referenced' if stated else kind} wind is wind over ground"
+        text = f"fixed platform, as given: {'ground-referenced' if stated else kind} wind is wind over ground"
         return channels, Finding(kind="fixed-platform", severity=Severity.NOTE, what=text)
     if stated:
         moves = (speed is not None and speed > MOVING) or options.platform in ("moving", "corrected")

@@ -9,26 +9,22 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flagdata.compass import POINTS
 from flagdata.errors import InputError, TimeError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.instants.dates import decide
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, FileLayout, Recipe, TimeLayout
-from flagdata.ingest.anemometer.tables.rowclock import Given
-from flagdata.ingest.anemometer.tables.table import read_table
-from flagdata.ingest.anemometer.text.columns import Columns
+from flagdata.ingest.anemometer.table.rowclock import Given
+from flagdata.ingest.anemometer.table.sonic import with_horizontal
+from flagdata.ingest.anemometer.table.table import read_table
 from flagdata.ingest.anemometer.text.rows import RowReader
 from flagdata.ingest.anemometer.text.source import TextFile
-from flagdata.ingest.anemometer.winds.sonic import with_horizontal
-from flagdata.ingest.anemometer.words.headings import understand
 from flagdata.schema import CHANNELS
 from flagdata.signals import Sensor
 from flagdata.timebase import NANOSECONDS
@@ -82,10 +78,9 @@ class Export:
         name: of the format.
         file, time, sensor, checks: see recipe.Recipe.
         assigned: its columns.
-        described_by: the maker's description that the reader follows, where no file of the instrument was seen.
+        described_by: the maker's description that the reader follows, where no file of the instrument was at hand.
         averaged: whether a row is the average over the distance of the stamps.
         starts: whether the stamp of an average is that of its beginning.
-        compass: columns whose directions may be points of the compass ("NNE").
     """
 
     name: str
@@ -97,7 +92,6 @@ class Export:
     described_by: str | None = None
     averaged: bool = False
     starts: bool = False
-    compass: tuple[int, ...] = ()
 
 
 def cut(line: str, delimiter: str) -> list[str]:
@@ -114,10 +108,10 @@ def stamp_format(texts: Sequence[str], options: WindOptions, where: str) -> tupl
         texts: stamps of the first rows, date before time.
 
     Raises:
-        TimeError: no date and time in them, or nothing that tells the day from the month.
+        TimeError: no date and time in them, or nothing that decides between day and month.
     """
     filled = [text.strip() for text in texts if text.strip()]
-    decision = decide(filled, told=options.date_order, where=where)
+    decision = decide(filled, given=options.date_order, where=where)
     found = [match for text in filled if (match := _REST.search(text))]
     rest = next(iter(found), None)
     if rest is None:
@@ -133,21 +127,13 @@ def stamp_format(texts: Sequence[str], options: WindOptions, where: str) -> tupl
     return form, (Finding(kind="date-order", severity=Severity.NOTE, what=text),)
 
 
-def split_unit(name: str) -> tuple[str, str]:
-    """Name and unit of "Speed 80 m [m/s]" or "Wind(km/h)"; no unit where there are no brackets at the end."""
-    match = re.fullmatch(r"(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*", name[:200])
-    return (match[1], match[2].strip()) if match else (name, "")
-
-
 def known_unit(text: str) -> str | None:
     """The unit that an export spells as `text`; `None` where it is not known."""
     bare = re.sub(r"^\s*[\[(](.*)[\])]\s*$", r"\1", text).strip()
     return "inHg" if bare.lower() in _INCHES else spelled(bare)
 
 
-def assign(
-    columns: Sequence[Column], names: Names, *, where: str, fix: str, ranges: Mapping[str, tuple[float, float]] = {}
-) -> Assigned:
+def assign(columns: Sequence[Column], names: Names, *, where: str, fix: str) -> Assigned:
     """Find the channels among columns by their names.
 
     Args:
@@ -155,7 +141,6 @@ def assign(
         names: see `Names`.
         where: the heading, for messages.
         fix: what to do about a unit that is not known or no wind at all.
-        ranges: of channels, in the column's own unit, where that is the channel's unit of the format.
 
     Raises:
         InputError: no column of wind, or wind in a unit that is not known.
@@ -179,7 +164,7 @@ def assign(
                 raise InputError(f"{column.name!r} is {channel}, but its unit is {column.unit!r}", where=where, fix=fix)
             unread.append(column.name)
             continue
-        channels[channel] = ChannelLayout(column=column.number, unit=name, range=ranges.get(channel))
+        channels[channel] = ChannelLayout(column=column.number, unit=name)
         taken[channel] = column.name
     if not {"wind_speed", "wind_x"} & set(channels):
         listed = ", ".join(column.name for column in columns[:40] if column.name)
@@ -199,12 +184,9 @@ def read_export(source: TextFile, export: Export, options: WindOptions) -> Readi
         name=export.name, about="from the file's own heading", source="the file", file=export.file, time=export.time,
         channels=assigned.channels, sensor=export.sensor, checks=export.checks,
     )  # fmt: skip
-    rows = CompassRows(source, export.file, export.compass)
+    rows = RowReader(source, export.file)
     reading = read_table(rows, recipe, where=where, zone_name=options.zone, given=Given(clock=options.clock)).reading
     found = [*column_findings(assigned)]
-    if rows.points:
-        text = f"{rows.points} directions are points of the compass, 22.5° apart"
-        found.append(Finding(kind="compass-points", severity=Severity.NOTE, count=rows.points, what=text))
     if export.averaged:
         reading = _with_period(reading)
     if export.starts and reading.sensor.averaging:
@@ -213,30 +195,6 @@ def read_export(source: TextFile, export: Export, options: WindOptions) -> Readi
     if export.described_by is not None:
         found.append(described(export.described_by))
     return with_horizontal(reading.with_findings(tuple(found)), options.azimuth, where=where)
-
-
-class CompassRows(RowReader):
-    """Rows in which points of the compass are written as degrees; `points` counts them."""
-
-    def __init__(self, source: TextFile, layout: FileLayout, columns: Sequence[int]) -> None:
-        super().__init__(source, layout)
-        self._compass = [column - 1 for column in columns]
-        self._degrees = {name: f"{degrees:g}".replace(".", layout.decimal) for name, degrees in POINTS.items()}
-        self.points = 0
-
-    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], Columns | list[list[str]]]]:
-        """See `RowReader.blocks`; row by row where there are points of the compass."""
-        return self._in_degrees(width) if self._compass else super().blocks(width)
-
-    def _in_degrees(self, width: int) -> Iterator[tuple[NDArray[np.int64], list[list[str]]]]:
-        for line, rows in self.rows(width):
-            for row in rows:
-                for column in self._compass:
-                    degrees = self._degrees.get(row[column].strip().upper())
-                    if degrees is not None:
-                        row[column] = degrees
-                        self.points += 1
-            yield line, rows
 
 
 def described(by: str) -> Finding:
@@ -272,7 +230,7 @@ def column_findings(assigned: Assigned) -> tuple[Finding, ...]:
         )  # fmt: skip
     if assigned.unread:
         # Columns that speak of the wind come first, so that none of them is lost among a hundred others.
-        names = sorted(assigned.unread, key=lambda name: "wind" not in understand(name).quantity)
+        names = sorted(assigned.unread, key=lambda name: "wind" not in name.lower())
         more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
         what = ", ".join(name[:_LONGEST] for name in names[:_LISTED]) + more
         found.append(Finding(kind="columns-not-read", severity=Severity.NOTE, count=len(names), what=what))

@@ -30,9 +30,8 @@ from flagdata.ingest.anemometer.formats.serial_lines import (
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.tables.unit_letters import GILL
+from flagdata.ingest.anemometer.table.sonic import with_horizontal
 from flagdata.ingest.anemometer.text.source import TextFile
-from flagdata.ingest.anemometer.winds.sonic import with_horizontal
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor
 from flagdata.units import UNITS
@@ -49,6 +48,9 @@ RIGHT = {"0", "00", "60", "51", "A"}
 _LONGEST = 160
 _SOUND = 100.0
 """A speed of sound is above this in every unit but not a temperature [°C]."""
+
+GILL = {"M": "m/s", "N": "kn", "P": "mph", "K": "km/h", "F": "ft/min"}
+"""Gill Instruments, WindSonic User Manual (1405-PS-0019, issue 28), 9.1: the unit's letter behind the speed."""
 
 
 class Gill:

@@ -15,10 +15,10 @@ from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.tables.rowclock import Given
-from flagdata.ingest.anemometer.tables.table import read_table
+from flagdata.ingest.anemometer.table.rowclock import Given
+from flagdata.ingest.anemometer.table.sonic import with_horizontal
+from flagdata.ingest.anemometer.table.table import read_table
 from flagdata.ingest.anemometer.text.source import TextFile
-from flagdata.ingest.anemometer.winds.sonic import with_horizontal
 
 # Possessive quantifiers: a line of 60,000 blanks or digits must not take quadratic time.
 _FIELD = (

@@ -130,8 +130,8 @@ class TimeLine:
                 text = f"{day[-1]} times the clock passes midnight: the day is counted on"
                 found.append(Finding(kind="midnight", severity=Severity.NOTE, count=int(day[-1]), what=text))
         marks = start + day * DAY + clock
-        marks, told = _one_clock(marks, at, choice)
-        found.extend(told)
+        marks, reported = _one_clock(marks, at, choice)
+        found.extend(reported)
         rising = marks > np.concatenate(([np.iinfo(np.int64).min], np.maximum.accumulate(marks)[:-1]))
         behind = np.concatenate(([False], np.diff(marks) < -DISORDER))
         if behind.any():

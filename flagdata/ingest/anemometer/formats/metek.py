@@ -2,7 +2,7 @@
 
 Those of the newest instruments (uSonic-3 Class A) are "status;x;y;z;T;vel;dir;vels;dirs": 32 hexadecimal digits, m/s,
 °C and degrees. Source: the project waggle-sonic, README, "Data sample", whose sample agrees with vel = √(x² + y²) and
-dir = atan2(−x, −y), where from, clockwise from y; what the digits of the status mean is told nowhere that was found.
+dir = atan2(−x, −y), where from, clockwise from y; what the digits of the status mean was found nowhere.
 
 Source: METEK, uSonic-2 user manual, 3.3.3 "Examples of different serial output formats", and USA-1 user manual, data
 sets: v speed and x, y, z components in cm/s, d direction in degrees (where from, clockwise from the north mark), t

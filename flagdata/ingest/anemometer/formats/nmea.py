@@ -2,7 +2,7 @@
 
 Wind sentences carry no time. Each gets one by interpolating, over line numbers, between the time sentences (ZDA, RMC,
 GGA, GLL, or the time of a TAG block), or that of its burst (`bursts`), and the flag TIME_UNSURE. MWV,R is wind past the
-platform; MWV,T is "theoretical": what the instrument computed as if the platform stood still; both are relative to the
+platform; MWV,T is "theoretical": what the instrument computed as if the platform did not move; both are relative to the
 bow. They stay in channels of their own, and neither is ground truth unless the user says the platform is fixed. VWR,
 VWT and MDA are what older instruments and weather stations send for MWV,R, MWV,T and MWD; beside these they are the
 same wind again.
@@ -350,7 +350,7 @@ def _platform(
     if moving and moving > MOVING:
         known = f"a platform that moves at {moving:.1f} kn"
     elif options.platform in ("moving", "corrected"):
-        known = "a moving platform, as told"
+        known = "a moving platform, as given"
     else:
         known = "a platform of unknown motion"
         fix = "if the sensor stands on a mast, say so: --platform fixed"
@@ -383,9 +383,9 @@ def _fixed(
             what = "the stream states wind over ground itself" if stated else "the stream has no directions"
             raise UsageError(f"an azimuth was given, but {what}", where=where, fix="leave out --azimuth")
         out["wind_direction"] = np.mod(out.pop(angle) + options.azimuth, 2 * np.pi)
-    text = f"fixed platform, as told: {kind} wind is wind over ground"
+    text = f"fixed platform, as given: {kind} wind is wind over ground"
     if stated:
-        text = f"fixed platform, as told: the wind over ground is that of {_sources(stream, 'wind')}"
+        text = f"fixed platform, as given: the wind over ground is that of {_sources(stream, 'wind')}"
     return out, (Finding(kind="fixed-platform", severity=Severity.NOTE, what=text),)
 
 
@@ -424,8 +424,8 @@ def no_wind(lines: Sequence[str], format_name: str) -> str:
 
 
 def _others_seen(kinds: Counter[str]) -> str:
-    seen = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common(6))
-    return f"; there are {seen}" if seen else ""
+    counted = ", ".join(f"{count} {kind}" for kind, count in kinds.most_common(6))
+    return f"; there are {counted}" if counted else ""
 
 
 def _findings(stream: _Stream, placed: Placed) -> tuple[Finding, ...]:

@@ -29,7 +29,7 @@ from flagdata.ingest.anemometer.instants.stamps import parse as parse_stamps
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.samples import possible
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.tables.rowclock import instants
+from flagdata.ingest.anemometer.table.rowclock import instants
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Sensor
@@ -93,7 +93,7 @@ class Instrument:
         channels: names of schema.CHANNELS, in the order of a sample's values.
         parse: a line without its stamp → sample or defect.
         sensor: the instrument.
-        described_by: the maker's description that `parse` follows, where no file of the instrument was seen.
+        described_by: the maker's description that `parse` follows, where no file of the instrument was at hand.
         split: a line → stamp ("" where there is none; ISO 8601 or Unix time) and the rest.
     """
 

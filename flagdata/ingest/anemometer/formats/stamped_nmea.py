@@ -22,7 +22,7 @@ from flagdata.ingest.anemometer.formats.serial_lines import GIVEN_CLOCK, split_s
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.tables.rowclock import instants
+from flagdata.ingest.anemometer.table.rowclock import instants
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import SampleFlag
 

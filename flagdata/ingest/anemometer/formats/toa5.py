@@ -17,23 +17,17 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.formats import toa5_headings
+from flagdata.ingest.anemometer.formats.described import names
 from flagdata.ingest.anemometer.formats.exports import Assigned, column_findings, known_unit, stamp_format
-from flagdata.ingest.anemometer.formats.windographer import NAMES as MAST_NAMES
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, FileLayout, Recipe, TimeLayout
-from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
-from flagdata.ingest.anemometer.tables import offered_columns
-from flagdata.ingest.anemometer.tables.rowclock import Given
-from flagdata.ingest.anemometer.tables.table import read_table
-from flagdata.ingest.anemometer.text.layout import lay_out
+from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.table.rowclock import Given
+from flagdata.ingest.anemometer.table.sonic import with_horizontal
+from flagdata.ingest.anemometer.table.table import read_table
 from flagdata.ingest.anemometer.text.rows import RowReader
 from flagdata.ingest.anemometer.text.source import TextFile
-from flagdata.ingest.anemometer.times.timecolumns import find_time
-from flagdata.ingest.anemometer.winds.instruments import find_winds
-from flagdata.ingest.anemometer.winds.sonic import with_horizontal
-from flagdata.ingest.anemometer.words.headings import fits, interest, understand
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Instants, Sensor
 from flagdata.timebase import NANOSECONDS
@@ -53,6 +47,7 @@ _NAMES: tuple[tuple[str, str], ...] = (
 )
 _DIAGNOSTIC = re.compile(r"diag(_csat|_sonic|nostic)?(_\d+)?|csat_?diag|diag_word", re.IGNORECASE)
 _MISSING = ("nan", '"nan"', "-7999", "7999", "-99999", "-2147483648")
+_SPREAD = re.compile(r"_(max|min|std|sd|tmx|tmn|tot)(_|$)", re.IGNORECASE)
 _WARNINGS = 0xF000
 _FORM = "%Y-%m-%d %H:%M:%S%f"
 _OWN = re.compile(r"\s*\d{4}-")
@@ -138,7 +133,7 @@ class Toa5:
         rivals: list[str] = []
         for name, spelling in zip(names, units, strict=True):
             channel = _channel(name)
-            if channel is not None and not channel.startswith("wind_") and understand(name, spelling).spread:
+            if channel is not None and not channel.startswith("wind_") and _SPREAD.search(name):
                 channel = None  # the maximum of a day is not its mean
             if channel is None or channel in channels:
                 if channel is not None and channel.startswith("wind_") and CHANNELS[channel].unit == "m/s":
@@ -158,17 +153,11 @@ class Toa5:
             channels[channel] = ChannelLayout(column=name, unit=spelled)
             taken[channel] = name
         if not {"wind_speed", "wind_x"} & set(channels):
-            channels.update(_by_heading(names, units, channels))
-            unread = [name for name in unread if name not in {layout.column for layout in channels.values()}]
-        if not {"wind_speed", "wind_x"} & set(channels):
             raise InputError(
                 "no column looks like wind speed or a wind component", where=f"{source.path}, line 2",
-                fix=f"{_offer(source)}describe the file by a recipe; its columns are {', '.join(names)}",
+                fix="let its columns be drafted, and confirm them: --as delimited; or describe the file by a recipe; "
+                f"its columns are {', '.join(names)}",
             )  # fmt: skip
-        direction, told = toa5_headings.direction(source, channels)
-        if direction is not None:
-            channels["wind_direction"] = direction
-            unread = [name for name in unread if name != direction.column]
         rows = [row[names.index(stamp)] for row in csv.reader(source.head(5000)[4:]) if len(row) == len(names)]
         form, found = _FORM, ()
         own = sum(_OWN.match(text) is not None for text in rows)
@@ -183,7 +172,7 @@ class Toa5:
             sensor=Sensor(name=f"{about[1] if len(about) > 1 else ''} on {model or 'Campbell logger'}".strip()),
         )  # fmt: skip
         assigned = Assigned(channels=channels, names=taken, unread=tuple(unread), rivals=tuple(rivals))
-        return recipe, assigned, [*found, *told, *toa5_headings.contradictions(source, channels)]
+        return recipe, assigned, [*found]
 
 
 def _stamp_name(names: list[str]) -> str | None:
@@ -191,24 +180,10 @@ def _stamp_name(names: list[str]) -> str | None:
 
 
 def _channel(name: str) -> str | None:
-    for pattern, channel in (*_NAMES, *MAST_NAMES):
+    for pattern, channel in (*_NAMES, *names("windographer")):
         if re.fullmatch(pattern, name, re.IGNORECASE):
             return channel
     return None
-
-
-def _by_heading(names: list[str], units: list[str], known: Mapping[str, ChannelLayout]) -> dict[str, ChannelLayout]:
-    """Channels of fields whose names are of no known program, by what their words say; the first that fits."""
-    found: dict[str, ChannelLayout] = {}
-    for name, spelling in zip(names, units, strict=True):
-        heading = understand(name, spelling)
-        if not heading.channel or not heading.sure or heading.channel in {*known, *found}:
-            continue
-        if heading.unit is not None and fits(heading.channel, heading.unit):
-            found[heading.channel] = ChannelLayout(column=name, unit=heading.unit)
-    if {"wind_x", "wind_y"} <= set(found):
-        return found
-    return {channel: layout for channel, layout in found.items() if channel not in ("wind_x", "wind_y", "wind_z")}
 
 
 def _averaging(processing: str, time: Instants) -> float | None:
@@ -272,22 +247,3 @@ def _faults(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     word = np.where(known, values, 0).astype(np.int64)
     counting = len(word) > 2 and float((np.diff(word) % 64 == 1).mean()) > 0.5
     return ((word & _WARNINGS) != 0) if counting else (word != 0)
-
-
-def _offer(source: TextFile) -> str:
-    """What reads a table whose fields no known program has, with "; or " behind it; "" for no table.
-
-    Where the words of the headings tell winds, they are read by these; else the option says what the columns are.
-    """
-    layout = lay_out(source.head(HEAD_LINES), interest=interest)
-    if layout is None:
-        return ""
-    time = find_time(layout)
-    winds, _, _ = find_winds(layout, time=time.columns if time is not None else ())
-    offered = f"{offered_columns.offer(layout, time, winds)}; or "
-    if not winds:
-        return offered
-    unit_too = " --unit m/s (or km/h, mph, kn, after the program)" if any(wind.without_unit() for wind in winds) else ""
-    names = ", ".join(wind.label for wind in winds)
-    each = f", each of {names} by itself" if len(winds) > 1 else f", {names}"
-    return f"read it by the words of its headings{each}: --as delimited{unit_too}; or {offered}"

@@ -2,7 +2,7 @@
 
 Source: R. M. Young Company, Model 81000 Ultrasonic Anemometer manual (81000-90), 3.0 "Initial checkout" (speed m/s with
 two decimals, azimuth and elevation deg with one, speed of sound m/s, sonic temperature °C) and 6.8 "Serial output
-format". The two formats are told apart by their decimals. Azimuth is clockwise from the side marked N, where the wind
+format". The two formats differ by their decimals. Azimuth is clockwise from the side marked N, where the wind
 comes from. Speed is the length of the whole vector: its horizontal part is speed × cos(elevation). U, V and W are kept
 as written: their orientation is a setting. NMEA output is read by the format nmea. Written by the manual; no log of
 such an instrument was at hand.

@@ -20,14 +20,6 @@ SEVERAL = {
     "GST": (("+04:00", "the Gulf"), ("-02:00", "South Georgia")),
 }
 """What abbreviations may mean, as `--zone` takes it, the likeliest first."""
-_WRITTEN_OUT = {
-    "norsk normaltid": 1, "svensk normaltid": 1, "dansk normaltid": 1, "norsk sommertid": 2, "svensk sommartid": 2,
-    "dansk sommertid": 2, "mitteleuropäische zeit": 1, "mitteleuropäische sommerzeit": 2, "central european time": 1,
-    "central european summer time": 2, "eastern european time": 2, "eastern standard time": -5,
-    "eastern daylight time": -4, "pacific standard time": -8, "pacific daylight time": -7, "japan standard time": 9,
-    "korea standard time": 9, "australian eastern standard time": 10,
-    "new zealand standard time": 12, "south africa standard time": 2, "greenwich mean time": 0,
-}  # fmt: skip
 _IN_HEADING = re.compile(rf"(?:^|[^A-Za-z])({'|'.join(SEVERAL)})(?![A-Za-z])")
 _CELL, _WORD = re.compile(r"[^,;\t|]+"), re.compile(r"\S+")
 _HEADINGS = 5
@@ -41,13 +33,6 @@ _OF_TIME = re.compile(
 _STAMP = re.compile(r"\d[-/.]\d{1,2}[-/.]\d|\d:\d\d")
 _QUANTITIES = frozenset({"GST"})
 """Abbreviations that stand for a quantity as well: the gust."""
-
-
-def written_out(text: str) -> int | None:
-    """Hours east of UTC of a zone whose name is written out in a text; None where it names none."""
-    known = " ".join(text.replace("_", " ").lower().split())
-    longest = max((name for name in _WRITTEN_OUT if name in known), key=len, default="")
-    return _WRITTEN_OUT.get(longest)
 
 
 def advice(lines: Sequence[str]) -> str:

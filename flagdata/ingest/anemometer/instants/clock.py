@@ -2,7 +2,7 @@
 
 Rows follow one another at the usual step p, the median of the steps forward. A step s that differs from it says that
 rows are missing, or that the clock was set by s - p. Set back, time repeats itself, which a log does for no other
-reason; set on, it leaves an interval that missing rows leave as well. What tells the two apart is the size: people and
+reason; set on, it leaves an interval that missing rows leave as well. The size distinguishes the two: people and
 daylight saving set clocks by whole hours, and an outage lasts a whole hour, to within p, with probability p / 1 h.
 """
 
@@ -55,7 +55,7 @@ class Jump:
     size: int
     whole: bool
 
-    def told(self) -> str:
+    def text(self) -> str:
         """ "set back 1 h", "set on 30 min"."""
         return f"set {'back' if self.size < 0 else 'on'} {span(abs(self.size))}"
 
@@ -140,7 +140,7 @@ def _length(steady: NDArray[np.bool_]) -> int:
 def set_on(time: Instants, *, returns: Sequence[Jump] = ()) -> tuple[Jump, ...]:
     """Intervals by which the clock may have been set on: whole hours that chance does not explain, or years.
 
-    Of rows a day or more apart none is told: they keep whole days between them whatever the clock does.
+    Of rows a day or more apart none is reported: they keep whole days between them whatever the clock does.
 
     Args:
         time: (n,) instants in the order of the rows.
@@ -186,7 +186,7 @@ def excursions(time: Instants, *, most: int) -> NDArray[np.bool_]:
 
     Such a stretch lies between a step back and a step forward of half its size or more and no usual one, in either
     order, and the rows on both sides of it follow each other as rows do. Beside the log's first or last row only one
-    side is seen: a stretch there counts where it is more than a day off.
+    side is noticed: a stretch there counts where it is more than a day off.
     """
     wild = np.zeros(len(time), dtype=bool)
     steps = np.diff(time)
@@ -248,15 +248,15 @@ def report(
                 "say which of the two clocks is right, so either may be off by that much"
             )
         elif choice == "first":
-            doubt = f"as told, the clock before it is right: the {rows} rows from there on continue it"
+            doubt = f"as given, the clock before it is right: the {rows} rows from there on continue it"
         else:
-            doubt = f"as told, the clock after the last jump is right: the {jump.row} rows before this one fit it"
+            doubt = f"as given, the clock after the last jump is right: the {jump.row} rows before this one fit it"
         found.append(
             Finding(
                 kind=f"clock-set-{'back' if jump.size < 0 else 'on'}",
                 severity=Severity.WARNING if choice is None else Severity.NOTE,
                 count=rows, value=jump.size / NANOSECONDS, where=f"line {line[jump.row]}",
-                what=f"clock {jump.told()} at line {line[jump.row]}: {before} is followed by {after}; {doubt}",
+                what=f"clock {jump.text()} at line {line[jump.row]}: {before} is followed by {after}; {doubt}",
                 fix=_fix(jump) if choice is None else None,
             )
         )  # fmt: skip
@@ -273,7 +273,7 @@ def doubt(time: Instants, jumps: Sequence[Jump], line: NDArray[np.int64]) -> tup
             f"{line[jump.row]} was not set yet ({before} is followed by {after}), so that their stamps say nothing"
             if jump.size > NEVER_SET
             else f"an interval is longer than usual by {span(jump.size)}, to within the rows' step: either the clock "
-            f"was {jump.told()} at line {line[jump.row]} ({before} is followed by {after}) and what follows is off by "
+            f"was {jump.text()} at line {line[jump.row]} ({before} is followed by {after}) and what follows is off by "
             "that much, or so many rows are missing"
         )
         found.append(
@@ -292,7 +292,7 @@ def doubt_where_it_stood(time: Instants, jumps: Sequence[Jump], line: NDArray[np
             kind="clock-set-back", severity=Severity.WARNING, value=jump.size / NANOSECONDS,
             where=f"line {line[jump.row]}",
             what=f"the steady rows from line {line[jump.row]} on begin with the stamp of the row before them, "
-            f"{iso(int(time[jump.row]))}: either the clock was {jump.told()} at line {line[jump.row]} and what comes "
+            f"{iso(int(time[jump.row]))}: either the clock was {jump.text()} at line {line[jump.row]} and what comes "
             "before or after is off by that much, or there is one row too many; stamps are taken as written",
             fix=_fix(jump),
         )

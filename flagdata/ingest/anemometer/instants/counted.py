@@ -31,12 +31,8 @@ from flagdata.timebase import NANOSECONDS, iso
 _EPOCH = {"epoch-us": 1_000, "epoch-ns": 1}
 _SERIAL = {"excel-days": 25_569, "datenum": 719_529}
 """Number of the day 1970-01-01."""
-SERIAL_DAYS = tuple((form, day + 7_305, day + 25_567) for form, day in _SERIAL.items())
-"""Formats of serial days, each with its numbers of 1 January 1990 and of 2040, between which logs lie."""
 _YEARS = "decimal-years"
-_FIRST_YEAR, _LAST_YEAR, _LATEST = 1990, 2100, 2040
-WORDS = {"years": _YEARS, "excel": "excel-days", "excel-day": "excel-days", "matlab": "datenum"}
-"""Other words for formats of this module."""
+_FIRST_YEAR, _LAST_YEAR = 1990, 2100
 _ELAPSED = {
     "elapsed-s": NANOSECONDS, "elapsed-ms": 1_000_000, "elapsed-us": 1_000, "elapsed-min": 60 * NANOSECONDS,
     "elapsed-h": 3600 * NANOSECONDS, "elapsed-d": DAY,
@@ -50,23 +46,6 @@ FORMS = (*_EPOCH, *_SERIAL, _YEARS, *_ELAPSED)
 """Formats of this module that are names."""
 
 
-def serial_days(value: NDArray[np.float64]) -> str | None:
-    """The format of serial days or decimal years that numbers are likely in, of which they rise by fractions.
-
-    `None` for no such.
-
-    Args:
-        value: (n,) of the rows.
-    """
-    steps = np.diff(value)
-    if len(steps) < 2 or not np.all(np.isfinite(steps)) or bool((steps < 0).any()) or not np.any(value % 1 != 0):
-        return None
-    if float(np.median(steps)) > 0.5:  # seconds of the day rise by one
-        return None
-    bounds = (*SERIAL_DAYS, (_YEARS, _FIRST_YEAR - 1, _LATEST))
-    return next((form for form, low, high in bounds if bool(np.all((value > low) & (value < high)))), None)
-
-
 def _of_years(value: NDArray[np.float64]) -> NDArray[np.int64]:
     """Nanoseconds since 1970 of decimal years, to the second: a double holds them to 15 us, tables to half a minute."""
     year = np.floor(value).astype(np.int64)
@@ -76,7 +55,7 @@ def _of_years(value: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def is_elapsed(form: str) -> bool:
-    """Whether a format counts from a start that the file does not tell."""
+    """Whether a format counts from a start that the file does not state."""
     return form in _ELAPSED
 
 
@@ -194,7 +173,7 @@ def since_start(
 
 
 def _refuse_restarts(count: NDArray[np.int64], *, line: NDArray[np.int64], where: str) -> None:
-    """Refuse a count that starts again, as after a reset: when the second stretch began, nothing tells."""
+    """Refuse a count that starts again, as after a reset: the file does not say when the second stretch began."""
     if len(count) < 3:
         return
     steps = np.diff(count)
@@ -203,13 +182,10 @@ def _refuse_restarts(count: NDArray[np.int64], *, line: NDArray[np.int64], where
     back = [row for row in back.tolist() if row + 1 < len(count) and count[row] <= count[row + 1] < count[row - 1]]
     if back:
         row, times = back[0], f"{len(back)} times" if len(back) > 1 else "once"
-        fix = (
-            "make a file of each stretch and give each its own --start; where a column tells the stretches apart, name "
-            "it as site in --columns, and read each with its --start: --wind VALUE"
-        )
+        fix = "make a file of each stretch and give each its own --start"
         raise TimeError(
-            f"the count starts again {times}, first at line {line[row]}, and nothing tells how long after", where=where,
-            fix=fix,
+            f"the count starts again {times}, first at line {line[row]}, and the file does not say how long after",
+            where=where, fix=fix,
         )  # fmt: skip
 
 

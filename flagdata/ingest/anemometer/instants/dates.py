@@ -44,7 +44,7 @@ class Decision:
         return self.separator.join({"y": year, "m": "%m", "d": "%d"}[letter] for letter in self.order)
 
 
-def decide(texts: Sequence[str], *, told: Order | None, where: str) -> Decision:
+def decide(texts: Sequence[str], *, given: Order | None, where: str) -> Decision:
     """The order in which dates at the start of `texts` are written.
 
     Evidence: a number above 12 is a day; where there is none, points between the numbers (every locale of the Unicode
@@ -53,7 +53,7 @@ def decide(texts: Sequence[str], *, told: Order | None, where: str) -> Decision:
     ("26-03-14").
 
     Args:
-        told: the user's word; refused when a date contradicts it.
+        given: the user's word; refused when a date contradicts it.
 
     Raises:
         TimeError: no date, contradictory dates, or no evidence.
@@ -62,8 +62,8 @@ def decide(texts: Sequence[str], *, told: Order | None, where: str) -> Decision:
     year_first = [text.strip() for text in dated if _ISO.match(text)]
     if len(year_first) * 2 > len(dated):
         first = year_first[0]
-        if told not in (None, "ymd"):
-            raise TimeError(f"dates are not {told}, but {first[:10]}", where=where, fix="leave out --date-order")
+        if given not in (None, "ymd"):
+            raise TimeError(f"dates are not {given}, but {first[:10]}", where=where, fix="leave out --date-order")
         return Decision(order="ymd", separator=first[4], long_year=True, reason=f"dates are written as {first[:10]}")
     parts = [match for text in dated if (match := _PARTS.match(text))]
     if len(parts) * 2 <= len(dated) or not parts:
@@ -71,9 +71,9 @@ def decide(texts: Sequence[str], *, told: Order | None, where: str) -> Decision:
     separator, long_year = parts[0][2], len(parts[0][4]) == 4
     first = np.array([int(match[1]) for match in parts])
     second = np.array([int(match[3]) for match in parts])
-    if not long_year and (told == "ymd" or (told is None and separator == "-")):
+    if not long_year and (given == "ymd" or (given is None and separator == "-")):
         third = np.array([int(match[4]) for match in parts])
-        found = _short_year_first(first, second, third, told=told, separator=separator, text=dated[0], where=where)
+        found = _short_year_first(first, second, third, given=given, separator=separator, text=dated[0], where=where)
         if found is not None:
             return found
     days_first, days_second = int((first > 12).sum()), int((second > 12).sum())
@@ -86,15 +86,17 @@ def decide(texts: Sequence[str], *, told: Order | None, where: str) -> Decision:
         order: Order = "dmy" if days_first else "mdy"
         number = "first" if days_first else "second"
         reason = f"{days_first or days_second} of the first {len(parts)} dates have a {number} number above 12"
-        if told is not None and told != order:
+        if given is not None and given != order:
             raise TimeError(
-                f"dates are not {told}: {reason}", where=where, fix=f"leave out --date-order, it is {order}"
+                f"dates are not {given}: {reason}", where=where, fix=f"leave out --date-order, it is {order}"
             )
         return Decision(order=order, separator=separator, long_year=long_year, reason=reason)
-    if told == "ymd":
+    if given == "ymd":
         raise TimeError("years of four digits do not come first here", where=where, fix="give --date-order dmy or mdy")
-    if told is not None:
-        return Decision(order=told, separator=separator, long_year=long_year, reason=f"the date order {told} was given")
+    if given is not None:
+        return Decision(
+            order=given, separator=separator, long_year=long_year, reason=f"the date order {given} was given"
+        )
     if separator == "." and not any(map(_TWELVE.search, dated)):
         reason = "dates whose numbers are divided by points are written with the day first"
         return Decision(order="dmy", separator=separator, long_year=long_year, reason=reason)
@@ -106,7 +108,7 @@ def decide(texts: Sequence[str], *, told: Order | None, where: str) -> Decision:
         reason = "no number above 12, but only in this order the log moves on from day to day"
         return Decision(order=smooth[0], separator=separator, long_year=long_year, reason=reason)
     raise TimeError(
-        f"{dated[0].strip()[:10]} may be day/month or month/day, and nothing in the log tells", where=where,
+        f"{dated[0].strip()[:10]} may be day/month or month/day, and nothing in the log decides it", where=where,
         fix="give --date-order dmy or mdy",
     )  # fmt: skip
 
@@ -116,7 +118,7 @@ def _short_year_first(
     second: NDArray[np.int64],
     third: NDArray[np.int64],
     *,
-    told: Order | None,
+    given: Order | None,
     separator: str,
     text: str,
     where: str,
@@ -127,8 +129,8 @@ def _short_year_first(
         TimeError: they may be, and as well day, month, year.
     """
     possible = bool(np.all((second >= 1) & (second <= 12) & (third >= 1) & (third <= 31)))
-    if told == "ymd" or (possible and bool((first > 31).any() or (first < 1).any())):
-        reason = "the date order ymd was given" if told else "first numbers are no days"
+    if given == "ymd" or (possible and bool((first > 31).any() or (first < 1).any())):
+        reason = "the date order ymd was given" if given else "first numbers are no days"
         return Decision(order="ymd", separator=separator, long_year=False, reason=reason)
     if not possible or len(set(first.tolist())) > len(set(third.tolist())):
         return None
@@ -136,7 +138,7 @@ def _short_year_first(
         reason = "the last number of the dates changes more often than the first"
         return Decision(order="ymd", separator=separator, long_year=False, reason=reason)
     raise TimeError(
-        f"{text.strip()[:8]} may be year-month-day or day-month-year, and nothing in the log tells", where=where,
+        f"{text.strip()[:8]} may be year-month-day or day-month-year, and nothing in the log decides it", where=where,
         fix="give --date-order ymd or dmy",
     )  # fmt: skip
 

@@ -1,6 +1,6 @@
 """Rows that a file lists in another order than they were logged in: interleaved devices, blocks, shuffled exports.
 
-Disorder and a clock that was set back both make the stamps run back. They are told apart by what sorting does to the
+Disorder and a clock that was set back both make the stamps run back. They are distinguished by what sorting does to the
 steps between rows. A clock set back brings stamps again that the log had already, so that sorted rows share stamps or
 lie closer than the logger's step. Rows out of order fill the intervals that they left: sorted, they follow each other
 at the logger's step, and fewer steps differ from it than in the file.
@@ -40,7 +40,7 @@ class Sorting:
         first: index of the first of them in the file.
         irregular: steps that differ from the usual one, in the file and sorted.
         step: the usual one [ns].
-        told: whether the user says that the rows are out of order.
+        given: whether the user says that the rows are out of order.
     """
 
     order: NDArray[np.int64]
@@ -48,22 +48,22 @@ class Sorting:
     first: int
     irregular: tuple[int, int]
     step: int
-    told: bool
+    given: bool
 
     def finding(self, line: NDArray[np.int64]) -> Finding:
         """What is said of it; `line` (n,) in the order of the file."""
         n, (before, after) = len(self.order), self.irregular
         why = (
-            "as told"
-            if self.told
+            "as given"
+            if self.given
             else f"{after} steps then differ from the usual {self.step / NANOSECONDS:g} s, {before} do in the file: a "
             "clock that was set back would have brought stamps again"
         )
         return Finding(
-            kind=KIND, severity=Severity.NOTE if self.told else Severity.WARNING, count=self.displaced,
+            kind=KIND, severity=Severity.NOTE if self.given else Severity.WARNING, count=self.displaced,
             where=f"line {line[self.first]}",
             what=f"{self.displaced} of {n} rows are out of order in the file; sorted by their stamps ({why})",
-            fix=None if self.told else "if the logger's clock was set anew all the same, say whose stamps are right: "
+            fix=None if self.given else "if the logger's clock was set anew all the same, say whose stamps are right: "
             "--clock first (before it) or --clock last (after it)",
         )  # fmt: skip
 
@@ -76,8 +76,8 @@ def sorting(time: Instants, choice: ClockChoice | None) -> Sorting | None:
         choice: "sort" where the user says that the rows are out of order; another word says that the clock was set.
     """
     steps = np.diff(time)
-    told = choice == "sort"
-    if choice not in (None, "sort") or not np.any(steps < (0 if told else -JITTER)):
+    given = choice == "sort"
+    if choice not in (None, "sort") or not np.any(steps < (0 if given else -JITTER)):
         return None
     order = np.argsort(time, kind="stable")
     ordered = np.diff(time[order])
@@ -85,16 +85,16 @@ def sorting(time: Instants, choice: ClockChoice | None) -> Sorting | None:
     regular = np.abs(ordered - step) <= NEAR * step
     before = int((np.abs(steps - step) > NEAR * step).sum())
     after = int((~regular).sum())
-    if not told and after >= before:
+    if not given and after >= before:
         return None
     displaced = np.ones(len(time), dtype=bool)
     displaced[longest_rise(time)] = False
     fitting = np.concatenate(([True], regular)) & np.concatenate((regular, [True]))
-    if not told and float(fitting[displaced[order]].mean()) < FITTING:
+    if not given and float(fitting[displaced[order]].mean()) < FITTING:
         return None
     return Sorting(
         order=order, displaced=int(displaced.sum()), first=int(np.flatnonzero(displaced)[0]),
-        irregular=(before, after), step=step, told=told,
+        irregular=(before, after), step=step, given=given,
     )  # fmt: skip
 
 
@@ -102,7 +102,7 @@ def in_blocks(time: Instants) -> bool:
     """Whether rows that run back may be blocks out of order: sorted, each fills a place that the others leave free.
 
     Of a clock that was set back the sorted rows lie among those before, row by row, or share their stamps; a stamp that
-    is wrong lies by itself. Where rows come unevenly nothing tells more, so it is for the user to say.
+    is wrong lies by itself. Where rows come unevenly the stamps show no more, so the user decides.
 
     Args:
         time: (n,) stamps in the order of the file.

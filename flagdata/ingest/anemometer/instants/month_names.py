@@ -52,20 +52,3 @@ NUMBERS = {
     for form in (name, unicodedata.normalize("NFC", _bare(name)))
 }
 """The month of each name of another language, in small letters."""
-NAME = rf"(?:(?:{'|'.join(ENGLISH)})[a-z]{{0,6}}|{'|'.join(sorted(NUMBERS, key=len, reverse=True))})(?![{LETTERS}])\.?"
-"""A name as a regular expression that ignores case."""
-ALONE = re.compile(rf"^\s*{NAME}\s*$", re.IGNORECASE)
-"""A cell that holds the name of a month and nothing more."""
-DATE = re.compile(
-    rf"^\s*(?:[{LETTERS}]{{2,10}}\.?,?\s+)?"
-    rf"(?:\d{{1,2}}\.?(?:[-/ ]|\s+de\s+){NAME},?(?:[-/ ]|\s+del?\s+)(?:\d{{4}}|\d{{2}})"
-    rf"|\d{{1,2}}{NAME}\d{{4}}|{NAME}[-/ ]\d{{1,2}}(?:,\s*|[-/ ])\d{{4}}|\d{{4}}[-/ ]{NAME}[-/ ]\d{{1,2}})(?!\d)",
-    re.IGNORECASE,
-)
-"""A whole date with the name of its month at the beginning of a text, a day of the week before it or none."""
-FORMS = (
-    *(form.format(s=s) for s in "- /" for form in ("%d{s}%b{s}%Y", "%d{s}%b{s}%y", "%Y{s}%b{s}%d")),
-    "%b %d %Y", "%b %d, %Y", "%b-%d-%Y", "%b/%d/%Y", "%d. %b %Y", "%d %b, %Y", "%d de %b de %Y", "%d de %b %Y",
-    "%d%b%Y",
-)  # fmt: skip
-"""How such dates are written; %b is the name of a month."""

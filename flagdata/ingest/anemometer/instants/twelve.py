@@ -1,8 +1,8 @@
 """Clocks of twelve hours that are written without AM or PM: 12:59 is followed by 1:00, twice a day.
 
-They are told by hours of 1 to 12 alone and by stamps that go on, but for the fall from 12:59 to 1:00. A date that holds
-the end of its first half tells both; a date that holds one half goes on from the evening before, or leads to the
-morning after. Where neither tells, the user says when the first row was.
+They are recognised by hours of 1 to 12 alone and by stamps that go on, but for the fall from 12:59 to 1:00. A date that
+holds the end of its first half shows both; a date that holds one half goes on from the evening before, or leads to the
+morning after. Where neither shows it, the user gives when the first row was.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def resolved(
         start: the first row's instant by the wall clock [ns], as the user says.
 
     Raises:
-        TimeError: nothing tells which half of the day the first rows are of.
+        TimeError: the file does not say which half of the day the first rows are of.
     """
     inside = wall % HALF
     turns = np.concatenate(([0], np.cumsum(np.diff(inside) < 0)))
@@ -88,7 +88,7 @@ def resolved(
         shown = str(np.datetime64(int(time[0]), "ns"))[:19]
         what = f"by the order of its rows the log begins at {shown} of its clock, and not at the start that was given"
         raise TimeError(what, where=f"{where}, line {line[0]}", fix="correct --start and --zone, or leave --start out")
-    return time, (_finding(wall, line, "their order tells the half of the day"),)
+    return time, (_finding(wall, line, "their order shows the half of the day"),)
 
 
 def _usual(wall: NDArray[np.int64]) -> int:
@@ -103,8 +103,8 @@ def _unknown(whose: str, line: int, where: str, *, first: bool = True) -> TimeEr
         else "export the log with a clock of 24 hours, or with AM and PM"
     )
     return TimeError(
-        f"the hours run from 1 to 12 without AM or PM, and nothing tells of which half of the day {whose} first rows "
-        "are",
+        f"the hours run from 1 to 12 without AM or PM, and the file does not say of which half of the day {whose} "
+        "first rows are",
         where=f"{where}, line {line}", fix=fix,
     )  # fmt: skip
 

@@ -98,9 +98,9 @@ def zone_advice(wall: NDArray[np.int64], lines: NDArray[np.int64]) -> str:
     jumps = [jump for jump in _whole_jumps(wall) if jump.size == -_HOUR]
     if not jumps:
         return "name the zone of the logger's clock, e.g. --zone Europe/Amsterdam or --zone +01:00"
-    told = ", ".join(f"{jump.told()} at line {lines[jump.row]}" for jump in jumps)
+    changes = ", ".join(f"{jump.text()} at line {lines[jump.row]}" for jump in jumps)
     return (
-        f"the log's clock was {told}, as for daylight saving: name the place whose clocks it followed, e.g. --zone "
+        f"the log's clock was {changes}, as for daylight saving: name the place whose clocks it followed, e.g. --zone "
         "Europe/Amsterdam; with a fixed offset some of its rows would be off"
     )
 
@@ -136,7 +136,7 @@ def _second_pass(
         reason = (
             "the log runs through it once without a break, so its clock was not set back"
             if before
-            else "nothing in the log tells which pass it is"
+            else "nothing in the log says which pass it is"
         )
         raise TimeError(
             f"{_show(int(wall[rows[0]]))} occurs twice in {place} and {reason}",
@@ -187,7 +187,7 @@ def _late(change: _Change, jump: Jump, wall: NDArray[np.int64], lines: NDArray[n
     return Finding(
         kind=f"clock-set-{'back' if jump.size < 0 else 'on'}", severity=Severity.WARNING,
         count=len(wall) - jump.row, value=jump.size / NANOSECONDS, where=f"line {lines[jump.row]}",
-        what=f"clock {jump.told()} at line {lines[jump.row]}, {clock.span(abs(delay) // NANOSECONDS * NANOSECONDS)} "
+        what=f"clock {jump.text()} at line {lines[jump.row]}, {clock.span(abs(delay) // NANOSECONDS * NANOSECONDS)} "
         f"{'after' if delay > 0 else 'before'} the clocks of {place} were ({_show(zone_change)}): taken for the same "
         "change, so that the rows before that line are on the old offset and the others on the new one",
         fix="if the logger's clock was set for another reason, give the fixed offset of its first rows and say whose "
@@ -200,9 +200,9 @@ def _with_jumps(fix: str, jumps: Sequence[Jump], lines: NDArray[np.int64]) -> st
     back = [jump for jump in jumps if jump.size < 0]
     if not back:
         return fix
-    told = ", ".join(f"{jump.told()} at line {lines[jump.row]}" for jump in back)
+    changes = ", ".join(f"{jump.text()} at line {lines[jump.row]}" for jump in back)
     return (
-        f"the log's own clock was {told}, so that no one offset is right for all its rows: give the fixed offset of "
+        f"the log's own clock was {changes}, so that no one offset is right for all its rows: give the fixed offset of "
         "the first rows and --clock first, or that of the last rows and --clock last"
     )
 

@@ -47,7 +47,7 @@ def parse(text: pa.StringArray, form: str) -> Stamps:
 
 
 def numbered(form: str) -> bool:
-    """Whether the days are numbered from a start that is not told."""
+    """Whether the days are numbered from a start that is not stated."""
     return "%D" in form
 
 
@@ -59,7 +59,7 @@ def missing(form: str, first: int | None = None) -> tuple[str, str]:
     """
     if numbered(form):
         return (
-            "the days are numbered, and nothing tells of which date they are",
+            "the days are numbered, and the file does not say of which date they are",
             "give the day of the first row: --date DATE",
         )
     what = "the stamps have no year"

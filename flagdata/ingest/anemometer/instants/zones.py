@@ -15,7 +15,6 @@ from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.instants import abbreviations
 from flagdata.ingest.anemometer.instants.wall import offset_at
-from flagdata.ingest.anemometer.instants.zone_sentences import sentences
 from flagdata.signals import Instants
 from flagdata.timebase import NANOSECONDS, zone
 
@@ -68,10 +67,6 @@ def stated(lines: Sequence[str]) -> Statement | None:
             name = _name(match["zone"], match["count"] or "")
             if name is not None:
                 found.append(Statement(line=number, text=" ".join(match[0].split()), name=name))
-        found.extend(
-            Statement(line=number, text=words, name=name)
-            for words, name in sentences(text) if all(words not in one.text and one.text not in words for one in found)
-        )  # fmt: skip
         below = lines[number][:_LONGEST] if number < len(lines) else ""
         found.extend(_below(text, below, number))
     offsets = [_offsets(zone(one.name)) for one in found]
@@ -80,7 +75,7 @@ def stated(lines: Sequence[str]) -> Statement | None:
 
 
 def hint(statement: Statement | None, lines: Sequence[str]) -> str:
-    """What the first lines tell a user who named no zone: a statement, else an abbreviation; "" for neither."""
+    """What the first lines say to a user who named no zone: a statement, else an abbreviation; "" for neither."""
     return abbreviations.advice(lines) if statement is None else statement.advice()
 
 

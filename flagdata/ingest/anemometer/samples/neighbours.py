@@ -3,7 +3,7 @@
 Both are averaged over bins, and each bin is taken relative to the one before it: weather that changes over hours, which
 any two logs share at any lag, is gone. At every half-hour of lag the correlation r over the n bins that both cover has
 the score z = atanh(r) √(n - 3) (Fisher 1921), standard normal where the logs have nothing to do with each other. A lag
-is told where its score is beyond what chance explains and well beyond that of the stamps as they are.
+is reported where its score is beyond what chance explains and well beyond that of the stamps as they are.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ BINS = (60, 300, 600, 1800)
 FEWEST = 30
 """Bins that both logs must cover."""
 SCORE = 6.0
-"""Score of a lag that is told: chance reaches it in one of 10⁹ lags."""
+"""Score of a lag that is reported: chance reaches it in one of 10⁹ lags."""
 LEAD = 4.0
 """By which it must exceed the score at no lag."""
 

@@ -59,7 +59,7 @@ def in_order(
     """Apply the rules above.
 
     Args:
-        source: the file, whose lines tell whether rows are equal in the cells that are not read.
+        source: the file, whose lines show whether rows are equal in the cells that are not read.
         choice: whose stamps are right where the clock was set anew, or that the rows are out of order; `None` where
             nobody said.
 
@@ -78,7 +78,7 @@ def _refuse_bare_dates(reading: Reading, where: str) -> None:
     """Refuse rows whose stamps are dates alone, and are shared by most.
 
     Raises:
-        TimeError: nothing tells when within its day a row was read.
+        TimeError: the file does not say when within its day a row was read.
     """
     again = np.diff(reading.time) == 0
     shared = np.concatenate(([False], again)) | np.concatenate((again, [False]))
@@ -86,7 +86,7 @@ def _refuse_bare_dates(reading: Reading, where: str) -> None:
         return
     raise TimeError(
         f"the stamps are dates without a time of day, and {int(shared.sum())} of {len(shared)} rows share theirs with "
-        f"others: nothing tells when within {iso(int(reading.time[shared][0]))[:10]} each was read",
+        f"others: the file does not say when within {iso(int(reading.time[shared][0]))[:10]} each was read",
         where=f"{where}, line {reading.line[shared][0]}",
         fix="name the column of the time of day beside that of the date; if the rows came at a steady rate, read the "
         "wind alone (--columns) with --start TIME --rate HZ; else export the log with the time of each row",
@@ -243,7 +243,7 @@ def _risen(reading: Reading, lag: NDArray[np.int64], few: int, where: str, *, se
             why = "day and month change places there, as where a spreadsheet read a part of the dates"
             ways = ["split the file there and ingest each part by itself, with its own --date-order"]
         elif len(backwards) > _JOINED:
-            ways = [sort, *ways, "if rows of several stations are mixed, name the column that tells them apart as site"]
+            ways = [sort, *ways, "if rows of several stations are mixed, read one by a recipe with [rows]"]
             why = f"so it does in {len(backwards)} places, where rows are in no order or of several stations"
         else:
             ways = ["split the file there and ingest the parts by themselves", *ways, f"or, {sort}"]
@@ -313,7 +313,7 @@ def _without_repeats(reading: Reading, source: TextFile | None) -> Reading:
     finely = False
     if same.any() and source is not None:
         otherwise = written_otherwise(source, reading.line[:-1][same], reading.line[1:][same])
-        finely = 0 < int(otherwise.sum()) < PAIRS and _stamped_finely(reading)  # many are told by `distinct`
+        finely = 0 < int(otherwise.sum()) < PAIRS and _stamped_finely(reading)  # many are distinguished by `distinct`
         if not finely:
             differs[same] = otherwise
             same = _repeats(reading, differs)

@@ -89,7 +89,7 @@ def motion(reading: Reading, positions: Mapping[str, NDArray[np.float64]]) -> Mo
 
 def settle(
     reading: Reading,
-    told: Platform | None,
+    given: Platform | None,
     *,
     positions: Mapping[str, NDArray[np.float64]] | None = None,
     where: str,
@@ -97,14 +97,14 @@ def settle(
     """The reading with its wind in the channels that the platform allows.
 
     Args:
-        told: by the user.
+        given: by the user.
         positions: see `motion`.
 
     Raises:
         InputError: a platform said to be fixed that moves.
     """
     shown = motion(reading, positions or {})
-    if told == "fixed":
+    if given == "fixed":
         if shown is not None:
             raise InputError(
                 f"the platform was said to be fixed, but {shown.text}", where=where,
@@ -112,21 +112,21 @@ def settle(
                 "computed from a moving platform: --platform corrected",
             )  # fmt: skip
         return _fixed(reading)
-    if told == "corrected":
-        text = "wind over ground was computed from a moving platform's motion before it was logged, as told"
+    if given == "corrected":
+        text = "wind over ground was computed from a moving platform's motion before it was logged, as given"
         if "wind_speed" not in reading.channels and "theoretical_wind_speed" in reading.channels:
             text += "; what the file calls true wind is kept as wind_speed"
             names = {"theoretical_wind_speed": "wind_speed"}
             reading = replace(reading, channels={names.get(n, n): v for n, v in reading.channels.items()})
         return reading.with_findings((Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text),))
-    if told is None and shown is None:
+    if given is None and shown is None:
         return _of_unknown(reading)
     if {"wind_speed", "apparent_wind_speed"} <= set(reading.channels):
         text = "wind over ground was computed by the instrument from a moving platform's heading and speed"
         finding = Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text)
         return reading.with_findings((finding,))
     names = [name for name in _RENAMED if name in reading.channels and _RENAMED[name] not in reading.channels]
-    known = "a moving platform, as told" if shown is None else f"a platform that {shown.text}"
+    known = "a moving platform, as given" if shown is None else f"a platform that {shown.text}"
     text = f"wind relative to {known}: no ground truth"
     if "wind_speed" in names:
         text += "; what the file calls wind speed is kept as apparent_wind_speed"
@@ -134,15 +134,15 @@ def settle(
         text += ", its direction as one from the bow"
     finding = Finding(
         kind="apparent-wind-only", severity=Severity.WARNING, value=shown.speed if shown else None, what=text,
-        fix=None if told else "if the log's wind is over ground all the same, say so: --platform corrected",
+        fix=None if given else "if the log's wind is over ground all the same, say so: --platform corrected",
     )  # fmt: skip
     channels = {_RENAMED[name] if name in names else name: values for name, values in reading.channels.items()}
     return replace(reading, channels=channels).with_findings((finding,))
 
 
-def check_corrected(reading: Reading, told: Platform | None, *, where: str) -> None:
+def check_corrected(reading: Reading, given: Platform | None, *, where: str) -> None:
     """Raises InputError where the platform's motion is said to have been taken out, and no wind is over ground."""
-    if told != "corrected" or "wind_speed" in reading.channels or {"wind_x", "wind_y"} <= set(reading.channels):
+    if given != "corrected" or "wind_speed" in reading.channels or {"wind_x", "wind_y"} <= set(reading.channels):
         return
     raise InputError(
         "no wind over ground in the log, which was said to be corrected for its platform's motion", where=where,
@@ -153,7 +153,7 @@ def check_corrected(reading: Reading, told: Platform | None, *, where: str) -> N
 def _fixed(reading: Reading) -> Reading:
     """Apparent wind of a sensor that stands still as the wind, where the log has none over ground."""
     channels = dict(reading.channels)
-    text = "fixed platform, as told"
+    text = "fixed platform, as given"
     if "wind_speed" not in channels and "apparent_wind_speed" in channels:
         channels["wind_speed"] = channels.pop("apparent_wind_speed")
         text += ": apparent wind is wind over ground, its direction still from the sensor's own mark"
@@ -167,7 +167,7 @@ def _of_unknown(reading: Reading) -> Reading:
     if "theoretical_wind_speed" in reading.channels:
         finding = Finding(
             kind="apparent-wind-only", severity=Severity.WARNING,
-            what="wind that is computed as if its platform stood still (true wind, TWS): no ground truth",
+            what="wind that is computed as if its platform did not move (true wind, TWS): no ground truth",
             fix="if it is wind over ground, computed with the platform's speed and heading, say so: "
             "--platform corrected",
         )  # fmt: skip

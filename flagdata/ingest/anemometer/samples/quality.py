@@ -29,7 +29,7 @@ STALE_SECONDS = 1.0
 COARSE_STEP, LEAST_OFF = 0.2, 0.1
 """Step between speeds [m/s] from which on an instrument is coarse, and how far its least speed may be from that."""
 VANE_ROWS, VANE_SPEEDS = 20, 3
-"""Rows and different speeds from which on a direction that stays the same is told."""
+"""Rows and different speeds from which on a direction that stays the same is reported."""
 STUCK_SECONDS = 60.0
 STUCK_REPEATS = 60
 """Wind that reads the same for as long as this [s], so many times, is stale whatever the rest of the log looks like."""
@@ -60,7 +60,7 @@ def gaps(reading: Reading) -> tuple[Finding, ...]:
 
 
 def _gaps_of(reading: Reading, own: NDArray[np.int64], of: str) -> tuple[Finding, ...]:
-    """Gaps between rows; what is usual is told by the rows `own`, and `of` says of which kind they are."""
+    """Gaps between rows; what is usual is taken from the rows `own`, and `of` says of which kind they are."""
     if len(own) < 4:
         return ()
     between = np.diff(reading.time[own])
@@ -363,7 +363,7 @@ def at_nyquist(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...
     """Frequencies found in frames taken once a row that lie within one step of half the frame rate: ALIASED.
 
     A sampled oscillation of frequency f is the same as one of |k·rate - f| for every whole k (Shannon 1949); close to
-    rate/2 the two lowest candidates cannot be told apart within the resolution of the estimate: two of its steps, or
+    rate/2 the two lowest candidates cannot be distinguished within the resolution of the estimate: two of its steps, or
     5 % of rate/2. The step is the median spacing of the frequencies above a quarter of the rate; the rate is the
     mean one.
     """
@@ -389,7 +389,7 @@ def at_nyquist(reading: Reading) -> tuple[NDArray[np.uint16], tuple[Finding, ...
                 what=f"{int(near.sum())} values of {name}, median {typical:.2f} Hz in steps of {step:.2f} Hz, lie at "
                 f"the Nyquist limit {limit:.2f} Hz of {rate:.1f} frames a second: the true frequency may as well be "
                 f"{rate - typical:.1f} or {rate + typical:.1f} Hz",
-                fix=f"only a camera faster than {4 * limit:.0f} frames a second can tell",
+                fix=f"only a camera faster than {4 * limit:.0f} frames a second can show it",
             )
         )  # fmt: skip
     return flags, tuple(found)

@@ -1,6 +1,6 @@
 """Rows that share a stamp, given instants of their own by the rate at which they came.
 
-Five causes, told apart by the stamps themselves:
+Five causes, distinguished by the stamps themselves:
 
 - The stamps are coarse or held: nearly every stamp stands for several rows. It may be written to the second only, or
   come from a clock that is read less often than the sensor (a GPS fix once a minute). The sensor's own period is the
@@ -10,10 +10,10 @@ Five causes, told apart by the stamps themselves:
   differ more from the last row of one stamp to the first of the next than from row to row within a stamp: where the
   mean square of those differences, by von Neumann's ratio, is `BURST` times as large over `ENOUGH` stamps or more, the
   rows are spread within the resolution.
-- Few rows share a stamp and their neighbours leave room: they waited in a buffer, or the clock stood for a moment. They
-  are spread over that room. So are rows of a fast logger that leave none, within half a period.
+- Few rows share a stamp and their neighbours leave room: they waited in a buffer, or the clock stopped for a moment.
+  They are spread over that room. So are rows of a fast logger that leave none, within half a period.
 - Rows come when something happens, and their stamps are coarse: stamps lie unevenly, or stand for more or fewer rows
-  than the time to the next one explains, and no period tells when a row came. Rows are spread within the resolution of
+  than the time to the next one explains, and no period shows when a row came. Rows are spread within the resolution of
   their own stamp.
 - Rows of one stamp of a slow log hold the same readings: they are one reading, said again. The first is kept.
 - Few rows of a slow, even logger share a stamp and there is no room: two rows claim one instant. The first is kept.
@@ -55,8 +55,8 @@ _OF_STAMPS = frozenset({"coarse-stamps", "held-stamps", "uneven-stamps", "equal-
 _SLOW = 60 * NANOSECONDS
 """Time between stamps of a slow log, whose readings change from one to the next [ns]."""
 _APART = (
-    "log a stamp with every row; if the rows of one stamp are of several stations, name the column that tells them "
-    "apart as site in --columns"
+    "log a stamp with every row; if the rows of one stamp are of several stations, read one by a recipe: "
+    "[rows] column = its column, value = its name"
 )
 
 
@@ -201,7 +201,7 @@ def _few(reading: Reading, again: NDArray[np.bool_]) -> Reading:
             kind="equal-stamps", severity=Severity.WARNING, count=int(moved.sum()), value=worst,
             where=f"line {reading.line[moved][0]}",
             what=f"{int(moved.sum())} rows share a stamp with a neighbour, as rows do that waited in a buffer or whose "
-            f"clock stood for a moment: kept, spread between their neighbours by up to {worst:.4g} s, and unsure by "
+            f"clock stopped for a moment: kept, spread between their neighbours by up to {worst:.4g} s, and unsure by "
             "as much",
         )  # fmt: skip
         flags = np.where(moved, reading.flags | SampleFlag.TIME_UNSURE, reading.flags)
@@ -281,7 +281,7 @@ def _held(reading: Reading, runs: _Runs, *, period: float, burst: bool, continui
     if not even:
         sure = f"their number a stamp does not follow the time to the next, so each time is unsure by up to {every:g} s"
     if continuity is None:
-        why = f"the readings do not tell whether rows came evenly or in bursts; {'if evenly, ' if even else ''}{sure}"
+        why = f"the readings do not show whether rows came evenly or in bursts; {'if evenly, ' if even else ''}{sure}"
     elif continuity <= BURST:
         came = "came evenly and" if even else "came in no bursts, but"
         why = (
@@ -310,7 +310,7 @@ def _even(runs: _Runs, period: float) -> bool:
 
 
 def _continuity(reading: Reading, again: NDArray[np.bool_]) -> float | None:
-    """Mean square difference of the wind across a change of stamp over that within a stamp; `None` where few tell."""
+    """Mean square difference of the wind across a change of stamp over that within a stamp; `None` for few."""
     ratios: list[float] = []
     for name in sorted(WIND_CHANNELS & set(reading.channels)):
         square = np.diff(reading.channels[name]) ** 2

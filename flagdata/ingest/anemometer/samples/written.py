@@ -11,7 +11,7 @@ from flagdata.ingest.anemometer.text.source import TextFile
 def written_otherwise(source: TextFile, earlier: NDArray[np.int64], later: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(n,) whether the lines `later` hold other text than the lines `earlier`, blanks at their ends apart.
 
-    The file is read once more. A line that it does not have tells nothing, so that its pair is no different.
+    The file is read once more. A line that it does not have shows nothing, so that its pair is no different.
     """
     numbers = np.unique(np.concatenate((earlier, later)))
     found = np.zeros(len(numbers), dtype=np.int64)

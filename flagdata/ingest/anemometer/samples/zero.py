@@ -117,7 +117,7 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
     """Report the zero offset of `wind_speed`, and subtract it where `choice` says so.
 
     A jump out of the calm that was found becomes the sensor's threshold, where its recipe states none and calm reads
-    about 0 after the shift: the uncertainty of a calm then tells what it may hide.
+    about 0 after the shift: the uncertainty of a calm then covers what it may hide.
 
     Raises:
         RefusedError: an estimate was asked for and the log has no idle stretch.

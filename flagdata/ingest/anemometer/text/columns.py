@@ -1,6 +1,6 @@
 """Delimited text cut into columns by Arrow, block by block: what `rows` says of lines, without a Python object a cell.
 
-A line is regular when its bytes alone tell its cells: as many delimiters as the others have, quotes that begin and end
+A line is regular when its bytes alone show its cells: as many delimiters as the others have, quotes that begin and end
 cells and hold no delimiter, no NUL and no line end but its own. Arrow reads those. All other lines (damaged, blank,
 commented, quoted within a cell) go the way of `rows`, which defines what they are. Both give the same, which is tested.
 """

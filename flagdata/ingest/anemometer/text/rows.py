@@ -51,8 +51,8 @@ class RowReader:
         self._headed = 0
         if layout.header:
             names = head[layout.preamble].lstrip("\ufeff")
-            self.header = [cell.strip() for cell in _cut([names], layout.delimiter)[0]]
-            row = _cut(head[layout.preamble + layout.header :], layout.delimiter)
+            self.header = [cell.strip() for cell in cells_of_lines([names], layout.delimiter)[0]]
+            row = cells_of_lines(head[layout.preamble + layout.header :], layout.delimiter)
             used = max((at for at, cell in enumerate(row[0], start=1) if cell.strip()), default=0) if row else 0
             self._headed = len(self.header)
             while len(self.header) > max(1, used) and not self.header[-1]:
@@ -94,7 +94,7 @@ class RowReader:
             kept.append(line)
         good: list[list[str]] = []
         where: list[int] = []
-        for number, row in zip(looked, _cut(kept, self._layout.delimiter), strict=True):
+        for number, row in zip(looked, cells_of_lines(kept, self._layout.delimiter), strict=True):
             size = len(row)
             # Cells below the empty headings at the end, which hold something in some rows only, shift no others.
             fits = named is None or size in (named, self._headed) or _only_empty_beyond(row, named)
@@ -112,7 +112,7 @@ class RowReader:
         encoding = "utf-8" if self._source.encoding == "utf-8-sig" else self._source.encoding
         first, shape = 1, None
         for data in self._source.raw_blocks():
-            shape = shape or self._shape(data, width)
+            shape = shape or self._shape(data)
             lines = lines_of(data, shape) if shape is not None and shape.cells >= width else None
             if lines is None:
                 with io.TextIOWrapper(io.BytesIO(data), encoding=encoding, newline=None) as stream:
@@ -127,7 +127,7 @@ class RowReader:
                 yield where, found
             first += len(lines.start)
 
-    def _shape(self, data: bytes, width: int) -> Shape | None:
+    def _shape(self, data: bytes) -> Shape | None:
         """The shape of the file's regular lines by its first row; `None` where the block has no row."""
         at = -1
         for _ in range(self.first_line - 1):
@@ -221,7 +221,7 @@ def _only_empty_beyond(row: Sequence[str], named: int) -> bool:
     return len(row) > named and not any(cell.strip() for cell in row[named:])
 
 
-def _cut(lines: Sequence[str], delimiter: str) -> list[list[str]]:
+def cells_of_lines(lines: Sequence[str], delimiter: str) -> list[list[str]]:
     """Cells of each line. Quotes bind within a line; a line with a quote that is not closed becomes one cell."""
     if delimiter == " ":
         return [blank_cells(line) for line in lines]

@@ -88,7 +88,7 @@ class TableText(TextFile):
 
     @classmethod
     def of(cls, source: TextFile, lines: Sequence[str], findings: Iterable[Finding] = ()) -> TableText:
-        """A file restated as these lines, with what was found beside the file's own findings."""
+        """A file converted to these lines, with what was found beside the file's own findings."""
         return cls(
             path=source.path, encoding="utf-8", lines=len(lines), findings=(*source.findings, *findings),
             text=tuple(lines),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer import WindOptions, read_log
+from flagdata.ingest.anemometer.draft.questions import OpenFactsError
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
 
@@ -36,12 +38,23 @@ def named(content: str | bytes, options: Mapping[str, Any]) -> dict[str, Any]:
     return dict(options)
 
 
+def answered(path: Path, options: WindOptions) -> WindLog:
+    """A log as it is read when its user answers every doubt about its numbers with yes."""
+    while True:
+        try:
+            return read_log(path, options)
+        except OpenFactsError as error:
+            if any(question.key != "expect" for question in error.questions):
+                raise
+            options = replace(options, expect=(*options.expect, *(question.example for question in error.questions)))
+
+
 @pytest.fixture
 def read(log_file: Callable[[str | bytes], Path]) -> Reader:
     """Reads text or bytes as a log."""
 
     def run(content: str | bytes, **options: object) -> WindLog:
-        return read_log(log_file(content), WindOptions(**named(content, options)))  # type: ignore[arg-type]
+        return answered(log_file(content), WindOptions(**named(content, options)))  # type: ignore[arg-type]
 
     return run
 
@@ -59,7 +72,7 @@ def check_refused(log_file: Callable[[bytes], Path]) -> Callable[..., None]:
     ) -> None:
         path = log_file(content)
         with pytest.raises(FlagdataError) as caught:
-            read_log(path, WindOptions(**named(content, options or {})))
+            answered(path, WindOptions(**named(content, options or {})))
         assert isinstance(caught.value, error), caught.value
         assert caught.value.fix
         assert where in (caught.value.where or "")
@@ -82,7 +95,7 @@ def check_reported(log_file: Callable[[bytes], Path]) -> Callable[..., None]:
         samples: int | None = None,
         options: Mapping[str, Any] | None = None,
     ) -> None:
-        log = read_log(log_file(content), WindOptions(**named(content, options or {})))
+        log = answered(log_file(content), WindOptions(**named(content, options or {})))
         found = [f for f in log.findings if f.kind == finding]
         assert found, [f.kind for f in log.findings]
         assert count in (None, found[0].count)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime as dt
-import gzip
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,11 +12,11 @@ import pytest
 
 from flagdata.errors import InputError
 from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.documents.opening import open_text
 from flagdata.ingest.anemometer.instants.stamps import PLAIN_FORMS, parse
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.recipe import FileLayout
 from flagdata.ingest.anemometer.text.columns import Columns
+from flagdata.ingest.anemometer.text.opening import open_text
 from flagdata.ingest.anemometer.text.rows import RowReader
 from flagdata.ingest.anemometer.text.source import TextFile
 
@@ -207,21 +206,3 @@ STAMPED: dict[str, tuple[str, Callable[[int], str], dict[str, Any]]] = {
     "a counter": ("millis,wind [m/s]\n", lambda i: f"{i * 100 + 7},{3 + i / 10:.1f}", {"start": 1_777 * 10**15}),
     "times of day": ("time,wind [m/s]\n", lambda i: f"23:59:{i:02d},{i}", {"date": dt.date(2026, 5, 1), "zone": "UTC"}),
 }
-
-
-@pytest.mark.parametrize("packed", [False, True], ids=["plain", "gzip"])
-@pytest.mark.parametrize("law", STAMPED)
-def test_a_drafted_table_is_read_by_columns_as_row_by_row(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, law: str, packed: bool
-) -> None:
-    heading, row, said = STAMPED[law]
-    text = (heading + "".join(f"{row(i)}\n" for i in range(60))).encode()
-    path = tmp_path / ("log.csv.gz" if packed else "log.csv")
-    path.write_bytes(gzip.compress(text) if packed else text)
-    fast = read_log(path, WindOptions(**said))
-    monkeypatch.setattr(RowReader, "blocks", RowReader.rows)
-    slow = read_log(path, WindOptions(**said))
-    assert len(fast.series.time) == (20 if law == "a row of another site" else 60)
-    assert fast.findings == slow.findings
-    np.testing.assert_array_equal(fast.series.time, slow.series.time)
-    np.testing.assert_array_equal(fast.series.channels["wind_speed"], slow.series.channels["wind_speed"])

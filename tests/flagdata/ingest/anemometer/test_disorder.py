@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import datetime as dt
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from flagdata.errors import InputError, TimeError, UsageError
+from flagdata.errors import TimeError, UsageError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer import WindOptions, anemometers, read_log
 from flagdata.ingest.anemometer.instants.clock import ClockChoice
 from flagdata.ingest.anemometer.instants.disorder import longest_rise, sorting, turned_about
 from flagdata.rng import stream
@@ -72,28 +70,6 @@ def test_rows_written_twice_in_a_disordered_file_are_reported(read: Read) -> Non
     found = read(log([*SHUFFLED[:150], *SHUFFLED[40:60], *SHUFFLED[150:]]), zone="UTC")
     assert len(found.series) == N
     assert told(found, "duplicate-rows").count == 20
-
-
-def test_the_rows_of_each_turbine_are_sorted_by_themselves(read: Read) -> None:
-    text = log(SHUFFLED, site=lambda row: f"T{row % 2}")
-    found = read(text, zone="UTC", wind="T1")
-    assert found.series.channels["wind_speed"].tolist() == SPEEDS[1::2].tolist()
-    assert told(found, "rows-sorted").severity is Severity.WARNING
-
-
-def test_devices_that_follow_each_other_beyond_the_first_rows_are_told_apart(
-    read: Read, log_file: Callable[[str], Path]
-) -> None:
-    stamps = [f"{START + dt.timedelta(minutes=10 * row)}" for row in range(1200)]
-    text = "Turbine,Timestamp,Wind speed (m/s)\n" + "".join(
-        f"T{site},{stamp},{site + at % 2}.5\n" for site in (3, 5) for at, stamp in enumerate(stamps)
-    )
-    assert anemometers(log_file(text), WindOptions(zone="UTC")) == ("T3", "T5")
-    with pytest.raises(InputError, match="--wind T3"):
-        read(text, zone="UTC")
-    for site in (3, 5):
-        found = read(text, zone="UTC", wind=f"T{site}")
-        assert found.series.channels["wind_speed"].tolist() == [site + at % 2 + 0.5 for at in range(1200)]
 
 
 def test_wall_clock_rows_are_sorted_before_daylight_saving_is_told(read: Read) -> None:
@@ -227,17 +203,6 @@ def test_a_word_on_the_clock_is_offered_only_where_it_would_have_the_rows_read(r
         assert caught.value.fix.startswith("if all stamps are right and only the rows are out of order: --clock sort")
         assert "split" not in caught.value.fix
     assert len(read(text, zone="UTC", clock="sort").series.time) == 40
-
-
-def test_a_day_and_a_month_that_change_places_are_named(log_file: Callable[[str], Path]) -> None:
-    hours = [dt.datetime(2020, 1, 1, tzinfo=dt.UTC) + dt.timedelta(hours=at) for at in range(24 * 14)]
-    stamps = [f"{one:%m-%d-%Y %H:%M}" if one.day <= 12 else f"{one:%d-%m-%Y %H:%M}" for one in hours]
-    path = log_file(
-        "\n".join(["Date,Wind speed (m/s)", *(f"{stamp},3.{at % 10}" for at, stamp in enumerate(stamps))]) + "\n"
-    )
-    with pytest.raises(TimeError, match="day and month change places there") as caught:
-        read_log(path, WindOptions(zone="Europe/Istanbul"))
-    assert "--clock" not in (caught.value.fix or "")
 
 
 @pytest.mark.parametrize(

@@ -53,15 +53,6 @@ def test_a_sheet_with_dates_is_read_by_its_recipe(book: Book) -> None:
     assert log.series.channels["air_temperature"][0] == pytest.approx(293.15)
 
 
-def test_a_sheet_that_no_recipe_describes_is_drafted_as_its_text_is(book: Book) -> None:
-    rows = [["time", "Wind speed [km/h]"], *([START + dt.timedelta(seconds=i), 36 + 3.6 * i] for i in range(4))]
-    path = book(Log=rows)
-    assert sniff(path)[0].doubts == ()
-    log = read_log(path, WindOptions(zone="UTC"))
-    assert log.series.channels["wind_speed"] == pytest.approx([10.0, 11.0, 12.0, 13.0])
-    assert sniff(book(Log=PLAIN))[0].doubts[0].startswith("the unit of column 'wind_speed' is not stated")
-
-
 def test_a_makers_export_in_a_sheet_is_told_as_its_text_is(book: Book) -> None:
     rows = [
         ["z6-01234", "Port1", None, "Port8"], ["# Records: 3", "ATMOS 22 Ultrasonic Anemometer", None, "Barometer"],

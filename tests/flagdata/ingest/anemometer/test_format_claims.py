@@ -38,13 +38,14 @@ SAMPLES = {
     "nrg": "NRG Export Service\nTime Zone:\tUTC-5:00\nTimestamp\tCh1_Anem_40.00m_N_Avg_m/s\n2026-05-01 12:00:00\t5\n",
     "windographer": "Created 1-5-2026 by Windographer 5\n\nDate/Time\tSpd80m [m/s]\n2026-05-01 12:00\t5\n",
     "zentra": "z6-1,Port1,\n# Records: 2,ATMOS 22,\nTimestamps,m/s Wind Speed,° Wind Direction\n5/13/2026 12:00,3,90\n",
-    "davis": "\t\tTemp\tWind\tWind\nDate\tTime\tOut\tSpeed\tDir\n25/05/26\t12:30p\t20\t3\tN\n",
+    "davis": '"Date & Time","Avg Wind Speed - km/h"\n"5/13/26 12:05 AM","18.0"\n',
     "ecowitt": "Time,Outdoor Temperature(℃),Wind(m/s),Gust(m/s),Wind Direction(deg)\n2026-05-01 12:00,20,3,4,90\n",
     "hobo": '"Plot Title: x"\n"#","Date Time, GMT+00:00","Wind Speed, m/s (LGR S/N: 1)"\n1,07/15/26 12:00:00 PM,3\n',
     "eddypro": "filename,date,time,wind_speed,wind_dir\n,[yyyy-mm-dd],[HH:MM],[m+1s-1],[deg_from_north]\n"
     "a,2026-05-01,12:30,3,90\n",
     "fluxnet": "TIMESTAMP_START,TIMESTAMP_END,WS,WD\n202605011200,202605011230,3,90\n",
     "icos": "#Site;SamplingHeight;Year;Month;Day;Hour;Minute;WS;WD\nLIN;40.0;2026;05;01;12;00;4.2;210\n",
+    "icos-ecosystem": "TIMESTAMP,WS_1_1_1\n20260501120000,4.2\n20260501120010,4.4\n",
     "surfrad": " X\n 40.05 -88.37 230 m version 1\n" + " 2026 121 5 1 12 0 12.0 40.0" + " 1.0 0" * 20 + "\n",
 }
 

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.errors import InputError, TimeError
+from flagdata.errors import FlagdataError, InputError, TimeError
 from flagdata.ingest.anemometer import WindOptions, anemometers
-from flagdata.ingest.anemometer.words.headings import understand
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
 from flagdata.timebase import iso
@@ -161,71 +160,20 @@ def test_a_toa5_table_whose_dates_could_be_either_order_is_refused_unless_told(r
     assert first(read(text, zone="UTC", date_order="mdy")) == "2026-09-01T12:00:00Z"
 
 
-# Vantage consoles keep whole mph; WeatherLink rounds what it converts to one decimal.
-MPH = {"mph": (1, 2, 3, 5, 8, 9), "km/h": (1.6, 3.2, 4.8, 8.0, 12.9, 14.5), "m/s": (0.4, 0.9, 1.3, 2.2, 3.6, 4.0)}
+WEATHERLINK = (
+    "\t\tTemp\tWind\tWind\nDate\tTime\tOut\tSpeed\tDir\n"
+    "25/05/26\t10:30a\t20.1\t2\tNNE\n25/05/26\t11:30a\t20.1\t3\tN\n25/05/26\t1:30p\t20.1\t5\t---\n"
+)
 
 
-def weatherlink(speeds: tuple[float, ...], *, delimiter: str = "\t") -> str:
-    upper = ["", "", "Temp", "Hi", "Out", "Wind", "Wind", "Hi", "Hi", ""]
-    lower = ["Date", "Time", "Out", "Temp", "Hum", "Speed", "Dir", "Speed", "Dir", "Bar"]
-    rows = [
-        ["25/05/26", ("10:30a", "11:30a", "1:30p")[i], "20.1", "21.0", "55", str(speed), "NNE", "9", "N", "1013.2"]
-        for i, speed in enumerate(speeds[:3])
-    ]
-    rows += [
-        ["26/05/26", f"1:{10 + i}a", "---", "---", "---", str(speed), "---", "9", "N", "---"]
-        for i, speed in enumerate(speeds[3:])
-    ]
-    if delimiter == "\t":
-        return "\n".join("\t".join(row) for row in [upper, lower, *rows]) + "\n"
-    width = 9
-    lines = ["".join(f"{cell:>{width}}" for cell in row) for row in [upper, lower]]
-    body = ["".join(f"{cell:>{width}}" for cell in row) for row in rows]
-    return "\n".join([*lines, "-" * width * len(lower), *body, ""])
-
-
-@pytest.mark.parametrize(("unit", "speeds"), MPH.items())
-@pytest.mark.parametrize("delimiter", ["\t", " "])
-def test_the_unit_of_a_weatherlink_text_shows_in_whole_miles_per_hour(
-    read: Read, unit: str, speeds: tuple[float, ...], delimiter: str
-) -> None:
-    log = read(weatherlink(speeds, delimiter=delimiter), zone="UTC")
-    # 2 mph = 0.894 m/s; the file's one decimal is 0.05 of its unit
-    assert log.format == "davis"
-    assert log.series.channels["wind_speed"][1] == pytest.approx(0.894, abs=0.03)
+def test_the_text_of_the_program_weatherlink_states_no_unit_and_is_read_by_what_its_user_gives(read: Read) -> None:
+    with pytest.raises(FlagdataError, match="unit of 'Speed'"):
+        read(WEATHERLINK, zone="UTC")
+    columns = "1=date[%d/%m/%y],2=time[%I:%M%p],4=wind_speed[mph],5=wind_direction[points]"
+    log = read(WEATHERLINK, zone="UTC", columns=columns)
+    assert (first(log), iso(int(log.series.time[2]))) == ("2026-05-25T10:30:00Z", "2026-05-25T13:30:00Z")
+    assert log.series.channels["wind_speed"].tolist() == pytest.approx([2 * 0.44704, 3 * 0.44704, 5 * 0.44704])
     assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(22.5))
-    assert np.isnan(log.series.channels["wind_direction"][4])
-    assert first(log) == "2026-05-25T10:30:00Z"
-    assert iso(int(log.series.time[2])) == "2026-05-25T13:30:00Z"
-    assert {"unit-from-resolution", "compass-points"} <= set(kinds(log))
-
-
-def test_a_weatherlink_direction_is_the_one_beside_the_speed_and_gusts_are_offered(read: Read) -> None:
-    text = weatherlink(MPH["mph"], delimiter=" ")
-    upper, rest = text.split("\n", 1)
-    places = [match.start() for match in re.finditer("Wind", upper)]
-    moved = f"{upper[: places[1]]}    {upper[places[1] + 4 :]}"  # the second "Wind" is not above Dir
-    log = read(f"{moved}\n{rest}", zone="UTC")
-    assert log.format == "davis"
-    assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(22.5))
-    told = " ".join(finding.what for finding in log.findings if finding.kind == "columns-not-read")
-    (line,) = re.findall(r'--columns "([^"]*)"', told)
-    gusts = read(f"{moved}\n{rest}", zone="UTC", columns=line)
-    assert gusts.series.channels["wind_speed"].tolist() == pytest.approx([9 * 0.44704] * 6)
-    assert gusts.series.channels["wind_direction"][0] == pytest.approx(0.0)
-
-
-def test_weatherlink_speeds_that_show_no_unit_are_refused(read: Read) -> None:
-    with pytest.raises(InputError, match="carries no units") as caught:
-        read(weatherlink((0, 0, 0.4, 0, 0, 0)), zone="UTC")
-    assert "recipe" in (caught.value.fix or "")
-
-
-def test_a_unit_of_the_user_that_weatherlink_speeds_speak_against_is_doubted(read: Read) -> None:
-    text = weatherlink(MPH["km/h"])
-    assert {"unit-doubtful", "unit-from-resolution"}.isdisjoint(kinds(read(text, zone="UTC", unit="km/h")))
-    (doubt,) = (found for found in read(text, zone="UTC", unit="m/s").findings if found.kind == "unit-doubtful")
-    assert "--unit km/h" in (doubt.fix or "")
 
 
 def test_weatherlink_com_names_its_units(read: Read) -> None:
@@ -379,13 +327,6 @@ def test_eddypro_directions_in_the_unit_of_another_column_are_refused_with_a_ste
     assert "--columns" in (caught.value.fix or "")
 
 
-def test_a_line_of_units_that_lacks_one_is_told(read: Read) -> None:
-    rows = "".join(f"2026-05-01T12:{at:02d}:00Z,{3 + at % 5},{200 + at}\n" for at in range(20))
-    told = {one.what for one in read(f"time,wind,wind dir\nm/s,deg\n{rows}").findings}
-    assert "line 2 has 2 units for 3 columns: taken as those of all but the first" in told
-    assert not any("units for" in one.what for one in read(f"time,wind,wind dir\n,m/s,deg\n{rows}").findings)
-
-
 def test_statistics_of_components_are_no_wind_of_a_table_read_without_its_format(
     log_file: Callable[[str], Path],
 ) -> None:
@@ -398,12 +339,6 @@ STATISTICS = (
     "spikes", "skewness", "kurtosis", "flag", "qc", "var", "cov", "rand_err", "strg", "stdev", "sd", "skw", "kur", "se",
     "quality_flag", "itc", "timelag_hf", "mask", "error", "count",
 )  # fmt: skip
-
-
-@pytest.mark.parametrize("stem", ["u", "v", "w", "Ux", "u_rot", "wind_speed", "WS", "VENTO"])
-@pytest.mark.parametrize("statistic", STATISTICS)
-def test_a_heading_that_ends_in_a_statistic_is_never_a_wind(stem: str, statistic: str) -> None:
-    assert understand(f"{stem}_{statistic}").channel == ""
 
 
 def test_flux_networks_have_fixed_units_and_stamp_the_end(read: Read) -> None:
@@ -450,6 +385,6 @@ def test_icos_atmosphere_is_in_utc_and_its_flag_is_heeded(read: Read) -> None:
 
 def test_icos_ecosystem_raw_files_have_one_stamp_and_fixed_units(read: Read) -> None:
     log = read("TIMESTAMP,TA_1_1_1,WS_1_1_1\n20260501120000,12.1,4.2\n20260501120010,12.1,4.4\n", zone="UTC")
-    assert log.format == "fluxnet"
+    assert log.format == "icos-ecosystem"
     assert log.series.channels["wind_speed"].tolist() == [4.2, 4.4]
     assert log.series.sensor.averaging is None

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from flagdata.errors import FlagdataError, InputError, TimeError, UnknownNameError, UsageError
+from flagdata.ingest.anemometer.draft.questions import OpenFactsError
 from flagdata.schema import SampleFlag
 
 Check = Callable[..., None]
@@ -109,7 +110,7 @@ REFUSED = [
         id="other-delimiter",
     ),
     pytest.param(
-        {"content": csv(ROW, header="time,speed"), "error": InputError, "says": "--unit"}, id="column-missing"
+        {"content": csv(ROW, header="time,speed"), "error": OpenFactsError, "says": "--unit"}, id="column-missing"
     ),
     pytest.param(
         {
@@ -143,7 +144,7 @@ REFUSED = [
         id="format-unknown",
     ),
     pytest.param(
-        {"content": csv(ROW), "error": InputError, "says": "--unit", "options": {"format": "delimited"}},
+        {"content": csv(ROW), "error": OpenFactsError, "says": "--unit", "options": {"format": "delimited"}},
         id="format-without-recipe",
     ),
     pytest.param(

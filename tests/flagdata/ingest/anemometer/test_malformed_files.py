@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flagdata.errors import InputError, LimitError
+from flagdata.errors import FlagdataError, InputError, LimitError
 from flagdata.ingest.anemometer import Limits
+from flagdata.ingest.anemometer.draft.questions import OpenFactsError
 
 Check = Callable[..., None]
 
@@ -87,12 +88,10 @@ REFUSED = [
     pytest.param(
         {"content": b"The wind blew all day.\nThen it stopped.\n", "error": InputError, "says": "recipe"}, id="prose"
     ),
-    pytest.param(
-        {"content": b'{"time": 1, "wind_speed": 3}\n', "error": InputError, "says": "unit of column"}, id="json"
-    ),
+    pytest.param({"content": b'{"time": 1, "wind_speed": 3}\n', "error": OpenFactsError, "says": "unit of"}, id="json"),
     pytest.param({"content": b"<!doctype html><html><body>404</body></html>\n", "error": InputError}, id="html"),
     pytest.param({"content": b'[file]\ndelimiter = ","\n', "error": InputError}, id="toml"),
-    pytest.param({"content": b"1 2 3\n4 5 6\n", "error": InputError, "says": "--columns"}, id="numbers-without-header"),
+    pytest.param({"content": b"1 2 3\n4 5 6\n", "error": FlagdataError}, id="numbers-without-header"),
 ]
 
 

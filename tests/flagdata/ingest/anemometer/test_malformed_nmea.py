@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from flagdata.errors import InputError, TimeError, UsageError
+from flagdata.ingest.anemometer.draft.questions import OpenFactsError
 from flagdata.ingest.anemometer.formats.sentences import checksum
 from flagdata.schema import SampleFlag
 
@@ -64,7 +65,7 @@ REFUSED = [
         id="no-wind-format-named",
     ),
     pytest.param(
-        {"content": b"\r\n".join([b"$IIMWV,010,R,5.0,N,A*00"] * 10), "error": InputError}, id="all-checksums-wrong"
+        {"content": b"\r\n".join([b"$IIMWV,010,R,5.0,N,A*00"] * 10), "error": OpenFactsError}, id="all-checksums-wrong"
     ),
     pytest.param(
         {

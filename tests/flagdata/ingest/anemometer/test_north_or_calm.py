@@ -8,11 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.errors import InputError, UsageError
-from flagdata.ingest.anemometer.log import read_log
-from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.signals import WindLog
-from flagdata.timebase import parse
 
 Read = Callable[..., WindLog]
 Write = Callable[..., Path]
@@ -50,24 +46,3 @@ def test_without_a_zero_or_in_whole_degrees_nothing_is_doubted(read: Read, turns
 
 def test_a_zero_at_a_speed_of_nothing_is_calm_anyway(read: Read) -> None:
     assert not doubts(read(rows([*_TENS, 350, 0], [*[4.0] * 21, 0.0]), zone="UTC"))
-
-
-def test_what_stands_for_calm_air_is_a_rule_of_all_sites(log_file: Write) -> None:
-    turns = [*_TENS, 360, 0]
-    lines = [f"S{at:02d},2026-05-01T12:00:00Z,3,{turn}" for at, turn in enumerate(turns)]
-    path = log_file("station_id,observation_time,wind_speed_kt,wind_dir_degrees\n" + "\n".join(lines) + "\n")
-    north, calm = (read_log(path, WindOptions(wind=f"S{at:02d}")) for at in (len(turns) - 2, len(turns) - 1))
-    assert north.series.channels["wind_direction"][0] == pytest.approx(0.0)
-    assert np.isnan(calm.series.channels["wind_direction"][0])
-    assert [found for found in calm.findings if found.kind == "code-for-missing"]
-
-
-def test_dates_before_1970_are_refused_with_a_step_that_works(log_file: Write) -> None:
-    path = log_file("Yr,Mo,Dy,RPT\n" + "".join(f"61,1,{day},{10 + day % 5}.5\n" for day in range(1, 21)))
-    with pytest.raises(InputError) as caught:
-        read_log(path, WindOptions(wind="RPT", unit="kn", zone="UTC"))
-    assert "a TIME from 1970 on" in (caught.value.fix or "")
-    with pytest.raises(UsageError, match="before 1970"):
-        read_log(path, WindOptions(columns=",,,wind_speed[kn]", start=parse("1961-01-01T00:00:00Z"), rate=1 / 86_400))
-    log = read_log(path, WindOptions(columns=",,,wind_speed[kn]", start=parse("1971-01-01T00:00:00Z"), rate=1 / 86_400))
-    assert len(log.series.time) == 20

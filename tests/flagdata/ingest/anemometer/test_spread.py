@@ -80,7 +80,7 @@ def test_bursts_are_told_from_held_stamps_by_the_jump_of_the_readings() -> None:
 
 def test_readings_that_do_not_vary_leave_it_open_whether_rows_came_in_bursts() -> None:
     log = ordered(np.repeat(np.arange(20) * 60 * S, 60), np.full(1200, 3.0), step=S)
-    assert "do not tell" in log.findings[0].what
+    assert "do not show" in log.findings[0].what
 
 
 @pytest.mark.parametrize("early", [True, False])

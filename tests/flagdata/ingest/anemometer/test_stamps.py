@@ -173,18 +173,18 @@ def test_a_log_that_runs_through_the_skipped_hour_was_not_set_forward() -> None:
     ],
 )
 def test_the_order_of_a_date_is_decided_by_evidence(texts: list[str], order: str) -> None:
-    assert decide(texts, told=None, where="x").order == order
+    assert decide(texts, given=None, where="x").order == order
 
 
 def test_a_told_order_for_dates_that_begin_with_the_year_is_refused() -> None:
     with pytest.raises(TimeError, match="2026-06-01"):
-        decide(["2026-06-01 10:00"], told="dmy", where="x")
+        decide(["2026-06-01 10:00"], given="dmy", where="x")
 
 
 def test_an_order_without_evidence_is_refused_unless_told() -> None:
     with pytest.raises(TimeError):
-        decide(["5/6/2026 10:00"], told=None, where="x")
-    assert decide(["5/6/2026 10:00"], told="mdy", where="x").order == "mdy"
+        decide(["5/6/2026 10:00"], given=None, where="x")
+    assert decide(["5/6/2026 10:00"], given="mdy", where="x").order == "mdy"
 
 
 @pytest.mark.parametrize("year", [1900, 1969, 2201, 3000])

@@ -152,17 +152,3 @@ def test_wind_over_ground_from_a_platform_that_moves_is_taken_by_its_users_word(
     log = read(track(2000), platform="corrected")
     assert "wind_speed" in log.series.channels
     assert "computed-true-wind" in [finding.kind for finding in log.findings]
-
-
-@pytest.mark.parametrize("text", ["time,AWS (m/s),AWA (deg)\n2026-05-01T12:00:00Z,3,40\n2026-05-01T12:00:01Z,4,41\n"])
-def test_apparent_wind_alone_is_no_corrected_wind(read: Read, text: str) -> None:
-    with pytest.raises(InputError, match="no wind over ground in the log"):
-        read(text, platform="corrected")
-
-
-def test_true_wind_of_a_table_is_told_and_taken_as_over_ground_by_its_users_word(read: Read) -> None:
-    table = "time,TWS (km/h)\n2026-05-01T12:00:00Z,18\n2026-05-01T12:00:01Z,36\n"
-    found = read(table)
-    assert found.series.channels["theoretical_wind_speed"] == pytest.approx([5.0, 10.0])
-    assert "apparent-wind-only" in [finding.kind for finding in found.findings]
-    assert read(table, platform="corrected").series.channels["wind_speed"] == pytest.approx([5.0, 10.0])

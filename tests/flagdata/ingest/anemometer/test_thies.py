@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import reduce
 from operator import xor
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from flagdata.errors import InputError
-from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]
@@ -47,12 +44,6 @@ def test_each_fixed_telegram_is_read_behind_a_stamp(read: Read, form: str) -> No
     np.testing.assert_allclose(np.rad2deg(found["wind_direction"]), 200 + np.arange(30))
     if form != "VD":
         np.testing.assert_allclose(found["sonic_temperature"], 294.65)
-
-
-def test_the_unit_is_asked_for_where_the_telegram_does_not_tell_it(log_file: Callable[[str], Path]) -> None:
-    with pytest.raises(InputError) as caught:
-        read_log(log_file(log(bodies("VDT"))), WindOptions(zone="UTC"))
-    assert "--unit" in caught.value.fix
 
 
 def test_frames_that_were_lost_or_written_out_are_not_needed(read: Read) -> None:

@@ -100,3 +100,18 @@ def test_records_show_what_the_stamps_alone_would_hide(read: Read) -> None:
     log = read(text, zone="UTC")
     lost = next(f for f in log.findings if f.kind == "records-lost")
     assert (lost.count, lost.where) == (2, "line 12")
+
+
+def test_a_direction_that_was_averaged_as_a_number_is_a_warning(read: Read) -> None:
+    rows = [(3 + at % 7 / 10, (350 + at) % 360) for at in range(30)]
+    warned = {
+        how: "direction-mean-of-numbers"
+        in {
+            found.kind
+            for found in read(
+                table([("WS_ms_Avg", "meters/second", how), ("WindDir_Avg", "degrees", how)], rows), zone="UTC"
+            ).findings
+        }
+        for how in ("Avg", "WVc")
+    }
+    assert warned == {"Avg": True, "WVc": False}

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.winds import unitcheck
+from flagdata.ingest.anemometer.table import unitcheck
 from flagdata.units import unit
 
 WIND: NDArray[np.float64] = np.asarray(5 * np.abs(np.random.default_rng(7).weibull(2.0, 400)), dtype=np.float64)
@@ -58,30 +55,6 @@ def test_a_day_of_gales_in_metres_a_second_is_doubted_an_hour_is_not() -> None:
     assert found is not None
     assert "km/h" in found.what
     assert unitcheck.contradiction(gale, "km/h", span=2 * 86_400.0) is None
-
-
-def test_gusts_below_the_mean_or_above_three_times_it_are_of_another_unit() -> None:
-    assert unitcheck.gust_factor(WIND, 1.6 * WIND) is None
-    assert unitcheck.gust_factor(WIND, 0.5 * WIND) == pytest.approx(0.5)
-    assert unitcheck.gust_factor(WIND, 1.6 * 3.6 * WIND) == pytest.approx(5.76)
-
-
-def test_a_file_whose_values_contradict_its_heading_warns(log_file: Callable[[str], str]) -> None:
-    values = written("mph", 1.0, "km/h", 1)[:200]
-    rows = "".join(f"2026-05-13 12:{i // 60:02d}:{i % 60:02d},{v:g}\n" for i, v in enumerate(values))
-    log = read_log(log_file("time,ws (m/s)\n" + rows), WindOptions(zone="UTC"))
-    doubt = next(f for f in log.findings if f.kind == "unit-doubtful")
-    assert "km/h" in doubt.what
-    assert doubt.fix is not None
-    assert "--unit km/h" in doubt.fix
-
-
-def test_a_column_without_a_unit_is_refused_with_the_likely_one(log_file: Callable[[str], str]) -> None:
-    values = written("mph", 1.0, "km/h", 1)[:200]
-    rows = "".join(f"2026-05-13 12:{i // 60:02d}:{i % 60:02d},{v:g}\n" for i, v in enumerate(values))
-    with pytest.raises(Exception, match="likely km/h") as caught:
-        read_log(log_file("time,wind\n" + rows), WindOptions(zone="UTC"))
-    assert "--unit km/h" in caught.value.fix  # type: ignore[attr-defined]
 
 
 def test_whole_numbers_of_another_unit_by_a_rounded_factor_are_of_the_stated_one() -> None:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import datetime as dt
-import re
 from collections.abc import Callable
 
 import pytest
 
-from flagdata.errors import FlagdataError
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]
@@ -43,17 +41,3 @@ def test_a_receiver_whose_time_is_another_is_told(read: Read, receiver: str, sai
     )
     found = told(read(lines), "receiver-clock-off")
     assert [said in what for what in found] == ([True] if said else [])
-
-
-def test_years_of_two_digits_that_only_the_last_century_had_are_refused(read: Read) -> None:
-    rows = "".join(f"61 1 {day} {10 + day % 5}.04\n" for day in range(1, 29))
-    with pytest.raises(FlagdataError, match="would be 2061"):
-        read(f"Yr Mo Dy RPT\n{rows}", wind="RPT", unit="kn", zone="UTC")
-
-
-def test_the_line_of_a_year_of_two_digits_can_be_pasted(read: Read) -> None:
-    rows = "".join(f"21 1 {day} {10 + day % 5}.04 200\n" for day in range(1, 29))
-    text = f"Yr Mo Dy RPT dirx\n{rows}"
-    (line, *_) = re.findall(r'--columns "([^"]*)"', str(read(text, wind="RPT", unit="kn", zone="UTC").findings))
-    columns = line.replace("?=", "5=").replace("[?]", "[kn]")
-    assert read(text, columns=columns, zone="UTC").series.time[0] == 1_609_459_200 * 10**9

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
-from flagdata.errors import TimeError
-from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.ingest.anemometer.instants.abbreviations import advice
 from flagdata.ingest.anemometer.instants.zones import stated
 from flagdata.signals import WindLog
@@ -63,23 +60,6 @@ def test_a_zone_off_the_preambles_is_told_whatever_reader_is_chosen(read: Read) 
         found = [finding for finding in log.findings if finding.kind == "zone-contradicts"]
         assert [finding.value for finding in found] == [6.0]
         assert "zone-contradicts" not in kinds(read(_NRG, format=name, zone="-05:00"))
-
-
-def test_a_place_is_no_contradiction_where_its_clocks_agree(read: Read) -> None:
-    assert "zone-contradicts" not in kinds(read(f"UTC Offset,+2\n{_TABLE}", zone="Europe/Amsterdam"))
-    assert "zone-contradicts" in kinds(read(f"UTC Offset,+1\n{_TABLE}", zone="Europe/Amsterdam"))
-
-
-def test_a_zone_in_the_heading_is_taken_and_another_one_given_is_told(read: Read) -> None:
-    text = _TABLE.replace("Time,", "Time (Europe/Berlin),")
-    assert read(text).series.time[0] == 1_784_023_200_000_000_000  # 10:00 UTC
-    assert "zone-contradicts" in kinds(read(text, zone="UTC"))
-
-
-def test_a_missing_zone_is_asked_for_with_what_the_file_says(log_file: Callable[[str], Path]) -> None:
-    path = log_file(f"Timezone=UTC\n{_TABLE}")
-    with pytest.raises(TimeError, match="line 1 says 'Timezone=UTC': if that is the zone of the stamps, --zone UTC"):
-        read_log(path, WindOptions())
 
 
 @pytest.mark.parametrize("heading", ["CST,Max wind mph,Wind SpeedMPH,Dew", "no,Year,DOY,MST,Direct,Wind speed [m/s]"])

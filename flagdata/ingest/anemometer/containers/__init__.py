@@ -1,0 +1,1 @@
+"""Files that hold a table and are no plain text of it."""

@@ -1,0 +1,63 @@
+"""JSON lines of flat objects: one reading a line, whose names become the heading of a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.text.source import TableText, TextFile
+
+_NAMES = 2000
+
+
+def matches(lines: Sequence[str]) -> bool:
+    """Whether the first line that holds something is one object."""
+    first = next((line.strip() for line in lines if line.strip()), "")
+    return first.startswith("{") and first.endswith("}")
+
+
+def as_table(source: TextFile) -> TableText:
+    """The objects as rows; the first names the columns, lines that are none are left out.
+
+    Raises:
+        InputError: objects that hold others, or no row.
+    """
+    names: list[str] = []
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    left_out = 0
+    for line in source.each_line():
+        if not line.strip():
+            continue
+        try:
+            value = json.loads(line)
+        except (ValueError, RecursionError):
+            value = None
+        if not isinstance(value, dict):
+            left_out += 1
+            continue
+        if any(isinstance(item, (dict, list)) for item in value.values()) or len(value) > _NAMES:
+            fix = "write one flat object a line: its time and its wind, or a CSV"
+            raise InputError("the objects hold objects or lists", where=str(source.path), fix=fix)
+        if not names:
+            names = list(value)
+            writer.writerow(names)
+        writer.writerow([_text(value.get(name)) for name in names])
+    lines = out.getvalue().splitlines()
+    if len(lines) < 2:
+        raise InputError(
+            "no row in the JSON lines", where=str(source.path), fix="check that the logger recorded anything"
+        )
+    found = [Finding(kind="json-lines", severity=Severity.NOTE, what="lines are counted with the names as the first")]
+    if left_out:
+        what = f"{left_out} lines are no JSON object; left out"
+        found.append(Finding(kind="malformed-lines", severity=Severity.WARNING, count=left_out, what=what))
+    return TableText.of(source, lines, found)
+
+
+def _text(value: object) -> str:
+    return "" if value is None else " ".join(str(value).split())

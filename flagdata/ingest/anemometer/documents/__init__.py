@@ -1,1 +1,0 @@
-"""Files that are opened as text: plain and packed files, workbooks, JSON."""

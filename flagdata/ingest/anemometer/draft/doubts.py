@@ -1,0 +1,226 @@
+"""Numbers of a drafted reading that are impossible or doubtful: each opens a question that only the user answers.
+
+A doubt is answered for good by its key in a recipe: `[expect] confirmed = ["fast", …]`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from flagdata.ingest.anemometer.instants.stamps import DAY
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.recipe import Recipe
+from flagdata.signals import Series
+from flagdata.timebase import NANOSECONDS, iso
+from flagdata.units import UNITS, unit
+
+_FASTEST = 75.0
+"""m/s; above the strongest gusts of any storm but tornadoes and the record of Barrow Island (113 m/s)."""
+_STRONG = 30.0
+"""m/s; a median above it is a storm that lasts."""
+_FEW, _RARE = 0.05, 0.01
+_SLOW = 60 * NANOSECONDS
+_BEFORE = 631_152_000 * NANOSECONDS
+"""1990-01-01T00:00:00Z."""
+_TENS = 36.0
+_CALM = 0.2
+_FAR = 0.1
+"""Share of a log by which its time goes back no clock that was set goes."""
+_NORTH = 30.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doubt:
+    """What speaks against a drafted reading.
+
+    Attributes:
+        key: of the recipe's [expect].
+        text: what is odd, with numbers.
+        question: to be answered.
+    """
+
+    key: str
+    text: str
+    question: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Seen:
+    """A reading as it is examined: speed and direction as they are written, without missing values."""
+
+    reading: Reading
+    speed: Series
+    direction: Series
+    both: tuple[Series, Series]
+    unit: str
+    assumed: bool
+    left_out: int
+    now: int
+
+
+def doubts(reading: Reading, recipe: Recipe, *, assumed: frozenset[str], left_out: int, now: int) -> tuple[Doubt, ...]:
+    """Everything that is odd of a drafted reading, but for what the recipe expects.
+
+    Args:
+        reading: in the order of the file, before it was judged.
+        assumed: channels whose unit is assumed.
+        left_out: lines that could not be read.
+        now: UTC nanoseconds.
+    """
+    speed, direction = (_written(reading, recipe, name) for name in ("wind_speed", "wind_direction"))
+    known = np.isfinite(speed) & np.isfinite(direction)
+    seen = _Seen(
+        reading=reading, speed=speed[np.isfinite(speed)], direction=direction[np.isfinite(direction)],
+        both=(speed[known], direction[known]), unit=_unit(recipe, "wind_speed"), assumed="wind_direction" in assumed,
+        left_out=left_out, now=now,
+    )  # fmt: skip
+    found = ((key, check(seen), question) for key, (check, question) in CHECKS.items() if key not in recipe.expect)
+    of_values = tuple(Doubt(key=key, text=text, question=question) for key, text, question in found if text)
+    of_reader = (
+        Doubt(key=one.kind, text=one.what, question="Is that right?")
+        for one in reading.findings if one.kind in REPORTED and one.kind not in recipe.expect
+    )  # fmt: skip
+    return (*of_values, *of_reader)
+
+
+def _unit(recipe: Recipe, name: str) -> str:
+    return recipe.channels[name].unit if name in recipe.channels else "m/s"
+
+
+def _written(reading: Reading, recipe: Recipe, name: str) -> Series:
+    """A channel in the file's unit; angles in degrees where they are points of the compass."""
+    values = reading.channels.get(name)
+    if values is None:
+        return np.full(len(reading.time), np.nan)
+    spelled = _unit(recipe, name)
+    return unit(spelled).from_si(values) if spelled in UNITS else np.rad2deg(values)
+
+
+def _si(seen: _Seen) -> Series:
+    return unit(seen.unit).to_si(seen.speed)
+
+
+def _fast(seen: _Seen) -> str:
+    over = _si(seen) > _FASTEST
+    return (
+        f"{int(over.sum())} speeds are above {_FASTEST:g} m/s, the highest {_si(seen).max():.4g}" if over.any() else ""
+    )
+
+
+def _strong(seen: _Seen) -> str:
+    median = float(np.median(_si(seen))) if len(seen.speed) else 0.0
+    return f"the median speed is {median:.3g} m/s" if median > _STRONG else ""
+
+
+def _negative(seen: _Seen) -> str:
+    below = seen.speed[seen.speed < 0]
+    values, counts = np.unique(below, return_counts=True)
+    if len(counts) and counts.max() > 1:
+        return f"{values[counts.argmax()]:g} {seen.unit} occurs {counts.max()} times and is no speed"
+    share = len(below) / max(1, len(seen.speed))
+    return f"{share:.0%} of the speeds are below 0, the lowest {below.min():g} {seen.unit}" if share > _FEW else ""
+
+
+def _still(seen: _Seen) -> str:
+    return "every speed is 0" if len(seen.speed) and not seen.speed.any() else ""
+
+
+def _constant(seen: _Seen) -> str:
+    same = len(seen.speed) > 10 and seen.speed[0] != 0 and bool((seen.speed == seen.speed[0]).all())
+    return f"every speed is {seen.speed[0]:g} {seen.unit}" if same else ""
+
+
+def _angles(seen: _Seen) -> str:
+    off = np.abs(seen.speed - np.round(seen.speed))
+    whole = len(seen.speed) > 10 and bool((off < 1e-6).all()) and bool((seen.speed >= 0).all())
+    spread = whole and seen.speed.max() <= 360 and seen.speed.max() > 180 and len(np.unique(seen.speed)) > 10
+    return f"the speeds are whole numbers from {seen.speed.min():g} to {seen.speed.max():g}" if spread else ""
+
+
+def _tens(seen: _Seen) -> str:
+    found = seen.direction
+    small = (
+        seen.assumed and len(found) > 1 and bool((found % 1 == 0).all()) and found.min() >= 0 and found.max() <= _TENS
+    )
+    return f"the directions are whole numbers up to {found.max():g}, and no unit is stated" if small else ""
+
+
+def _fixed(seen: _Seen) -> str:
+    speed, direction = seen.both
+    same = len(direction) > 10 and bool((direction == direction[0]).all()) and len(np.unique(speed)) > 3
+    return f"the direction is {direction[0]:g} in every row, while the speed varies" if same else ""
+
+
+def _calm(seen: _Seen) -> str:
+    speed, direction = seen.both
+    zero = direction == 0
+    si = unit(seen.unit).to_si(speed)
+    if zero.sum() < 2 or zero.all():
+        return ""
+    rows = f"the direction is 0 in {int(zero.sum())} rows"
+    if bool((si[zero] <= _CALM).all()) and bool((si[~zero] > _CALM).any()):
+        return f"{rows}, all of them at speeds up to {_CALM:g} m/s"
+    near = (np.minimum(direction % 360, -direction % 360) < _NORTH) & ~zero
+    return "" if near.any() else f"{rows}, and no other is within {_NORTH:g}° of north"
+
+
+def _order(seen: _Seen) -> str:
+    steps = np.diff(seen.reading.time)
+    back = steps <= 0
+    share = float(back.mean()) if len(back) else 0.0
+    span = int(np.ptp(seen.reading.time))
+    far = len(back) and -int(steps.min()) > max(_SLOW, _FAR * span)
+    if far:
+        by = f"{-int(steps.min()) / NANOSECONDS:g} s"
+        return f"the time goes back by {by}, as after a clock was set back, or where devices follow one another"
+    return f"the time does not increase in {share:.0%} of the rows" if share > _RARE else ""
+
+
+def _future(seen: _Seen) -> str:
+    last = int(seen.reading.time.max())
+    return f"the last row is of {iso(last)}, which is to come" if last > seen.now + DAY else ""
+
+
+def _old(seen: _Seen) -> str:
+    first = int(seen.reading.time.min())
+    return f"the first row is of {iso(first)[:10]}" if first < _BEFORE else ""
+
+
+def _coarse(seen: _Seen) -> str:
+    steps = np.diff(np.sort(seen.reading.time))
+    step = float(np.median(steps)) / NANOSECONDS if len(steps) else 0.0
+    return f"rows are {step:g} s apart" if step * NANOSECONDS > _SLOW else ""
+
+
+def _lines(seen: _Seen) -> str:
+    share = seen.left_out / max(1, seen.left_out + len(seen.reading.time))
+    return f"{seen.left_out} lines ({share:.0%}) were left out" if share > _RARE else ""
+
+
+CHECKS: Mapping[str, tuple[Callable[[_Seen], str], str]] = {
+    "fast": (_fast, "Is the unit right?"),
+    "strong": (_strong, "Is the unit right?"),
+    "negative": (_negative, "Do negative speeds occur, as of a calibration's zero?"),
+    "still": (_still, "Did the wind rest all the time?"),
+    "constant": (_constant, "Did the wind never change?"),
+    "angles": (_angles, "Are these speeds, and no directions?"),
+    "tens": (_tens, "Are these degrees, and no tens of degrees or sectors?"),
+    "fixed": (_fixed, "Did the vane never turn?"),
+    "calm": (_calm, "Is 0 the north, and not calm air or a variable wind?"),
+    "order": (_order, "Are all rows of one device, in their order? (--clock corrects a clock that was set)"),
+    "future": (_future, "Is the clock right?"),
+    "old": (_old, "Is the clock right?"),
+    "coarse": (_coarse, "Are these readings or means that long apart?"),
+    "lines": (_lines, "May these lines be left out?"),
+}
+"""Key of [expect] → the check, and what is asked; "yes" confirms the reading as it is."""
+REPORTED = frozenset(
+    {
+        "code-for-missing", "out-of-range", "north-or-calm", "speed-only-grows", "speed-may-be-sum", "unit-doubtful",
+        "below-threshold", "calm-in-words",
+    }
+)  # fmt: skip
+"""Kinds of findings of the reader that are doubts of a draft, each by its kind."""

@@ -1,0 +1,52 @@
+"""Open facts of a draft: what only the user can answer, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flagdata.errors import RefusedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Open:
+    """A question that only the user can answer.
+
+    Attributes:
+        key: the option that answers it.
+        question: in words.
+        example: what stands behind the option; never an answer, but for the key of a doubt.
+    """
+
+    key: str
+    question: str
+    example: str
+
+    def fix(self) -> str:
+        """The option that answers it."""
+        return f"--{self.key.replace('_', '-')} {self.example}{' (if yes)' if self.key == 'expect' else ''}"
+
+
+ZONE = Open(
+    key="zone", question="what is the zone of the logger's clock (Europe/Amsterdam, +02:00, UTC)?", example="ZONE"
+)
+
+
+class OpenFactsError(RefusedError):
+    """A draft with questions that nobody has answered."""
+
+    kind = "open-facts"
+
+    def __init__(self, what: str, *, where: str | None = None, fix: str, questions: tuple[Open, ...] = ()) -> None:
+        super().__init__(what, where=where, fix=fix)
+        self.questions = questions
+
+    @classmethod
+    def of(cls, questions: Sequence[Open], *, where: str) -> OpenFactsError:
+        """The error for some questions, which names what answers each."""
+        return cls(
+            f"the file leaves this open: {'; '.join(one.question for one in questions)}",
+            where=where, questions=tuple(questions),
+            fix=f"answer by {' '.join(one.fix() for one in questions)}; or describe the file by a recipe: "
+            "--sensor FILE.toml",
+        )  # fmt: skip

@@ -1,0 +1,149 @@
+"""Which columns of a table are its time, and in which of some forty forms: all that fit, never the likelier one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flagdata.ingest.anemometer.draft.shape import Shape
+from flagdata.ingest.anemometer.draft.words import Meaning
+from flagdata.ingest.anemometer.instants import counted, stamps
+from flagdata.ingest.anemometer.instants.midnight import parse_as
+from flagdata.ingest.anemometer.instants.stamps import Stamps
+
+_CLOCKS = ("%H:%M:%S%f", "%H:%M", "%I:%M:%S%f %p", "%I:%M %p", "%H%M%S", "%H%M", "%H")
+_DATES = (
+    "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y%m%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y",
+    "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%d %b %Y", "%d-%b-%Y", "%b %d %Y", "%Y %j",
+)  # fmt: skip
+_WHOLE = ("iso", "%Y%m%d%H%M%S", "%Y%m%d%H%M", "%Y%m%dT%H%M%S%z")
+_EPOCHS = ("epoch-s", "epoch-ms", "epoch-us")
+_FITS = 0.95
+"""Share of the stamps that a form must read."""
+_ORDER = {"%d": "d", "%m": "m", "%Y": "y", "%y": "y"}
+_LOOK = 3
+"""Stamps that a form is tried on first."""
+_CLOCK = re.compile(r"\d:\d\d")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeFields:
+    """The time of a table.
+
+    Attributes:
+        columns: their indices; they are joined with a blank.
+        forms: all that fit; one where nothing is open, none where the columns are no time that is known.
+        zoned: whether the stamps state their zone.
+        utc: whether a heading says that they are of UTC.
+        evidence: what shows the form.
+    """
+
+    columns: tuple[int, ...]
+    forms: tuple[str, ...]
+    zoned: bool = False
+    utc: bool = False
+    evidence: str = ""
+
+    @property
+    def form(self) -> str | None:
+        return self.forms[0] if len(self.forms) == 1 else None
+
+
+def find_time(shape: Shape, meanings: Sequence[Meaning], order: str | None) -> TimeFields | None:
+    """The time of a table, by its headings and its cells; `None` where no column reads as one.
+
+    A time of day is none beside a date that does not read: its days would be lost.
+
+    Args:
+        order: of dates of numbers alone, as the user gives it.
+    """
+    dates = [i for i, one in enumerate(meanings) if one.kind == "date"]
+    times = [i for i, one in enumerate(meanings) if one.kind == "time"]
+    unnamed = [i for i, one in enumerate(meanings) if one.kind == "other" and not shape.names[i]][:2]
+    choices = [(d, t) for d in dates for t in times] + [(i,) for i in (*times, *dates, *unnamed)]
+    choices += [(i, i + 1) for i in unnamed if i + 1 in unnamed]
+    for columns in choices:
+        found = of_columns(shape, columns, order)
+        dated = not dates or any(i in dates for i in columns)
+        if found is not None and (dated or not any(map(counted.is_time_of_day, found.forms))):
+            utc = any(meanings[i].utc for i in columns)
+            return TimeFields(
+                columns=columns, forms=found.forms, zoned=found.zoned, utc=utc, evidence=found.evidence
+            )  # fmt: skip
+    return None
+
+
+def of_columns(shape: Shape, columns: tuple[int, ...], order: str | None, form: str | None = None) -> TimeFields | None:
+    """These columns as a time, in `form` or in all forms that fit; `None` where none does."""
+    texts = [" ".join(row[i] for i in columns) for row in shape.rows]
+    texts = [text for text in texts if text.strip()]
+    forms = [form] if form is not None else _candidates(texts, columns)
+    forms = [one for one in forms if form is not None or _reads_any(texts[:_LOOK], one)]
+    fitting = [one for one in forms if _reads(texts, one) and _ordered(one, order)]
+    if not fitting:
+        return None
+    kept = _distinct(fitting, texts)
+    read = parse_as(texts, kept[0])[0]
+    evidence = f"first {texts[0]!r}"
+    swapped = [one for one in forms if _same_but_order(one, kept[0]) and one not in fitting]
+    if len(kept) == 1 and order is not None:
+        evidence = f"the order {order} was given"
+    elif len(kept) == 1 and swapped:
+        bad = next(text for text in texts if not _reads([text], swapped[0]))
+        evidence = f"{bad!r} is a date in this order alone"
+    return TimeFields(columns=columns, forms=kept, zoned=bool(read.utc[read.valid].all()), evidence=evidence)
+
+
+def _candidates(texts: Sequence[str], columns: tuple[int, ...]) -> list[str]:
+    first = texts[0] if texts else ""
+    if re.fullmatch(r"\d{9,19}(\.\d+)?", first):
+        return [*_EPOCHS, *(one for one in _WHOLE if one != "iso")]
+    dated = [f"{date} {clock}" for date in _DATES for clock in _CLOCKS]
+    dated += _CLOCKS if len(columns) == 1 else ()
+    return [*_WHOLE, *dated] if len(columns) > 1 or _CLOCK.search(first) else [*_WHOLE, *dated, *_DATES]
+
+
+def _reads_any(texts: Sequence[str], form: str) -> bool:
+    """Whether a form fits one of the first stamps by its letters, so that all are worth a look."""
+    if "%" not in form:
+        return bool(parse_as(list(texts), form)[0].valid.any())
+    day = "%Y-%m-%d " if counted.is_time_of_day(form) else ""
+    expression = re.compile(stamps.pattern(f"{day}{form}"))
+    return any(expression.fullmatch(f"{'1970-01-01 ' if day else ''}{text.strip()}") for text in texts)
+
+
+def _reads(texts: Sequence[str], form: str) -> bool:
+    found = parse_as(list(texts), form)[0]
+    return bool(len(texts)) and float(found.valid.mean()) >= _FITS
+
+
+def _letters(form: str) -> str:
+    return "".join(_ORDER[part] for part in re.findall(r"%[dmYy]", form))
+
+
+def _ordered(form: str, order: str | None) -> bool:
+    """Whether a form has the order that the user gave; one without numbers of day and month has any."""
+    letters = _letters(form)
+    return order is None or len(letters) < 3 or letters == order
+
+
+def _same_but_order(one: str, other: str) -> bool:
+    return one != other and sorted(_letters(one)) == sorted(_letters(other)) and _letters(one) != _letters(other) and (
+        re.sub(r"%[dmYy]", "", one) == re.sub(r"%[dmYy]", "", other)
+    )  # fmt: skip
+
+
+def _distinct(forms: Sequence[str], texts: Sequence[str]) -> tuple[str, ...]:
+    """The forms but for those that read the same instants as one before, where both read any."""
+    kept: dict[str, Stamps] = {}
+    for form in forms:
+        read = parse_as(list(texts), form)[0]
+        if not any(_alike(read, other) for other in kept.values()):
+            kept[form] = read
+    return tuple(kept)
+
+
+def _alike(one: Stamps, other: Stamps) -> bool:
+    both = one.valid & other.valid
+    return bool(both.any()) and bool((one.ns[both] == other.ns[both]).all())

@@ -1,0 +1,159 @@
+"""What a file is: of a format by its maker's signature, of a recipe by its heading, a table, or something else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from flagdata.addresses import local_path
+from flagdata.errors import FlagdataError, NotFoundError
+from flagdata.ingest.anemometer import untimed
+from flagdata.ingest.anemometer.containers import json_lines, spreadsheet
+from flagdata.ingest.anemometer.draft.drafting import Draft
+from flagdata.ingest.anemometer.formats import ft, sentences_in_lines, thies
+from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
+from flagdata.ingest.anemometer.options import Limits, WindOptions
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKind, Head
+from flagdata.ingest.anemometer.table.delimited import Delimited, drafted
+from flagdata.ingest.anemometer.text.opening import first_bytes, open_text, signature
+from flagdata.ingest.anemometer.text.source import TextFile
+
+_PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
+_MESHES = {".obj", ".ply", ".stl", ".off"}
+_AS_TABLE = (json_lines, thies, ft)
+
+
+def opened(path: Path, options: WindOptions, encoding: str | None = None) -> TextFile:
+    """A log as lines: telegrams and JSON lines as a table, rows that carry no time on the clock that was given.
+
+    Raises:
+        FlagdataError: it cannot be read as text, or does not fit the options.
+    """
+    source = open_text(path, limits=options.limits, encoding=options.encoding or encoding)
+    if options.rate is not None:
+        kind = next((one for one in _AS_TABLE if one.matches(source.head())), None)
+        source = source if kind is None else kind.as_table(source) or source
+        return untimed.timed(source, rate=options.rate, start=options.start, columns=options.columns)
+    if options.recipe is None and sentences_in_lines.matches(source.head()):
+        return sentences_in_lines.as_table(source)
+    if options.format is not None or options.recipe is not None or recognised(source):
+        return source
+    for kind in _AS_TABLE:
+        if kind.matches(source.head()):
+            return kind.as_table(source) or source
+    return source
+
+
+def recognised(source: TextFile) -> tuple[Guess, ...]:
+    """The formats and recipes that know a file, the surest first; none where it is unknown."""
+    return tuple(guess for guess in _guesses(source) if guess.score >= SURE)
+
+
+def _guesses(source: TextFile) -> tuple[Guess, ...]:
+    head = Head(lines=tuple(source.head(HEAD_LINES)), counted=source.counted)
+    found: list[Guess] = []
+    for name in FORMATS:
+        reader: Format = FORMATS[name]()
+        guess = reader.recognise(head)
+        if guess is not None:
+            found.append(guess)
+    return tuple(sorted(found, key=lambda guess: -guess.score))
+
+
+def guess_of(draft: Draft) -> Guess:
+    """What `sniff` says of a draft."""
+    return Guess(
+        format=Delimited.name, score=0.3 if draft.open else 0.55, reasons=tuple(fact.line() for fact in draft.facts),
+        notes=(f"not used: {', '.join(draft.unused)}",) if draft.unused else (), draft=draft.recipe, winds=draft.winds,
+        doubts=tuple(f"{one.question}: {one.fix()}" for one in draft.open),
+        fix="; ".join(one.fix() for one in draft.open) or None,
+    )  # fmt: skip
+
+
+def sniff(path: Path | str) -> tuple[Guess, ...]:
+    """Guesses at what a file or folder is, the likeliest first; never empty.
+
+    Raises:
+        NotFoundError: there is no such file.
+        InputError: it is empty or cannot be read.
+    """
+    path = local_path(path)
+    if not path.exists():
+        raise NotFoundError(f"no file {path.name}", where=str(path), fix="check the path")
+    if path.is_dir():
+        return (_folder(path),)
+    head = first_bytes(path)
+    other = None if spreadsheet.is_workbook(path, head) else signature(head)
+    if other is not None:
+        what, fix = other
+        kind: GuessKind = "camera" if "video" in what else "record" if "MCAP" in what else "other"
+        reason = f"this is {what}: its first bytes are {head[:8].hex(' ')}"
+        return (Guess(format="video" if kind == "camera" else what, score=0.99, reasons=(reason,), kind=kind, fix=fix),)
+    if path.suffix.lower() in _MESHES:
+        reason = f"the name ends in {path.suffix}"
+        return (Guess(format="mesh", score=0.9, reasons=(reason,), kind="meshes", fix="ingest the folder it is in"),)
+    try:
+        source = opened(path, WindOptions(limits=Limits()))
+        rewritten = tuple(finding.what for finding in source.findings)
+        found = recognised(source) or tuple(filter(None, [completed(path, WindOptions())]))
+    except FlagdataError as error:
+        return (Guess(format="unknown", score=0.0, reasons=(error.what,), kind="other", fix=error.fix),)
+    return tuple(replace(guess, notes=(*rewritten, *guess.notes)) for guess in found) or (unknown(source),)
+
+
+def completed(path: Path | str, options: WindOptions) -> Guess | None:
+    """The guess at a table that no recipe describes, with what the user gives; `None` where it is no table of a log.
+
+    Raises:
+        FlagdataError: the file cannot be read as text.
+    """
+    found = drafted(opened(Path(path), options), options)
+    return None if found is None else guess_of(found)
+
+
+def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[str, ...]:
+    """Labels of the anemometers of a table that no recipe describes, where it holds several; else none.
+
+    Each can be read by itself: `read_log(path, replace(options, wind=label))`.
+
+    Raises:
+        FlagdataError: the file cannot be read as text.
+    """
+    options = options or WindOptions()
+    if options.recipe is not None or options.format not in (None, Delimited.name) or options.wind is not None:
+        return ()
+    source = opened(Path(path), options)
+    if options.format is None and options.columns is None and recognised(source):
+        return ()
+    found = drafted(source, options)
+    return found.winds if found is not None and len(found.winds) > 1 else ()
+
+
+def unknown(source: TextFile) -> Guess:
+    """A text that no format and no recipe knows, and that is no table of a time and a wind; or what a format says."""
+    said = next((guess for guess in _guesses(source) if guess.fix), None)
+    if said is not None:
+        return said
+    text = "its text is neither a table with a time and a wind, nor lines of an instrument that is known"
+    columns = '--columns "time[FORMAT],wind_speed[UNIT]"'
+    fix = (
+        f"if it is a log, say what its columns are, in order: {columns}; or describe it by a recipe: --sensor FILE.toml"
+    )
+    return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix)
+
+
+def _folder(path: Path) -> Guess:
+    names = [item.name for item in sorted(path.iterdir())]
+    meshes = [name for name in names if Path(name).suffix.lower() in _MESHES]
+    pictures = [name for name in names if Path(name).suffix.lower() in _PICTURES]
+    if meshes and len(meshes) >= len(pictures):
+        arcsim = " with an ArcSim conf.json" if "conf.json" in names else ""
+        reason = f"a folder of {len(meshes)} mesh files{arcsim}, the first {meshes[0]}"
+        return Guess(format="mesh folder", score=0.95, reasons=(reason,), kind="meshes", fix="ingest it as meshes")
+    if pictures:
+        reason = f"a folder of {len(pictures)} pictures, the first {pictures[0]}"
+        return Guess(format="image sequence", score=0.9, reasons=(reason,), kind="camera", fix="ingest it as a camera")
+    return Guess(
+        format="folder", score=0.0, reasons=(f"a folder of {len(names)} files, neither meshes nor pictures",),
+        kind="other", fix="give one file",
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Tables read by a recipe: cells, clock, units and codes."""

@@ -1,0 +1,139 @@
+"""The format "delimited": a table by a sensor recipe, or by a draft whose facts are all known."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from flagdata.errors import InputError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer import recipe as recipes
+from flagdata.ingest.anemometer.draft.doubts import doubts
+from flagdata.ingest.anemometer.draft.drafting import Draft, draft
+from flagdata.ingest.anemometer.draft.questions import Open, OpenFactsError
+from flagdata.ingest.anemometer.draft.words import meaning
+from flagdata.ingest.anemometer.options import WindOptions
+from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
+from flagdata.ingest.anemometer.recipe import Recipe
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
+from flagdata.ingest.anemometer.table.by_recipe import read_by_recipe
+from flagdata.ingest.anemometer.text.source import TextFile
+
+_ASKED = frozenset({"unit", "date_order", "wind", "columns", "missing", "expect"})
+"""Options that complete a draft; a recipe says these things itself."""
+_WEST = 1.5 * np.pi
+"""The azimuth of components towards east (x) and north (y): wind along +x comes from the west."""
+_LEFT_OUT = frozenset({"malformed-lines", "unreadable-stamps"})
+
+
+class Delimited:
+    """Format "delimited": a recipe of catalogs/sensors, the user's own TOML file, or a draft."""
+
+    name = "delimited"
+    about = "delimited text described by a sensor recipe, or by a draft that its user confirms"
+    uses = frozenset({"zone", "azimuth", "platform", "start", "date", *_ASKED})
+
+    def recognise(self, head: Head) -> Guess | None:
+        """The recipe of the catalog whose columns the header names; the one with most columns in common."""
+        best: Guess | None = None
+        for name in recipes.SENSORS.names():
+            found = _match(recipes.load(name), name, head)
+            if found and (best is None or found.score > best.score):
+                best = found
+        return best
+
+    def read(self, source: TextFile, options: WindOptions) -> Reading:
+        """Read a file by the recipe in `options`, or by its draft."""
+        where = str(source.path)
+        if options.recipe is None:
+            return _by_draft(source, options, where)
+        strange = sorted(_ASKED & options.given())
+        if strange:
+            raise UsageError(
+                f"the recipe says for itself: {', '.join(strange)}", where=where, fix="leave it out, or edit the recipe"
+            )
+        recipe = recipes.load(options.recipe)
+        if recipe.file.host:
+            raise UsageError(
+                f"the recipe {recipe.name} is for host-stamped lines", where=where, fix="use --as host-stamped"
+            )
+        return read_by_recipe(source, recipe, options, azimuth=options.azimuth)
+
+
+def drafted(source: TextFile, options: WindOptions) -> Draft | None:
+    """The draft of a file; `None` where it holds no table."""
+    return draft(source.head(HEAD_LINES), options)
+
+
+def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:
+    found = drafted(source, options)
+    if found is None:
+        fix = "describe it by a recipe: --sensor FILE.toml"
+        raise UsageError("no table in its first lines", where=where, fix=fix)
+    if len(found.winds) > 1 and options.wind is None:
+        question = f"the file holds {len(found.winds)} anemometers: {', '.join(found.winds)}; which one?"
+        raise OpenFactsError.of([Open(key="wind", question=question, example="COLUMN")], where=where)
+    if found.open:
+        raise OpenFactsError.of(found.open, where=where)
+    recipe = recipes.parse(found.recipe, where=f"the draft for {where}")
+    recipe = replace(recipe, expect=frozenset((*options.expect, *(("order",) if options.clock is not None else ()))))
+    azimuth = _WEST if found.of_earth and options.azimuth is None else options.azimuth
+    reading = read_by_recipe(source, recipe, options, azimuth=azimuth)
+    if _LEFT_OUT & {finding.kind for finding in reading.findings}:
+        _refuse_new_names(source, recipe, where)
+    odd = doubts(
+        reading, recipe, assumed=frozenset(fact.what for fact in found.facts if fact.origin == "assumed"),
+        left_out=sum(one.count for one in reading.findings if one.kind in _LEFT_OUT), now=time.time_ns(),
+    )  # fmt: skip
+    if odd:
+        asked = [Open(key="expect", question=f"{one.text}. {one.question}", example=one.key) for one in odd]
+        raise OpenFactsError.of(asked, where=where)
+    unused = _unused(found)
+    understood = tuple(fact.line() for fact in found.facts)
+    return replace(
+        reading.with_findings(unused), drafted=found.recipe, stated=found.stated, understood=understood
+    )  # fmt: skip
+
+
+def _refuse_new_names(source: TextFile, recipe: Recipe, where: str) -> None:
+    """Refuse a table whose columns change places on the way, by a line that names them in another order."""
+    heading = source.head(recipe.file.preamble + 1)[-1].strip()
+    cut = recipe.file.delimiter if recipe.file.delimiter != " " else None
+    names = sorted(heading.split(cut))
+    for number, line in enumerate(source.each_line(), start=1):
+        if len(line) == len(heading) and line != heading and sorted(line.split(cut)) == names:
+            what = "this line names the columns anew, in another order"
+            raise InputError(what, where=f"{where}, line {number}", fix="split the file before it")
+
+
+def _unused(found: Draft) -> tuple[Finding, ...]:
+    what = f"columns that are not used: {', '.join(found.unused)}"
+    return (Finding(kind="columns-not-read", severity=Severity.NOTE, what=what),) if found.unused else ()
+
+
+def _states_its_unit(recipe: Recipe) -> bool:
+    """Whether the headings that a recipe expects state the unit of the wind."""
+    winds = [layout.column for name, layout in recipe.channels.items() if name in WIND_CHANNELS]
+    return all(isinstance(column, str) and meaning(column).unit is not None for column in winds)
+
+
+def _match(recipe: Recipe, name: str, head: Head) -> Guess | None:
+    layout = recipe.file
+    if not _states_its_unit(recipe) or layout.host or layout.header == 0 or len(head.lines) <= layout.preamble:
+        return None
+    line = head.lines[layout.preamble]
+    cells = [
+        cell.strip().strip('"') for cell in (line.split() if layout.delimiter == " " else line.split(layout.delimiter))
+    ]
+    needed = [c.column for c in recipe.channels.values() if not c.optional] + list(recipe.time.columns)
+    if not all(column in cells for column in needed):
+        return None
+    found = [c.column for c in recipe.channels.values() if c.column in cells]
+    return Guess(
+        format="delimited",
+        recipe=name,
+        score=min(0.95, 0.6 + 0.05 * (len(found) + len(recipe.time.columns))),
+        reasons=(f"line {layout.preamble + 1} names the columns of recipe {name}: {', '.join(map(str, needed))}",),
+    )

@@ -1,0 +1,463 @@
+"""Cells of a delimited log, by a recipe, into a `Reading`: what the formats with rows and columns share."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from flagdata import compass
+from flagdata.errors import InputError, NothingMeasuredError, UnknownNameError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.instants import counted, zones
+from flagdata.ingest.anemometer.instants.stamps import DAY, YEARS
+from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
+from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
+from flagdata.ingest.anemometer.samples import possible
+from flagdata.ingest.anemometer.table import below, calm, codes, cumulated, unitcheck
+from flagdata.ingest.anemometer.table.rowclock import Block, Given, Order, RowClock, cells_of
+from flagdata.ingest.anemometer.text.cells import Cell, numbers
+from flagdata.ingest.anemometer.text.columns import Columns
+from flagdata.ingest.anemometer.text.growing import Growing
+from flagdata.schema import CHANNELS, SampleFlag
+from flagdata.timebase import NANOSECONDS
+from flagdata.units import unit
+
+_MINUTE = 60 * NANOSECONDS
+TURNS = ("deg", "10 deg")
+"""Units of directions that services write codes in."""
+DOUBTED = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
+"""Channels whose unit is held against their values."""
+_DIRECTIONS = frozenset(name for name in CHANNELS if name.endswith(("wind_direction", "wind_direction_magnetic")))
+
+
+class Rows(Protocol):
+    """Where the cells come from; `shift` is the index of the column that recipes call 1."""
+
+    header: list[str] | None
+    shift: int
+    first_line: int
+
+    def blocks(self, width: int) -> Iterator[tuple[NDArray[np.int64], Block]]: ...
+
+    def findings(self) -> tuple[Finding, ...]: ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A log read by a recipe.
+
+    Attributes:
+        reading: its channels.
+        extra: (n,) float64 of the columns asked for beside the channels, as written.
+    """
+
+    reading: Reading
+    extra: Mapping[str, NDArray[np.float64]]
+
+
+@dataclass
+class _Column:
+    """One column as its blocks come in."""
+
+    index: int
+    suffix: str = ""
+    points: Mapping[str, float] | None = None
+    calm: Collection[str] = ()
+    absent: Sequence[str] = ()
+    limit: float = 0.0
+    values: Growing[np.float64] = field(default_factory=lambda: Growing(np.float64))
+    states: Growing[np.uint8] = field(default_factory=lambda: Growing(np.uint8))
+
+    def value(self, order: Order) -> NDArray[np.float64]:
+        """All values; they are let go, so that a long log is not held twice."""
+        found, self.values = self.values.view()[order], Growing(np.float64)
+        return found
+
+    def state(self, order: Order) -> NDArray[np.uint8]:
+        """All states; likewise."""
+        found, self.states = self.states.view()[order], Growing(np.uint8)
+        return found
+
+
+@dataclass
+class _Check:
+    """Whether the cells of one column are among the right ones, as the blocks come in."""
+
+    layout: CheckLayout
+    index: int
+    right: list[NDArray[np.bool_]] = field(default_factory=list)
+
+    def faults(self, order: Order, line: NDArray[np.int64]) -> tuple[NDArray[np.bool_], tuple[Finding, ...]]:
+        fault = ~np.concatenate(self.right)[order]
+        if not fault.any():
+            return fault, ()
+        count, values = int(fault.sum()), ", ".join(self.layout.values)
+        what = f"{count} rows whose {self.layout.about} is not {values}; left out of averages"
+        where = f"line {line[fault][0]}"
+        return fault, (Finding(kind="sensor-fault", severity=Severity.WARNING, count=count, where=where, what=what),)
+
+
+@dataclass
+class _Gathered:
+    """All cells wanted, as the blocks come in."""
+
+    clock: RowClock
+    host: RowClock | None
+    channels: dict[str, _Column]
+    extra: dict[str, _Column]
+    checks: list[_Check]
+    rows: int | None = None
+    lines: Growing[np.int64] = field(default_factory=lambda: Growing(np.int64))
+    bad_stamps: list[int] = field(default_factory=list)
+    distant: int = 0
+    blank: list[int] = field(default_factory=list)
+    turns: dict[str, list[NDArray[np.float64]]] = field(default_factory=dict)
+
+    def columns(self) -> list[_Column]:
+        return [*self.channels.values(), *self.extra.values()]
+
+    def width(self) -> int:
+        """Cells a row must have."""
+        only = [] if self.rows is None else [self.rows]
+        return 1 + max([*only, *self.clock.columns, *(column.index for column in [*self.columns(), *self.checks])])
+
+    def add(self, line: NDArray[np.int64], block: Block, recipe: Recipe) -> None:
+        if self.rows is not None and recipe.rows is not None:
+            self._directions(block, recipe)
+            wanted = _among(block, self.rows, (recipe.rows.value,))
+            line, block = line[wanted], _where(block, wanted)
+            if not len(line):
+                return
+        stamps = self.clock.parse(block)
+        keep = stamps.valid
+        if self.host is not None:
+            host = self.host.parse(block)
+            keep = keep & host.valid
+            self.host.add(host, keep)
+        self.clock.add(stamps, keep)
+        self.bad_stamps.extend(line[~keep].tolist())
+        self.distant += int(stamps.distant.sum())
+        empty = [_among(block, index, ("",)) for index in self.clock.columns]
+        self.blank.extend(line[~keep & np.logical_and.reduce(empty)].tolist())
+        self.lines.add(line[keep])
+        for column in self.columns():
+            cells = cells_of(block, column.index)
+            cells = _in_degrees(cells, recipe.file.decimal, column.points) if column.points is not None else cells
+            parsed = numbers(
+                cells, decimal=recipe.file.decimal, missing=(*recipe.file.missing, *column.absent),
+                suffix=column.suffix, zeros=column.calm, below=bool(column.calm),
+            )  # fmt: skip
+            column.limit = max(column.limit, parsed.limit)
+            column.values.add(parsed.value[keep])
+            column.states.add(parsed.state[keep])
+        for check in self.checks:
+            right = _among(block, check.index, check.layout.values)
+            check.right.append(right[keep])
+
+    def _directions(self, block: Block, recipe: Recipe) -> None:
+        """Keep the directions of all sites, since what stands for calm air is a rule of the whole file."""
+        for name, column in self.channels.items():
+            if _blows_from(name) and column.points is None and recipe.channels[name].unit in TURNS:
+                cells = cells_of(block, column.index)
+                read = numbers(cells, decimal=recipe.file.decimal, missing=recipe.file.missing, suffix=column.suffix)
+                self.turns.setdefault(name, []).append(read.value)
+
+    def beside(self, name: str) -> NDArray[np.float64] | None:
+        """(m,) a direction of all sites' rows as written; `None` where the file has one site."""
+        return np.concatenate(self.turns[name]) if name in self.turns else None
+
+    def line(self) -> NDArray[np.int64]:
+        return self.lines.view()
+
+
+def _blows_from(name: str) -> bool:
+    """Whether a channel is an angle that the wind blows from."""
+    return CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from")
+
+
+def _in_degrees(cells: Sequence[str] | pa.StringArray, decimal: str, points: Mapping[str, float]) -> list[str]:
+    """Points of the compass as degrees; calm air and what else is no point have no direction."""
+    texts: list[str] = [str(text) for text in cells]
+    degrees = (points.get(text.strip().upper()) for text in texts)
+    return ["" if value is None else f"{value:g}".replace(".", decimal) for value in degrees]
+
+
+def _where(block: Block, wanted: NDArray[np.bool_]) -> Block:
+    """The rows of a block that are wanted (n,)."""
+    if isinstance(block, Columns):
+        return block.where(wanted)
+    return [row for row, kept in zip(block, wanted.tolist(), strict=True) if kept]
+
+
+def _among(block: Block, index: int, values: Sequence[str]) -> NDArray[np.bool_]:
+    """(n,) whether the trimmed cells of a column are among `values`."""
+    if isinstance(block, Columns):
+        return block.among(index, values)
+    return np.array([row[index].strip() in values for row in block], dtype=bool)
+
+
+def read_table(
+    rows: Rows,
+    recipe: Recipe,
+    *,
+    where: str,
+    zone_name: str | None,
+    extra: Sequence[str] = (),
+    given: Given | None = None,
+) -> Table:
+    """Read cells by a recipe.
+
+    Args:
+        rows: the file's rows.
+        where: the file, for messages.
+        zone_name: of wall-clock stamps; goes before the recipe's.
+        extra: further columns to read, by name.
+        given: what the user says about stamps that are no dates.
+
+    Raises:
+        UsageError: a start or date for stamps that have one.
+        InputError: no such columns, or hardly a row that can be read.
+        TimeError: stamps without a zone, or impossible ones.
+    """
+    own = [_index(column, rows, where) for column in recipe.time.columns]
+    host = RowClock(form=recipe.file.host, columns=[0]) if recipe.file.host else None
+    gathered = _Gathered(
+        clock=RowClock(form=recipe.time.format, columns=own) if own or host is None else host,
+        host=host if own else None,
+        channels={
+            name: _channel_column(name, i, recipe.channels[name])
+            for name, i in _channel_columns(recipe, rows, where).items()
+        },
+        extra={name: _Column(index=_index(name, rows, where)) for name in extra},
+        checks=[_Check(layout=check, index=_index(check.column, rows, where)) for check in recipe.checks],
+        rows=None if recipe.rows is None else _index(recipe.rows.column, rows, where),
+    )
+    for line, block in rows.blocks(gathered.width()):
+        gathered.add(line, block, recipe)
+    pa.default_memory_pool().release_unused()  # the text of the last blocks
+    findings = [*rows.findings(), *_stamp_findings(gathered, rows, recipe, where)]
+    given = given or Given()
+    order, found = gathered.clock.order(gathered.line(), given.clock)
+    line = gathered.line()[order]
+    findings.extend(found)
+    if zone_name is not None and gathered.host is None and gathered.clock.stated():
+        counts = counted.is_elapsed(gathered.clock.form)
+        why = (
+            "the stamps count from a start, which has a zone of its own"
+            if counts
+            else "the stamps state their own zone"
+        )
+        text = f"{why}: {zone_name} is not used"
+        findings.append(Finding(kind="zone-not-needed", severity=Severity.NOTE, what=text))
+        zone_name = None
+    named, zone_name = zone_name, zone_name or recipe.time.zone
+    time, found = gathered.clock.instants(order, line=line, zone_name=zone_name, where=where, given=given)
+    findings.extend(found)
+    findings.extend(_rounded(gathered.clock))
+    if named is not None and recipe.time.zone is not None:
+        findings.extend(zones.contradiction("the heading, or the recipe, says", recipe.time.zone, named, time))
+    host_time = None
+    if gathered.host is not None:
+        host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where, given=Given())
+    channels: dict[str, NDArray[np.float64]] = {}
+    unsure: dict[str, NDArray[np.bool_]] = {}
+    flags = np.zeros(len(line), dtype=np.uint16)
+    states = {name: column.state(order) for name, column in gathered.channels.items()}
+    still = calm.rows(states)
+    sensor = recipe.sensor
+    for name, column in gathered.channels.items():
+        layout, state = recipe.channels[name], states.pop(name)
+        unreadable = int((state == Cell.UNREADABLE).sum())
+        refuse_if_most(unreadable, len(line) - unreadable, f"unreadable values of {name}", where)
+        cells = column.value(order)  # NaN where a cell is no number
+        if name in DOUBTED and name in still:
+            findings.append(calm.report(name, still[name], line))
+        elif name in still:
+            state, cells = np.where(still[name], np.uint8(Cell.CALM), state), np.where(still[name], np.nan, cells)
+        away = _blows_from(name)
+        if name in DOUBTED or (away and layout.unit in TURNS):
+            beside = gathered.beside(name)
+            coded = codes.within_a_turn(cells, beside=beside) if away else codes.speeds(cells)
+            if away:
+                unsure[name] = codes.north_or_calm(cells, beside=beside)
+            findings.extend(codes.report(name, cells, coded, line))
+            state = np.where(coded, np.uint8(Cell.MISSING), state)
+            cells = np.where(coded, np.nan, cells)
+        value = in_si(cells, layout)
+        if column.limit:
+            limit = float(in_si(np.array([column.limit]), layout)[0])
+            findings.append(below.report(name, state == Cell.BELOW, limit, line))
+            sensor = below.known(sensor, limit)
+        if name in DOUBTED:
+            span = float(time.max() - time.min()) / NANOSECONDS
+            doubt = unitcheck.contradiction(cells * layout.gain, layout.unit, span=span, channel=name)
+            findings.extend([doubt] if doubt is not None else [])
+            findings.extend(cumulated.report(name, cells, line))
+        channel_flags, found = cell_flags(name, layout, value, state, line)
+        findings.extend(found)
+        if away:
+            value, found = possible.direction(name, value, line, offset=unit(layout.unit).scale * layout.offset)
+            findings.extend(found)
+            value = turned(value, layout)
+        channels[name] = value
+        if name in WIND_CHANNELS:
+            flags |= channel_flags
+    for name, zero in unsure.items():
+        speed = channels.get(name.replace("direction", "speed"))
+        findings.extend(codes.may_be_calm(name, zero if speed is None else zero & (speed > 0), line))
+    for check in gathered.checks:
+        fault, found = check.faults(order, line)
+        flags[fault] |= SampleFlag.SENSOR_FAULT
+        findings.extend(found)
+    reading = Reading(
+        time=time, channels=channels, flags=flags, line=line, sensor=sensor, step=gathered.clock.step,
+        rules=recipe.quality, host_time=host_time, findings=tuple(findings),
+    )  # fmt: skip
+    return Table(reading=reading, extra={name: column.value(order) for name, column in gathered.extra.items()})
+
+
+def _rounded(clock: RowClock) -> tuple[Finding, ...]:
+    """What is said of times that are fractions of a day or an hour, where a digit is more than two minutes."""
+    if (
+        clock.form is None
+        or not any(part in clock.form for part in ("%J", "%Q"))
+        or not 2 * _MINUTE < clock.step < DAY // 2
+    ):
+        return ()
+    unsure = clock.step / 2 / _MINUTE
+    step = clock.step / _MINUTE
+    what = f"the times are fractions, whose last digit is {step:.2g} min: each is unsure by {unsure:.2g} min"
+    fix = "if another column holds the hour, name it beside the day: --columns with year, day_of_year and hour"
+    return (Finding(kind="times-rounded", severity=Severity.WARNING, value=unsure * 60, what=what, fix=fix),)
+
+
+def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str) -> tuple[Finding, ...]:
+    """Rows left out for their stamps.
+
+    Raises:
+        InputError: all or most of them.
+    """
+    bad, form, distant = gathered.bad_stamps, gathered.clock.form, gathered.distant
+    count = len(gathered.line())
+    years = f"outside the accepted years, {YEARS[0]} to {YEARS[1]}"
+    far = f"; {distant} of them are {years}: a clock that was not set" if distant else ""
+    if count == 0 and not bad and recipe.rows is not None:
+        raise InputError(
+            f"no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which names the site", where=where,
+            fix="name a site as the file writes it, or the wind's column by its heading; ingest --sniff lists them",
+        )  # fmt: skip
+    if count == 0:
+        refused = InputError if recipe.rows is None else NothingMeasuredError  # of several sites the others are read
+        raise refused(
+            f"no row with a readable time stamp{far}",
+            where=f"{where}, line {bad[0] if bad else rows.first_line}",
+            fix=f"stamps are expected as {form}; check the recipe, or that the logger recorded anything",
+        )
+    if not bad:
+        return ()
+    blank = sum(number < gathered.line()[0] for number in gathered.blank)
+    refuse_if_most(len(bad) - blank, count, f"rows without a stamp as {form}", where)
+    unset = f"{blank} rows before the first stamp have none: the clock was not set; left out"
+    return (
+        Finding(
+            kind="unreadable-stamps", severity=Severity.ERROR, count=len(bad), where=f"line {bad[0]}",
+            what=f"{len(bad)} rows whose stamp is {years}: a clock that was not set; left out"
+            if distant == len(bad)
+            else unset
+            if blank == len(bad)
+            else f"{len(bad)} rows whose stamp is not {form} or no date; left out{far}",
+        ),
+    )  # fmt: skip
+
+
+def _channel_columns(recipe: Recipe, rows: Rows, where: str) -> dict[str, int]:
+    absent = set(rows.header).isdisjoint if rows.header is not None else None
+    found: dict[str, int] = {}
+    for name, layout in recipe.channels.items():
+        if layout.optional and isinstance(layout.column, str) and absent is not None and absent([layout.column]):
+            continue
+        found[name] = _index(layout.column, rows, where)
+    return found
+
+
+def _channel_column(name: str, index: int, layout: ChannelLayout) -> _Column:
+    return _Column(
+        index=index, suffix=layout.suffix, points=compass.BY_UNIT.get(layout.unit),
+        calm=compass.STILL if name in DOUBTED else (), absent=tuple(compass.CALM) if name in _DIRECTIONS else (),
+    )  # fmt: skip
+
+
+def _index(column: str | int, rows: Rows, where: str) -> int:
+    header = rows.header
+    if isinstance(column, int):
+        if header is not None and column > len(header):
+            raise InputError(f"no column {column}, only {len(header)}", where=where, fix="correct the recipe")
+        return column - 1 + rows.shift
+    names = list(header or ())
+    if column not in names:
+        fix = UnknownNameError.of("column", column, names).fix
+        raise InputError(f"no column {column!r} in the header", where=where, fix=fix)
+    if names.count(column) > 1:
+        raise InputError(
+            f"{names.count(column)} columns are called {column!r}", where=where, fix="give the column's number instead"
+        )
+    return names.index(column)
+
+
+def in_si(value: NDArray[np.float64], layout: ChannelLayout) -> NDArray[np.float64]:
+    """Cells of a column in SI, by the recipe's calibration; directions still as the vane gives them."""
+    if layout.gain != 1.0 or layout.offset != 0.0:
+        value = value * layout.gain + layout.offset
+    stated = unit(layout.unit)
+    return value if stated.scale == 1.0 and stated.offset == 0.0 else stated.to_si(value)
+
+
+def turned(angle: NDArray[np.float64], layout: ChannelLayout) -> NDArray[np.float64]:
+    """A vane's angles [rad] as 'from', clockwise, 0 to 2π."""
+    mounted = unit(layout.unit).to_si(layout.rotation) + (np.pi if layout.convention == "to" else 0.0)
+    return np.mod(angle + mounted, 2 * np.pi)
+
+
+def cell_flags(
+    name: str, layout: ChannelLayout, value: NDArray[np.float64], state: NDArray[np.uint8], line: NDArray[np.int64]
+) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
+    """Flags and findings about single cells: missing, unreadable, infinite, outside the instrument's range."""
+    flags = np.zeros(len(value), dtype=np.uint16)
+    found: list[Finding] = []
+
+    def note(mask: NDArray[np.bool_], flag: SampleFlag, kind: str, severity: Severity, what: str) -> None:
+        if mask.any():
+            flags[mask] |= flag
+            count = int(mask.sum())
+            found.append(
+                Finding(
+                    kind=kind, severity=severity, count=count, where=f"line {line[mask][0]}",
+                    what=f"{count} {what} of {name}",
+                )
+            )  # fmt: skip
+
+    note(state == Cell.MISSING, SampleFlag.MISSING, "missing-values", Severity.WARNING, "missing values")
+    note(state == Cell.UNREADABLE, SampleFlag.MISSING, "unreadable-values", Severity.ERROR, "unreadable values")
+    note(state == Cell.INFINITE, SampleFlag.OUT_OF_RANGE, "out-of-range", Severity.WARNING, "infinite values")
+    if layout.range is not None:
+        low, high = (float(unit(layout.unit).to_si(bound)) for bound in layout.range)
+        text = f"values outside {layout.range[0]:g} to {layout.range[1]:g} {layout.unit}"
+        note((value < low) | (value > high), SampleFlag.OUT_OF_RANGE, "out-of-range", Severity.WARNING, text)
+    return flags, tuple(found)
+
+
+def refuse_if_most(bad: int, good: int, what: str, where: str) -> None:
+    """Refuse a file of which less than half can be read: it is of another format.
+
+    Raises:
+        InputError: with both counts.
+    """
+    if bad > good or (bad and bad == good and good > 1):
+        raise InputError(
+            f"{bad} of {bad + good} are {what}", where=where, fix="look at it with flagdata ingest --sniff"
+        )

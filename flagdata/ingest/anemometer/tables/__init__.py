@@ -1,1 +1,0 @@
-"""Tables: read by a recipe, by their headings, or by a draft that says what is missing."""

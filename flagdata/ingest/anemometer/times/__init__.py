@@ -1,1 +1,0 @@
-"""Which columns of an unknown table are its time."""

@@ -1,1 +1,0 @@
-"""Which columns are a wind, whose it is, in which unit and direction, and which values are none."""
