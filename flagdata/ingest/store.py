@@ -8,12 +8,11 @@ it was.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow.compute as pc
 
 from flagdata.align.paired import PairedClocks, host_clock
@@ -21,23 +20,22 @@ from flagdata.errors import ConflictError, FlagdataError, InputError, NothingMea
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.ingest.anemometer.confirm import UNASKED, Confirm, confirmed
-from flagdata.ingest.anemometer.reading import streams
 from flagdata.ingest.anemometer.recipe import SENSORS
 from flagdata.ingest.anemometer.samples.neighbours import hours_off
 from flagdata.ingest.before import earlier, other_readings
 from flagdata.ingest.camera import CameraOptions
+from flagdata.ingest.report import FrameTimes, camera_report, wind_report
 from flagdata.ingest.source import Source
 from flagdata.lake import Artifact, Lake, Transaction
 from flagdata.provenance import digest, recipe_hash
 from flagdata.record import Coding, Record, RecordWriter
 from flagdata.record.metadata import CAMERA, PROVENANCE, camera_metadata
 from flagdata.record.writer import ATTACHMENT_LIMIT, JPEG_QUALITY
-from flagdata.schema import CHANNELS, Kind
-from flagdata.signals import CameraInfo, WindLog, WindSeries
-from flagdata.timebase import NANOSECONDS, iso
+from flagdata.schema import Kind
+from flagdata.signals import WindLog, WindSeries
+from flagdata.timebase import iso
 
 Progress = Callable[[int], object]
-REPORT_SCHEMA = "flagdata.ingest-report/1"
 NEIGHBOURS = 3
 """Logs of a session that a new one is compared with: those that share most of its time."""
 CROP_PICTURE = "crop.png"
@@ -93,7 +91,7 @@ class IngestResult:
     Attributes:
         artifact: as it is in the lake.
         created: false when it was there already, and nothing was written.
-        report: what was found, see `REPORT_SCHEMA`.
+        report: what was found, see `flagdata.ingest.report`.
     """
 
     artifact: Artifact
@@ -156,7 +154,7 @@ def ingest_camera(
         return present
     with lake.transaction(f"ingest camera {source.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
-        times = _Times()
+        times = FrameTimes()
         with open_camera(path, options.camera) as stream:
             metadata = {CAMERA: camera_metadata(stream.info), PROVENANCE: source.provenance(recipe)}
             with RecordWriter(staged, metadata=metadata, coding=options.coding, quality=JPEG_QUALITY) as record:
@@ -176,7 +174,7 @@ def ingest_camera(
         if not times.count:
             raise InputError("no frame could be read", where=str(path), fix="check the file")
         source.check_unchanged()
-        report = _camera_report(info, times, findings, reasons)
+        report = camera_report(info, times, findings, reasons)
         artifact = _artifact(
             Kind.CAMERA, source, recipe, labels, findings=findings, report=report, start=times.first, end=times.last,
             rate=times.rate, frame_count=times.count, stored=transaction.put(staged),
@@ -326,7 +324,7 @@ def _staged(
             drafted = log.drafted.encode()
             record.attach("drafted.recipe.toml", drafted, media_type="application/toml", log_time=int(time[0]))
     source.check_unchanged()
-    report = _wind_report(log, findings, named=one.options.wind.recipe)
+    report = wind_report(log, findings, named=one.options.wind.recipe)
     if how is not None:
         report["confirmed"] = how
     if one.paired is not None:
@@ -359,28 +357,6 @@ def _beside(
         if finding is not None:
             found.append(finding)
     return tuple(found)
-
-
-@dataclass
-class _Times:
-    """What is kept of a stream of frames."""
-
-    count: int = 0
-    first: int = 0
-    last: int = 0
-    worst_error: float = 0.0
-
-    def add(self, time: int, stamp_error: float) -> None:
-        if not self.count:
-            self.first = time
-        self.last = time
-        self.count += 1
-        self.worst_error = max(self.worst_error, stamp_error)
-
-    @property
-    def rate(self) -> float | None:
-        """Mean frame rate [Hz]; `None` for a single frame."""
-        return (self.count - 1) * NANOSECONDS / (self.last - self.first) if self.count > 1 else None
 
 
 def find(
@@ -459,55 +435,6 @@ def result_of(transaction: Transaction, artifact: Artifact, report: Mapping[str,
         return IngestResult(artifact=kept, created=True, report=report)
     _check_labels(kept, labels)
     return IngestResult(artifact=kept, created=False, report=json.loads(kept.report or "{}"))
-
-
-def _span(start: int, end: int) -> dict[str, Any]:
-    return {"start": iso(start), "end": iso(end), "span": (end - start) / NANOSECONDS}
-
-
-def _camera_report(
-    info: CameraInfo, times: _Times, findings: Iterable[Finding], reasons: Sequence[str]
-) -> dict[str, Any]:
-    return {
-        "schema": REPORT_SCHEMA,
-        "kind": Kind.CAMERA.value,
-        "format": f"{info.container} / {info.codec}",
-        "reasons": list(reasons),
-        **_span(times.first, times.last),
-        "frames": times.count,
-        "rate": times.rate,
-        "worst_stamp_error": times.worst_error,
-        "camera": {**vars(info), "crop": list(info.crop), "start": iso(info.start)},
-        "findings": [finding.as_dict() for finding in findings],
-    }
-
-
-def _wind_report(log: WindLog, findings: Iterable[Finding], *, named: str | None) -> dict[str, Any]:
-    """The report of a log; of a recipe file that was named, only its base name stays."""
-    series = log.series
-    time = series.time
-    kinds = [time[rows] for _, rows in streams(series.channels)]
-    steps = np.diff(max(kinds, key=len))
-    longest = max((int(np.diff(kind).max()) for kind in kinds if len(kind) > 1), default=None)
-    speed = series.channels.get("wind_speed")
-    sensor = {name: value for name, value in vars(series.sensor).items() if value is not None}
-    return {
-        "schema": REPORT_SCHEMA,
-        "kind": Kind.WIND.value,
-        "format": log.format,
-        "reasons": [r.replace(named, Path(named).name) if named else r for r in log.reasons],
-        **_span(int(time[0]), int(time[-1])),
-        "samples": len(series),
-        "rate": float(NANOSECONDS / np.median(steps)) if len(steps) else None,
-        "longest_gap": longest / NANOSECONDS if longest is not None else None,
-        "channels": {
-            name: {"unit": CHANNELS[name].unit, "values": int(np.isfinite(values).sum())}
-            for name, values in series.channels.items()
-        },
-        "mean_speed": float(np.nanmean(speed)) if speed is not None and np.isfinite(speed).any() else None,
-        "sensor": sensor,
-        "findings": [finding.as_dict() for finding in findings],
-    }
 
 
 def _not_attached(path: Path) -> Finding:

@@ -9,8 +9,9 @@ from typing import Any
 
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.markers.table import MarkerOptions, read_table
+from flagdata.ingest.report import REPORT_SCHEMA
 from flagdata.ingest.source import Source
-from flagdata.ingest.store import REPORT_SCHEMA, IngestResult, Labels, find, result_of
+from flagdata.ingest.store import IngestResult, Labels, find, result_of
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.markers import MarkerSequence, write_markers

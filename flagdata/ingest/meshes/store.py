@@ -16,8 +16,9 @@ from flagdata.findings import Finding, quality_flags
 from flagdata.ingest.meshes.checks import check_units, findings
 from flagdata.ingest.meshes.folder import read_folder
 from flagdata.ingest.meshes.pieces import welded
+from flagdata.ingest.report import REPORT_SCHEMA
 from flagdata.ingest.source import Source
-from flagdata.ingest.store import REPORT_SCHEMA, IngestResult, Labels, find, result_of
+from flagdata.ingest.store import IngestResult, Labels, find, result_of
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, write_meshes
