@@ -144,7 +144,7 @@ def _deletion_options(command: F) -> F:
     for option in (
         click.option("--message", "-m", help="--delete: why."),
         click.option("--discard", is_flag=True, help="--delete: also if it alone shows artifacts, which gc deletes."),
-        click.option("--delete", is_flag=True, help="Delete NAME; the log notes what it showed."),
+        click.option("-d", "--delete", is_flag=True, help="Delete NAME; the log notes what it showed."),
     ):
         command = option(command)
     return command
