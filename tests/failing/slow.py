@@ -40,8 +40,8 @@ from tests.failing.trial import Command
 
 WIDTH, HEIGHT, RATE, SECONDS, NOISE = 0.75, 0.5, 25.0, 4.6, 5e-4
 SPEEDS = (3.5, 4.3, 5.1, 6.0)
-KINDS, LEVEL = 6, 0.25
-"""Kinds of numerics of the bank, by which this level can be tested."""
+KINDS, LEVEL = 9, 0.25
+"""Kinds of numerics of the bank, the fewest that a bank may have; this level can be tested by them."""
 EXPERIMENT = """
 title = "tracks"
 [cloth]
