@@ -13,6 +13,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +89,7 @@ def _counted(wrong: Sequence[Mapping[str, Any]]) -> dict[str, int]:
 
 def campaign(
     names: Sequence[str], results: Path, *, seed: int, scenes: Path | None = None, stride: int = 1,
-    stays: bool = True, first: int = 0, kills: int | None = None,
+    stays: bool = True, first: int = 0, kills: int | None = None, real: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
     """Try commands, note the results of each in a JSON file, and return all that the file holds.
 
@@ -97,6 +98,7 @@ def campaign(
         scenes: folder in which scenes are kept for a later campaign; None makes them anew.
         stride, stays, first: as of `tried`.
         kills: points at which commands are killed; None lets calls fail.
+        real: whether nothing stands in for computing.
     """
     known: dict[str, Any] = json.loads(results.read_text()) if results.exists() else {}
     with ExitStack() as stack:
@@ -112,11 +114,13 @@ def campaign(
             for name in wanted:
                 place = scratch / f"{group}-{name}"
                 place.mkdir()
+                command = replace(commands[name], stand_in=None) if real else commands[name]
                 if kills is not None:
-                    title, found = f"{name}, killed", killed(commands[name], scene, injector, place, points=kills)
+                    title, found = f"{name}, killed", killed(command, scene, injector, place, points=kills)
                 else:
                     title = f"{name}, alone" if not stays else name
-                    found = tried(commands[name], scene, injector, place, stride=stride, stays=stays, first=first)
+                    found = tried(command, scene, injector, place, stride=stride, stays=stays, first=first)
+                title = f"computing all: {title}" if real and commands[name].stand_in else title
                 known[title] = {**found, "circumstances": circumstances(seed)}
                 print(title, found, flush=True)  # noqa: T201
                 results.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n")
@@ -167,8 +171,9 @@ if __name__ == "__main__":
     parser.add_argument("--first", type=int, default=0, help="first call to try")
     parser.add_argument("--alone", action="store_true", help="only calls that fail alone")
     parser.add_argument("--kill", type=int, metavar="N", help="kill commands at so many calls instead")
+    parser.add_argument("--real", action="store_true", help="let nothing stand in for computing")
     given = parser.parse_args()
     campaign(
         given.names, given.out, seed=0, scenes=given.scenes, stride=given.stride, stays=not given.alone,
-        first=given.first, kills=given.kill,
+        first=given.first, kills=given.kill, real=given.real,
     )  # fmt: skip
