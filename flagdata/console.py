@@ -6,7 +6,7 @@ import json
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,10 +22,14 @@ class LocalPath(click.Path):
     """A path on the command line, a `Path` afterwards; the address of a storage or stream is refused as what it is."""
 
     def __init__(self, *, exists: bool = False, file_okay: bool = True, dir_okay: bool = True) -> None:
-        super().__init__(exists=exists, file_okay=file_okay, dir_okay=dir_okay, path_type=Path)
+        super().__init__(exists=exists, file_okay=file_okay, dir_okay=dir_okay, readable=False, path_type=Path)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        return super().convert(local_path(value), param, ctx)
+        path = local_path(value)
+        if self.exists:
+            with suppress(FileNotFoundError, NotADirectoryError):  # click takes any error for these
+                path.stat()
+        return super().convert(path, param, ctx)
 
 
 def json_option(command: F) -> F:
@@ -100,10 +104,11 @@ def foreseen(error: Exception) -> FlagdataError:
     """What a user is told of any exception that reached the command line."""
     if isinstance(error, FlagdataError):
         return error
-    if isinstance(error, OSError) and error.errno is not None:
+    if isinstance(error, OSError):
+        what = " ".join((error.strerror or str(error)).split())  # without strerror where a library of C++ raised it
         return FlagdataError(
-            f"the system refused: {error.strerror or error}", where=None if error.filename is None
-            else str(error.filename), fix="check that the file is there, its permissions and the space on the disk",
+            f"the system refused: {what}", where=None if error.filename is None else str(error.filename),
+            fix="check that the file is there, its permissions and the space on the disk",
         )  # fmt: skip
     if isinstance(error, MemoryError):
         return LimitError("there is not enough memory for this", fix="ask for less at a time, or use a larger machine")

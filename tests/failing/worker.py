@@ -1,4 +1,4 @@
-"""Runs commands of flagdata in children of its own, one failing call each; started with failing_calls.c preloaded.
+"""Runs commands of flagdata in children of its own, one failing call each; started with calls.c preloaded.
 
 Each line on standard input is a JSON object: `prepare`, a "module:function" that is called here with `argument`, or
 `arguments` of the command, `call` that fails (negative for none), `error`
@@ -21,7 +21,7 @@ from pathlib import Path
 
 from flagdata.cli import main
 
-_STATE = struct.Struct("@qqiiii1024s")  # as failing_calls.c has it
+_STATE = struct.Struct("@qqiiii1024s")  # as calls.c has it
 _LONGEST = 900.0  # s, of a command
 _SHARED = {
     "flagdata", "sim", "models", "measure", "torch", "zarr", "scipy", "av", "jinja2", "duckdb", "safetensors", "PIL",
@@ -31,7 +31,7 @@ _SHARED = {
 
 
 class Calls:
-    """The memory that failing_calls.c looks at, in this process and all that it starts."""
+    """The memory that calls.c looks at, in this process and all that it starts."""
 
     def __init__(self, path: Path) -> None:
         with path.open("r+b") as file:

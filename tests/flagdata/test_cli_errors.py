@@ -44,6 +44,13 @@ def test_an_unforeseen_exception_is_one_line_with_the_request_to_report_it(run, 
     assert "Traceback" not in err
 
 
+def test_what_the_system_refuses_is_no_defect_also_where_a_library_gives_no_number(run) -> None:
+    """As PyArrow raises it for a file that cannot be looked at."""
+    code, _, err = run(OSError("error stat()ing file"))
+    assert code == 1
+    assert err.startswith("flagdata: the system refused: error stat()ing file")
+
+
 def test_the_traceback_is_shown_when_asked_for(run, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "Traceback" in run(KeyError("x"), before=("--debug",))[2]
     assert "Traceback" in run(InputError("bad", fix="good"), before=("--debug",))[2]
