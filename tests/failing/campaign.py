@@ -25,8 +25,9 @@ from tests.failing.trial import Command, Trials
 
 _ABOUT = (
     "One call on a file of the work folder (open, read, stat, map, write, flush, rename, link, remove, lock) fails, "
-    "alone or with all later calls, or the command is killed before it. A report is right where exit code 0 means "
-    "that all is published, and exit code 1, with a fix, that it is not. Of every fourth failure the command is given "
+    "alone or with all later calls, or the command is killed before it. Every call after the last publication is "
+    "tried, and every so many (stride) before it. A report is right where exit code 0 means that all is published, "
+    "and exit code 1, with a fix, that it is not. Of every fourth failure the command is given "
     "once more, of every kill always, and must end as an undisturbed one. After each trial the lake is examined "
     "(doctor, verify). For close-loop, propose and build the computing was done once and its result taken; their "
     "reads and writes are their own."
@@ -131,7 +132,16 @@ def campaign(
 def page(known: Mapping[str, Any]) -> str:
     """The results as Markdown."""
     tables = {
-        "Calls that fail": ("calls", "after_publication", "trials", "wrong", "unhealthy", "unforeseen", "code"),
+        "Calls that fail": (
+            "calls",
+            "after_publication",
+            "stride",
+            "trials",
+            "wrong",
+            "unhealthy",
+            "unforeseen",
+            "code",
+        ),
         "Commands that are killed": ("calls", "points", "wrong", "unhealthy", "code"),
     }
     lines = [

@@ -15,7 +15,7 @@ from tests.failing.trial import Trials
 
 BEFORE, AFTER = 2, 3
 """How many of a command's calls fail in turn before and after it has published, spread evenly; all of them with
-FLAGDATA_EVERY_CALL set. `python -m tests.validation failing-calls` has the slow commands as well."""
+FLAGDATA_EVERY_CALL set. `python -m tests.failing.campaign` has the slow commands as well, and kills."""
 EVERY = bool(os.environ.get("FLAGDATA_EVERY_CALL"))
 
 

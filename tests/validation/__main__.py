@@ -12,7 +12,6 @@ VALIDATIONS = {
     "clip-information": "tests.validation.clip_information",
     "clock-recovery": "tests.validation.clock_recovery",
     "datasets": "tests.validation.datasets",
-    "failing-calls": "tests.validation.failing_calls",
     "flags": "tests.validation.flags",
     "flow-ablation": "tests.validation.flow_ablation",
     "flutter": "tests.validation.flutter",
