@@ -7,10 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from flagdata.ingest.anemometer.documents.opening import first_bytes
 
 from flagdata.errors import InputError, LimitError, NotFoundError
 from flagdata.files import check_input
+from flagdata.ingest.anemometer.text.opening import first_bytes
 from flagdata.ingest.camera import open_camera
 from flagdata.ingest.classify import guesses
 from flagdata.ingest.cloths import read_cloths

@@ -56,7 +56,7 @@ def test_json_gives_the_manifest(lake: Lake, tmp_path: Path, capsys: pytest.Capt
         (["parquet", "--to", "{lake}"], 1, "exists"),
         (["parquet", "--to", "{out}", "--at", "nowhere"], 1, "nowhere"),
         (["parquet"], 2, "--to"),
-        (["parquet", "--to", "{lake}/lake.json/out"], 1, "writing the output"),
+        (["parquet", "--to", "{lake}/lake.json/out"], 1, "this is no folder"),
         (["parquet", "--to", "{out}", "--salt", "x"], 2, "--salt without --split"),
     ],
 )

@@ -13,8 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import duckdb
-
 from flagdata.ingest.anemometer.recipe import MISSING, MISSING_SIGNS
 from flagdata.ingest.anemometer.text.rows import cells_of_lines
 from flagdata.units import spelled
@@ -124,6 +122,8 @@ def _delimiter(lines: Sequence[str]) -> str | None:
 
 def _sniffed(lines: Sequence[str]) -> str | None:
     """The delimiter that DuckDB finds, where it cuts most lines alike."""
+    import duckdb  # costs a tenth of a second, and readers of records need none
+
     with tempfile.NamedTemporaryFile("w", suffix=".csv", encoding="utf-8") as file:
         file.write("\n".join([*lines, ""]))
         file.flush()
