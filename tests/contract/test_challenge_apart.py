@@ -2,38 +2,30 @@
 
 from __future__ import annotations
 
-import ast
 import subprocess
 import sys
-from pathlib import Path
 
-import pytest
+from tests.contract.imports import ROOT, imported_from, modules
 
-ROOT = Path(__file__).resolve().parents[2]
 FITTING = (
     "sim", "models", "measure/observe", "measure/verdict", "measure/forecasting", "measure/probes", "measure/inference",
     "measure/nulls", "measure/loop", "measure/report", "measure/closing", "measure/propose", "measure/cases",
 )  # fmt: skip
-MODULES = sorted(path for part in FITTING for path in (ROOT / part).rglob("*.py"))
+MODULES = modules(*FITTING)
 
 
-def imported(path: Path) -> set[str]:
-    found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            found |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
-    return found
+def test_what_fits_imports_nothing_of_challenges() -> None:
+    """Not even as text that could be imported."""
+    offenders = [
+        str(path.relative_to(ROOT))
+        for path in MODULES
+        if any(name.startswith("measure.challenge") for name in imported_from(path))
+        or "measure.challenge" in path.read_text(encoding="utf-8")
+    ]
+    assert offenders == []
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda p: str(p.relative_to(ROOT)))
-def test_what_fits_imports_nothing_of_challenges(path: Path) -> None:
-    assert not {name for name in imported(path) if name.startswith("measure.challenge")}
-    assert "measure.challenge" not in path.read_text(), "not even as text that could be imported"
-
-
-def test_what_fits_can_be_imported_where_challenges_cannot() -> None:
+def test_what_fits_needs_no_challenge_and_a_run_loads_nothing_that_makes_one() -> None:
     names = [
         ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
         for path in MODULES
@@ -50,22 +42,15 @@ def test_what_fits_can_be_imported_where_challenges_cannot() -> None:
         "    importlib.import_module(name)\n"
         "from sim.effects import EFFECTS\n"
         "[EFFECTS[name] for name in EFFECTS]\n"
-        "print(sorted(name for name in sys.modules if name.startswith('measure.challenge')))"
+        "def loaded():\n"
+        "    return sorted(name for name in sys.modules if name.startswith('measure.challenge'))\n"
+        "print(loaded())\n"
+        "del sys.meta_path[0]\n"
+        "import measure.challenge.run, measure.challenge.filing, measure.challenge.fitter\n"
+        "print(loaded())"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
-    assert done.stdout.strip() == "[]"
-
-
-def test_running_a_challenge_loads_nothing_that_makes_one() -> None:
-    code = (
-        "import sys\nimport measure.challenge.run, measure.challenge.filing, measure.challenge.fitter\n"
-        "print(sorted(name for name in sys.modules if name.startswith('measure.challenge')))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
-    kept = (
-        "measure.challenge.outside",
-        "measure.challenge.design",
-        "measure.challenge.flight",
-        "measure.challenge.key",
-    )
-    assert not [name for name in kept if name in done.stdout]
+    fitting, running = done.stdout.splitlines()
+    assert fitting == "[]"
+    makers = ("outside", "design", "flight", "key")
+    assert not [name for name in makers if f"measure.challenge.{name}" in running]

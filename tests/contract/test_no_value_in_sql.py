@@ -5,14 +5,10 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
-from pathlib import Path
-
-import pytest
 
 from flagdata.query import COLUMNS
+from tests.contract.imports import ROOT, modules
 
-ROOT = Path(__file__).parents[2]
-PACKAGES = ("flagdata", "sim", "models", "measure", "tests/validation")
 TAKES_SQL = {"rows", "pairs", "sides", "sql", "execute", "query", "select", "Request", "ExplicitSplit", "_clips"}
 """Functions of this project and of DuckDB that take SQL as their first argument or by a keyword of `SQL_KEYWORDS`."""
 SQL_KEYWORDS = {"where", "sql", "order", "query"}
@@ -102,36 +98,28 @@ def _name(function: ast.AST) -> str:
     return function.id if isinstance(function, ast.Name) else ""
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        "lake.rows(f\"kind = '{kind}'\")",
-        "lake.rows('name = ' + name)",
-        "lake.rows(where='name = %s' % name)",
-        "source.pairs('name = {}'.format(name))",
-        "where = f'{column} > 3'; lake.rows(where)",
-        "lake.rows(' and '.join(conditions))",
-        "return f\"name like '{dataset}-{side}-%'\"",
-        "return 'kind = \\'' + kind + '\\''",
-        "return f'seed is not null and frame_count >= {count}'",
-    ],
+PASTED = (
+    "lake.rows(f\"kind = '{kind}'\")",
+    "lake.rows('name = ' + name)",
+    "lake.rows(where='name = %s' % name)",
+    "source.pairs('name = {}'.format(name))",
+    "where = f'{column} > 3'; lake.rows(where)",
+    "lake.rows(' and '.join(conditions))",
+    "return f\"name like '{dataset}-{side}-%'\"",
+    "return 'kind = \\'' + kind + '\\''",
+    "return f'seed is not null and frame_count >= {count}'",
 )
-def test_a_value_that_is_put_into_sql_is_found(line: str) -> None:
-    assert list(pasted(f"def of(lake):\n    {line}\n"))
+BESIDE = ("lake.rows({'kind': kind})", "lake.rows(query)", "lake.rows('seed is not null')", "say(f'name = {name}')")
 
 
-@pytest.mark.parametrize(
-    "line", ["lake.rows({'kind': kind})", "lake.rows(query)", "lake.rows('seed is not null')", "say(f'name = {name}')"]
-)
-def test_values_beside_sql_are_let_through(line: str) -> None:
-    assert not list(pasted(f"def of(lake):\n    {line}\n"))
+def test_a_value_that_is_put_into_sql_is_found_and_values_beside_it_are_let_through() -> None:
+    assert [line for line in PASTED + BESIDE if list(pasted(f"def of(lake):\n    {line}\n"))] == list(PASTED)
 
 
-@pytest.mark.parametrize("package", PACKAGES)
-def test_no_module_puts_a_value_into_sql(package: str) -> None:
+def test_no_module_puts_a_value_into_sql() -> None:
     found = [
         f"{path.relative_to(ROOT)}:{line}"
-        for path in sorted((ROOT / package).rglob("*.py"))
+        for path in modules("flagdata", "sim", "models", "measure", "tests/validation")
         if str(path.relative_to(ROOT)) not in NAMES_ALONE
         for line in pasted(path.read_text(encoding="utf-8"))
     ]

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import ast
-from pathlib import Path
+from collections.abc import Iterable
 
-import pytest
+from tests.contract.imports import ROOT, imported_from, imported_names, modules, tree
 
-from tests.contract.imports import imported_names
-
-ROOT = Path(__file__).resolve().parents[2]
 ROOMS = (
     "observe", "verdict", "forecasting", "probes", "inference", "nulls", "loop", "report", "closing", "propose",
     "challenge",
@@ -17,26 +14,26 @@ ROOMS = (
 """Each may import those before it."""
 BARE = {"verdict": set[str](), "observe": set[str]()}
 """What imports no other room, not even those before it."""
-MODULES = [(room, path) for room in ROOMS for path in sorted((ROOT / "measure" / room).rglob("*.py"))]
 
 
-def imported_rooms(source: str) -> set[str]:
-    """Rooms that a module imports anything of, wherever in it the import stands."""
-    parts = [name.split(".") for name in imported_names(source)]
+def rooms_of(names: Iterable[str]) -> set[str]:
+    """Rooms that imported names belong to."""
+    parts = [name.split(".") for name in names]
     return {part[1] for part in parts if part[0] == "measure" and len(part) > 1} & set(ROOMS)
 
 
-@pytest.mark.parametrize(("room", "path"), MODULES, ids=lambda value: str(value).removeprefix(f"{ROOT}/"))
-def test_a_room_imports_only_what_lies_before_it(room: str, path: Path) -> None:
-    allowed = BARE.get(room, set(ROOMS[: ROOMS.index(room)]))
-    extra = imported_rooms(path.read_text(encoding="utf-8")) - allowed - {room}
-    assert not extra, f"measure/{room} may not import {sorted(extra)}"
+def test_a_room_imports_only_what_lies_before_it() -> None:
+    offenders = {
+        str(path.relative_to(ROOT)): extra
+        for i, room in enumerate(ROOMS)
+        for path in modules(f"measure/{room}")
+        if (extra := rooms_of(imported_from(path)) - BARE.get(room, set(ROOMS[:i])) - {room})
+    }
+    assert offenders == {}
 
 
-@pytest.mark.parametrize("room", ROOMS)
-def test_every_room_says_what_it_holds(room: str) -> None:
-    tree = ast.parse((ROOT / "measure" / room / "__init__.py").read_text(encoding="utf-8"))
-    assert ast.get_docstring(tree)
+def test_every_room_says_what_it_holds() -> None:
+    assert [room for room in ROOMS if not ast.get_docstring(tree(ROOT / "measure" / room / "__init__.py"))] == []
 
 
 def test_an_import_within_a_function_or_for_types_alone_is_seen() -> None:
@@ -45,4 +42,4 @@ def test_an_import_within_a_function_or_for_types_alone_is_seen() -> None:
         "if TYPE_CHECKING:\n    from measure.report.page import page\n"
         "def late():\n    from measure import closing\n    import measure.nulls.bank\n"
     )
-    assert imported_rooms(source) == {"report", "closing", "nulls"}
+    assert rooms_of(imported_names(source)) == {"report", "closing", "nulls"}
