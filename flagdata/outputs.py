@@ -139,7 +139,7 @@ def write_files(folder: Path, contents: Mapping[str, str | bytes | None], *, com
 
 
 def rewrite(path: Path, content: str | bytes) -> None:
-    """Replace a file of the program's own by its next state, such as a ledger that was read and has grown by an entry;
+    """Replace a file of the program's own by its next state, such as a log with one more entry;
     a reader sees the old one or the new one. The folder is made where it is missing. That it is the program's own, the
     caller has made sure of.
 

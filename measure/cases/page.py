@@ -20,7 +20,7 @@ from measure.cases.observe import Clip, Observations
 from measure.cases.recipe import Case, Group
 from measure.cases.study import Cell, Outcome, Study
 from measure.cases.verdict import Verdict
-from measure.cases.words import ledger, verdict_words
+from measure.cases.words import candidates_tried, verdict_words
 from measure.pages.render import data_url, render
 
 _PAGE, _RESULT = "index.html", "result.json"
@@ -59,7 +59,8 @@ def write(folder: Path, *, case: Case, seen: Observations, study: Study, verdict
         "held_lengths": _listed(1e3 * h for h in case.held_out_lengths),
         "linear": [_model_row(o) for o in study.linear], "crossed": [_model_row(o) for o in study.crossed],
         "in_time": [_model_row(o) for o in study.in_time],
-        "floor": {kind.value: 100 * value for kind, value in study.floor.items()}, "ledger": ledger(study, verdict),
+        "floor": {kind.value: 100 * value for kind, value in study.floor.items()},
+        "candidates_tried": candidates_tried(study, verdict),
         "version": f"flagdata {code_version()}",
     }  # fmt: skip
     content = json.dumps(as_json(case, seen, study, verdict), indent=2, allow_nan=False, ensure_ascii=False)

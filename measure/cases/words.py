@@ -1,4 +1,4 @@
-"""The verdict and the ledger of candidates, in words with their numbers."""
+"""The verdict and the table of the candidates tried, in words with their numbers."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _tension(study: Study) -> str:
     )
 
 
-def ledger(study: Study, verdict: Verdict) -> list[tuple[str, str, str]]:
+def candidates_tried(study: Study, verdict: Verdict) -> list[tuple[str, str, str]]:
     """(candidate, judgement, why) for each."""
     rows = []
     kept = {o.candidate for o in verdict.remaining}

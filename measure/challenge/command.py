@@ -142,8 +142,8 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
     help="File of all graded challenges, to which this one is added under its folder's name.",
 )  # fmt: skip
 @click.option(
-    "--against", type=click.Choice(["oracle", "floor"]), default="oracle", show_default=True,
-    help="What E_red is measured against: the true model's error, which is computed anew, or the verdict's floor.",
+    "--against", type=click.Choice(["true-model", "floor"]), default="true-model", show_default=True,
+    help="Error against which E_red is measured: that of the true model, which is computed, or the verdict's floor.",
 )  # fmt: skip
 @json_option
 @click.pass_context
@@ -158,16 +158,16 @@ def score(
     from measure.challenge import history as histories
     from measure.challenge import sheet as sheets
     from measure.challenge.folder import ChallengeFolder
-    from measure.challenge.oracle import true_model
     from measure.challenge.score import score as score_challenge
+    from measure.challenge.true_model import true_model_errors
 
-    target, oracle = ChallengeFolder(folder), true_model if against == "oracle" else None
+    target, reference = ChallengeFolder(folder), true_model_errors if against == "true-model" else None
     name = folder.resolve().name
     if out is not None:
         sheets.check(out)
     before = [] if history is None else histories.without(history, name)  # refused before any key is opened
     with progress(len(target.chosen(only)), label="grading", unit="set") as advance:
-        sheet = score_challenge(target, only=only, oracle=oracle, progress=advance)
+        sheet = score_challenge(target, only=only, reference=reference, progress=advance)
     if out is not None:
         for path in sheets.write(sheet, out):
             say(f"wrote {path}")

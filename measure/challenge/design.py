@@ -11,8 +11,8 @@ import numpy as np
 
 from flagdata.errors import UsageError
 from flagdata.rng import stream
+from measure.challenge.answer_key import Acting, AnswerKey
 from measure.challenge.classes import class_of
-from measure.challenge.key import Acting, Key
 from measure.challenge.recipe import ChallengeRecipe, Kind, Method, Strengths, effect_type
 from sim.effects.effect import ClothEffect
 
@@ -31,7 +31,7 @@ def composition(recipe: ChallengeRecipe, count: int) -> dict[Kind, int]:
     return dealt
 
 
-def draw(recipe: ChallengeRecipe, *, seed: int, count: int) -> tuple[Key, ...]:
+def draw(recipe: ChallengeRecipe, *, seed: int, count: int) -> tuple[AnswerKey, ...]:
     """The keys of `count` sets, in the order of their names, which says nothing; impacts are not known yet.
 
     Effects, noises, rates and strengths that are fixed beforehand are dealt out evenly, everything else is drawn for
@@ -57,7 +57,7 @@ def draw(recipe: ChallengeRecipe, *, seed: int, count: int) -> tuple[Key, ...]:
     varying = deal("wind", [index < round(10 * recipe.varying) for index in range(10)], count)
     order = stream(seed, "order").permutation(count)
     turns = [groups[:index].count(group) for index, group in enumerate(groups)]
-    keys: list[Key] = []
+    keys: list[AnswerKey] = []
     for place, index in enumerate(order.tolist()):
         kind, effects = groups[index]
         numerics = next(nulls) if kind is Kind.NULL else _numerics(recipe, seed, kind, effects)
@@ -105,13 +105,13 @@ def _key(
     rate: int,
     noise: float,
     varying: bool,
-) -> Key:
+) -> AnswerKey:
     material = recipe.materials[int(rng.integers(len(recipe.materials)))]
     density, bending = recipe.density.at(rng.random()), recipe.bending.at(rng.random())
     damping = recipe.numerics[numerics].damping.at(rng.random())
     intensity = recipe.intensity.at(rng.random())
     table = recipe.outside if kind is Kind.OUTSIDE else recipe.effects
-    return Key(
+    return AnswerKey(
         name=name, kind=kind, effects=tuple(_acting(effect, table[effect], turn, rng.random) for effect in effects),
         impact=0.0, material=material, density=density, bending=bending, damping=damping,
         speeds=_speeds(recipe, rng), toward=float(rng.uniform(-math.pi, math.pi)),

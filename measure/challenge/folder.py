@@ -27,7 +27,7 @@ from flagdata.provenance import canonical, digest, file_hash
 from flagdata.recipes import is_name
 from measure.observe.anchors import as_seen
 from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
-from sim import handles as held
+from sim.handles import corners
 from sim.material import named
 from sim.mesh import grid
 
@@ -199,7 +199,7 @@ def read_set(folder: Path) -> Experiment:
         beside = {path.name: path for path in folder.iterdir()}
         markers = _array(beside["markers.npy"])
         specimen = Specimen(
-            mesh=mesh, material=named(flag["material"]), held=held.corners(mesh.rest), anchors=np.array(flag["pins"]),
+            mesh=mesh, material=named(flag["material"]), held=corners(mesh.rest), anchors=np.array(flag["pins"]),
             stiffness=flag["pin_stiffness"], gravity=tuple(flag["gravity"]), anchors_told=False,
         )  # fmt: skip
         recordings = tuple(
@@ -226,7 +226,7 @@ def _array(path: Path) -> Floats:
         first = np.lib.format.read_magic(stream) == (1, 0)
         header = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
         shape, _, kind = header(stream)
-        held = path.stat().st_size - stream.tell()
-    if kind.kind not in "fiu" or min(shape, default=0) < 0 or math.prod(shape) * kind.itemsize != held:
-        raise ValueError(f"{path.name} states {shape} of {kind}, and holds {held} bytes")
+        size = path.stat().st_size - stream.tell()
+    if kind.kind not in "fiu" or min(shape, default=0) < 0 or math.prod(shape) * kind.itemsize != size:
+        raise ValueError(f"{path.name} states {shape} of {kind}, and holds {size} bytes")
     return np.load(path, allow_pickle=False).astype(np.float64)

@@ -16,12 +16,12 @@ from flagdata.outputs import fresh_folder
 from flagdata.provenance import code_version
 from flagdata.rng import stream
 from measure.challenge import folder as files
+from measure.challenge.answer_key import AnswerKey, seal
 from measure.challenge.design import draw
-from measure.challenge.flight import Flight, batches, fly
 from measure.challenge.folder import ChallengeFolder
-from measure.challenge.key import Key, seal
 from measure.challenge.meshes import layout, seen
 from measure.challenge.recipe import ChallengeRecipe
+from measure.challenge.simulation import SimulatedSet, batches, simulate
 from measure.challenge.workers import single_threaded
 from sim.handles import ARCSIM_STIFFNESS
 from sim.scene import GRAVITY
@@ -67,20 +67,20 @@ def _make(
     keys = draw(recipe, seed=seed, count=count)
     entries: dict[str, Any] = {}
 
-    def write(flights: dict[str, Flight]) -> None:
+    def write(simulated: dict[str, SimulatedSet]) -> None:
         by_name = {key.name: key for key in keys}
-        for name, flight in flights.items():
-            entries[name] = _write(target, recipe, seed, by_name[name], flight)
+        for name, made in simulated.items():
+            entries[name] = _write(target, recipe, seed, by_name[name], made)
         if progress is not None:
-            progress(len(flights))
+            progress(len(simulated))
 
     groups = batches(keys, recipe.count)
     if workers == 1:
         for group in groups:
-            write(fly(recipe, seed, group))
+            write(simulate(recipe, seed, group))
     else:
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=single_threaded) as pool:
-            for done in as_completed([pool.submit(fly, recipe, seed, group) for group in groups]):
+            for done in as_completed([pool.submit(simulate, recipe, seed, group) for group in groups]):
                 write(done.result())
     files.write_json(target.path / "sealed" / "seed.json", {"seed": seed, "title": recipe.title, "sets": count})
     files.write_json(
@@ -92,13 +92,15 @@ def _make(
     )  # fmt: skip
 
 
-def _write(target: ChallengeFolder, recipe: ChallengeRecipe, seed: int, key: Key, flight: Flight) -> dict[str, str]:
+def _write(
+    target: ChallengeFolder, recipe: ChallengeRecipe, seed: int, key: AnswerKey, made: SimulatedSet
+) -> dict[str, str]:
     markers = layout(recipe, stream(seed, "markers"))
     weights = seen(recipe.numerics[key.numerics], markers, width=recipe.width, height=recipe.height)
     place = np.append(stream(seed, key.name, "place").uniform(-_AROUND, _AROUND, 2), files.HEIGHT)
     names = _NAMES[: recipe.count]
     positions: dict[str, NDArray[np.float32]] = {}
-    for index, (name, track) in enumerate(zip(names, flight.positions, strict=True)):
+    for index, (name, track) in enumerate(zip(names, made.positions, strict=True)):
         tracked = np.einsum("mv,fvx->fmx", weights, track.astype(np.float64)) + place
         noise = stream(seed, key.name, "noise", index).normal(0.0, 1.0, tracked.shape)
         positions[name] = (tracked + key.noise * noise).astype(np.float32)
@@ -112,11 +114,11 @@ def _write(target: ChallengeFolder, recipe: ChallengeRecipe, seed: int, key: Key
         "rate": key.rate,
         "noise": key.noise,
         "recordings": [
-            {"name": name, "wind": _log(recipe, wind)} for name, wind in zip(names, flight.winds, strict=True)
+            {"name": name, "wind": _log(recipe, wind)} for name, wind in zip(names, made.winds, strict=True)
         ],
     }  # fmt: skip
     data = files.write_set(target.data(key.name), about=about, markers=markers, positions=positions)
-    key = replace(key, impact=flight.impact, effects=flight.effects)
+    key = replace(key, impact=made.impact, effects=made.effects)
     salt = stream(seed, key.name, "salt").bytes(32).hex()
     files.write_json(target.sealed(key.name), {"key": key.as_dict(), "salt": salt})
     return {"data": data, "commitment": seal(key, salt)}

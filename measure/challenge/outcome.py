@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from statistics import fmean, median
 from typing import Any
 
+from measure.challenge.answer_key import Acting, AnswerKey
 from measure.challenge.classes import class_of
 from measure.challenge.filing import Filing
-from measure.challenge.key import Acting, Key
 from measure.challenge.recipe import Kind
 from measure.verdict.record import Conclusion
 
@@ -28,20 +28,20 @@ class Outcome:
         ranking: candidates as in the verdict.
         comparisons, apart: as in the verdict.
         seconds: it took.
-        oracle: comparison → error of the true model [m], where it is known.
+        true_model_errors: comparison → error of the true model [m], where it is known.
     """
 
-    key: Key
+    key: AnswerKey
     conclusion: Conclusion | None
     named: tuple[str, ...]
     ranking: tuple[Mapping[str, Any], ...]
     comparisons: tuple[Mapping[str, Any], ...]
     seconds: float
     apart: Mapping[str, Any] | None = None
-    oracle: Mapping[str, float] = field(default_factory=dict)
+    true_model_errors: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, key: Key, filing: Filing) -> Outcome:
+    def of(cls, key: AnswerKey, filing: Filing) -> Outcome:
         """From what was sealed and what was filed."""
         if filing.verdict is None:
             return cls(key=key, conclusion=None, named=(), ranking=(), comparisons=(), seconds=filing.seconds)
@@ -120,7 +120,7 @@ class Outcome:
 
     def _share(self, entry: Mapping[str, Any]) -> float | None:
         before, after = entry["before"]["value"], entry["after"]["value"]
-        least = self.oracle.get(entry["what"])
+        least = self.true_model_errors.get(entry["what"])
         if least is None:
             return entry["share"]
         return (before - after) / (before - least) if before > least else None

@@ -23,7 +23,12 @@ if TYPE_CHECKING:
     from importlib.machinery import ModuleSpec
 
 IN_THIS_PROCESS = 0
-_APART = ("measure.challenge.outside", "measure.challenge.design", "measure.challenge.flight", "measure.challenge.key")
+_APART = (
+    "measure.challenge.outside",
+    "measure.challenge.design",
+    "measure.challenge.simulation",
+    "measure.challenge.answer_key",
+)
 
 
 class Fitter(Protocol):

@@ -3,14 +3,14 @@
 Definitions, in the words of the sheet:
 
 - *False positive*: a null whose base model was not found sufficient. A refusal of the data counts as one.
-- *Half-detection strength*: the impact (see `Key.impact`) at which half are detected, of a class of effects (see
+- *Half-detection strength*: the impact (see `AnswerKey.impact`) at which half are detected, of a class of effects (see
   `rates.Power`). Identification is graded on sets of one effect at twice that or more; effects from outside the
   library are called strong by twice that of a class that was not seen.
 - *Top-1*: the effect named, or the best ranked of those named, acted; *class-level*: one of its class did.
 - *False discovery*: a claim that an effect of some class acts where none does. "One of" makes a single claim.
 - *None of the library*: the verdict says so, or that the library explains only a part.
-- *E_red*: (before − after)/(before − oracle), the oracle being the true model with the fitter's numerics; the median
-  over a set's comparisons, where an effect was named.
+- *E_red*: (before − after)/(before − least), with the error of the true model, by the fitter's numerics, as the least;
+  the median over a set's comparisons, where an effect was named.
 - *Control separated*: the same freedom spent on the best wrong effect leaves a larger misfit on the recordings left out
   in turn, by an interval of the paired difference that does not reach zero. Of all sets with an effect of the library
   where effects were named and a control was run, that does not act itself (of two effects it may be the other); "one
@@ -28,13 +28,13 @@ import numpy as np
 
 from flagdata.errors import RefusedError
 from measure.challenge import filing
+from measure.challenge.answer_key import opened
 from measure.challenge.classes import class_of
 from measure.challenge.folder import ChallengeFolder
-from measure.challenge.key import opened
-from measure.challenge.oracle import Oracle
 from measure.challenge.outcome import Outcome
 from measure.challenge.rates import Power
 from measure.challenge.recipe import Kind
+from measure.challenge.true_model import ReferenceErrors
 from measure.shares import Share
 from measure.verdict.record import Conclusion
 
@@ -241,15 +241,15 @@ def score(
     folder: ChallengeFolder,
     *,
     only: Sequence[str] = (),
-    oracle: Oracle | None = None,
+    reference: ReferenceErrors | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Sheet:
     """Open the keys and grade. What had been filed by then is kept on record, and no verdict can be filed afterwards.
 
     Args:
         only: names of sets; none for all.
-        oracle: what E_red is measured against where an effect of the library was named; None for the verdict's own
-            floor.
+        reference: errors against which E_red is measured where an effect of the library was named; None for the
+            verdict's own floor.
         progress: called with 1 for each set.
 
     Raises:
@@ -274,8 +274,8 @@ def score(
         content, where = folder.seal(name), str(folder.sealed(name))
         key = opened(content, manifest["sets"][name]["commitment"], where=where)
         outcome = Outcome.of(key, filed[name])
-        if oracle is not None and outcome.named and outcome.true:
-            outcome = replace(outcome, oracle=oracle(folder, key))
+        if reference is not None and outcome.named and outcome.true:
+            outcome = replace(outcome, true_model_errors=reference(folder, key))
         outcomes.append(outcome)
         if progress is not None:
             progress(1)

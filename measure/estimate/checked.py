@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from measure.estimate.gate import Reason
 from measure.gate.gate import Gate as Calibrated
 from measure.gate.judgement import CONFIDENCE, judge
-from measure.gate.tails import level
+from measure.gate.tail_probability import level
 from models.estimator import Estimator
 
 

@@ -19,7 +19,7 @@ from flagdata.errors import InputError
 from measure.gate.checks import CHECKS
 from measure.gate.distortions import DISTORTIONS
 from measure.gate.features import MOVES
-from measure.gate.tails import Tails, joint_p
+from measure.gate.tail_probability import ExponentialTails, joint_p
 from models.handmade import FEATURES
 from models.outliers import shrunk_covariance
 
@@ -99,7 +99,7 @@ class Gate:
     whitening: Vector
     directions: Vector
     offsets: Vector
-    tails: Tails
+    tails: ExponentialTails
     calibration: Vector
     statistics: Vector
     summaries: Vector
@@ -143,7 +143,7 @@ class Gate:
             offsets.append(direction @ (other.mean(axis=0) + z.mean(axis=0)) / 2)
         values, vectors = np.linalg.eigh(shrunk_covariance(z)[0])
         whitening = vectors.T / np.sqrt(np.maximum(values, 1e-9))[:, None]
-        blank = Tails(start=np.zeros(len(SCORES)), excess=np.ones(len(SCORES)))
+        blank = ExponentialTails(start=np.zeros(len(SCORES)), excess=np.ones(len(SCORES)))
         gate = cls(
             centre=centre, scale=scale, whitening=whitening, directions=np.array(directions),
             offsets=np.array(offsets), tails=blank, calibration=np.zeros(0),
@@ -152,7 +152,7 @@ class Gate:
         return gate._calibrated(rest, calibration)
 
     def _calibrated(self, rest: Vector, calibration: Vector) -> Gate:
-        gate = replace(self, tails=Tails.of(self.scores(rest), _RESOLUTION))
+        gate = replace(self, tails=ExponentialTails.of(self.scores(rest), _RESOLUTION))
         return replace(gate, calibration=np.sort(gate.surprises(calibration).max(axis=1)))
 
     def scores(self, vectors: Vector) -> Vector:

@@ -16,7 +16,7 @@ from measure.gate.features import features_of
 from measure.gate.gate import SCORES, Gate, Vector
 from measure.gate.motion import LEAST_AREA
 from measure.gate.reasons import REASONS
-from measure.gate.tails import level
+from measure.gate.tail_probability import level
 from models.estimator import Estimator
 
 FALSE_ALARM = 0.05

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flagdata.checksums import write_sums
 from flagdata.errors import CorruptError
 from measure.gate.gate import SCORES, Gate
-from measure.gate.tails import Tails
+from measure.gate.tail_probability import ExponentialTails
 from models.estimator import Estimator
 from models.storage import read_tensors, write_tensors
 
@@ -60,5 +60,5 @@ def read(folder: Path, model: Estimator) -> Gate:
         raise CorruptError("the gate was calibrated for another network", where=str(path), fix=again)
     return Gate(
         **{name: arrays[name] for name in _DIRECT},
-        tails=Tails(start=arrays["tail_start"], excess=arrays["tail_excess"]),
+        tails=ExponentialTails(start=arrays["tail_start"], excess=arrays["tail_excess"]),
     )

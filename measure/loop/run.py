@@ -30,7 +30,7 @@ from measure.loop.residuals import residuals
 from measure.loop.selection import EQUIVALENT, GUST_COLUMN, Judgement, Weighed, finalists, judge, strength
 from measure.loop.validation import LeftOut, Predictions, Trial, compare, folds, numerical_floor, predict
 from measure.nulls import bank as banks
-from measure.nulls import supply
+from measure.nulls import plan
 from measure.nulls.conformal import kinds_needed
 from measure.nulls.reference import NullBank, Reference
 from measure.observe.trajectory import Experiment
@@ -48,7 +48,7 @@ _LOOKS = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(supply.NullOptions):
+class Options(plan.NullOptions):
     """How to close the loop: by which nulls, at which level of the global test.
 
     Raises:
@@ -116,7 +116,7 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
         setting = setting.moved(late)
         found, projection = _looked_at(setting)
     tell("sensitivities", 1, 1)
-    bank = supply.supplied(setting, options, stage=tell)
+    bank = plan.bank_for(setting, options, stage=tell)
     reference = bank.reference(
         len(setting.segments), noise=setting.design.noise, seed=options.seed, prior=setting.prior
     )

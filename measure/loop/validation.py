@@ -192,7 +192,7 @@ def compare(
     old, new = before.squared, after.squared
     return Comparison(
         what=fold.words, frames=frames, before=root(old), after=root(new), reduction=paired(old, new),
-        floor=root(floor), oracle=None, share=share_removed(old, new, floor),
+        floor=root(floor), share=share_removed(old, new, floor),
         control=None if control is None else root(control.squared), control_name=control_name,
         apart=None if control is None else a_segment(control.misfit - after.misfit, recording),
     )  # fmt: skip
@@ -205,8 +205,8 @@ def share_removed(before: Floats, after: Floats, floor: Floats) -> float | None:
         before, after, floor: (segment,) mean squared distances [m²].
     """
     most = float(before.mean())
-    room = most - min(float(floor.mean()), most)
-    return float(before.mean() - after.mean()) / room if room > CRITERIA.room * most else None
+    above = most - min(float(floor.mean()), most)
+    return float(before.mean() - after.mean()) / above if above > CRITERIA.room * most else None
 
 
 def a_segment(values: Floats, recording: NDArray[np.int64]) -> Estimate:

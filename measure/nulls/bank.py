@@ -25,7 +25,7 @@ from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import Column, columns, names
 from measure.forecasting.segments import Segments
 from measure.inference.random_effect import Nulls
-from measure.nulls import fabric as fabrics
+from measure.nulls import stiffness
 from measure.nulls.reference import NullBank
 from measure.nulls.simulation import NullBatch
 from measure.observe.anchors import as_seen
@@ -74,14 +74,14 @@ def prior_batch(
     """A null experiment over the priors: one cloth in four winds, one from each quarter of `speeds`.
 
     Density and bending are log-uniform about the nominal ones, damping log-uniform, the other stiffness as
-    `fabric.drawn` has it.
+    `stiffness.drawn` has it.
     """
     rng = stream(seed, "null", "prior")
     cloth = Calibration(density=_log(rng, _DENSITY), bending=_log(rng, _BENDING), damping=_log(rng, _DAMPING))
     shares = (np.arange(WINDS) + rng.random(WINDS)) / WINDS
     return NullBatch(
         specimen=specimen, markers=markers, rate=rate, duration=duration, noise=noise, calibrations=(cloth,) * WINDS,
-        fabric=fabrics.drawn(rng),
+        stiffness=stiffness.drawn(rng),
         speeds=tuple(float(u) for u in speeds[0] + (speeds[1] - speeds[0]) * shares),
         seed=child_seed(seed, "null", "batch"),
     )  # fmt: skip

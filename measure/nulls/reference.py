@@ -276,14 +276,14 @@ class Reference:
             InputError: no nulls of such noise.
         """
         kinds = found.kinds
-        alike = np.abs(found.noise - noise) <= CRITERIA.alike_noise
-        count, needed = len(np.unique(kinds[alike])), kinds_needed(1 - CRITERIA.interval)
+        similar = np.abs(found.noise - noise) <= CRITERIA.alike_noise
+        count, needed = len(np.unique(kinds[similar])), kinds_needed(1 - CRITERIA.interval)
         if count < needed:
             raise InputError(
                 f"{count} kinds of numerics with markers as noisy as {1e3 * noise:.2g} mm", where="null bank",
                 fix=f"build a bank of {needed} or more with such noise, or leave it out",
             )  # fmt: skip
-        usual = _Usual.of(found.select(alike))
+        usual = _Usual.of(found.select(similar))
         scaled, far = np.empty_like(found.shares), np.empty((len(kinds), len(usual.centre)))
         for kind in np.unique(kinds):
             own = kinds == kind
@@ -366,8 +366,8 @@ class Reference:
         own = slice(len(self.spread) + 2, len(self.centre) - (self.lines is not None))
         if len(self.centre[own]) != len(found):
             raise UsageError("courses of the data alone", where="reference", fix="look at them in the nulls as well")
-        alike = found * np.exp(-self.damping * self.powers)
-        return float(np.abs((alike - self.centre[own]) / self.width[own]).max())
+        damped = found * np.exp(-self.damping * self.powers)
+        return float(np.abs((damped - self.centre[own]) / self.width[own]).max())
 
     def line(self, evidence: Evidence) -> Line | None:
         """The most prominent one of data; None where spectra are not looked at.

@@ -18,7 +18,7 @@ from flagdata.errors import FlagdataError
 from flagdata.rng import stream
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import SegmentWind
-from measure.nulls.fabric import Fabric
+from measure.nulls.stiffness import StiffnessFactors
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 from sim.effects import Effect, apply
@@ -56,7 +56,7 @@ class NullBatch:
         speeds: of the wind, along +x, one a recording [m/s].
         winds: that blow in place of steady ones of these speeds, one a recording; none where they are steady.
         seed: of the numerics, the starts and the noise.
-        fabric: how its tables of stiffness differ from the nominal ones.
+        stiffness: how its tables of stiffness differ from the nominal ones.
         effects: what acts beside the base model: none for nulls proper, those named for the floor of a larger model.
     """
 
@@ -68,7 +68,7 @@ class NullBatch:
     calibrations: tuple[Calibration, ...]
     speeds: tuple[float, ...]
     seed: int
-    fabric: Fabric = field(default_factory=Fabric)
+    stiffness: StiffnessFactors = field(default_factory=StiffnessFactors)
     winds: tuple[WindTrack, ...] = ()
     effects: tuple[Effect, ...] = ()
 
@@ -121,7 +121,7 @@ class NullBatch:
                 return found
         raise FlagdataError(
             f"a simulation of nulls diverges, even in steps {2**_HALVINGS} times smaller than usual",
-            where=f"{self.calibrations[0]}, stretching × {self.fabric.stretching:.3g}, winds "
+            where=f"{self.calibrations[0]}, stretching × {self.stiffness.stretching:.3g}, winds "
             f"{', '.join(f'{speed:.3g}' for speed in self.speeds)} m/s",
             fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",
         )  # fmt: skip
@@ -140,7 +140,7 @@ class NullBatch:
         for calibration, rough, speed in zip(self.calibrations, roughness, self.speeds, strict=True):
             position = start + rough
             position[list(held)] = specimen.anchors
-            material = calibration.material(self.fabric.of(specimen.material))
+            material = calibration.material(self.stiffness.of(specimen.material))
             scenes.append(
                 Scene(
                     mesh=flat, position=position, gravity=specimen.gravity, air=specimen.air, wind=(speed, 0.0, 0.0),

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @click.option("--lake", "lake_path", type=LocalPath(), envvar="FLAGDATA_LAKE",
               help="Lake that artifacts are read from; also FLAGDATA_LAKE.")  # fmt: skip
 @click.option("--out", type=LocalPath(), default=Path("out/close-loop"), show_default=True,
-              help="Folder in which proposal/ is written: the effect file, its tests and ledger.json.")  # fmt: skip
+              help="Folder in which proposal/ is written: the effect file, its tests and proposals.json.")  # fmt: skip
 @json_option
 def propose(
     recipe_path: Path,
@@ -44,9 +44,9 @@ def propose(
 
     RECIPE.toml is one of `flagdata close-loop --recipe` that names its recordings. Terms are sought in a part of them;
     up to three become an effect, written as a module with its contract tests; the rest of the recordings decide: errors
-    must fall, and below those of as many terms of another direction. What was tried goes into proposal/ledger.json. Run
-    it where close-loop says "none of the library"; where it says "partly explained", name what it found with --known.
-    --effect tests such a file on other recordings, beside the terms as controls.
+    must fall, and below those of as many terms of another direction. proposal/proposals.json records what was tried.
+    Run it where close-loop says "none of the library"; where it says "partly explained", name what it found with
+    --known. --effect tests such a file on other recordings, beside the terms as controls.
 
     \b
       flagdata propose flag.toml
@@ -54,15 +54,15 @@ def propose(
       flagdata propose other.toml --effect out/close-loop/proposal/proposed_1f2e3d.py:UpwardLower
     """
     from flagdata.lake import Lake
-    from measure.nulls.supply import NullOptions
+    from measure.nulls.plan import NullOptions
     from measure.observe import recipe as recipes
-    from measure.propose import candidates, effect_file, ledger
+    from measure.propose import candidates, effect_file, proposal_log
     from measure.propose.propose import propose as seek
     from measure.propose.terms import dictionary
     from measure.propose.words import words
 
     folder = out / "proposal"
-    ledger.check(folder / "ledger.json")
+    proposal_log.check(folder / "proposals.json")
     if effect is None:
         effect_file.check(folder)
     recipe = recipes.load(recipe_path)
@@ -78,7 +78,7 @@ def propose(
     spec = effect or ""
     if effect is None and outcome.strengths:
         spec = effect_file.write(outcome, folder).spec
-    ledger.add(folder / "ledger.json", outcome, effect=spec)
+    proposal_log.add(folder / "proposals.json", outcome, effect=spec)
     _tell(outcome, spec, folder, as_json=as_json, text=words(outcome))
 
 
@@ -89,4 +89,4 @@ def _tell(outcome: Outcome, spec: str, folder: Path, *, as_json: bool, text: str
         click.echo(text)
     if spec:
         say(f"effect {spec}")
-    say(f"wrote {folder / 'ledger.json'}")
+    say(f"wrote {folder / 'proposals.json'}")

@@ -1,7 +1,7 @@
 """What the terms' statistics are when nothing is missing: errors of nulls in the place of the data's.
 
-The response of the lens to the terms is the data's; what is seen through it is taken from null recordings, by a null
-model that has seen none of their numerics. So nulls along the directions of the lens alone test any number of terms.
+The response of the projected errors to the terms is the data's; the errors themselves are those of null recordings,
+standardised by a null model fitted without nulls of the same numerics. So one bank of nulls tests any number of terms.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from measure.inference.evidence import Evidence
 from measure.inference.random_effect import Nulls
 from measure.nulls.reference import left_out_groups
 from measure.probes.statistics import Statistics
-from measure.propose.lens import evidence
+from measure.propose.projected import evidence
 
 Floats = NDArray[np.float64]
 
 _NOTHING = 1e-6
-"""Mean share below which a term is never seen."""
-_ALIKE = 5e-4
+"""Mean share below which a term has no projected response."""
+_NOISE_TOLERANCE = 5e-4
 """Difference of the markers' noise that does not matter [m]: with more, quieter nulls fall outside the level."""
 _LEAST = 24
 """Groups of nulls as noisy as the data, below which all are taken."""
@@ -45,7 +45,7 @@ class Family:
 
     @classmethod
     def of(cls, nulls: Nulls, found: Statistics, *, noise: float, seed: int) -> Family:
-        """For what a lens sees of data.
+        """For the projected errors of data.
 
         Args:
             found: of the data.
@@ -55,8 +55,8 @@ class Family:
             InputError: no null experiment has as many segments.
         """
         count, columns = found.response.shape[0], found.response.shape[2]
-        alike = nulls.select(np.abs(nulls.noise - noise) <= _ALIKE)
-        pool = alike if len(alike.noise) and len(np.unique(alike.experiment)) >= _LEAST else nulls
+        similar = nulls.select(np.abs(nulls.noise - noise) <= _NOISE_TOLERANCE)
+        pool = similar if len(similar.noise) and len(np.unique(similar.experiment)) >= _LEAST else nulls
         shares: list[Floats] = []
         for kept in left_out_groups(nulls, pool, count, seed=seed):
             for chosen in kept.groups:

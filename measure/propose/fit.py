@@ -1,4 +1,4 @@
-"""Models fitted beyond the linear through a lens: linearised again where the last fit led, until they stay."""
+"""Gauss–Newton fits of models to projected errors: linearised again at each estimate until it converges."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from measure.forecasting.model import Model
 from measure.forecasting.regressors import EffectColumn
 from measure.inference.random_effect import NullModel
 from measure.loop.gauss_newton import ROUNDS, STAYS, cut
-from measure.propose.lens import Lens, evidence
+from measure.propose.projected import ProjectedSegments, evidence
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +26,13 @@ class Fitted:
     errors: tuple[float, ...]
 
 
-def fit(lens: Lens, null: NullModel, speeds: Floats, columns: Sequence[EffectColumn], start: Sequence[float]) -> Fitted:
+def fit(
+    projected: ProjectedSegments,
+    null: NullModel,
+    speeds: Floats,
+    columns: Sequence[EffectColumn],
+    start: Sequence[float],
+) -> Fitted:
     """Calibrated parameters and strengths, by Gauss and Newton.
 
     Args:
@@ -37,16 +43,16 @@ def fit(lens: Lens, null: NullModel, speeds: Floats, columns: Sequence[EffectCol
     step, errors = np.array(cut(np.array(start, dtype=np.float64))), np.zeros(len(start))
     for _ in range(ROUNDS):
         model = model.moved(tuple(step))
-        step, errors = _step(lens, null, speeds, model)
+        step, errors = _step(projected, null, speeds, model)
         if np.abs(step / errors).max() < STAYS:
             break
     return Fitted(model=model.moved(tuple(step)), errors=tuple(float(e) for e in errors))
 
 
-def _step(lens: Lens, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:
+def _step(projected: ProjectedSegments, null: NullModel, speeds: Floats, model: Model) -> tuple[Floats, Floats]:
     """One step of generalised least squares from a model, under the prior about the nominal calibration, and its
     standard errors."""
-    own = evidence(lens.at(model), speeds, null)
+    own = evidence(projected.at(model), speeds, null)
     found = own.fit(range(len(THETA), own.columns), centre=Calibration().steps_from(model.calibration))
     value, error = np.array([found.of(column) for column in range(own.columns)]).T
     return np.array(cut(value)), error

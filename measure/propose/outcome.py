@@ -94,8 +94,8 @@ class Strength:
 class Retest:
     """Models before and after on segments that neither choice nor fit has seen.
 
-    Errors are root mean squares [m]. What decides is the half misfit along the lens, in which the bias of the fit's
-    mesh, most of a squared distance, is taken out as nulls know it [nat a segment].
+    Errors are root mean squares [m]. The half misfit of the projected errors decides [nat a segment]; the bias of the
+    fit's mesh, most of a squared distance, is taken out of it with the help of the nulls.
 
     Attributes:
         what: which data.
@@ -173,5 +173,5 @@ class Outcome:
     seed: int
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values: an entry of a ledger."""
+        """JSON values: an entry of the proposal log."""
         return asdict(self)

@@ -1,8 +1,8 @@
-"""Effects from data: terms sought in a part of recordings, fitted there, and tested on the rest.
+"""Effects from data: terms are selected and fitted on one part of the recordings and tested on the rest.
 
-Terms are seen through a lens, along the directions in which the base model's own errors are known from nulls: its
-numerics could look like a term. What is taken is refitted and run on data that nothing has seen, with terms of another
-direction and beside what numerics leave.
+Errors are projected on directions whose null distribution is known, because errors of the numerics could look like a
+term. The selected model is refitted and tested on data not used before, against control terms of another direction and
+against the numerical floor.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from measure.forecasting.setting import Setting, Stage
 from measure.inference.evidence import Evidence, gains
 from measure.inference.random_effect import NullModel
 from measure.loop.selection import estimate
-from measure.nulls import supply
+from measure.nulls import plan
 from measure.nulls.reference import NullBank
 from measure.observe.trajectory import Experiment
 from measure.probes.statistics import Statistics
 from measure.propose.course import course
 from measure.propose.family import Family
 from measure.propose.fit import Fitted, fit
-from measure.propose.lens import Lens, evidence
 from measure.propose.outcome import Decision, Outcome, Ranked, Strength
+from measure.propose.projected import ProjectedSegments, evidence
 from measure.propose.retest import retest
 from measure.propose.search import Step, search, wrong
 from measure.propose.split import data_hash, split
@@ -55,7 +55,7 @@ def propose(
     *,
     known: Sequence[EffectColumn] = (),
     controls: Sequence[EffectColumn] = (),
-    options: supply.NullOptions,
+    options: plan.NullOptions,
     stage: Stage | None = None,
 ) -> Outcome:
     """Seek terms that a model lacks, and keep them if they help on recordings that were not looked at.
@@ -72,7 +72,7 @@ def propose(
     torch.set_num_threads(1)
     tell = stage or (lambda what, done, total: None)
     setting = made_ready(experiment)
-    bank = supply.supplied(setting, options, stage=tell)
+    bank = plan.bank_for(setting, options, stage=tell)
     return weigh(setting, candidates, bank, columns(), known=known, controls=controls, options=options, stage=tell)
 
 
@@ -100,7 +100,7 @@ def weigh(
     *,
     known: Sequence[EffectColumn] = (),
     controls: Sequence[EffectColumn] = (),
-    options: supply.NullOptions,
+    options: plan.NullOptions,
     stage: Stage,
 ) -> Outcome:
     """The outcome for recordings, given nulls.
@@ -111,17 +111,17 @@ def weigh(
     Raises:
         InputError: nulls of segments of another length; too few segments.
     """
-    supply.check(bank, setting)
+    plan.check(bank, setting)
     bank = bank.plain()
     parts = split(setting.segments, setting.speeds)
     null = bank.model(setting.design).under(setting.prior)
     stage("terms", 0, 1)
-    whole = Lens.of(setting.forecaster, setting.segments, weighed)
-    lens = whole.select(np.flatnonzero(parts.seen))
-    speeds = lens.speeds(setting.speeds)
-    tried = _tried(lens, null, speeds, candidates, [*known, *controls])
+    whole = ProjectedSegments.of(setting.forecaster, setting.segments, weighed)
+    projected = whole.select(np.flatnonzero(parts.seen))
+    speeds = projected.speeds(setting.speeds)
+    tried = _tried(projected, null, speeds, candidates, [*known, *controls])
     own = evidence(tried.found, speeds, null)
-    noise = max(segment.noise for segment in lens.segments.items)
+    noise = max(segment.noise for segment in projected.segments.items)
     family = Family.of(bank.nulls, tried.found, noise=noise, seed=options.seed)
     names = tuple(column.name for column in tried.columns)
     beside = list(range(len(THETA), len(THETA) + len(known)))
@@ -136,7 +136,7 @@ def weigh(
     def fitted(columns: Sequence[int]) -> Fitted:
         linear = own.fit(columns)
         start = [linear.of(column)[0] for column in (*range(len(THETA)), *columns)]
-        return fit(lens, null, speeds, [tried.columns[column - len(THETA)] for column in columns], start)
+        return fit(projected, null, speeds, [tried.columns[column - len(THETA)] for column in columns], start)
 
     strengths: tuple[Strength, ...] = ()
     tested = None
@@ -159,7 +159,7 @@ def weigh(
     return Outcome(
         decision=decision, reason=reason, steps=steps, tried=len(others) - len(controls),
         ranking=_ranking(own, family, labels, pool), strengths=strengths, retest=tested, level=options.level,
-        nulls=bank.words, proposed_from=data_hash(lens.segments),
+        nulls=bank.words, proposed_from=data_hash(projected.segments),
         tested_on=data_hash(setting.segments.select(np.flatnonzero(~parts.seen))),
         known=tuple(column.name for column in known), seed=options.seed,
     )  # fmt: skip
@@ -177,18 +177,22 @@ def _kind(column: EffectColumn) -> str:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Tried:
-    """Columns, and what the lens sees of them after the calibrated parameters."""
+    """Columns, and their projected statistics after those of the calibrated parameters."""
 
     columns: tuple[EffectColumn, ...]
     found: Statistics
 
 
 def _tried(
-    lens: Lens, null: NullModel, speeds: Floats, candidates: Sequence[EffectColumn], fixed: Sequence[EffectColumn]
+    projected: ProjectedSegments,
+    null: NullModel,
+    speeds: Floats,
+    candidates: Sequence[EffectColumn],
+    fixed: Sequence[EffectColumn],
 ) -> _Tried:
     """Fixed columns, candidates, and the best local candidate at places nearby."""
     columns = (*fixed, *candidates)
-    tried = _Tried(columns=columns, found=lens.of_columns(columns))
+    tried = _Tried(columns=columns, found=projected.of_columns(columns))
     for size in _MOVES:
         first = len(THETA) + len(fixed)
         gained = gains(
@@ -197,7 +201,7 @@ def _tried(
         moved = _moved(dict(zip(tried.columns[len(fixed) :], gained.sum(axis=1).tolist(), strict=True)), size)
         if not moved:
             break
-        more = lens.of_columns(moved).response[:, :, len(THETA) :]
+        more = projected.of_columns(moved).response[:, :, len(THETA) :]
         response = np.concatenate([tried.found.response, more], axis=2)
         tried = _Tried(columns=(*tried.columns, *moved), found=replace(tried.found, response=response))
     return tried

@@ -56,7 +56,6 @@ def page(verdict: Verdict) -> str:
         "warnings": sentences.control_warnings(verdict) + sentences.reduction_warnings(verdict),
         "after_label": sentences.after_label(verdict),
         "has_after": any(quantity.known(c.after) for c in verdict.comparisons),
-        "has_oracle": any(quantity.known(c.oracle) for c in verdict.comparisons),
         "has_control": any(quantity.known(c.control) for c in verdict.comparisons),
         "has_shift": any(quantity.known(p.after) for p in verdict.parameters),
         "residual_after": any(r.in_time_after for r in verdict.residuals),

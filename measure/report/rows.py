@@ -18,13 +18,13 @@ _STEP = 13.0
 
 def errors_scale(comparisons: Sequence[Comparison]) -> Linear:
     """One axis for the errors of all comparisons, from zero."""
-    shown = [e for c in comparisons for e in (c.before, c.after, c.floor, c.oracle, c.control) if e is not None]
+    shown = [e for c in comparisons for e in (c.before, c.after, c.floor, c.control) if e is not None]
     ends = [v for e in shown for v in (e.value, e.low, e.high)]
     return Linear.over(ends, _INSET, _WIDTH - _INSET, at_least=[0.0])
 
 
 def errors_row(comparison: Comparison, scale: Linear) -> Markup:
-    """The errors of one comparison: before, after and control with their intervals, floor shaded, oracle ticked."""
+    """The errors of one comparison: before, after and control with their intervals; floor shaded."""
     shown = [(comparison.before, "before"), (comparison.after, "after"), (comparison.control, "control")]
     there = [(e, kind) for e, kind in shown if e is not None and known(e)]
     height = 15 * len(there) + 3
@@ -32,8 +32,6 @@ def errors_row(comparison: Comparison, scale: Linear) -> Markup:
     if known(comparison.floor):
         edge = scale(min(max(comparison.floor.value, scale.low), scale.high))
         parts.append(f'<rect class="floor" x="{scale(0):.1f}" y="0" width="{edge - scale(0):.1f}" height="{height}"/>')
-    if comparison.oracle is not None and scale.shows(comparison.oracle.value):
-        parts.append(f'<path class="line oracle" d="M{scale(comparison.oracle.value):.1f} 0V{height}"/>')
     parts += [_whisker(estimate, scale, 9.0 + 15 * place, kind) for place, (estimate, kind) in enumerate(there)]
     told = f"before {estimate_text(comparison.before)}, after {estimate_text(comparison.after)}"
     return drawing(_WIDTH, height, f"Errors, {comparison.what}", told, "".join(parts))

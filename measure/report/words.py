@@ -88,8 +88,6 @@ def _compared(comparison: Comparison, after_label: str) -> str:
         parts.append(f"reduction {estimate_text(comparison.reduction, shown=shown)}")
         parts.append(f"E_red {share(comparison.share)}")
     parts.append(f"floor {estimate_text(comparison.floor, shown=shown)}")
-    if known(comparison.oracle):
-        parts.append(f"oracle {estimate_text(comparison.oracle, shown=shown)}")
     if known(comparison.control):
         parts.append(f"control {comparison.control_name} {estimate_text(comparison.control, shown=shown)}")
         if known(comparison.apart):

@@ -78,8 +78,7 @@ class Comparison:
         before, after: of the base model and of the model with the effect.
         reduction: paired, before − after [m].
         floor: of the model itself on data simulated from it with other numerics: differences below are not effects.
-        oracle: of the model with the true effect, where it is known.
-        share: E_red = (before − after) / (before − oracle, or floor); None where before is not above it.
+        share: E_red = (before − after) / (before − floor); None where before is not above it.
         control: after, with the same freedom spent on the best wrong effect.
         control_name: which.
         apart: mean half misfit of a segment by the control less that by the effect, paired, what the model's numerics
@@ -92,7 +91,6 @@ class Comparison:
     after: Estimate
     reduction: Estimate
     floor: Estimate
-    oracle: Estimate | None
     share: float | None
     control: Estimate | None
     control_name: str

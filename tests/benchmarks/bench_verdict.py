@@ -18,7 +18,7 @@ from flagdata.rng import child_seed
 from measure.forecasting.setting import Setting
 from measure.loop.run import Options, solve
 from measure.nulls import bank as banks
-from measure.nulls.supply import batches
+from measure.nulls.plan import batches
 from measure.verdict.criteria import CRITERIA
 from tests.validation import stressors
 

@@ -52,5 +52,5 @@ def test_what_fits_needs_no_challenge_and_a_run_loads_nothing_that_makes_one() -
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     fitting, running = done.stdout.splitlines()
     assert fitting == "[]"
-    makers = ("outside", "design", "flight", "key")
+    makers = ("outside", "design", "simulation", "answer_key")
     assert not [name for name in makers if f"measure.challenge.{name}" in running]

@@ -1,4 +1,4 @@
-"""The house's arrows: who may import whom, read from the source, so that a lazy import inside a function counts too."""
+"""Which package may import which, read from the source, so that a lazy import inside a function counts too."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ ALLOWED = {
     "sim/blender/worker.py": SCRATCH,
     "sim/datasets/record.py": SCRATCH,
     "sim/datasets/plan.py": SCRATCH,
-    "measure/nulls/supply.py": SCRATCH,
+    "measure/nulls/plan.py": SCRATCH,
     "flagdata/dataset/cache.py": "a cache: files named by 64 hex digits and its own two, whichever folder it is in",
     "measure/nulls/bank.py": "makes the folder of a bank that `challenge bank` has claimed; batches by put_if_absent",
     "sim/kernel/build.py": "flagdata's own cache folder",

@@ -21,7 +21,7 @@ CASES: dict[str, tuple[tuple[str, ...], str]] = {
     "evaluate --out": (("evaluate", "flow", "--lake", "nowhere", "--out", "{out}"), "evaluation.md"),
     "close-loop --out": (("close-loop", "nowhere.csv", "--lake", "nowhere", "--out", "{out}"), "model.toml"),
     "case --out": (("case", "paper-flag", ".", "--out", "{out}"), "plane.png"),
-    "propose --out, ledger": (("propose", "nowhere.toml", "--out", "{out}"), "proposal/ledger.json"),
+    "propose --out, log": (("propose", "nowhere.toml", "--out", "{out}"), "proposal/proposals.json"),
     "propose --out, effect": (("propose", "nowhere.toml", "--out", "{out}"), "proposal/pyproject.toml"),
     "challenge make": (("challenge", "make", "{out}", "--seed", "1"), "mine"),
     "challenge bank": (("challenge", "bank", "{out}", "--seed", "1"), "mine"),
@@ -44,7 +44,7 @@ def test_a_taken_output_is_refused_first_and_kept(
     (out / taken).write_text("mine")
     monkeypatch.chdir(tmp_path)
     code, error = refusal([argument.format(out=out) for argument in arguments], capsys)
-    assert (code, error["kind"]) == (1, "corrupt" if taken.endswith(("ledger.json", ".csv")) else "conflict")
+    assert (code, error["kind"]) == (1, "corrupt" if taken.endswith(("proposals.json", ".csv")) else "conflict")
     assert str(out) in f"{error['what']} {error['where']}"
     assert error["fix"]
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == [out / taken]

@@ -1,4 +1,4 @@
-"""ARCHITECTURE.md is one page, and the house it draws is the one that stands."""
+"""ARCHITECTURE.md is one page, and its list of packages is that of the source."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ PAGE = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
 WORDS = 900
 
 
-def house() -> list[tuple[str, str]]:
+def listed() -> list[tuple[str, str]]:
     """Top-level folders and the names that are listed under each (folders with a slash, modules with their suffix)."""
     block = re.search(r"```\n(.*?)```", PAGE, re.DOTALL)
-    assert block, "the drawing of the house is missing"
+    assert block, "the list of packages is missing"
     named: list[tuple[str, str]] = []
     top = ""
     for line in block.group(1).splitlines():
@@ -33,22 +33,22 @@ def test_the_map_is_one_page() -> None:
     assert len(PAGE.split()) <= WORDS
 
 
-@pytest.mark.parametrize(("top", "name"), house(), ids=lambda part: part or "itself")
+@pytest.mark.parametrize(("top", "name"), listed(), ids=lambda part: part or "itself")
 def test_what_the_map_names_exists(top: str, name: str) -> None:
     place = ROOT / top / name
     assert place.is_file() if name.endswith(".py") else place.is_dir()
 
 
-def test_every_package_and_every_room_is_on_the_map() -> None:
-    named = set(house())
+def test_every_package_and_every_subpackage_is_on_the_map() -> None:
+    named = set(listed())
     packages = {path.parent.name for path in ROOT.glob("*/__init__.py")}
     assert packages <= {top for top, _ in named}
-    rooms = {
+    subpackages = {
         (path.parts[-3], f"{path.parts[-2]}/")
         for package in ("flagdata", "sim", "models", "measure")
         for path in ROOT.glob(f"{package}/*/__init__.py")
     }
-    assert rooms <= named
+    assert subpackages <= named
 
 
 def test_every_decision_is_in_the_index() -> None:

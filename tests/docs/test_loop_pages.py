@@ -21,8 +21,8 @@ from flagdata.schema import Kind
 from measure.demo.tracked import TrackedRecipe, make_tracks
 from measure.observe.recipe import load
 from measure.observe.trajectory import Experiment
-from measure.propose.ledger import entries
 from measure.propose.outcome import Decision, Outcome
+from measure.propose.proposal_log import entries
 from measure.verdict.record import Conclusion, Estimate, Parameter, Verdict
 from sim.mesh import grid
 from tests.docs.pages import Shell, blocks, commands
@@ -155,4 +155,4 @@ def test_every_command_of_proposing_runs(folder: Path, tmp_path: Path, monkeypat
     assert [str(column.effect) for column in known["known"]] == ["vertical-wind"]
     assert len(tried) == 1
     assert len(tested["controls"]) == len(first)
-    assert len(entries(made / "ledger.json")) == 3
+    assert len(entries(made / "proposals.json")) == 3

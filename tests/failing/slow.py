@@ -25,7 +25,7 @@ from measure.forecasting.calibration import Calibration
 from measure.forecasting.setting import Setting
 from measure.loop.run import Options
 from measure.nulls import bank as banks
-from measure.nulls import supply
+from measure.nulls import plan
 from measure.nulls.simulation import NullBatch
 from measure.observe import recipe as recipes
 from measure.observe.trajectory import Specimen
@@ -120,12 +120,12 @@ def loop_scene(folder: Path) -> Scene:
     text = EXPERIMENT.format(width=WIDTH, height=HEIGHT) + "".join(parts)
     (folder / "tracks.toml").write_text(text)
     experiment = recipes.read(recipes.load(folder / "tracks.toml")).experiment
-    banks.build(folder / "bank", supply.batches(Setting.of(experiment), kinds=KINDS, seed=0), workers=2)
+    banks.build(folder / "bank", plan.batches(Setting.of(experiment), kinds=KINDS, seed=0), workers=2)
     kept = folder.with_name(f"{folder.name}.kept")
     kept.mkdir()
     verdict = close_loop(experiment, Options(bank=folder / "bank", level=LEVEL))
     (kept / "verdict").write_bytes(pickle.dumps(verdict))
-    options = supply.NullOptions(bank=folder / "bank", level=LEVEL)
+    options = plan.NullOptions(bank=folder / "bank", level=LEVEL)
     (kept / "outcome").write_bytes(pickle.dumps(propose(experiment, dictionary(), options=options)))
     return Scene(folder=folder, ids={"kept": str(kept)})
 
@@ -228,10 +228,10 @@ def _kept(path: str) -> object:
 
 
 def proposal(folder: Path) -> frozenset[object]:
-    """The effect's files, and what the ledger holds: a command that was killed after its entry adds it once more."""
-    ledger = folder / "out" / "proposal" / "ledger.json"
-    entries = json.loads(ledger.read_text())["entries"] if ledger.exists() else []
-    written = {entry for entry in files("out")(folder) if "ledger.json" not in str(entry)}
+    """The effect's files, and the proposal log: a command that was killed after its entry adds it once more."""
+    log = folder / "out" / "proposal" / "proposals.json"
+    entries = json.loads(log.read_text())["entries"] if log.exists() else []
+    written = {entry for entry in files("out")(folder) if "proposals.json" not in str(entry)}
     return frozenset(written | {json.dumps(entry).replace(str(folder), "") for entry in entries})
 
 

@@ -27,7 +27,7 @@ VALIDATIONS = {
     "refinement": "tests.validation.refinement",
     "renderers": "tests.validation.renderers",
     "replicates": "tests.validation.replicates",
-    "robot-held": "tests.validation.robot_held",
+    "robot-cloth": "tests.validation.robot_cloth",
     "stressors": "tests.validation.stressors",
     "transfer": "tests.validation.transfer",
     "verification": "tests.validation.verification",

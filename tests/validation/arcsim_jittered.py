@@ -27,7 +27,7 @@ from measure.closing.close import close_loop
 from measure.forecasting.setting import Setting
 from measure.loop.run import Options
 from measure.nulls import bank as banks
-from measure.nulls.supply import batches
+from measure.nulls.plan import batches
 from measure.observe import Hold, Observation, Setup, from_arrays, observe
 from measure.observe.trajectory import DENSITY_UNCERTAINTY, Experiment, WindTrack
 from measure.verdict.criteria import CRITERIA

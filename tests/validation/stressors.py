@@ -35,9 +35,9 @@ from flagdata.rng import child_seed, stream
 from measure.forecasting.setting import Setting
 from measure.loop.run import Options, solve
 from measure.nulls import bank as banks
-from measure.nulls.fabric import Fabric
+from measure.nulls.plan import batches
 from measure.nulls.simulation import NullBatch
-from measure.nulls.supply import batches
+from measure.nulls.stiffness import StiffnessFactors
 from measure.observe import Hold, Observation, Setup, from_arrays, observe
 from measure.observe.setup import sheet
 from measure.observe.trajectory import Experiment, Specimen, WindTrack
@@ -291,7 +291,7 @@ def simulated(case: str, number: int, seed: int, *, across: int = ACROSS_MARKERS
     winds = np.stack([_wind(speed, rng, turbulent=case == _TURBULENT) for speed in SPEEDS])
     times = np.arange(winds.shape[1]) / LOG_RATE - _SETTLED
     batch: NullBatch = replace(
-        drawn, fabric=Fabric(stretching=drawn.fabric.stretching), speeds=SPEEDS,
+        drawn, stiffness=StiffnessFactors(stretching=drawn.stiffness.stretching), speeds=SPEEDS,
         calibrations=drawn.calibrations[: len(SPEEDS)],
         winds=tuple(WindTrack(times=times, velocity=wind) for wind in winds),
     )  # fmt: skip

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from measure.challenge.answer_key import Acting, AnswerKey
 from measure.challenge.filing import Filing, verdict_json
-from measure.challenge.key import Acting, Key
 from measure.challenge.recipe import Kind
 from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Verdict
 
@@ -54,8 +54,10 @@ def acting(effect: str, value: float = 1.0, parameter: str = "coefficient") -> A
     return Acting(effect=effect, parameter=parameter, value=value, unit="1")
 
 
-def key(name: str, kind: Kind, *effects: Acting, impact: float = 0.01, noise: float = 0.001, rate: int = 25) -> Key:
-    return Key(
+def key(
+    name: str, kind: Kind, *effects: Acting, impact: float = 0.01, noise: float = 0.001, rate: int = 25
+) -> AnswerKey:
+    return AnswerKey(
         name=name, kind=kind, effects=effects, impact=impact if effects else 0.0, material="camel-ponte-roma",
         density=1.0, bending=1.0, damping=1e-3, speeds=(3.0, 5.0, 7.0), toward=0.0, heading=0.0, intensity=0.0,
         rate=rate, noise=noise, numerics="only",
@@ -77,7 +79,7 @@ def comparison(*, share: float | None = 0.9, after: float = 1e-3, control: float
     """Errors in metres; the reduction's interval is 1 mm to either side."""
     return Comparison(
         what="unseen", frames=100, before=estimate(5e-3, 1e-3), after=estimate(after, 1e-3),
-        reduction=estimate(5e-3 - after, 1e-3), floor=estimate(5e-4, 1e-4), oracle=None, share=share,
+        reduction=estimate(5e-3 - after, 1e-3), floor=estimate(5e-4, 1e-4), share=share,
         control=None if control is None else estimate(control, 1e-3), control_name="another",
         apart=None if control is None else estimate(control - after, 1e-3),
     )  # fmt: skip

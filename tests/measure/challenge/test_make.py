@@ -13,13 +13,13 @@ import pytest
 from flagdata.errors import ConflictError, CorruptError, InputError, UnknownNameError
 from flagdata.provenance import file_hash
 from flagdata.rng import stream
+from measure.challenge.answer_key import AnswerKey, opened, seal
 from measure.challenge.classes import class_of
 from measure.challenge.design import composition, draw
-from measure.challenge.flight import batches
 from measure.challenge.folder import ChallengeFolder
-from measure.challenge.key import Key, opened, seal
 from measure.challenge.meshes import layout, mesh_of, seen
 from measure.challenge.recipe import CHALLENGES, Kind, load, parse
+from measure.challenge.simulation import batches
 from tests.measure.challenge import cases
 from tests.measure.challenge.cases import TINY
 
@@ -54,7 +54,7 @@ def test_a_key_whose_hash_was_not_published_is_refused(tiny: ChallengeFolder) ->
 def test_a_seal_depends_on_the_salt_and_a_key_survives_json() -> None:
     key = cases.key("set-001", Kind.ONE, cases.acting("lift"))
     assert seal(key, "a") != seal(key, "b")
-    assert Key.from_dict(json.loads(json.dumps(key.as_dict()))) == key
+    assert AnswerKey.from_dict(json.loads(json.dumps(key.as_dict()))) == key
 
 
 def test_data_that_were_changed_are_refused(tiny: ChallengeFolder) -> None:

@@ -11,9 +11,9 @@ import pytest
 
 from flagdata.errors import ConflictError, CorruptError, InputError, RefusedError, UnknownNameError
 from measure.challenge import filing as filings
+from measure.challenge.answer_key import AnswerKey
 from measure.challenge.filing import Filing, verdict_json
 from measure.challenge.folder import ChallengeFolder
-from measure.challenge.key import Key
 from measure.challenge.recipe import Kind
 from measure.challenge.run import IN_THIS_PROCESS, run
 from measure.challenge.score import score
@@ -93,17 +93,17 @@ def test_keys_stay_sealed_until_the_verdict_is_filed(tiny: ChallengeFolder, sati
     assert len(score(tiny, only=("set-001",)).outcomes) == 1
 
 
-def test_the_oracle_is_asked_where_an_effect_of_the_library_was_named(tiny: ChallengeFolder) -> None:
+def test_the_true_models_error_is_computed_where_an_effect_of_the_library_was_named(tiny: ChallengeFolder) -> None:
     run(tiny, lambda e, s: cases.verdict(Conclusion.EFFECT, "lift"), seed=5, workers=IN_THIS_PROCESS)
     asked: list[Kind] = []
 
-    def oracle(folder: ChallengeFolder, key: Key) -> dict[str, float]:
+    def reference(folder: ChallengeFolder, key: AnswerKey) -> dict[str, float]:
         asked.append(key.kind)
         return {"unseen": 1e-3}
 
-    result = score(tiny, oracle=oracle)
+    result = score(tiny, reference=reference)
     assert sorted(asked) == [Kind.ONE, Kind.PAIR]
-    # From 5 mm to 1 mm, which is the oracle's own.
+    # From 5 mm to 1 mm, which is the true model's.
     assert result.reductions == pytest.approx([1.0, 1.0])
 
 
@@ -177,7 +177,7 @@ sys.path.insert(0, {folder!r})
 from pathlib import Path
 from judge import judge
 from measure.challenge.folder import ChallengeFolder
-from measure.challenge.key import Key
+from measure.challenge.answer_key import AnswerKey
 from measure.challenge.recipe import Kind
 from measure.challenge.run import run
 if __name__ == "__main__":

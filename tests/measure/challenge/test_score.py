@@ -11,8 +11,8 @@ import pytest
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from measure.challenge import sheet as sheets
+from measure.challenge.answer_key import AnswerKey
 from measure.challenge.classes import class_of, classes
-from measure.challenge.key import Key
 from measure.challenge.outcome import Outcome
 from measure.challenge.rates import Power
 from measure.challenge.recipe import Kind
@@ -25,7 +25,7 @@ from tests.measure.challenge.cases import acting, candidate, comparison, estimat
 LIBRARY = ("lift", "added-mass", "pole-wake", "shear", "full-hoist")
 
 
-def keys(count: int = 40) -> list[Key]:
+def keys(count: int = 40) -> list[AnswerKey]:
     """Of each kind so many; impacts from 0.3 to 30 mm."""
     impacts = np.geomspace(3e-4, 3e-2, count)
     made = [key(f"n{i}", Kind.NULL) for i in range(count)]
@@ -38,12 +38,12 @@ def keys(count: int = 40) -> list[Key]:
     return made
 
 
-def sheet(judge, sets: list[Key] | None = None) -> Sheet:
+def sheet(judge, sets: list[AnswerKey] | None = None) -> Sheet:
     chosen = keys() if sets is None else sets
     return graded("made by hand", [Outcome.of(k, filing(k.name, judge(k))) for k in chosen])
 
 
-def knowing(k: Key) -> Verdict:
+def knowing(k: AnswerKey) -> Verdict:
     """Says what is true."""
     if k.kind is Kind.NULL:
         return verdict(Conclusion.SUFFICIENT)
@@ -244,9 +244,9 @@ def test_reduction_is_measured_against_the_true_model_where_it_is_known() -> Non
     """From 5 mm to 2 mm where the true model has 1 mm: 3/4. None where the base model is no worse than the true one."""
     said = verdict(Conclusion.EFFECT, "lift", comparisons=(comparison(share=0.1, after=2e-3),))
     outcome = Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", said))
-    assert replace(outcome, oracle={"unseen": 1e-3}).reduction == pytest.approx(0.75)
-    assert replace(outcome, oracle={"another": 1e-3}).reduction == pytest.approx(0.1)
-    assert replace(outcome, oracle={"unseen": 6e-3}).reduction is None
+    assert replace(outcome, true_model_errors={"unseen": 1e-3}).reduction == pytest.approx(0.75)
+    assert replace(outcome, true_model_errors={"another": 1e-3}).reduction == pytest.approx(0.1)
+    assert replace(outcome, true_model_errors={"unseen": 6e-3}).reduction is None
 
 
 @pytest.mark.parametrize(

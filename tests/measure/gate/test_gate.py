@@ -13,7 +13,7 @@ from measure.gate.checks import CHECKS
 from measure.gate.distortions import DISTORTIONS
 from measure.gate.gate import SCORES, Gate, squashed
 from measure.gate.reasons import REASONS
-from measure.gate.tails import level
+from measure.gate.tail_probability import level
 from models.handmade import FEATURES
 
 DIMENSION = len(CHECKS) + len(FEATURES) + 4 + 3

@@ -9,8 +9,8 @@ import pytest
 
 from flagdata.errors import FlagdataError
 from measure.forecasting.calibration import Calibration
-from measure.nulls.fabric import Fabric
 from measure.nulls.simulation import NullBatch
+from measure.nulls.stiffness import StiffnessFactors
 from measure.observe.trajectory import Specimen, WindTrack
 from sim.effects.vertical_wind import VerticalWind
 
@@ -19,7 +19,7 @@ def batch(specimen: Specimen, *, speed: float) -> NullBatch:
     """One gently damped flag of little stretching stiffness, by explicit steps."""
     return NullBatch(
         specimen=specimen, markers=specimen.mesh.rest, rate=25.0, duration=0.4, noise=0.0, seed=5,
-        calibrations=(Calibration(damping=0.5e-3),), speeds=(speed,), fabric=Fabric(stretching=0.02),
+        calibrations=(Calibration(damping=0.5e-3),), speeds=(speed,), stiffness=StiffnessFactors(stretching=0.02),
     )  # fmt: skip
 
 

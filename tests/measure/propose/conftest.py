@@ -60,7 +60,7 @@ def columns() -> tuple[EffectColumn, ...]:
 
 
 @pytest.fixture(scope="session")
-def lens() -> tuple[Column, ...]:
+def directions() -> tuple[Column, ...]:
     """What terms are seen along: the smooth fields, of which the small bank can hold the null distribution."""
     return fields()
 
@@ -79,8 +79,8 @@ def simulated(
 
 
 @pytest.fixture(scope="session")
-def nulls(specimen: Specimen, columns: tuple[EffectColumn, ...], lens: tuple[Column, ...]) -> tuple[Nulls, float]:
-    """48 recordings of six meshes and methods, along the lens and then along the terms; duration of a segment [s]."""
+def nulls(specimen: Specimen, columns: tuple[EffectColumn, ...], directions: tuple[Column, ...]) -> tuple[Nulls, float]:
+    """48 recordings of six meshes and methods, projected on directions, then on terms; duration of a segment [s]."""
     parts: list[Nulls] = []
     duration = 0.0
     for seed in range(KINDS):
@@ -95,7 +95,7 @@ def nulls(specimen: Specimen, columns: tuple[EffectColumn, ...], lens: tuple[Col
         ]  # fmt: skip
         calibrations = [cloth for cloth in cloths for _ in range(RECORDINGS // CLOTHS)]
         speeds = [float(u) for u in rng.uniform(3.2, 6.5, RECORDINGS)]
-        made, duration = evaluate(simulated(specimen, calibrations, speeds, (), seed), seed, (*lens, *columns))
+        made, duration = evaluate(simulated(specimen, calibrations, speeds, (), seed), seed, (*directions, *columns))
         shifted = replace(made.statistics, recording=made.statistics.recording + seed * RECORDINGS)
         parts.append(replace(made, statistics=shifted))
     whole = Nulls.joined(parts)
@@ -103,13 +103,13 @@ def nulls(specimen: Specimen, columns: tuple[EffectColumn, ...], lens: tuple[Col
 
 
 @pytest.fixture(scope="session")
-def bank(nulls: tuple[Nulls, float], lens: tuple[Column, ...]) -> NullBank:
-    """The same along the lens alone: what a proposal is given."""
+def bank(nulls: tuple[Nulls, float], directions: tuple[Column, ...]) -> NullBank:
+    """The same, projected on the directions alone: the bank that a proposal uses."""
     whole, duration = nulls
-    count = len(THETA) + len(lens)
+    count = len(THETA) + len(directions)
     own = whole.statistics
     cut = replace(own, r=own.r[:, :count], response=own.response[:, :count, :count])
-    names = (*(name for name, _, _ in THETA), *(column.name for column in lens))
+    names = (*(name for name, _, _ in THETA), *(column.name for column in directions))
     return NullBank(nulls=replace(whole, statistics=cut), columns=names, duration=duration, words="of the tests")
 
 

@@ -11,14 +11,14 @@ from measure.forecasting.calibration import PRIOR
 from measure.inference.random_effect import NullModel, Nulls
 from measure.probes.statistics import Statistics
 from measure.propose.family import Family
-from measure.propose.lens import evidence
+from measure.propose.projected import evidence
 
 DIRECTIONS, TERMS, KINDS, RECORDINGS, SEGMENTS = 12, 20, 30, 8, 2
 
 
 def drawn(rng: np.random.Generator) -> tuple[Nulls, Statistics]:
-    """Nulls of a covariance and of shifts from kind to kind, and what a lens sees of terms; calibrated parameters move
-    the first three directions."""
+    """Nulls of a covariance and of shifts from kind to kind, and projected responses to terms; calibrated parameters
+    move the first three directions."""
     count = KINDS * RECORDINGS * SEGMENTS
     numerics = np.repeat(np.arange(KINDS), RECORDINGS * SEGMENTS)
     recording = np.repeat(np.arange(KINDS * RECORDINGS), SEGMENTS)

@@ -11,8 +11,8 @@ import torch
 
 from flagdata.errors import InputError, UsageError
 from measure.forecasting.regressors import Column, EffectColumn
+from measure.nulls.plan import NullOptions
 from measure.nulls.reference import NullBank
-from measure.nulls.supply import NullOptions
 from measure.observe.trajectory import Experiment, Specimen, WindTrack
 from measure.propose.effect_file import write
 from measure.propose.outcome import Decision, Outcome, Retest
@@ -29,8 +29,10 @@ def silent(what: str, done: int, total: int) -> None:
 
 
 @pytest.fixture(scope="module")
-def found(pushed: Experiment, columns: tuple[EffectColumn, ...], bank: NullBank, lens: tuple[Column, ...]) -> Outcome:
-    return weigh(made_ready(pushed), columns, bank, lens, options=NullOptions(), stage=silent)
+def found(
+    pushed: Experiment, columns: tuple[EffectColumn, ...], bank: NullBank, directions: tuple[Column, ...]
+) -> Outcome:
+    return weigh(made_ready(pushed), columns, bank, directions, options=NullOptions(), stage=silent)
 
 
 def test_a_planted_push_is_kept(found: Outcome) -> None:

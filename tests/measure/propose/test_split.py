@@ -1,4 +1,4 @@
-"""What a proposal sees and what tests it share no segment; the ledger only grows."""
+"""What a proposal sees and what tests it share no segment; entries of the proposal log are only added."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from flagdata.errors import CorruptError, InputError
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Trajectory, WindTrack
-from measure.propose import ledger
+from measure.propose import proposal_log
 from measure.propose.outcome import Decision, Outcome
 from measure.propose.split import data_hash, split
 
@@ -66,21 +66,21 @@ def outcome(seed: int) -> Outcome:
     )  # fmt: skip
 
 
-def test_a_ledger_keeps_what_was_tried_before(tmp_path: Path) -> None:
-    path = tmp_path / "proposal" / "ledger.json"
-    ledger.add(path, outcome(1), effect="")
-    ledger.add(path, outcome(2), effect="file.py:X")
-    kept = ledger.entries(path)
+def test_the_proposal_log_keeps_earlier_entries(tmp_path: Path) -> None:
+    path = tmp_path / "proposal" / "proposals.json"
+    proposal_log.add(path, outcome(1), effect="")
+    proposal_log.add(path, outcome(2), effect="file.py:X")
+    kept = proposal_log.entries(path)
     assert [entry["seed"] for entry in kept] == [1, 2]
     assert kept[1]["effect"] == "file.py:X"
     assert kept[0]["decision"] == "rejected"
-    assert json.loads(path.read_text(encoding="utf-8"))["schema"] == ledger.SCHEMA
+    assert json.loads(path.read_text(encoding="utf-8"))["schema"] == proposal_log.SCHEMA
 
 
 @pytest.mark.parametrize("content", ["not JSON", "[]", '{"schema": "other"}'])
-def test_what_is_no_ledger_is_not_overwritten(content: str, tmp_path: Path) -> None:
-    path = tmp_path / "ledger.json"
+def test_another_file_is_not_overwritten_by_the_proposal_log(content: str, tmp_path: Path) -> None:
+    path = tmp_path / "proposals.json"
     path.write_text(content)
     with pytest.raises(CorruptError):
-        ledger.add(path, outcome(1), effect="")
+        proposal_log.add(path, outcome(1), effect="")
     assert path.read_text() == content

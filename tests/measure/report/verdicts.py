@@ -92,7 +92,7 @@ def candidates(named: tuple[str, ...], recordings: int) -> tuple[Candidate, ...]
     return tuple(ranked)
 
 
-def comparison(what: str, before: float, *, with_after: bool, oracle: bool) -> Comparison:
+def comparison(what: str, before: float, *, with_after: bool) -> Comparison:
     missing = Estimate(value=math.nan, low=math.nan, high=math.nan, unit="m")
     after = 0.4 * before
     return Comparison(
@@ -102,7 +102,6 @@ def comparison(what: str, before: float, *, with_after: bool, oracle: bool) -> C
         after=about(after, 0.00011) if with_after else missing,
         reduction=about(before - after, 0.00017) if with_after else missing,
         floor=about(0.00081, 0.00004),
-        oracle=about(0.9 * after, 0.0001) if oracle else None,
         share=0.94 if with_after else None,
         control=about(0.93 * before, 0.0002) if with_after else None,
         control_name="tangential-linear-drag" if with_after else "",
@@ -173,7 +172,7 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
         ),
         ranking=candidates(named, 3),
         comparisons=tuple(
-            comparison(what, before, with_after=not sufficient, oracle=conclusion is Conclusion.EFFECT)
+            comparison(what, before, with_after=not sufficient)
             for what, before in (("tunnel 7.0 m/s, unseen", 0.0042), ("last part of tunnel 5.5 m/s", 0.0033))
         ),
         residuals=tuple(
@@ -194,7 +193,7 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
 
 
 def with_holes(whole: Verdict) -> Verdict:
-    """The same with what measurement leaves out: lost markers, no oracle, candidates that could not be weighed."""
+    """The same with what measurement leaves out: lost markers, candidates that could not be weighed."""
     nan = math.nan
     first, *others = whole.residuals
     lost = replace(

@@ -1,4 +1,4 @@
-"""Thresholds live in one frozen object, which verdicts record; nowhere else in the rooms of a verdict is one."""
+"""Thresholds live in one frozen object, which verdicts record; nowhere else in the stages of a verdict is one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flagdata.errors import UsageError
 from measure.verdict.criteria import CRITERIA, Criteria
 
 MEASURE = Path(__file__).resolve().parents[3] / "measure"
-ROOMS = ("verdict", "forecasting", "probes", "inference", "nulls", "loop", "closing")
+STAGES = ("verdict", "forecasting", "probes", "inference", "nulls", "loop", "closing")
 
 METHOD = {
     "forecasting/alignment": {"_CALM"},
@@ -28,7 +28,7 @@ METHOD = {
     "inference/random_effect": {"_SHIFTS", "_POWERS", "_UNSEEN"},
     "nulls/bank": {"WINDS", "FILE_LIMIT", "_VERSION", "_DENSITY", "_BENDING", "_DAMPING"},
     "nulls/conformal": {"MOST_KINDS"},
-    "nulls/fabric": {"_STRETCHING", "_APART"},
+    "nulls/stiffness": {"_STRETCHING", "_APART"},
     "nulls/reference": {"_GROUPS", "_NOTHING"},
     "nulls/simulation": {"SETTLE", "_FINER", "_STEPS", "_SAMPLED", "_UNEVEN", "_HALVINGS", "_GENTLE"},
     "nulls/winds": {"_STEADY", "_EVERY"},
@@ -67,7 +67,7 @@ def constants(path: Path) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    "name", sorted(f"{room}/{path.stem}" for room in ROOMS for path in (MEASURE / room).glob("*.py"))
+    "name", sorted(f"{stage}/{path.stem}" for stage in STAGES for path in (MEASURE / stage).glob("*.py"))
 )
 def test_no_threshold_lives_outside_the_criteria(name: str) -> None:
     path = MEASURE / f"{name}.py"

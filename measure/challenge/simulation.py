@@ -13,14 +13,13 @@ from torch import Tensor
 
 from flagdata.errors import FlagdataError, UsageError
 from flagdata.rng import stream
-from measure.challenge.key import Acting, Key
+from measure.challenge.answer_key import Acting, AnswerKey
 from measure.challenge.meshes import mesh_of
 from measure.challenge.recipe import ChallengeRecipe, Method, Numerics, effect_type
-from sim import handles as held
 from sim.contact import Contact
 from sim.effects.effect import Effect, apply
 from sim.effects.gusts import Gusts
-from sim.handles import Handles
+from sim.handles import Handles, corners
 from sim.integrate import Integrator
 from sim.integrate.implicit import BackwardEuler
 from sim.integrate.symplectic import Symplectic
@@ -79,14 +78,14 @@ class SampledWind:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flight:
+class SimulatedSet:
     """What a set's cloth did.
 
     Attributes:
         positions: one (frame, vertex, 3) for each recording, the lower attachment at the origin [m].
         winds: one (sample, 3) for each recording: one sample where it is steady, else at the log's rate [m/s].
         effects: what acted, with the strengths that were simulated.
-        impact: see `Key`.
+        impact: see `AnswerKey`.
     """
 
     positions: tuple[NDArray[np.float32], ...]
@@ -95,16 +94,16 @@ class Flight:
     impact: float
 
 
-def batches(keys: Sequence[Key], recordings: int) -> list[tuple[Key, ...]]:
+def batches(keys: Sequence[AnswerKey], recordings: int) -> list[tuple[AnswerKey, ...]]:
     """Sets that are simulated together: one mesh, as many recordings as fit, and few different effects."""
-    groups: dict[str, list[Key]] = {}
+    groups: dict[str, list[AnswerKey]] = {}
     for key in sorted(keys, key=lambda key: [acting.effect for acting in key.effects]):
         groups.setdefault(key.numerics, []).append(key)
     each = max(1, WIDEST // recordings)
     return [tuple(group[i : i + each]) for group in groups.values() for i in range(0, len(group), each)]
 
 
-def fly(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key]) -> dict[str, Flight]:
+def simulate(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) -> dict[str, SimulatedSet]:
     """Set → what its cloth did. The clock of the effects starts with the run, `settle` before the first frame.
 
     Some effects feed the cloth with energy and, at some strengths, tear it apart. The strengths of a set that diverges
@@ -116,9 +115,9 @@ def fly(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key]) -> dict[str, Fl
     return _tried(recipe, seed, keys, _HALVINGS)
 
 
-def _tried(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key], halvings: int) -> dict[str, Flight]:
+def _tried(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey], halvings: int) -> dict[str, SimulatedSet]:
     try:
-        return _fly(recipe, seed, keys)
+        return _simulated(recipe, seed, keys)
     except _DivergedError as error:
         place, seconds = error.place, error.seconds
     key = keys[place]
@@ -136,7 +135,7 @@ def _halved(acting: Acting) -> Acting:
     return replace(acting, value=null + (acting.value - null) / 2)
 
 
-def _fly(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key]) -> dict[str, Flight]:
+def _simulated(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) -> dict[str, SimulatedSet]:
     numerics = recipe.numerics[keys[0].numerics]
     winds = {key.name: _winds(recipe, seed, key) for key in keys}
     base, start = _base(recipe, seed, numerics, keys, winds)
@@ -147,7 +146,7 @@ def _fly(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key]) -> dict[str, F
         stepper = _Stepper.of(numerics)
         frames, snapshots = _run(recipe, keys, stepper, system, state)
         impact = _impacts(stepper, system, base, snapshots) if effects else torch.zeros(base.cloth.batch)
-    result: dict[str, Flight] = {}
+    result: dict[str, SimulatedSet] = {}
     for place, key in enumerate(keys):
         members = range(place * recipe.count, (place + 1) * recipe.count)
         ticks = recipe.ticks // key.rate * np.arange(_frames(recipe, key))
@@ -155,20 +154,22 @@ def _fly(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key]) -> dict[str, F
         settled = tuple(wind[round(recipe.settle * recipe.log_rate) :] if len(wind) > 1 else wind
                         for wind in winds[key.name])  # fmt: skip
         square = float((impact[list(members)] ** 2).mean())
-        result[key.name] = Flight(positions=positions, winds=settled, effects=key.effects, impact=math.sqrt(square))
+        result[key.name] = SimulatedSet(
+            positions=positions, winds=settled, effects=key.effects, impact=math.sqrt(square)
+        )
     return result
 
 
-def material_of(key: Key) -> Material:
+def material_of(key: AnswerKey) -> Material:
     """The set's true cloth."""
     return replace(named(key.material).scaled(density=key.density, bending=key.bending), damping=key.damping)
 
 
-def _frames(recipe: ChallengeRecipe, key: Key) -> int:
+def _frames(recipe: ChallengeRecipe, key: AnswerKey) -> int:
     return round(recipe.duration * key.rate)
 
 
-def _winds(recipe: ChallengeRecipe, seed: int, key: Key) -> tuple[Floats, ...]:
+def _winds(recipe: ChallengeRecipe, seed: int, key: AnswerKey) -> tuple[Floats, ...]:
     """The wind of each recording (sample, 3) [m/s], from the start of the run."""
     direction = np.array([math.cos(key.toward), math.sin(key.toward), 0.0])
     if not key.intensity:
@@ -185,10 +186,14 @@ def _winds(recipe: ChallengeRecipe, seed: int, key: Key) -> tuple[Floats, ...]:
 
 
 def _base(
-    recipe: ChallengeRecipe, seed: int, numerics: Numerics, keys: Sequence[Key], winds: dict[str, tuple[Floats, ...]]
+    recipe: ChallengeRecipe,
+    seed: int,
+    numerics: Numerics,
+    keys: Sequence[AnswerKey],
+    winds: dict[str, tuple[Floats, ...]],
 ) -> tuple[System, State]:
     mesh = mesh_of(numerics, width=recipe.width, height=recipe.height)
-    handles = Handles(vertices=held.corners(mesh.rest))
+    handles = Handles(vertices=corners(mesh.rest))
     contact = Contact(thickness=numerics.thickness) if numerics.thickness else None
     scenes = [
         Scene(
@@ -208,20 +213,20 @@ def _base(
     return replace(system, wind=SampledWind(first=0.0, rate=recipe.log_rate, samples=samples)), state
 
 
-def heading(key: Key) -> Floats:
+def heading(key: AnswerKey) -> Floats:
     """(3,) unit vector from the pole to where the flag starts."""
     angle = key.toward + key.heading
     return np.array([math.cos(angle), math.sin(angle), 0.0])
 
 
-def _start(rest: Floats, key: Key, rng: np.random.Generator, handles: Handles) -> Floats:
+def _start(rest: Floats, key: AnswerKey, rng: np.random.Generator, handles: Handles) -> Floats:
     flat = rest[:, :1] * heading(key) + rest[:, 1:] * np.array([0.0, 0.0, 1.0])
     noise = rng.normal(0.0, _START_NOISE, flat.shape)
     noise[list(handles.vertices)] = 0.0
     return flat + noise
 
 
-def _effect(recipe: ChallengeRecipe, seed: int, keys: Sequence[Key], name: str) -> Effect:
+def _effect(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey], name: str) -> Effect:
     """An effect with its value for each recording, null in sets in which it does not act."""
     kind = effect_type(name)
     acting = [next((a for a in key.effects if a.effect == name), None) for key in keys]
@@ -267,7 +272,7 @@ class _Stepper:
 
 
 def _run(
-    recipe: ChallengeRecipe, keys: Sequence[Key], stepper: _Stepper, system: System, state: State
+    recipe: ChallengeRecipe, keys: Sequence[AnswerKey], stepper: _Stepper, system: System, state: State
 ) -> tuple[dict[int, NDArray[np.float32]], list[State]]:
     """Tick → positions (vertex, 3, batch), and states at some instants."""
     ticks, settle = recipe.ticks, round(recipe.settle * recipe.ticks)
@@ -294,7 +299,7 @@ def _run(
 
 
 def _impacts(stepper: _Stepper, system: System, base: System, snapshots: Sequence[State]) -> Tensor:
-    """(batch,) see `Key.impact`."""
+    """(batch,) see `AnswerKey.impact`."""
     total = torch.zeros(base.cloth.batch, dtype=torch.float64)
     for state in snapshots:
         acted = stepper.advance(system, state, HORIZON)

@@ -15,7 +15,7 @@ BODY = 0.8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Tails:
+class ExponentialTails:
     """Exponential tails of scores, all of them suspicious when high.
 
     Attributes:
@@ -27,7 +27,7 @@ class Tails:
     excess: NDArray[np.float64]
 
     @classmethod
-    def of(cls, scores: NDArray[np.float64], resolution: NDArray[np.float64]) -> Tails:
+    def of(cls, scores: NDArray[np.float64], resolution: NDArray[np.float64]) -> ExponentialTails:
         """Measure them on scores (n, c) of plain clips.
 
         Raises:

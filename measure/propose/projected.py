@@ -1,11 +1,12 @@
-"""Through which terms are seen: the directions along which nulls are known, those of the library and of smooth fields.
+"""Prediction errors and the effect of terms on them, projected on directions whose null distribution is known.
 
-A term's own statistic would want nulls of its own, for each of many terms. Instead the errors are projected onto the
-directions s_i that `measure.nulls.bank` weighs, whose null distribution is known, and a term is what it does to those:
+A test statistic for each term would need its own null recordings. Instead, errors are projected on the directions s_i
+that `measure.nulls.bank` stores (sensitivities to the library's effects and to smooth fields), and a term is described
+by its response along them:
 
     E r_i = μ_i + Σ_j R_ij δ_j,   R_ij = Σ w s_i·c_j / √(Σ w s_i²)
 
-with c_j the sensitivity to term j. What a term does across all of these directions is not seen.
+with c_j the sensitivity to term j. The part of a term's response orthogonal to all directions is lost.
 """
 
 from __future__ import annotations
@@ -31,18 +32,18 @@ from measure.propose.sensitivities import of_columns
 Floats = NDArray[np.float64]
 
 _TOGETHER = 40
-"""Columns that are brought down at a time: bounds memory."""
+"""Columns reduced at a time: bounds memory."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Lens:
-    """Segments with the sensitivities that they are looked at along.
+class ProjectedSegments:
+    """Segments and the directions on which their errors are projected.
 
     Attributes:
         forecaster: of the model.
-        segments: what is looked at.
+        segments: of the recordings.
         base: errors of the nominal model (frame, marker, 3, segment) [m].
-        directions: sensitivities there, of the calibrated parameters and of what is weighed.
+        directions: sensitivities of the calibrated parameters, then of the weighed columns.
     """
 
     forecaster: Forecaster
@@ -51,14 +52,14 @@ class Lens:
     directions: tuple[Tensor, ...]
 
     @classmethod
-    def of(cls, forecaster: Forecaster, segments: Segments, weighed: Sequence[Column]) -> Lens:
-        """Along the calibrated parameters and some columns: those of the nulls."""
+    def of(cls, forecaster: Forecaster, segments: Segments, weighed: Sequence[Column]) -> ProjectedSegments:
+        """Directions of the calibrated parameters and of the columns that the null bank weighs."""
         nominal = [Calibration()] * len(segments)
         base = forecaster.errors(*forecaster.system(segments, nominal), segments)
         along = forecaster.sensitivities(weighed, segments, nominal, base)
         return cls(forecaster=forecaster, segments=segments, base=base, directions=tuple(along))
 
-    def select(self, chosen: NDArray[np.int64]) -> Lens:
+    def select(self, chosen: NDArray[np.int64]) -> ProjectedSegments:
         """The same for some segments only."""
         return replace(
             self, segments=self.segments.select(chosen), base=self.base[..., chosen],
@@ -66,7 +67,7 @@ class Lens:
         )  # fmt: skip
 
     def whitened(self, null: NullModel, of_recordings: Floats) -> WhitenedMisfit:
-        """The measure of any model's errors along the lens, of speeds by recording [m/s]."""
+        """Misfit of the projected errors, whitened by the null model; `of_recordings` are wind speeds [m/s]."""
         recording, noise = self.segments.recording, self.segments.noise
         return WhitenedMisfit(
             found=reduced(self.base, self.directions, recording, noise, self.segments.counted),
@@ -79,7 +80,7 @@ class Lens:
     @property
     def calibrated(self) -> Statistics:
         """Statistics of the calibrated parameters, at the nominal model."""
-        return self.seen(self.base, self.directions[: len(THETA)])
+        return self.projected(self.base, self.directions[: len(THETA)])
 
     def of_columns(self, columns: Sequence[Column]) -> Statistics:
         """Statistics of the calibrated parameters and some columns, at the nominal model."""
@@ -87,16 +88,16 @@ class Lens:
         for first in range(0, len(columns), _TOGETHER):
             own = columns[first : first + _TOGETHER]
             found = of_columns(self.forecaster, self.segments, self.base, own)
-            parts.append(self.seen(self.base, [found[column.name] for column in own]))
+            parts.append(self.projected(self.base, [found[column.name] for column in own]))
         return replace(parts[0], response=np.concatenate([part.response for part in parts], axis=2))
 
     def at(self, model: Model) -> Statistics:
         """Statistics of the calibrated parameters and the effects of a model, there."""
         base, changes = linearised(model, self.forecaster, self.segments)
-        return self.seen(base, changes)
+        return self.projected(base, changes)
 
-    def seen(self, base: Tensor, changes: Sequence[Tensor]) -> Statistics:
-        """Errors and changes along the lens: r is (segment, direction), the response (segment, direction, change)."""
+    def projected(self, base: Tensor, changes: Sequence[Tensor]) -> Statistics:
+        """Projected errors r (segment, direction) and their response to changes (segment, direction, change)."""
         found = reduced(
             base, [*self.directions, *changes], self.segments.recording, self.segments.noise, self.segments.counted
         )
@@ -109,5 +110,5 @@ class Lens:
 
 
 def evidence(found: Statistics, speeds: Floats, null: NullModel) -> Evidence:
-    """The evidence in what a lens sees; its columns are those of the response."""
+    """The evidence in projected statistics; its columns are those of the response."""
     return replace(Evidence.of(found, speeds, null), columns=found.response.shape[2])

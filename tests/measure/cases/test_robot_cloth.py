@@ -10,12 +10,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flagdata.errors import InputError, NotFoundError, UsageError
-from measure.cases.held.attribution import late, left_errors, lower, sought
-from measure.cases.held.calibrate import Fit, calibrated, linear
-from measure.cases.held.model import Cloth, Parameters, described, predicted, rigid
-from measure.cases.held.reading import Floats, Swing, names, read
-from measure.cases.held.repeats import features, shuffled, tail_probability
-from measure.cases.held.tracker import CAMERA, LATENCY, OFFSETS, TRACKER, Tracker, errors, latencies, upper
+from measure.cases.robot_cloth.attribution import late, left_errors, lower, sought
+from measure.cases.robot_cloth.calibrate import Fit, calibrated, linear
+from measure.cases.robot_cloth.model import Cloth, Parameters, described, predicted, rigid
+from measure.cases.robot_cloth.reading import Floats, Swing, names, read
+from measure.cases.robot_cloth.repeats import features, shuffled, tail_probability
+from measure.cases.robot_cloth.tracker import CAMERA, LATENCY, OFFSETS, TRACKER, Tracker, errors, latencies, upper
 from sim.material import named
 
 SIDE, SIZE = 3, 0.3

@@ -1,4 +1,4 @@
-"""The ledger of proposals: what was tried on which data, errors before and after, and whether it was kept."""
+"""The proposal log: the terms tried on each data set, errors before and after, and whether the term was kept."""
 
 from __future__ import annotations
 
@@ -11,28 +11,29 @@ from flagdata.errors import CorruptError
 from flagdata.outputs import check_rewrite, rewrite
 from measure.propose.outcome import Outcome
 
-SCHEMA = "flagdata.ledger/1"
+SCHEMA = "flagdata.proposals/1"
+_FORMER_SCHEMA = "flagdata.ledger/1"
 
 
 def entries(path: Path) -> list[dict[str, Any]]:
-    """What a ledger holds; nothing where there is none.
+    """The entries of a log; empty where there is no file.
 
     Raises:
-        CorruptError: a file that is no ledger.
+        CorruptError: the file is not a proposal log.
     """
     if not path.exists():
         return []
-    content = read_json(path, noun="ledger", fix="move it away")
-    if content.get("schema") != SCHEMA or not isinstance(content.get("entries"), list):
-        raise CorruptError(f"not a ledger of schema {SCHEMA}", where=str(path), fix="move it away")
+    content = read_json(path, noun="proposal log", fix="move it away")
+    if content.get("schema") not in (SCHEMA, _FORMER_SCHEMA) or not isinstance(content.get("entries"), list):
+        raise CorruptError(f"not a proposal log of schema {SCHEMA}", where=str(path), fix="move it away")
     return content["entries"]
 
 
 def check(path: Path) -> None:
-    """Refuse a path at which no entry can be added, before any term is sought.
+    """Refuse a path at which no entry can be added, before any term is tried.
 
     Raises:
-        ConflictError, CorruptError: a file that is no ledger.
+        ConflictError, CorruptError: the file is not a proposal log.
         InputError: the folder cannot be written.
     """
     check_rewrite(path)
@@ -43,10 +44,10 @@ def add(path: Path, outcome: Outcome, *, effect: str) -> None:
     """One more entry, after those that are there. Entries are never changed.
 
     Args:
-        effect: name of the effect's file and class; empty where no term was taken.
+        effect: name of the effect's file and class; empty where no term was accepted.
 
     Raises:
-        CorruptError: a file that is no ledger.
+        CorruptError: the file is not a proposal log.
     """
     made = [*entries(path), {"effect": effect, **outcome.as_dict()}]
     text = json.dumps({"schema": SCHEMA, "entries": made}, indent=1, allow_nan=False, ensure_ascii=False)

@@ -13,8 +13,8 @@ from itertools import product
 
 import numpy as np
 
-from measure.cases.held.calibrate import Linear, weights
-from measure.cases.held.reading import Floats, Swing
+from measure.cases.robot_cloth.calibrate import Linear, weights
+from measure.cases.robot_cloth.reading import Floats, Swing
 
 SEGMENT = 1.5  # s
 _FRAMES = 5  # frames that a segment must have

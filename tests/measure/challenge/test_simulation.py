@@ -9,9 +9,9 @@ import pytest
 import torch
 
 from flagdata.errors import FlagdataError
-from measure.challenge.flight import fly
-from measure.challenge.key import Acting, Key
+from measure.challenge.answer_key import Acting, AnswerKey
 from measure.challenge.recipe import ChallengeRecipe, Kind, parse
+from measure.challenge.simulation import simulate
 from tests.measure.challenge import cases
 from tests.measure.challenge.cases import TINY
 
@@ -30,20 +30,20 @@ def recipe() -> ChallengeRecipe:
     return replace(parse(TINY, where="tiny"), settle=1.0)
 
 
-def reacting(name: str, mass: float) -> Key:
+def reacting(name: str, mass: float) -> AnswerKey:
     return replace(cases.key(name, Kind.ONE, reactive(mass)), speeds=(7.0, 8.0))
 
 
 def test_a_strength_that_tears_the_cloth_apart_is_halved_until_it_does_not(recipe: ChallengeRecipe) -> None:
     torn, whole = reacting("set-001", 3.0), reacting("set-002", 0.02)
-    flights = fly(recipe, 1, [torn, whole])
-    acted = flights["set-001"].effects
+    simulated = simulate(recipe, 1, [torn, whole])
+    acted = simulated["set-001"].effects
     assert 3.0 / acted[0].value in (2.0, 4.0, 8.0)
-    assert flights["set-002"].effects == whole.effects
-    again = fly(recipe, 1, [replace(torn, effects=acted), whole])
-    assert np.array_equal(again["set-001"].positions[0], flights["set-001"].positions[0])
+    assert simulated["set-002"].effects == whole.effects
+    again = simulate(recipe, 1, [replace(torn, effects=acted), whole])
+    assert np.array_equal(again["set-001"].positions[0], simulated["set-001"].positions[0])
 
 
 def test_what_tears_the_cloth_apart_at_an_eighth_as_well_is_an_error(recipe: ChallengeRecipe) -> None:
     with pytest.raises(FlagdataError, match=r"set-001.*diverged"):
-        fly(recipe, 1, [reacting("set-001", 30.0)])
+        simulate(recipe, 1, [reacting("set-001", 30.0)])

@@ -1,4 +1,4 @@
-"""A real cloth that a robot holds and swings in still air, tracked at about 10 Hz: see `measure.cases.held`.
+"""A real cloth that a robot holds and swings in still air, tracked at about 10 Hz: see `measure.cases.robot_cloth`.
 
 Calibrated on the repeats of two programmes, judged on those of two others. The cloth's mass is not known, so that its
 density stands for the ratio of mass to drag. What the calibrated model lacks is sought among effects of the tracker and
@@ -15,10 +15,10 @@ from typing import Any
 
 import torch
 
-from measure.cases.held.attribution import LEAD, Round
-from measure.cases.held.calibrate import at_bounds
-from measure.cases.held.model import described
-from measure.cases.held.study import LEVEL, MOVED, SHUFFLES, Error, HeldCloth, study
+from measure.cases.robot_cloth.attribution import LEAD, Round
+from measure.cases.robot_cloth.calibrate import at_bounds
+from measure.cases.robot_cloth.model import described
+from measure.cases.robot_cloth.study import LEVEL, MOVED, SHUFFLES, Error, HeldCloth, study
 from sim.material import named
 
 FITTED, HELD_OUT = ("range30", "range90"), ("range60", "range120")
@@ -32,7 +32,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         return {"missing": "no recordings of a held cloth in the reference data (set FLAGDATA_REFERENCE)"}
     torch.set_num_threads(1)
     found = study(folder, named(MATERIAL), fitted=FITTED, held_out=HELD_OUT, seed=seed)
-    (out / "validate-robot-held.md").write_text(page(found), encoding="utf-8")
+    (out / "validate-robot-cloth.md").write_text(page(found), encoding="utf-8")
     told = {"nominal": MATERIAL, "level": LEVEL, "moved": MOVED}
     return {**told, **asdict(found), "apart": found.apart.as_dict(), "apart_moved": found.apart_moved.as_dict()}
 

@@ -52,18 +52,18 @@ class NullOptions:
             )  # fmt: skip
 
 
-def supplied(setting: Setting, options: NullOptions, *, stage: Stage) -> NullBank:
+def bank_for(setting: Setting, options: NullOptions, *, stage: Stage) -> NullBank:
     """The bank of a folder where one is named; else nulls that are simulated for an experiment.
 
     Raises:
-        FlagdataError: as `given`.
+        FlagdataError: as `load_bank`.
     """
     if options.bank is not None:
-        return given(options.bank, setting)
+        return load_bank(options.bank, setting)
     return simulated(setting, nulls=options.nulls, seed=options.seed, workers=options.workers, stage=stage)
 
 
-def given(folder: Path, setting: Setting) -> NullBank:
+def load_bank(folder: Path, setting: Setting) -> NullBank:
     """The bank of a folder, made as `measure.nulls.bank` does.
 
     Raises:

@@ -21,7 +21,7 @@ _APART = 1.7
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fabric:
+class StiffnessFactors:
     """Factors [1] on the tables of a material.
 
     Attributes:
@@ -46,10 +46,10 @@ class Fabric:
         )
 
 
-def drawn(rng: np.random.Generator) -> Fabric:
+def drawn(rng: np.random.Generator) -> StiffnessFactors:
     """A fabric over the prior: all factors log-uniform, those of bending about a mean of 1, which is calibrated."""
     stretching = float(np.exp(rng.uniform(*np.log(_STRETCHING))))
     apart = rng.uniform(-math.log(_APART), math.log(_APART), 6)
     apart[3:] -= apart[3:].mean()
     warp, weft, shear, *bending = (float(factor) for factor in np.exp(apart))
-    return Fabric(stretching=stretching, warp=warp, weft=weft, shear=shear, bending=tuple(bending))  # type: ignore[arg-type]
+    return StiffnessFactors(stretching=stretching, warp=warp, weft=weft, shear=shear, bending=tuple(bending))  # type: ignore[arg-type]

@@ -29,7 +29,7 @@ class Acting:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Key:
+class AnswerKey:
     """What the participant is not told of a set.
 
     Attributes:
@@ -72,7 +72,7 @@ class Key:
         return {"schema": "flagdata.challenge-key/1", **asdict(self)}
 
     @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Key:
+    def from_dict(cls, content: Mapping[str, Any]) -> AnswerKey:
         """From `as_dict`."""
         values = {name: value for name, value in content.items() if name != "schema"}
         values["kind"] = Kind(values["kind"])
@@ -81,19 +81,19 @@ class Key:
         return cls(**values)
 
 
-def seal(key: Key, salt: str) -> str:
+def seal(key: AnswerKey, salt: str) -> str:
     """What is published of a key: the SHA-256 of its canonical JSON with a salt, so that it cannot be guessed."""
     return digest(canonical({"key": key.as_dict(), "salt": salt}))
 
 
-def opened(content: Mapping[str, Any], commitment: str, *, where: str) -> Key:
+def opened(content: Mapping[str, Any], commitment: str, *, where: str) -> AnswerKey:
     """The key of a sealed file, once it is found to be the one that was published.
 
     Raises:
         CorruptError: it is another.
     """
     try:
-        key = Key.from_dict(content["key"])
+        key = AnswerKey.from_dict(content["key"])
         found = seal(key, str(content["salt"]))
     except (KeyError, TypeError, ValueError) as error:
         raise CorruptError(f"not a sealed key: {error}", where=where, fix="restore the file") from error

@@ -1,4 +1,5 @@
-"""Terms side by side move the predictions as each alone does, and a lens sees of them what statistics see."""
+"""Terms in one batch move the predictions as each alone does; their projected statistics are parts of all
+statistics."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from measure.forecasting.regressors import Column
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Experiment
 from measure.probes.statistics import statistics
-from measure.propose.lens import Lens
+from measure.propose.projected import ProjectedSegments
 from measure.propose.propose import made_ready
 from measure.propose.sensitivities import of_columns
 from measure.propose.terms import Term, columns_of
@@ -43,14 +44,14 @@ def test_terms_side_by_side_are_what_each_is_alone(two: tuple[Forecaster, Segmen
         assert torch.linalg.vector_norm(together[column.name] - alone) < 0.02 * torch.linalg.vector_norm(alone)
 
 
-def test_a_lens_sees_of_a_term_what_its_statistics_say(
-    two: tuple[Forecaster, Segments], lens: tuple[Column, ...]
+def test_projected_statistics_are_the_rows_and_columns_of_all_statistics(
+    two: tuple[Forecaster, Segments], directions: tuple[Column, ...]
 ) -> None:
-    """The rows of the lens, the columns of the calibrated parameters and of the terms, of all statistics together."""
+    """Rows: the directions. Columns: the calibrated parameters and the terms."""
     forecaster, segments = two
-    weighed = lens[:3]
+    weighed = directions[:3]
     whole = statistics(forecaster, segments, [Calibration()] * len(segments), (*weighed, *TERMS))
-    seen = Lens.of(forecaster, segments, weighed).of_columns(TERMS)
+    seen = ProjectedSegments.of(forecaster, segments, weighed).of_columns(TERMS)
     rows = len(THETA) + len(weighed)
     kept = [*range(len(THETA)), *range(rows, rows + len(TERMS))]
     size = np.abs(whole.response).max()

@@ -12,12 +12,12 @@ import numpy as np
 
 from flagdata.console import progress
 from flagdata.rng import stream
-from measure.cases.held.attribution import Late, Round, late, left_errors, lower, sought
-from measure.cases.held.calibrate import Fit, Linear, at_bounds, calibrated, linear
-from measure.cases.held.model import Cloth, Parameters, rigid
-from measure.cases.held.reading import Floats, Swing, read_all
-from measure.cases.held.repeats import features, shuffled, tail_probability
-from measure.cases.held.tracker import LATENCY
+from measure.cases.robot_cloth.attribution import Late, Round, late, left_errors, lower, sought
+from measure.cases.robot_cloth.calibrate import Fit, Linear, at_bounds, calibrated, linear
+from measure.cases.robot_cloth.model import Cloth, Parameters, rigid
+from measure.cases.robot_cloth.reading import Floats, Swing, read_all
+from measure.cases.robot_cloth.repeats import features, shuffled, tail_probability
+from measure.cases.robot_cloth.tracker import LATENCY
 from measure.shares import Share
 from sim.material import Material
 

@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from measure.gate.tails import BODY, Tails, joint_p, level
+from measure.gate.tail_probability import BODY, ExponentialTails, joint_p, level
 
 
 def test_one_more_surprise_is_e_times_rarer_in_an_exponential_tail() -> None:
     """Exponential scores of any scale: 20 % lie above 0, and 20 %/e above 1; 20,000 draws tell it to 0.01."""
     rng = np.random.default_rng(1)
     scores = rng.exponential(1, (20_000, 2)) * np.array([0.3, 70]) + np.array([5, -2])
-    surprise = Tails.of(scores, np.zeros(2)).surprise(scores)
+    surprise = ExponentialTails.of(scores, np.zeros(2)).surprise(scores)
     np.testing.assert_allclose((surprise > 0).mean(axis=0), 1 - BODY, atol=0.01)
     np.testing.assert_allclose((surprise > 1).mean(axis=0), (1 - BODY) / np.e, atol=0.01)
 
 
 def test_a_score_that_is_always_the_same_is_measured_by_its_resolution() -> None:
-    tails = Tails.of(np.zeros((50, 1)), np.array([0.25]))
+    tails = ExponentialTails.of(np.zeros((50, 1)), np.array([0.25]))
     assert tails.surprise(np.array([0.5]))[0] == pytest.approx(2)
 
 
@@ -55,4 +55,4 @@ def test_a_rate_that_the_calibration_clips_cannot_tell_is_an_error() -> None:
     with pytest.raises(InputError, match="between 0 and 1"):
         level(99, 1.0, 0.9)
     with pytest.raises(InputError, match="at least 20"):
-        Tails.of(np.zeros((5, 1)), np.zeros(1))
+        ExponentialTails.of(np.zeros((5, 1)), np.zeros(1))

@@ -1,4 +1,4 @@
-"""The error that the true model would have had, with the fitter's own numerics: what E_red is measured against."""
+"""Prediction errors of the true model with the fitter's own numerics, against which E_red is measured."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 import torch
 
+from measure.challenge.answer_key import AnswerKey
 from measure.challenge.folder import ChallengeFolder
-from measure.challenge.key import Key
 from measure.challenge.recipe import effect_type
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.setting import Setting
@@ -19,16 +19,16 @@ from sim.effects import Effect, apply
 from sim.effects.gusts import Gusts
 
 
-class Oracle(Protocol):
-    """Knows the truth."""
+class ReferenceErrors(Protocol):
+    """Errors of the best attainable model of a set."""
 
-    def __call__(self, folder: ChallengeFolder, key: Key, /) -> Mapping[str, float]:
+    def __call__(self, folder: ChallengeFolder, key: AnswerKey, /) -> Mapping[str, float]:
         """Comparison, in the verdict's words → root mean square prediction error [m]; empty where it has none."""
         ...
 
 
-def true_model(folder: ChallengeFolder, key: Key) -> Mapping[str, float]:
-    """By predicting with the true cloth and effects; empty with gusts, whose course is in no model.
+def true_model_errors(folder: ChallengeFolder, key: AnswerKey) -> Mapping[str, float]:
+    """Errors of the true cloth and effects; empty with gusts, since no model holds their time series.
 
     Raises:
         InputError: recordings that the fitter cannot use.
@@ -38,10 +38,12 @@ def true_model(folder: ChallengeFolder, key: Key) -> Mapping[str, float]:
         return {}
     effects = [kind(**{acting.parameter: acting.value}) for kind, acting in kinds]
     calibration = Calibration(density=key.density, bending=key.bending, damping=key.damping)
-    return oracle(folder.experiment(key.name), calibration, effects)
+    return prediction_errors(folder.experiment(key.name), calibration, effects)
 
 
-def oracle(experiment: Experiment, calibration: Calibration, effects: Sequence[Effect]) -> Mapping[str, float]:
+def prediction_errors(
+    experiment: Experiment, calibration: Calibration, effects: Sequence[Effect]
+) -> Mapping[str, float]:
     """Root mean square prediction error [m] on each comparison of the verdict, by the comparison's words.
 
     Args:

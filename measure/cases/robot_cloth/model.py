@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from flagdata.errors import UsageError
-from measure.cases.held.reading import Floats, Swing
-from measure.cases.held.tracker import instants
+from measure.cases.robot_cloth.reading import Floats, Swing
+from measure.cases.robot_cloth.tracker import instants
 from sim import handles
 from sim.anchors import AnchorTracks
 from sim.effects import EFFECTS, Effect, Parameter, apply
