@@ -20,17 +20,20 @@ from typing import Any
 from tests.evidence import circumstances
 from tests.failing import slow
 from tests.failing.commands import COMMANDS, Scene, made_scene
+from tests.failing.groups import grouped
 from tests.failing.injector import Fault, Injector, injecting
 from tests.failing.trial import Command, Trials
 
 _ABOUT = (
     "One call on a file of the work folder (open, read, stat, map, write, flush, rename, link, remove, lock) fails, "
-    "alone or with all later calls, or the command is killed before it. Every call after the last publication is "
-    "tried, and every so many (stride) before it. A report is right where exit code 0 means that all is published, "
-    "and exit code 1, with a fix, that it is not. Of every fourth failure the command is given "
-    "once more, of every kill always, and must end as an undisturbed one. After each trial the lake is examined "
-    "(doctor, verify). For close-loop, propose and build the computing was done once and its result taken; their "
-    "reads and writes are their own."
+    "alone or with all later calls, or the command is killed before it. Calls are alike where they are the same "
+    "function on files of one role (numbers, hashes and identities of a path aside) after a publication of one role. "
+    "Of each such kind the first call, the last one and every so many are tried, and every call after the last "
+    "publication; with 1 every call is. The JSON file beside this page states for each kind how many calls it has and "
+    "how many were tried. A report is right where exit code 0 means that all is published, and exit code 1, with a "
+    "fix, that it is not. Of every fourth failure the command is given once more, of every kill always, and must end "
+    "as an undisturbed one. After each trial the lake is examined (doctor, verify). For close-loop, propose and build "
+    "the computing was done once and its result taken; their reads and writes are their own."
 )
 _KINDS = ("unhealthy", "unforeseen")
 REPEATED = 4
@@ -42,19 +45,20 @@ SCENES: Mapping[str, tuple[Callable[[Path], Scene], Mapping[str, Command]]] = {
 
 
 def tried(
-    command: Command, scene: Scene, injector: Injector, scratch: Path, *, stride: int, stays: bool, first: int = 0
+    command: Command, scene: Scene, injector: Injector, scratch: Path, *, every: int, stays: bool, first: int = 0
 ) -> dict[str, Any]:
-    """All faults of a command, and what was wrong with any.
+    """Faults of a command, and what was wrong with any.
 
     Args:
-        stride: every so many calls before the publication; after it all fail.
+        every: of calls that are alike every so many before the publication; after it all fail.
         stays: whether trials in which all later calls fail are made too.
         first: call that the first trial is of.
     """
     begun = time.monotonic()
     trials = Trials(command, scene.folder, scene.ids, injector, scratch)
     total, published = trials.whole.done.calls, trials.whole.published
-    calls = [n for n in range(first, total) if n > published or n % stride == 0]
+    groups = grouped(trials.whole.done.trace, every=every, last=published)
+    calls = sorted(n for group in groups for n in group.tried if n >= first)
     faults = [Fault(call=n, stays=held) for n in calls for held in ((False, True) if stays else (False,))]
     wrong = []
     for number, fault in enumerate(faults):
@@ -62,8 +66,10 @@ def tried(
             wrong.append(found)
             print(json.dumps(found, indent=1), flush=True)  # noqa: T201
     return {
-        "calls": total, "after_publication": total - 1 - published, "trials": len(faults), "stride": stride,
-        "wrong": len(wrong), "kinds": _counted(wrong), "seconds": round(time.monotonic() - begun),
+        "calls": total, "after_publication": total - 1 - published, "trials": len(faults), "every": every,
+        "alike": len(groups), "wrong": len(wrong), "kinds": _counted(wrong),
+        "seconds": round(time.monotonic() - begun),
+        "groups": {group.like: [len(group.calls), sum(n >= first for n in group.tried)] for group in groups},
     }  # fmt: skip
 
 
@@ -89,7 +95,7 @@ def _counted(wrong: Sequence[Mapping[str, Any]]) -> dict[str, int]:
 
 
 def campaign(
-    names: Sequence[str], results: Path, *, seed: int, scenes: Path | None = None, stride: int = 1,
+    names: Sequence[str], results: Path, *, seed: int, scenes: Path | None = None, every: int = 1,
     stays: bool = True, first: int = 0, kills: int | None = None, real: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
     """Try commands, note the results of each in a JSON file, and return all that the file holds.
@@ -97,7 +103,7 @@ def campaign(
     Args:
         names: of the commands; none names all.
         scenes: folder in which scenes are kept for a later campaign; None makes them anew.
-        stride, stays, first: as of `tried`.
+        every, stays, first: as of `tried`.
         kills: points at which commands are killed; None lets calls fail.
         real: whether nothing stands in for computing.
     """
@@ -120,10 +126,10 @@ def campaign(
                     title, found = f"{name}, killed", killed(command, scene, injector, place, points=kills)
                 else:
                     title = f"{name}, alone" if not stays else name
-                    found = tried(command, scene, injector, place, stride=stride, stays=stays, first=first)
+                    found = tried(command, scene, injector, place, every=every, stays=stays, first=first)
                 title = f"computing all: {title}" if real and commands[name].stand_in else title
                 known[title] = {**found, "circumstances": circumstances(seed)}
-                print(title, found, flush=True)  # noqa: T201
+                print(title, {name: value for name, value in found.items() if name != "groups"}, flush=True)  # noqa: T201
                 results.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n")
                 results.with_suffix(".md").write_text(page(known))
     return known
@@ -135,7 +141,8 @@ def page(known: Mapping[str, Any]) -> str:
         "Calls that fail": (
             "calls",
             "after_publication",
-            "stride",
+            "alike",
+            "every",
             "trials",
             "wrong",
             "unhealthy",
@@ -153,7 +160,9 @@ def page(known: Mapping[str, Any]) -> str:
         lines += ["", f"## {title}", "", f"| command | {' | '.join(columns)} |", f"|---{'|---:' * len(columns)}|"]
         for name, result in found.items():
             own = {**result, "code": result["circumstances"]["code_version"]}
-            shown = [own.get("kinds", {}).get(column, 0) if column in _KINDS else own[column] for column in columns]
+            shown = [
+                own.get("kinds", {}).get(column, 0) if column in _KINDS else own.get(column, "") for column in columns
+            ]
             lines.append(f"| {name.removesuffix(', killed')} | {' | '.join(map(str, shown))} |")
     if known:
         where = next(iter(known.values()))["circumstances"]
@@ -177,13 +186,13 @@ if __name__ == "__main__":
     parser.add_argument("names", nargs="*", help="commands; all if none is named")
     parser.add_argument("--out", type=Path, required=True, help="JSON file of the results")
     parser.add_argument("--scenes", type=Path, help="folder that scenes are kept in; some take minutes to make")
-    parser.add_argument("--stride", type=int, default=1, help="try every so many calls before the publication")
+    parser.add_argument("--every", type=int, default=1, help="of calls that are alike try every so many")
     parser.add_argument("--first", type=int, default=0, help="first call to try")
     parser.add_argument("--alone", action="store_true", help="only calls that fail alone")
     parser.add_argument("--kill", type=int, metavar="N", help="kill commands at so many calls instead")
     parser.add_argument("--real", action="store_true", help="let nothing stand in for computing")
     given = parser.parse_args()
     campaign(
-        given.names, given.out, seed=0, scenes=given.scenes, stride=given.stride, stays=not given.alone,
+        given.names, given.out, seed=0, scenes=given.scenes, every=given.every, stays=not given.alone,
         first=given.first, kills=given.kill, real=given.real,
     )  # fmt: skip

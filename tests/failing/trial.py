@@ -13,9 +13,8 @@ from typing import Any
 from flagdata.findings import Severity
 from flagdata.lake import Lake
 from flagdata.lake.health import doctor, object_names, verify, verify_catalog
+from tests.failing.groups import PUBLISHING
 from tests.failing.injector import Done, Fault, Injector
-
-_PUBLISHING = ("link ", "linkat ", "rename ", "renameat ", "renameat2 ")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +51,7 @@ class Whole:
     @property
     def published(self) -> int:
         """The number of the call that published last."""
-        return max((n for n, call in enumerate(self.done.trace) if call.startswith(_PUBLISHING)), default=0)
+        return max((n for n, call in enumerate(self.done.trace) if call.startswith(PUBLISHING)), default=0)
 
 
 class Trials:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.failing.commands import COMMANDS, Scene, core_scene
+from tests.failing.groups import grouped
 from tests.failing.injector import Fault, Injector, injecting
 from tests.failing.trial import Trials
 
@@ -54,3 +55,15 @@ def test_a_call_that_fails_before_publication_is_an_error_and_after_it_a_warning
         faults = [*(Fault(call=call) for call in calls), Fault(call=published + 1, stays=True)]
     wrong = [found for fault in faults if (found := trials.wrong(fault, repeated=EVERY))]
     assert not wrong, json.dumps(wrong, indent=1)
+
+
+def test_of_calls_that_are_alike_the_first_the_last_and_every_so_many_are_tried_and_all_after_the_publication() -> None:
+    before = [f"open /lake/mcap/{n:064x}.mcap" for n in range(8)]
+    trace = [*before, "read /lake/lake.json", "link /lake/log/.0123abcd", *before[:3]]
+    groups = {group.like: (group.calls, group.tried) for group in grouped(trace, every=4, last=9)}
+    assert groups == {
+        "open /lake/mcap/*.mcap after nothing": ((0, 1, 2, 3, 4, 5, 6, 7), (0, 4, 7)),
+        "read /lake/lake.json after nothing": ((8,), (8,)),
+        "link /lake/log/.* after nothing": ((9,), (9,)),
+        "open /lake/mcap/*.mcap after link /lake/log/.*": ((10, 11, 12), (10, 11, 12)),
+    }

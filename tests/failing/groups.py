@@ -1,0 +1,62 @@
+"""Calls that are alike, so that of thousands of calls each distinct one is tried and not each repetition.
+
+Two calls are alike where they are the same function on files of the same role, and what was published last before them
+has the same role too. A file's role is its path without what differs from run to run or from item to item: numbers,
+hashes and identities.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+PUBLISHING = ("link ", "linkat ", "rename ", "renameat ", "renameat2 ")
+"""Calls that give a file or a folder its name."""
+_IDENTITY = re.compile(r"[0-9a-f]{8,}(?:-[0-9a-f]+)*|[0-9]+")
+_HASHED = re.compile(r"[0-9a-f]{2,}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Group:
+    """Calls that are alike.
+
+    Attributes:
+        like: what they are: function and role, and what was published last before them.
+        calls: their numbers, in their order.
+        tried: the numbers of those that are made to fail.
+    """
+
+    like: str
+    calls: tuple[int, ...]
+    tried: tuple[int, ...]
+
+
+def role(call: str) -> str:
+    """A call of a trace, function and path, with every number, hash and identity of the path as `*`."""
+    function, _, path = call.partition(" ")
+    parts = ("*" if _HASHED.fullmatch(part) else _IDENTITY.sub("*", part) for part in path.split("/"))
+    return f"{function} {'/'.join(parts)}"
+
+
+def grouped(trace: Sequence[str], *, every: int, last: int) -> list[Group]:
+    """The groups of a command's calls.
+
+    Args:
+        trace: function and path of each call.
+        every: of each group the first call, the last one and every so many are tried.
+        last: number of the call that published last; all later ones are tried.
+    """
+    members: dict[str, list[int]] = {}
+    published = "nothing"
+    for number, call in enumerate(trace):
+        members.setdefault(f"{role(call)} after {published}", []).append(number)
+        if call.startswith(PUBLISHING):
+            published = role(call)
+    return [
+        Group(
+            like=like, calls=tuple(calls),
+            tried=tuple(n for k, n in enumerate(calls) if k % every == 0 or k == len(calls) - 1 or n > last),
+        )
+        for like, calls in members.items()
+    ]  # fmt: skip
