@@ -53,22 +53,25 @@ def content_hash(path: Path) -> str:
     return hashlib.sha256(_lines({name: file_hash(file) for name, file in _named(path).items()}).encode()).hexdigest()
 
 
-def write_sums(folder: Path, *, renewed: tuple[str, ...] | None = None) -> None:
+def write_sums(folder: Path) -> None:
     """State the SHA-256 of a folder's files in its `SHA256SUMS`.
 
-    Args:
-        renewed: names of files that were just written; of the others what is stated already stays, so that damage to
-            them is still found. None states all files.
+    Raises:
+        OSError: what the disk refuses.
+    """
+    sums = {name: file_hash(file) for name, file in _named(folder).items() if name != SUMS}
+    (folder / SUMS).write_text(_lines(sums), encoding="utf-8")
+
+
+def renewed_sums(folder: Path, name: str, content: bytes) -> str:
+    """The text of a folder's `SHA256SUMS` once a file of it, or a new one, has that content. What is stated of the
+    others stays, so that damage to them is still found.
 
     Raises:
         CorruptError: `SHA256SUMS` cannot be read.
-        OSError: what the disk refuses.
     """
-    files = {name: file for name, file in _named(folder).items() if name != SUMS}
-    stated = {} if renewed is None else _stated(folder, fix="restore the folder from a copy")
-    fresh = files if renewed is None else {name: files[name] for name in renewed}
-    sums = {**stated, **{name: file_hash(file) for name, file in fresh.items()}}
-    (folder / SUMS).write_text(_lines(dict(sorted(sums.items()))), encoding="utf-8")
+    stated = _stated(folder, fix="restore the folder from a copy")
+    return _lines({**stated, name: hashlib.sha256(content).hexdigest()})
 
 
 def check_sums(folder: Path, *, fix: str) -> None:
@@ -108,7 +111,7 @@ def _named(folder: Path) -> dict[str, Path]:
 
 
 def _lines(sums: dict[str, str]) -> str:
-    return "".join(f"{value}  {name}\n" for name, value in sums.items())
+    return "".join(f"{value}  {name}\n" for name, value in sorted(sums.items()))
 
 
 def _stated(folder: Path, *, fix: str) -> dict[str, str]:

@@ -18,9 +18,10 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
 
-from flagdata.checksums import SUMS, check_sums, content_hash
+from flagdata.checksums import SUMS, check_sums, content_hash, renewed_sums
 from flagdata.documents import read_json
 from flagdata.errors import CorruptError, LimitError, NotFoundError
+from flagdata.outputs import rewrite
 
 FORMAT = "flagdata.network/1"
 CARD = "card.json"
@@ -54,10 +55,28 @@ def check_model(folder: Path) -> None:
         check_sums(whole, fix=_AGAIN)
 
 
+def renew(folder: Path, name: str, content: bytes) -> None:
+    """Replace a file of a stored model, or add one, and state its checksum. Each of the two files is the old one or the
+    new one at any time; a process that is killed between them leaves a model that is refused by the file's name.
+
+    Raises:
+        CorruptError: the model's checksums cannot be read.
+        FlagdataError: what the disk refuses.
+    """
+    sums = renewed_sums(folder, name, content)
+    rewrite(folder / name, content)
+    rewrite(folder / SUMS, sums)
+
+
+def card_bytes(card: Mapping[str, Any]) -> bytes:
+    """The card of a model as it is stored."""
+    text = json.dumps({"format": FORMAT, **card}, indent=2, allow_nan=False, ensure_ascii=False)
+    return f"{text}\n".encode()
+
+
 def write_card(folder: Path, card: Mapping[str, Any]) -> None:
     """Write the card of a model."""
-    text = json.dumps({"format": FORMAT, **card}, indent=2, allow_nan=False, ensure_ascii=False)
-    (folder / CARD).write_text(text + "\n")
+    (folder / CARD).write_bytes(card_bytes(card))
 
 
 def read_card(folder: Path) -> dict[str, Any]:
@@ -76,13 +95,18 @@ def read_card(folder: Path) -> dict[str, Any]:
     return card
 
 
+def tensor_bytes(tensors: Mapping[str, Tensor]) -> bytes:
+    """Tensors by name as they are stored; each is copied, so that views are stored whole."""
+    return save({name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()})
+
+
 def write_tensors(path: Path, tensors: Mapping[str, Tensor]) -> None:
-    """Write tensors by name; each is copied, so that views are stored whole.
+    """Write tensors by name.
 
     Raises:
         OSError: what the disk refuses.
     """
-    path.write_bytes(save({name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}))
+    path.write_bytes(tensor_bytes(tensors))
 
 
 def read_tensors(path: Path) -> dict[str, Tensor]:

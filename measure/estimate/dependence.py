@@ -26,14 +26,13 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.checksums import write_sums
 from flagdata.console import LocalPath, progress, say
 from flagdata.errors import CorruptError, InputError
 from flagdata.rng import child_seed, stream
 from measure.estimate.combine import OWN, UNKNOWN, Dependence
 from measure.estimate.long_films import LongFilm, simulated
 from models.estimator import SHIPPED, Estimator
-from models.storage import CARD, read_card, write_card
+from models.storage import CARD, card_bytes, read_card, renew
 from models.targets import truth
 
 CARD_KEY = "window_correlation"
@@ -210,8 +209,7 @@ def main(name: str, films: int, windows: int, seed: int, out: Path) -> None:
             errors(model, _counted(simulated(model, count=films, windows=windows, seed=seed), advance)), seed=seed
         )
     card = {key: value for key, value in read_card(out / name).items() if key != "format"}
-    write_card(out / name, {**card, CARD_KEY: entry})
-    write_sums(out / name, renewed=(CARD,))
+    renew(out / name, CARD, card_bytes({**card, CARD_KEY: entry}))
     say(f"errors of two windows correlate by {entry['wind']:.2f} in wind and {entry['cloth']:.2f} in cloth")
 
 

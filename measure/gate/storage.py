@@ -9,12 +9,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.checksums import write_sums
 from flagdata.errors import CorruptError
 from measure.gate.gate import SCORES, Gate
 from measure.gate.tail_probability import ExponentialTails
 from models.estimator import Estimator
-from models.storage import read_tensors, write_tensors
+from models.storage import read_tensors, renew, tensor_bytes
 
 GATE = "gate.safetensors"
 """Name of the file in a model's folder."""
@@ -37,10 +36,8 @@ def write(folder: Path, gate: Gate, model: Estimator) -> Path:
     tensors = {name: torch.from_numpy(np.ascontiguousarray(getattr(gate, name))) for name in _DIRECT}
     tensors |= {"tail_start": torch.from_numpy(gate.tails.start), "tail_excess": torch.from_numpy(gate.tails.excess)}
     tensors["network"] = torch.from_numpy(fingerprint(model).copy())
-    path = folder / GATE
-    write_tensors(path, tensors)
-    write_sums(folder, renewed=(GATE,))
-    return path
+    renew(folder, GATE, tensor_bytes(tensors))
+    return folder / GATE
 
 
 def read(folder: Path, model: Estimator) -> Gate:

@@ -29,11 +29,13 @@ _ABOUT = (
     "alone or with all later calls, or the command is killed before it. Calls are alike where they are the same "
     "function on files of one role (numbers, hashes and identities of a path aside) after a publication of one role. "
     "Of each such kind the first call, the last one and every so many are tried, and every call after the last "
-    "publication; with 1 every call is. The JSON file beside this page states for each kind how many calls it has and "
-    "how many were tried. A report is right where exit code 0 means that all is published, and exit code 1, with a "
-    "fix, that it is not. Of every fourth failure the command is given once more, of every kill always, and must end "
-    "as an undisturbed one. After each trial the lake is examined (doctor, verify). For close-loop, propose and build "
-    "the computing was done once and its result taken; their reads and writes are their own."
+    "publication; with 1 every call is. Threads make their calls in another order each time: counted is what did "
+    "fail, and a kind whose every call was made at another place is untried. The JSON file beside this page states of "
+    "each kind how many calls there are and how many failed. A report is right where exit code 0 means that all is "
+    "published, and exit code 1, with a fix, that it is not. Of every fourth failure the command is given once more, "
+    "of every kill always, and must end as an undisturbed one. After each trial the lake is examined (doctor, "
+    "verify). For close-loop, propose and build the computing was done once and its result taken; their reads and "
+    "writes are their own."
 )
 _KINDS = ("unhealthy", "unforeseen")
 REPEATED = 4
@@ -58,7 +60,7 @@ def tried(
     trials = Trials(command, scene.folder, scene.ids, injector, scratch)
     total, published = trials.whole.done.calls, trials.whole.published
     groups = grouped(trials.whole.done.trace, every=every, last=published)
-    calls = sorted(n for group in groups for n in group.tried if n >= first)
+    calls = sorted(n for group in groups.values() for n in group.tried if n >= first)
     faults = [Fault(call=n, stays=held) for n in calls for held in ((False, True) if stays else (False,))]
     wrong = []
     for number, fault in enumerate(faults):
@@ -67,9 +69,12 @@ def tried(
             print(json.dumps(found, indent=1), flush=True)  # noqa: T201
     return {
         "calls": total, "after_publication": total - 1 - published, "trials": len(faults), "every": every,
-        "alike": len(groups), "wrong": len(wrong), "kinds": _counted(wrong),
-        "seconds": round(time.monotonic() - begun),
-        "groups": {group.like: [len(group.calls), sum(n >= first for n in group.tried)] for group in groups},
+        "alike": len(groups), "untried": len(groups.keys() - trials.failed.keys()), "wrong": len(wrong),
+        "kinds": _counted(wrong), "seconds": round(time.monotonic() - begun),
+        "groups": {
+            kind: [len(groups[kind].calls) if kind in groups else 0, trials.failed[kind]]
+            for kind in (*groups, *(trials.failed.keys() - groups.keys()))
+        },
     }  # fmt: skip
 
 
@@ -142,6 +147,7 @@ def page(known: Mapping[str, Any]) -> str:
             "calls",
             "after_publication",
             "alike",
+            "untried",
             "every",
             "trials",
             "wrong",

@@ -22,12 +22,10 @@ class Group:
     """Calls that are alike.
 
     Attributes:
-        like: what they are: function and role, and what was published last before them.
         calls: their numbers, in their order.
         tried: the numbers of those that are made to fail.
     """
 
-    like: str
     calls: tuple[int, ...]
     tried: tuple[int, ...]
 
@@ -39,8 +37,19 @@ def role(call: str) -> str:
     return f"{function} {'/'.join(parts)}"
 
 
-def grouped(trace: Sequence[str], *, every: int, last: int) -> list[Group]:
-    """The groups of a command's calls.
+def kinds(trace: Sequence[str]) -> list[str]:
+    """Of each call of a trace what it is: function and role, and what was published last before it."""
+    found = []
+    published = "nothing"
+    for call in trace:
+        found.append(f"{role(call)} after {published}")
+        if call.startswith(PUBLISHING):
+            published = role(call)
+    return found
+
+
+def grouped(trace: Sequence[str], *, every: int, last: int) -> dict[str, Group]:
+    """The groups of a command's calls, by what they are, as of `kinds`.
 
     Args:
         trace: function and path of each call.
@@ -48,15 +57,12 @@ def grouped(trace: Sequence[str], *, every: int, last: int) -> list[Group]:
         last: number of the call that published last; all later ones are tried.
     """
     members: dict[str, list[int]] = {}
-    published = "nothing"
-    for number, call in enumerate(trace):
-        members.setdefault(f"{role(call)} after {published}", []).append(number)
-        if call.startswith(PUBLISHING):
-            published = role(call)
-    return [
-        Group(
-            like=like, calls=tuple(calls),
+    for number, kind in enumerate(kinds(trace)):
+        members.setdefault(kind, []).append(number)
+    return {
+        kind: Group(
+            calls=tuple(calls),
             tried=tuple(n for k, n in enumerate(calls) if k % every == 0 or k == len(calls) - 1 or n > last),
         )
-        for like, calls in members.items()
-    ]  # fmt: skip
+        for kind, calls in members.items()
+    }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import signal
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import timedelta
@@ -13,7 +14,7 @@ from typing import Any
 from flagdata.findings import Severity
 from flagdata.lake import Lake
 from flagdata.lake.health import doctor, object_names, verify, verify_catalog
-from tests.failing.groups import PUBLISHING
+from tests.failing.groups import PUBLISHING, kinds
 from tests.failing.injector import Done, Fault, Injector
 
 
@@ -57,6 +58,11 @@ class Whole:
 class Trials:
     """Trials of one command, each in a copy of the scene's folder.
 
+    Attributes:
+        whole: the command without a fault.
+        failed: how many calls of each kind (`tests.failing.groups.kinds`) have failed. Threads do not make their calls
+            in the same order each time, so that a number may meet another call than in `whole`.
+
     Raises:
         AssertionError: the command fails or changes nothing without any fault.
     """
@@ -67,6 +73,7 @@ class Trials:
         self._command, self._scene, self._ids = command, scene, ids
         self._injector, self._scratch = injector, scratch
         self._count = 0
+        self.failed: Counter[str] = Counter()
         if command.stand_in is not None:
             injector.prepare(command.stand_in, ids["kept"])
         folder = self._copy()
@@ -84,7 +91,9 @@ class Trials:
             repeated: whether a command that failed is given once more, without the fault.
         """
         command, folder = self._command, self._copy()
-        done = self._injector.run(folder, command.given(folder, self._ids), fault)
+        done = self._injector.run(folder, command.given(folder, self._ids), fault, traced=True)
+        met = kinds(done.trace)[fault.call] if fault.call < len(done.trace) else "none: there were fewer"
+        self.failed[met] += 1
         state = command.state(folder)
         problems = self._lost(done, state) if fault.kills else self._report_against(done, state)
         problems += _health(folder / command.lake)
@@ -96,9 +105,8 @@ class Trials:
         shutil.rmtree(folder)
         if not problems:
             return None
-        call = self.whole.done.trace[fault.call] if fault.call < len(self.whole.done.trace) else "?"
         return {
-            "call": fault.call, "of": self.whole.done.calls, "stays": fault.stays, "was": call, "code": done.code,
+            "call": fault.call, "of": self.whole.done.calls, "stays": fault.stays, "was": met, "code": done.code,
             "after_publication": fault.call > self.whole.published, "problems": problems, "stderr": done.stderr,
         }  # fmt: skip
 

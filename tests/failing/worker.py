@@ -25,7 +25,7 @@ _STATE = struct.Struct("@qqiiii1024s")  # as calls.c has it
 _LONGEST = 900.0  # s, of a command
 _SHARED = {
     "flagdata", "sim", "models", "measure", "torch", "zarr", "scipy", "av", "jinja2", "duckdb", "safetensors", "PIL",
-    "matplotlib",
+    "matplotlib", "pandas", "pyarrow", "deltalake", "numcodecs",
 }  # fmt: skip
 """Packages whose modules, once a child has imported them, are imported before later forks."""
 

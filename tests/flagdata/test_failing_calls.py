@@ -60,7 +60,7 @@ def test_a_call_that_fails_before_publication_is_an_error_and_after_it_a_warning
 def test_of_calls_that_are_alike_the_first_the_last_and_every_so_many_are_tried_and_all_after_the_publication() -> None:
     before = [f"open /lake/mcap/{n:064x}.mcap" for n in range(8)]
     trace = [*before, "read /lake/lake.json", "link /lake/log/.0123abcd", *before[:3]]
-    groups = {group.like: (group.calls, group.tried) for group in grouped(trace, every=4, last=9)}
+    groups = {kind: (group.calls, group.tried) for kind, group in grouped(trace, every=4, last=9).items()}
     assert groups == {
         "open /lake/mcap/*.mcap after nothing": ((0, 1, 2, 3, 4, 5, 6, 7), (0, 4, 7)),
         "read /lake/lake.json after nothing": ((8,), (8,)),

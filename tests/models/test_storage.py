@@ -11,10 +11,10 @@ import pytest
 import torch
 
 from flagdata.checksums import SUMS, content_hash
-from flagdata.errors import CorruptError
+from flagdata.errors import CorruptError, FlagdataError
 from models import estimator
 from models.estimator import CLOUD, SHIPPED
-from models.storage import CARD, WEIGHTS, check_model, write_tensors
+from models.storage import CARD, WEIGHTS, check_model, renew, write_tensors
 
 FILES = (CARD, WEIGHTS, CLOUD, "gate.safetensors", SUMS)
 
@@ -62,6 +62,30 @@ def test_a_model_that_nothing_vouches_for_is_refused_with_how_to_state_it(shippe
     with pytest.raises(CorruptError, match="SHA256SUMS") as caught:
         estimator.load(shipped)
     assert "sha256sum * > SHA256SUMS" in caught.value.fix
+
+
+def test_renewing_one_file_states_no_other_anew(shipped: Path) -> None:
+    flip(shipped / WEIGHTS, share=0.5)
+    renew(shipped, CLOUD, b"written anew")
+    assert (shipped / CLOUD).read_bytes() == b"written anew"
+    with pytest.raises(CorruptError) as caught:
+        check_model(shipped)
+    assert caught.value.where == str(shipped / WEIGHTS)
+
+
+def test_a_file_that_cannot_be_renewed_stays_whole(shipped: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = {path.name: path.read_bytes() for path in shipped.iterdir()}
+
+    def full(path: Path, data: bytes) -> int:
+        with path.open("wb") as file:
+            file.write(data[:10])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(FlagdataError, match="No space left"):
+        renew(shipped, "gate.safetensors", b"another gate of many bytes")
+    assert {path.name: path.read_bytes() for path in shipped.iterdir()} == before
+    check_model(shipped)
 
 
 def test_a_full_disk_is_an_error_of_the_system_with_its_number() -> None:

@@ -21,7 +21,7 @@ from models.estimator import CLOUD, Estimator
 from models.frontend import FrontEnd
 from models.learner import Learner, Loss
 from models.outliers import Familiarity
-from models.storage import WEIGHTS, write_card, write_tensors
+from models.storage import WEIGHTS, renew, tensor_bytes, write_card, write_tensors
 from models.wave import WaveNetwork
 
 FRAMES, SIZE, RATE = 12, 24, 25.0
@@ -103,8 +103,7 @@ def written(folder: Path, targets: tuple[str, ...]) -> Path:
     with torch.no_grad():
         summaries = bare.embeddings(bare.inputs(clips))[0].numpy()
     cloud = Familiarity.of(summaries[:28], summaries[28:])
-    write_tensors(folder / CLOUD, {name: torch.from_numpy(value) for name, value in cloud.arrays().items()})
-    write_sums(folder, renewed=(CLOUD,))
+    renew(folder, CLOUD, tensor_bytes({name: torch.from_numpy(value) for name, value in cloud.arrays().items()}))
     return folder
 
 
