@@ -6,7 +6,7 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,27 @@ def from_toml(text: str) -> dict[str, Any]:
         raise ValueError(f"not TOML: {error}") from None
     _check(content)
     return content
+
+
+def to_toml(content: Mapping[str, Any], *, inside: str = "") -> str:
+    """A TOML text of these tables: texts, numbers, truth values, lists of them, tables, and lists of tables.
+
+    Args:
+        inside: the table's own name, with a dot behind it.
+    """
+    tables = {key: value for key, value in content.items() if isinstance(value, Mapping)}
+    lists = {key: value for key, value in content.items() if _are_tables(value)}
+    plain = {key: value for key, value in content.items() if key not in {*tables, *lists}}
+    # JSON writes these as TOML does.
+    parts = ["".join(f"{key} = {json.dumps(value, ensure_ascii=False)}\n" for key, value in plain.items())]
+    parts += [f"\n[{inside}{key}]\n{to_toml(value, inside=f'{inside}{key}.')}" for key, value in tables.items()]
+    for key, value in lists.items():
+        parts += [f"\n[[{inside}{key}]]\n{to_toml(one, inside=f'{inside}{key}.')}" for one in value]
+    return "".join(parts)
+
+
+def _are_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(one, Mapping) for one in value)
 
 
 def from_json(text: str | bytes) -> Any:

@@ -9,6 +9,7 @@ import pytest
 
 from docs import generate_cli, generate_effects
 from flagdata.ingest.anemometer.recipe import (
+    MATCH,
     ChannelLayout,
     CheckLayout,
     FileLayout,
@@ -60,6 +61,12 @@ def test_every_key_of_a_sensor_recipe_is_on_the_page(table: type) -> None:
     rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
     keys = {key.strip(" `") for row in rows for key in row.split(",")}
     assert {field.name.replace("_", "-") for field in fields(table)} <= keys
+
+
+def test_every_key_of_a_recipes_match_is_on_the_page() -> None:
+    page = (DOCS / "wind-recipes.md").read_text(encoding="utf-8").split("Keys of `[match]`")[1].split("\n## ")[0]
+    rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
+    assert sorted(key.strip(" `") for row in rows for key in row.split(",")) == sorted(MATCH.split())
 
 
 def test_every_table_of_a_sensor_recipe_is_on_the_page() -> None:

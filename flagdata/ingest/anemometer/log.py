@@ -111,7 +111,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         host_time=reading.host_time,
     )  # fmt: skip
     reasons = reading.understood or reasons
-    text = reading.drafted or (_text(options.recipe) if options.recipe is not None else None)
+    text = reading.drafted or reading.described or (_text(options.recipe) if options.recipe is not None else None)
     stated = reading.stated and _DOUBTS.isdisjoint(finding.kind for finding in findings)
     rows = shown_rows(source, reading) if reading.drafted else ()
     return WindLog(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from flagdata.findings import Finding
+from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.recipe import QualityRules
 from flagdata.signals import Instants, Sensor, Series
 
@@ -37,6 +37,7 @@ class Reading:
         host_time: (n,) the logging computer's clock, where the file has it.
         findings: of the format.
         stamped: whether each row has a stamp of its own; the lines of a stream have not, and cannot be sorted.
+        described: the recipe (TOML) of the catalog's format that the file is of, "" where code reads it.
         drafted: the recipe (TOML) that was drafted from the file, "" where it was read by another.
         stated: whether the file itself states all that the draft says.
         understood: what in the file spoke for that draft, completed by what the user said.
@@ -52,6 +53,7 @@ class Reading:
     host_time: Instants | None = None
     findings: tuple[Finding, ...] = ()
     stamped: bool = True
+    described: str = ""
     drafted: str = ""
     stated: bool = False
     understood: tuple[str, ...] = ()
@@ -80,6 +82,14 @@ class Reading:
         return replace(
             self, findings=(*self.findings, *found), flags=self.flags if flags is None else flags.astype(np.uint16)
         )
+
+
+def described(by: str) -> Finding:
+    """The finding that a reader follows a description alone."""
+    return Finding(
+        kind="read-by-description", severity=Severity.NOTE,
+        what=f"read by {by}; the reader was tried on made files only", fix="compare the first rows with the file",
+    )  # fmt: skip
 
 
 def streams(channels: Mapping[str, Series]) -> tuple[tuple[tuple[str, ...], NDArray[np.int64]], ...]:

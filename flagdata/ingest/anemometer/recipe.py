@@ -13,6 +13,8 @@ A recipe is parsed here and nowhere else; unknown keys are refused with the near
     [quality]                 zero-offset, stale-after, frame-rate-of, fault-where-zero
     [expect]                  confirmed: doubts about a draft that its user has answered (keys of draft/doubts.py)
     [[check]]                 column, values, about: cells that must be one of these texts, else the row is a fault
+
+A recipe may leave open what the heading of the file states: see `OpenRecipe`.
 """
 
 from __future__ import annotations
@@ -234,7 +236,35 @@ class Recipe:
             raise UsageError("columns by name where no header names them", where=self.name, fix="give their numbers")
 
 
-def load(recipe: str) -> Recipe:
+MATCH = "header first-line within mark cell units groups stacked row averaged starts"
+"""Keys of [match], by which the heading of a file is found.
+
+    header          names, each of which is a cell of the heading; within: lines in which the heading is looked for
+    first-line      a pattern at the beginning of the file; mark: one in the heading or above it; row: of the first row
+    cell            a pattern of a cell of the heading, with groups "name" and "unit"
+    units           whether the line below the heading holds units
+    groups          whether the line above the heading holds what goes before the names; stacked: their first words
+    averaged        whether a row is the average over the distance of the stamps (true)
+    starts          a pattern above the heading by which stamps begin the average
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OpenRecipe:
+    """A recipe that the heading of a file completes (see formats/described.py).
+
+    Attributes:
+        name: of the recipe.
+        file: what it says of the file itself.
+        data: its tables.
+    """
+
+    name: str
+    file: FileLayout
+    data: Mapping[str, Any]
+
+
+def load(recipe: str) -> Recipe | OpenRecipe:
     """The recipe called `recipe`, or in the TOML file of that path.
 
     Raises:
@@ -243,23 +273,77 @@ def load(recipe: str) -> Recipe:
         InputError: not TOML; a key missing, unknown or of the wrong type.
     """
     found = SENSORS.find(recipe)
-    return parse(found.text, where=found.where)
+    data = parsed(found.text, where=found.where)
+    return _opened(data, where=found.where) if _is_open(data) else of_data(data, where=found.where)
 
 
 def parse(text: str, *, where: str) -> Recipe:
-    """The recipe written in `text`.
+    """The complete recipe written in `text`; raises as `of_data`, and InputError for what is not TOML."""
+    return of_data(parsed(text, where=where), where=where)
+
+
+def parse_open(text: str, *, where: str) -> OpenRecipe:
+    """The open recipe written in `text`; raises as `parse`."""
+    return _opened(parsed(text, where=where), where=where)
+
+
+def of_data(data: Mapping[str, Any], *, where: str) -> Recipe:
+    """The recipe of these tables.
 
     Raises:
-        InputError: not TOML; a key missing or of the wrong type; values that do not fit together.
+        InputError: a key missing or of the wrong type; values that do not fit together.
         UnknownNameError: a key, channel, unit or zone that is not known, with the nearest.
     """
-    data = parsed(text, where=where)
     try:
         return _recipe(Table(data, where=where))
     except UnknownNameError as error:
         raise UnknownNameError(error.what, where=_inside(where, error.where), fix=error.fix) from None
     except FlagdataError as error:
         raise InputError(error.what, where=_inside(where, error.where), fix=error.fix) from None
+
+
+def _is_open(data: Mapping[str, Any]) -> bool:
+    """Whether a recipe leaves something to the heading of a file."""
+    channels, time = data.get("channels", {}), data.get("time", {})
+    layouts = channels.values() if isinstance(channels, Mapping) else ()
+    listed = any(
+        isinstance(one, Mapping) and (isinstance(one.get("column"), list) or isinstance(one.get("unit"), Mapping))
+        for one in layouts
+    )
+    return listed or "match" in data or (isinstance(time, Mapping) and isinstance(time.get("format"), list))
+
+
+def _opened(data: Mapping[str, Any], *, where: str) -> OpenRecipe:
+    """An open recipe, every key of which is checked, as far as it can be without a file."""
+    table = Table(data, where=where)
+    match = table.table("match")
+    match.texts("header")
+    _known(match, MATCH)
+    channels: dict[str, Any] = {}
+    for name, layout in table.mapping("channels").items():
+        own = dict(layout) if isinstance(layout, Mapping) else {}
+        names, stated = own.get("column"), own.get("unit")
+        if isinstance(names, list) and names and all(isinstance(one, str) for one in names):
+            own["column"] = names[0]
+        if isinstance(stated, Mapping):
+            inside = Table(stated, where=f"{where} [channels.{name}] unit")
+            _known(inside, "in else whole")
+            if stated.get("in") != "heading":
+                raise InputError("the unit is in no heading", where=inside.where, fix='write { in = "heading" }')
+            own["unit"] = CHANNELS[name].unit if name in CHANNELS else "m/s"
+        channels[name] = own
+    time, sensor = (_without_facts(table.mapping(key)) for key in ("time", "sensor"))
+    time["format"] = time["format"] if isinstance(time.get("format"), str) else "iso"
+    closed = {key: data[key] for key in data.keys() - {"match", "facts", "described-by"}}
+    checked = of_data({**closed, "channels": channels, "time": time, "sensor": sensor}, where=where)
+    return OpenRecipe(name=checked.name, file=checked.file, data=data)
+
+
+def _without_facts(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys whose texts stand for nothing that is in the file; a name counts as it is."""
+    return {
+        key: value for key, value in table.items() if key == "name" or not (isinstance(value, str) and "{" in value)
+    }
 
 
 def _inside(file: str, place: str | None) -> str:

@@ -1,86 +1,128 @@
-"""Table formats that are data: recipes whose open facts are in the heading of the file itself.
+"""Tables described by data: recipes that the heading of the file itself completes.
 
-Each is a TOML file of catalogs/sensors/formats: a recipe (see recipe.py) in which the file states what differs from one
-export to the next. Patterns are regular expressions; those of names and cells fit the whole of it, case ignored.
+Such a recipe leaves open what differs from one export to the next: where the heading stands, which of several names a
+column has, in which unit it is. The formats of catalogs/sensors/formats are recipes of this kind that recognise their
+files; a user's own is read by `--sensor FILE.toml`. Beside the keys of every recipe (see recipe.py) they have
 
     described-by        whose description it follows, where it was tried on made files only
-    [match]             header: patterns, each of which a cell of the heading fits; within: lines in which the heading
-                        is looked for; mark: a pattern in the heading or above it; cell: of one of its cells, groups
-                        "name" and "unit"; units: whether the line below the heading holds units; groups: whether the
-                        line above it holds what goes before the names; averaged: whether a row is the average over the
-                        distance of the stamps; starts: a pattern above the heading by which stamps begin the average
+    [match]             see recipe.MATCH
     [facts]             name → pattern with one group, looked for down to the first row; "{name}" in texts stands for it
-    [time] columns      patterns of cells (those but one may be absent; group "zone" states the zone), or numbers
-    [time] format       absent: by the stamps themselves
-    [channels.…]        column: patterns of names (the first column that fits is read), or a number; range in SI
+    [time] columns      names (those but one may be absent; a group "zone" of the pattern states the zone), or numbers
+    [time] format       a list: the first that most stamps fit, else by the stamps themselves, as where there is none
+    [channels.…]        column: a list of names (the first column with one of them is read), or a number
     unit = { in = "heading", else = "deg" }     else: where the heading states none; absent: there it is an error
+    unit = { in = "heading", whole = "mph" }    whole: the unit that the instrument counts whole, by which that of a
+                        file that states none is inferred, and confirmed by its user; `--unit` gives it
+    range               of a column whose unit is in the heading: in SI
+
+A name is the heading's, or a regular expression that fits the whole of it, case ignored.
 """
 
 from __future__ import annotations
 
+import csv
 import re
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from itertools import islice
 from typing import Any
 
-from flagdata.errors import InputError
+import numpy as np
+
+from flagdata.documents import to_toml
+from flagdata.errors import InputError, TimeError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.formats.exports import (
-    Assigned,
-    Column,
-    Export,
-    Names,
-    assign,
-    cut,
-    known_unit,
-    read_export,
-    stamp_format,
-)
+from flagdata.ingest.anemometer import recipe as recipes
+from flagdata.ingest.anemometer.instants.dates import decide
+from flagdata.ingest.anemometer.instants.stamps import parse
 from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.recipe import DELIMITERS, CheckLayout, FileLayout, TimeLayout
+from flagdata.ingest.anemometer.reading import Reading, described
+from flagdata.ingest.anemometer.recipe import DELIMITERS, OpenRecipe, Recipe
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.text.rows import cells_of_lines
+from flagdata.ingest.anemometer.table.rowclock import Given
+from flagdata.ingest.anemometer.table.sonic import with_horizontal
+from flagdata.ingest.anemometer.table.table import Table, read_table
+from flagdata.ingest.anemometer.text.rows import RowReader, cells_of_lines
 from flagdata.ingest.anemometer.text.source import TextFile
-from flagdata.recipes import Shelf, parsed
+from flagdata.recipes import Shelf
 from flagdata.schema import CHANNELS
-from flagdata.signals import Sensor
-from flagdata.units import unit
+from flagdata.timebase import NANOSECONDS
+from flagdata.units import UNITS, spelled, unit
 
 _SHELF = Shelf(folder="sensors/formats", noun="table format")
 _LINES, _LONGEST = 5000, 20_000
 """Lines by which order of dates and decimal mark are decided, and letters of a heading."""
 _FIX = "export again in m/s, km/h, mph or knots (Beaufort is a scale of classes), or describe the file by a recipe"
+_REST = re.compile(
+    r"\s+\d{1,2}:\d{2}(?P<s>:\d{2})?(?P<f>[.,]\d+)?(?P<b>\s*)(?P<p>[AaPp](?:\.?[Mm]\.?)?)?\s*(?P<z>Z|[+-]\d{2}:?\d{2})?$"
+)
+_NAMED, _WIDE = 60, 120
+"""Columns that are not read which a note names, and letters of each."""
+_WINDS = ("mph", "km/h", "m/s", "kn")
+_ENOUGH = 5
+"""Different speeds above 0 that show the unit which an instrument counts whole."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Heading:
-    """The line of names, from 0; the lines above the rows; cells and, for each, name and unit as written."""
+class Column:
+    """A column of a heading: its number from 1, its name, and its unit as written ("" where there is none)."""
+
+    number: int
+    name: str
+    unit: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Heading:
+    """The line of names, from 0; the lines above the rows; the names' cells and columns, and the units below them."""
 
     at: int
     rows: int
     delimiter: str
     cells: Sequence[str] = ()
-    names: Sequence[str] = ()
-    units: Sequence[str] = ()
+    columns: Sequence[Column] = ()
     below: Sequence[str] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Completed:
+    """A recipe that a file's heading completed.
+
+    Attributes:
+        recipe: its channels in the order of the file; columns are numbers.
+        data: its tables, as TOML has them.
+        channels: channel → the column that is read.
+        unread, rivals: columns that are not read, and further ones of wind speed or components.
+        inferred: why a unit is inferred that the file does not state; "" where none is.
+        averaged: whether a row is the average over the distance of the stamps; starts: and stamped by its beginning.
+        findings: about dates and units.
+    """
+
+    recipe: Recipe
+    data: Mapping[str, Any]
+    channels: Mapping[str, Column]
+    unread: tuple[Column, ...]
+    rivals: tuple[Column, ...]
+    inferred: str
+    averaged: bool
+    starts: bool
+    findings: tuple[Finding, ...]
 
 
 class Described:
     """A format of the catalog, by its name."""
 
-    uses = frozenset({"zone", "date_order"})
-
     def __init__(self, name: str) -> None:
         self.name = name
-        self._data = _data(name)
-        self.about: str = self._data["about"]
+        self.text, self.open = opened(name)
+        self.about: str = self.open.data["about"]
+        self.uses = frozenset({"zone", "date_order", *(["unit"] if self._whole() else [])})
 
     def recognise(self, head: Head) -> Guess | None:
         """The heading and the mark that the maker writes."""
-        found = _heading(self._data, head.lines)
+        found = _heading(self.open.data, head.lines)
         if found is None:
             return None
         reason = f"line {found.at + 1} is as in every {self.about}: {head.lines[found.at].strip()[:100]}"
@@ -88,83 +130,158 @@ class Described:
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read the rows by what the heading states."""
-        where, data = str(source.path), self._data
-        lines = source.head(_LINES)
-        heading = _heading(data, lines)
-        if heading is None:
-            raise InputError(f"no heading of a {self.about}", where=where, fix="export it again, or name another --as")
-        rows = [row for row in cells_of_lines(lines[heading.rows :], heading.delimiter) if any(map(str.strip, row))]
-        if not rows:
-            raise InputError("no rows below the heading", where=f"{where}, line {heading.at + 1}", fix="export again")
-        facts = _facts(data, lines[: heading.rows + 1])
-        time, found = _time(data["time"], heading, rows, options, f"{where}, line {heading.rows + 1}")
-        assigned, about = _assigned(data, heading, rows, facts, f"{where}, line {heading.at + 1 + bool(heading.below)}")
-        facts |= assigned.names
-        averaged = data["match"].get("averaged", True)
-        starts = data["match"].get("starts")
-        export = Export(
-            name=self.name, file=_file(data.get("file", {}), heading, assigned, rows), time=time, assigned=assigned,
-            sensor=_sensor(data["sensor"], facts), checks=_checks(data.get("check", ()), heading),
-            described_by=data.get("described-by"), averaged=averaged,
-            starts=starts is not None and re.search(starts, "\n".join(lines[: heading.at])) is not None,
-        )  # fmt: skip
-        return read_export(source, export, options).with_findings((*found, *about))
+        done = self.completed(source, options)
+        return self.finished(self.table(source, done, options).reading, done, options, where=str(source.path))
+
+    def completed(self, source: TextFile, options: WindOptions) -> Completed:
+        """What the heading of a file states."""
+        return complete(self.open, source.head(_LINES), options, where=str(source.path), named=self.named)
+
+    def named(self, heading: Heading, lines: Sequence[str]) -> Heading:
+        """The heading with the names by which the recipe knows its columns."""
+        return heading
+
+    def table(self, source: TextFile, done: Completed, options: WindOptions, extra: Sequence[str] = ()) -> Table:
+        """The rows below the heading, and further columns by their names."""
+        rows, where = RowReader(source, done.recipe.file), str(source.path)
+        return read_table(
+            rows, done.recipe, where=where, zone_name=options.zone, given=Given(clock=options.clock), extra=extra
+        )
+
+    def finished(self, reading: Reading, done: Completed, options: WindOptions, *, where: str) -> Reading:
+        """The reading with what the format states of averages, and what is reported of other columns."""
+        found = [*done.findings, *column_findings(done)]
+        if done.averaged and len(reading.time) > 1:
+            period = float(np.median(np.abs(np.diff(reading.time)))) / NANOSECONDS
+            reading = replace(reading, sensor=replace(reading.sensor, averaging=period))
+        if done.starts and reading.sensor.averaging:
+            text = f"stamps are of the beginning of averages over {reading.sensor.averaging:g} s; kept as written"
+            found.append(Finding(kind="stamps-at-start", severity=Severity.NOTE, what=text))
+        if "described-by" in self.open.data:
+            found.append(described(self.open.data["described-by"]))
+        reading = with_horizontal(reading.with_findings(tuple(found)), options.azimuth, where=where)
+        if not done.inferred:
+            return replace(reading, described=self.text)
+        return replace(reading, drafted=to_toml(done.data), understood=(self.about, done.inferred))
+
+    def _whole(self) -> bool:
+        layouts = self.open.data["channels"].values()
+        return any("whole" in layout["unit"] for layout in layouts if isinstance(layout["unit"], Mapping))
 
 
-def names(format_name: str) -> Names:
-    """The patterns by which a format of the catalog names its columns, and their channels."""
-    return tuple((_either(layout["column"]), channel) for channel, layout in _data(format_name)["channels"].items())
+def complete(
+    open_recipe: OpenRecipe, lines: Sequence[str], options: WindOptions, *, where: str, named: Any = None
+) -> Completed:
+    """Complete a recipe by the heading of a file.
+
+    Args:
+        lines: the first lines of the file.
+        options: `date_order` and `unit` count where the recipe and the heading state neither.
+        named: (heading, lines) → the heading with other names of its columns.
+
+    Raises:
+        InputError: no such heading, no rows, a column that is not there or whose unit is not known.
+        TimeError: no stamps, or nothing that decides between day and month.
+    """
+    data = open_recipe.data
+    heading = _heading(data, lines)
+    if heading is None:
+        fix = "export it again, or name another --as or --sensor"
+        raise InputError(f"no heading of a {data['about']}", where=f"{where}, line 1", fix=fix)
+    heading = named(heading, lines) if named is not None else heading
+    rows = [row for row in cells_of_lines(lines[heading.rows :], heading.delimiter) if any(map(str.strip, row))]
+    at_rows = f"{where}, line {heading.rows + 1}"
+    facts = _facts(data, lines[: heading.rows + 1])
+    stamped, zone = _stamped(data["time"], heading, facts, at_rows)
+    columns, found = _with_units(data, heading, rows, facts, stamped, options, where)
+    taken, unread, rivals = _assigned(data["channels"], columns, where=where, heading=heading)
+    if not rows:
+        raise InputError("no rows below the heading", where=at_rows, fix="export again")
+    form, about_time = _format(data["time"], stamped, heading, rows, options, at_rows)
+    time = {"columns": stamped, "format": form, **({"zone": zone} if zone else {})}
+    facts |= {channel: column.name for channel, column in taken.items()}
+    channels: dict[str, dict[str, Any]] = {}
+    for name, column in taken.items():
+        layout = dict(data["channels"][name])
+        if isinstance(layout["unit"], Mapping) and "range" in layout:
+            layout["range"] = [float(unit(column.unit).from_si(bound)) for bound in layout["range"]]
+        channels[name] = {**layout, "column": column.number, "unit": column.unit}
+    keys = data.keys() - {"match", "facts", "described-by", "check"}
+    closed: dict[str, Any] = {
+        **{key: value for key, value in data.items() if key in keys}, "time": time, "channels": channels,
+        "file": _file(data.get("file", {}), heading, [column.number - 1 for column in taken.values()], rows),
+        "sensor": _sensor(data["sensor"], facts), "check": _checks(data.get("check", ()), heading),
+    }  # fmt: skip
+    match = data.get("match", {})
+    begins = "starts" in match and re.search(match["starts"], "\n".join(lines[: heading.at])) is not None
+    return Completed(
+        recipe=recipes.of_data(closed, where=where), data=closed, channels=taken, unread=unread, rivals=rivals,
+        findings=(*about_time, *found.notes), inferred=found.inferred, averaged=match.get("averaged", True),
+        starts=begins,
+    )  # fmt: skip
 
 
 @cache
-def _data(name: str) -> dict[str, Any]:
-    found = _SHELF.named(name)
-    return parsed(found.text, where=found.where)
+def opened(name: str) -> tuple[str, OpenRecipe]:
+    """The text of a format of the catalog, and the recipe that it is."""
+    text = _SHELF.named(name).text
+    return text, recipes.parse_open(text, where=f"table format {name!r}")
 
 
-def _fits(pattern: str, cell: str) -> re.Match[str] | None:
-    return re.fullmatch(pattern, cell[:300], re.IGNORECASE)  # a heading of any length must not cost more
+def _fits(name: str, cell: str) -> re.Match[str] | None:
+    cell = cell[:300]  # a heading of any length must not cost more
+    return re.fullmatch(name, cell, re.IGNORECASE) or re.fullmatch(re.escape(name), cell, re.IGNORECASE)
 
 
-def _either(patterns: Sequence[str]) -> str:
-    return "|".join(f"(?:{pattern})" for pattern in patterns)
+def cut(line: str, delimiter: str) -> list[str]:
+    """The cells of one line of a heading, without blanks and quotes around them."""
+    if delimiter == " ":
+        return line.split()
+    return [cell.strip() for cell in next(csv.reader([line.lstrip("\ufeff")], delimiter=delimiter), [])]
 
 
-def _heading(data: Mapping[str, Any], lines: Sequence[str]) -> _Heading | None:
-    match, file = data["match"], data.get("file", {})
-    mark = match.get("mark", "")
-    if "header" not in match:
-        rows: int = file["preamble"]
-        known = len(lines) > rows and re.search(mark, lines[rows - 1])
-        return _Heading(at=rows - 1, rows=rows, delimiter=DELIMITERS[file["delimiter"]]) if known else None
-    above = [line[:_LONGEST] for line in lines[: match.get("within", 1)]]
+def _heading(data: Mapping[str, Any], lines: Sequence[str]) -> Heading | None:
+    match, file = data.get("match", {}), data.get("file", {})
+    mark, preamble = match.get("mark", ""), file.get("preamble", 0)
+    delimiter = DELIMITERS.get(file.get("delimiter", ""), file.get("delimiter"))
+    if not lines or not re.match(match.get("first-line", ""), lines[0].lstrip("\ufeff")):
+        return None
+    if file.get("header", 1) == 0:
+        known = len(lines) > preamble and re.search(mark, "\n".join(lines[:preamble]))
+        return Heading(at=max(preamble - 1, 0), rows=preamble, delimiter=delimiter or ",") if known else None
+    first = 0 if "header" in match else preamble
+    above = [line[:_LONGEST] for line in lines[: match.get("within", first + 1)]]
     if not re.search(mark, "\n".join(above)):
         return None
-    for at, line in enumerate(above):
+    for at, line in enumerate(above[first:], start=first):
         line = line.lstrip("\ufeff# ")
-        delimiter = "\t" if "\t" in line else ";" if line.count(";") > 1 or "," not in line else ","
-        cells = cut(line, delimiter)
+        used = delimiter or ("\t" if "\t" in line else ";" if line.count(";") > 1 or "," not in line else ",")
+        cells = cut(line, used)
         if match.get("groups") and at:
-            cells = _grouped(cut(above[at - 1], delimiter), cells)
-        held = all(any(_fits(one, cell) for cell in cells) for one in match["header"])
+            cells = _grouped(cut(above[at - 1], used), cells)
+        if match.get("stacked") and at:
+            used = "\t" if "\t" in line else " "
+            cells = _stacked(above[at - 1].lstrip("\ufeff"), above[at], used)
+        held = all(any(_fits(one, cell) for cell in cells) for one in match.get("header", ()))
         if held and re.search(mark, "\n".join(above[: at + 1])):
-            below = cut(lines[at + 1], delimiter) if match.get("units") and at + 1 < len(lines) else []
-            return _named(match, lines, at, delimiter, cells, below)
+            found = _named(match, lines, at, used, cells, file.get("header", 1 + bool(match.get("units"))))
+            row = lines[found.rows] if found.rows < len(lines) else ""
+            return found if re.match(match.get("row", ""), row) else None
     return None
 
 
 def _named(
-    match: Mapping[str, Any], lines: Sequence[str], at: int, delimiter: str, cells: list[str], below: list[str]
-) -> _Heading:
-    rows = at + 1 + bool(match.get("units"))
+    match: Mapping[str, Any], lines: Sequence[str], at: int, delimiter: str, cells: list[str], header: int
+) -> Heading:
+    below = cut(lines[at + 1], delimiter) if match.get("units") and at + 1 < len(lines) else []
+    rows = at + header
     while rows < len(lines) and not lines[rows].strip(f'{delimiter} "-'):
         rows += 1
     parts = [_fits(match["cell"], cell) if "cell" in match else None for cell in cells]
     stated = [*below, *[""] * len(cells)] if below else [part["unit"] or "" if part else "" for part in parts]
-    return _Heading(
-        at=at, rows=rows, delimiter=delimiter, cells=cells, units=stated, below=below,
-        names=[part["name"] or "" if part else cell for part, cell in zip(parts, cells, strict=True)],
-    )  # fmt: skip
+    names = [part["name"] or "" if part else cell for part, cell in zip(parts, cells, strict=True)]
+    columns = [Column(number=i + 1, name=name, unit=stated[i]) for i, name in enumerate(names)]
+    return Heading(at=at, rows=rows, delimiter=delimiter, cells=cells, columns=columns, below=below)
 
 
 def _grouped(above: Sequence[str], cells: Sequence[str]) -> list[str]:
@@ -176,125 +293,276 @@ def _grouped(above: Sequence[str], cells: Sequence[str]) -> list[str]:
     return joined
 
 
+def _stacked(upper: str, lower: str, delimiter: str) -> list[str]:
+    """Names whose first word stands in the line above: in the same cell, or over one of the letters."""
+    if delimiter != " ":
+        first, second = cut(upper, delimiter), cut(lower, delimiter)
+        return [f"{first[at] if at < len(first) else ''} {cell}".strip() for at, cell in enumerate(second)]
+    words = [(match.start(), match.end(), match[0]) for match in re.finditer(r"\S+", upper)]
+    return [
+        " ".join([*(word for start, end, word in words if start < one.end() and end > one.start()), one[0]])
+        for one in re.finditer(r"\S+", lower)
+    ]
+
+
 def _facts(data: Mapping[str, Any], lines: Sequence[str]) -> defaultdict[str, str]:
     text = "\n".join(lines).lstrip("\ufeff")
     found = ((name, re.search(pattern, text, re.MULTILINE)) for name, pattern in data.get("facts", {}).items())
     return defaultdict(str, {name: match[1].strip() for name, match in found if match})
 
 
-def _file(file: Mapping[str, Any], heading: _Heading, assigned: Assigned, rows: Sequence[Sequence[str]]) -> FileLayout:
-    read = [int(layout.column) - 1 for layout in assigned.channels.values()]
+def _file(
+    file: Mapping[str, Any], heading: Heading, read: Sequence[int], rows: Sequence[Sequence[str]]
+) -> dict[str, Any]:
     commas = heading.delimiter != "," and any("," in row[at] for row in rows for at in read if at < len(row))
     # A line of units that names columns of its own leaves the heading no right count of cells.
-    named = bool(heading.cells) and not any(heading.below[len(heading.cells) :])
-    return FileLayout(
-        delimiter=heading.delimiter, decimal="," if commas else ".", preamble=heading.at if named else heading.rows,
-        header=heading.rows - heading.at if named else 0, missing=tuple(file.get("missing", ())),
-    )  # fmt: skip
+    named = bool(heading.cells) and not any(heading.below[len(heading.cells) :]) and heading.delimiter != " "
+    return {
+        "decimal": "," if commas else ".", **file, "delimiter": heading.delimiter,
+        "preamble": heading.at if named else heading.rows, "header": heading.rows - heading.at if named else 0,
+    }  # fmt: skip
 
 
-def _time(
-    time: Mapping[str, Any], heading: _Heading, rows: Sequence[Sequence[str]], options: WindOptions, where: str
-) -> tuple[TimeLayout, tuple[Finding, ...]]:
+def _stamped(
+    time: Mapping[str, Any], heading: Heading, facts: Mapping[str, str], where: str
+) -> tuple[list[int], str | None]:
+    """The numbers of the columns of time, and the zone that the recipe or the file states."""
     columns: list[int] = []
-    zone = time.get("zone")
+    zone: str | None = time.get("zone", "").format_map(facts) or None
     for wanted in time["columns"]:
-        cells = enumerate(heading.cells, start=1)
-        found = (
-            (wanted, None) if isinstance(wanted, int)
-            else next(((at, match) for at, cell in cells if (match := _fits(wanted, cell))), None)
-        )  # fmt: skip
-        if found is not None:
-            columns.append(found[0])
-            zone = (found[1].groupdict().get("zone") if found[1] else None) or zone
-    if "format" in time:
-        return TimeLayout(columns=tuple(columns), format=time["format"], zone=zone), ()
+        if isinstance(wanted, int):
+            columns.append(wanted)
+            continue
+        fits = ((at, match) for at, cell in enumerate(heading.cells, start=1) if (match := _fits(wanted, cell)))
+        for at, match in islice(fits, 1):
+            columns.append(at)
+            zone = match.groupdict().get("zone") or zone
+    if not columns:
+        fix = f"its columns are {', '.join(heading.cells)[:_LONGEST]}"
+        raise InputError(f"no column is called {' or '.join(time['columns'])}", where=where, fix=fix)
+    return columns, zone
+
+
+def _format(
+    time: Mapping[str, Any], columns: Sequence[int], heading: Heading, rows: Sequence[Sequence[str]],
+    options: WindOptions, where: str,
+) -> tuple[str, tuple[Finding, ...]]:  # fmt: skip
+    """The format of stamps: the recipe's, the first of its formats that most fit, or that of the stamps themselves."""
+    forms = time.get("format", [])
+    if isinstance(forms, str):
+        return forms, ()
     texts = [" ".join(row[at - 1].strip() for at in columns) for row in rows if len(row) >= max(columns)]
-    form, order = stamp_format(texts, options, where)
-    claim = heading.below[columns[0] - 1] if heading.below else ""
-    if claim.upper().startswith("YYYY"):
-        order = tuple(
-            replace(one, severity=Severity.WARNING, what=f"{one.what}; the heading says {claim!r}") for one in order
-        )
-    return TimeLayout(columns=tuple(columns), format=form, zone=zone), order
+    if options.date_order is None:
+        for form in forms:
+            if 2 * int(parse(texts, form).valid.sum()) >= max(1, len(texts)):
+                return form, ()
+    return stamp_format(texts, options, where, claim=heading.below[columns[0] - 1] if heading.below else "")
 
 
-def _assigned(
-    data: Mapping[str, Any], heading: _Heading, rows: Sequence[Sequence[str]], facts: Mapping[str, str], where: str
-) -> tuple[Assigned, list[Finding]]:
-    """The columns that are read, and what was found about their units."""
+def stamp_format(
+    texts: Sequence[str], options: WindOptions, where: str, *, claim: str = ""
+) -> tuple[str, tuple[Finding, ...]]:
+    """The format of stamps (see stamps.py) by the stamps themselves, and what was found about the order of dates.
+
+    Args:
+        texts: stamps of the first rows, date before time.
+        claim: what the heading says of them.
+
+    Raises:
+        TimeError: no date and time in them, or nothing that decides between day and month.
+    """
+    filled = [text.strip() for text in texts if text.strip()]
+    decision = decide(filled, given=options.date_order, where=where)
+    found = [match for text in filled if (match := _REST.search(text))]
+    rest = next(iter(found), None)
+    if rest is None:
+        first = filled[0] if filled else ""
+        raise TimeError(f"no time of day in {first!r}", where=where, fix="export date and time")
+    clock = ("%I" if rest["p"] else "%H") + ":%M" + (":%S" if rest["s"] else "")
+    clock += "%f" if any(match["f"] for match in found) else ""  # some loggers drop zeros at the end
+    half = f"{' ' if rest['b'] else ''}%p" if rest["p"] else ""
+    form = f"{decision.directives()} {clock}{half}{'%z' if rest['z'] else ''}"
+    if decision.order == "ymd":
+        return form, ()
+    other = claim.upper().startswith("YYYY")
+    text = f"dates are read as {decision.order}: {decision.reason}" + (f"; the heading says {claim!r}" if other else "")
+    return form, (Finding(kind="date-order", severity=Severity.WARNING if other else Severity.NOTE, what=text),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Units:
+    """What was found about units: notes, and why one is inferred."""
+
+    notes: tuple[Finding, ...]
+    inferred: str = ""
+
+
+def _known(text: str) -> str | None:
+    """The unit that an export spells as `text`; `None` where it is not known. Inches are of mercury here."""
+    bare = re.sub(r"^\s*[\[(](.*)[\])]\s*$", r"\1", text).strip()
+    return "inHg" if bare.lower() in ("in", "inches") else spelled(bare)
+
+
+def _channel(channels: Mapping[str, Mapping[str, Any]], column: Column) -> str | None:
+    """The channel of a column by its name, or its number where the recipe gives one."""
+    for name, layout in channels.items():
+        wanted = layout["column"]
+        names = wanted if isinstance(wanted, list) else [wanted]
+        if column.number in names or any(isinstance(one, str) and _fits(one, column.name) for one in names):
+            return name
+    return None
+
+
+def _with_units(
+    data: Mapping[str, Any], heading: Heading, rows: Sequence[Sequence[str]], facts: Mapping[str, str],
+    stamped: Iterable[int], options: WindOptions, where: str,
+) -> tuple[list[Column], _Units]:  # fmt: skip
+    """The columns but those of time, with the units that they are read in."""
     channels: Mapping[str, Mapping[str, Any]] = data["channels"]
     if not heading.cells:
         columns = [Column(number=one["column"], name=name, unit=one["unit"]) for name, one in channels.items()]
-        return assign(columns, [(name, name) for name in channels], where=where, fix=_FIX), []
-    stamped = [at for at, cell in enumerate(heading.cells) if any(_fits(one, cell) for one in data["time"]["columns"])]
-    always = [f"{at + 1}={heading.cells[at]}" for at in stamped]
-    columns: list[Column] = []
-    strange: list[str] = []
-    repaired: list[str] = []
-    borrowed = ""
-    for at, (name, written) in enumerate(zip(heading.names, heading.units, strict=False)):
-        channel = next((c for c, one in channels.items() if _fits(_either(one["column"]), name)), None)
-        if at in stamped or channel is None:
-            columns.extend([] if at in stamped else [Column(number=at + 1, name=name, unit=written)])
+        return columns, _Units(notes=())
+    columns, always = [], [f"{at}={heading.cells[at - 1]}" for at in stamped]
+    strange, repaired, borrowed, inferred = [], [], "", ""
+    for column in heading.columns:
+        channel = _channel(channels, column)
+        if column.number in stamped or channel is None:
+            columns.extend([] if column.number in stamped else [column])
             continue
         stated: str | Mapping[str, str] = channels[channel]["unit"]
         if isinstance(stated, str):
-            columns.append(Column(number=at + 1, name=name, unit=stated))
+            columns.append(replace(column, unit=stated))
             continue
-        other = stated.get("else", "")
-        spelled, bare = written, written.encode("ascii", "ignore").decode().strip()
-        if known_unit(written) is None and bare != written and (known_unit(bare) or not bare):
-            spelled = bare or other
-            repaired.append(f"{name}: {written!r} is read as {known_unit(spelled)}")
-        spelled = spelled or other.format_map(facts)
-        if other == spelled == "points" and not any(
-            any(map(str.isalpha, cell)) for row in rows for cell in row[at : at + 1]
-        ):
-            spelled = "deg"
-        borrowed = borrowed or (spelled if not written and "{" in other else "")
+        cells = [row[column.number - 1] for row in rows if len(row) >= column.number]
+        other, written = stated.get("else", ""), column.unit
+        text, bare = written, written.encode("ascii", "ignore").decode().strip()
+        if _known(written) is None and bare != written and (_known(bare) or not bare):
+            text = bare or other
+            repaired.append(f"{column.name}: {written!r} is read as {_known(text)}")
+        text = text or other.format_map(facts)
+        if other == text == "points" and not any(any(map(str.isalpha, cell)) for cell in cells):
+            text = "deg"
+        if not text and "whole" in stated:
+            others = [one.number - 1 for one in heading.columns if "speed" in one.name.lower()]
+            speeds = [row[at] for row in rows for at in others if at < len(row)]
+            shown = _whole(cells, stated["whole"]) or _whole(speeds, stated["whole"])
+            text = options.unit or shown or ""
+            if not text:
+                what = f"the file states no unit of {column.name!r}, and its values do not show one"
+                fix = "give the one that was set: --unit m/s (or km/h, mph, kn)"
+                raise InputError(what, where=f"{where}, line {heading.at + 1}", fix=fix)
+            if options.unit is None:
+                inferred = f"{column.name!r} in {text}: inferred, its values are whole {stated['whole']} converted"
+        borrowed = borrowed or (text if not written and "{" in other else "")
         if other and heading.below:
-            always.append(f"{at + 1}={channel}[{other}]")
-            known = known_unit(spelled)
-            strange.extend([] if known and unit(known).si == CHANNELS[channel].unit else [f"{name} in {written}"])
-        columns.append(Column(number=at + 1, name=name, unit=spelled))
+            always.append(f"{column.number}={channel}[{other}]")
+            known = _known(text)
+            right = known is not None and unit(known).si == CHANNELS[channel].unit
+            strange.extend([] if right else [f"{column.name} in {written}"])
+        columns.append(replace(column, unit=text))
     short = len(heading.cells) - len(heading.below)
     if strange and (short > 0 or any("wind" in one for one in strange)):
         fewer = f", {short} fewer of them," if short > 0 else ""
         what = f"the units{fewer} do not stand below their names: {', '.join(strange[:3])}"
         fix = f'mend the line of units; or, since they are the same in every such file: --columns "{",".join(always)}"'
-        raise InputError(what, where=where, fix=fix)
-    assigned = assign(columns, names(data["name"]), where=where, fix=_FIX)
-    layouts = dict(assigned.channels)
-    for channel in {name for name, one in channels.items() if "range" in one} & layouts.keys():
-        low, high = (float(unit(layouts[channel].unit).from_si(bound)) for bound in channels[channel]["range"])
-        layouts[channel] = replace(layouts[channel], range=(low, high))
-    found: list[Finding] = []
+        raise InputError(what, where=f"{where}, line {heading.at + 2}", fix=fix)
+    notes: list[Finding] = []
     if borrowed:
         what = f"speeds carry no unit: taken to be in {borrowed}, which is stated above the heading"
-        found.append(Finding(kind="unit-from-preamble", severity=Severity.WARNING, what=what))
+        notes.append(Finding(kind="unit-from-preamble", severity=Severity.WARNING, what=what))
     if repaired:
         text = "; ".join(repaired)
-        found.append(Finding(kind="units-repaired", severity=Severity.NOTE, count=len(repaired), what=text))
-    return replace(assigned, channels=layouts), found
+        notes.append(Finding(kind="units-repaired", severity=Severity.NOTE, count=len(repaired), what=text))
+    return columns, _Units(notes=tuple(notes), inferred=inferred)
 
 
-def _sensor(sensor: Mapping[str, Any], facts: Mapping[str, str]) -> Sensor:
+def _whole(cells: Iterable[str], counted: str) -> str | None:
+    """The unit in which all speeds are whole ones of `counted`, to one decimal; `None` unless there is just one."""
+    texts = {cell.strip().replace(",", ".") for cell in cells}
+    speeds = {float(text) for text in texts if re.fullmatch(r"\d{1,3}(\.\d)?", text)} - {0.0}
+    steps = {name: UNITS[counted].scale / UNITS[name].scale for name in _WINDS}
+    fits = [
+        name for name, step in steps.items()
+        if all(abs(round(round(speed / step) * step, 1) - speed) < 0.01 for speed in speeds)
+    ]  # fmt: skip
+    return fits[0] if len(speeds) >= _ENOUGH and len(fits) == 1 else None
+
+
+def _assigned(
+    channels: Mapping[str, Mapping[str, Any]], columns: Sequence[Column], *, where: str, heading: Heading
+) -> tuple[dict[str, Column], tuple[Column, ...], tuple[Column, ...]]:
+    """The column of each channel, those that are not read, and further ones of speed.
+
+    Raises:
+        InputError: a column that the recipe needs is not there, or its unit is not known.
+    """
+    taken: dict[str, Column] = {}
+    unread: list[Column] = []
+    rivals: list[Column] = []
+    at_names, at_units = (f"{where}, line {heading.at + 1 + below}" for below in (0, bool(heading.below)))
+    for column in columns:
+        channel = column.name if not heading.cells else _channel(channels, column)
+        if channel is None or channel in taken:
+            rival = channel is not None and channel.startswith("wind_") and CHANNELS[channel].unit == "m/s"
+            (rivals if rival else unread).extend([column] if column.name else [])
+            continue
+        name = _known(column.unit)
+        if name is None or unit(name).si != CHANNELS[channel].unit:
+            if channel.startswith("wind_") or not channels[channel].get("optional"):
+                what = f"{column.name!r} is {channel}, but its unit is {column.unit!r}"
+                raise InputError(what, where=at_units, fix=_FIX)
+            unread.append(column)
+            continue
+        taken[channel] = replace(column, unit=name)
+    listed = ", ".join(column.name for column in columns[:40] if column.name)
+    for channel in channels:
+        if channel not in taken and not channels[channel].get("optional"):
+            what = f"no column of {channel.replace('_', ' ')} among {listed}"
+            raise InputError(what, where=at_names, fix=f"{_FIX}; or let its columns be drafted: --as delimited")
+    if not {name for name in taken if name.startswith("wind_") and CHANNELS[name].unit == "m/s"}:
+        fix = "let its columns be drafted, and confirm them: --as delimited; or describe the file by a recipe"
+        raise InputError(f"no column of wind speed among {listed}", where=at_names, fix=fix)
+    return taken, tuple(unread), tuple(rivals)
+
+
+def _sensor(sensor: Mapping[str, Any], facts: Mapping[str, str]) -> dict[str, Any]:
+    """The sensor's keys with facts in their texts; a height that the file does not state is left out."""
     texts = {key: value.format_map(facts).strip() for key, value in sensor.items() if isinstance(value, str)}
-    numbers = {key.replace("-", "_"): value for key, value in sensor.items() if key not in texts}
-    height = float(texts["height"]) if texts.get("height") else None
-    return Sensor(name=texts["name"], **({"height": height} if height else {}), **numbers)
+    height = {"height": float(texts.pop("height"))} if texts.get("height") else {}
+    return {**sensor, **{key: value for key, value in texts.items() if key != "height"}, **height}
 
 
-def _checks(checks: Sequence[Mapping[str, Any]], heading: _Heading) -> tuple[CheckLayout, ...]:
+def _checks(checks: Sequence[Mapping[str, Any]], heading: Heading) -> list[dict[str, Any]]:
     """The checks of columns that the file has."""
-    found: list[CheckLayout] = []
+    found: list[dict[str, Any]] = []
     for one in checks:
         column = one["column"]
-        if column in heading.cells:
-            column = heading.cells.index(column) + 1
-        if isinstance(column, int):
-            found.append(CheckLayout(column=column, values=tuple(one["values"]), about=one["about"]))
+        column = heading.cells.index(column) + 1 if column in heading.cells else column
+        found.extend([{**one, "column": column}] if isinstance(column, int) else [])
+    return found
+
+
+def column_findings(done: Completed) -> tuple[Finding, ...]:
+    """What is to be said of the columns that are not read, anemometers first."""
+    found: list[Finding] = []
+    if done.rivals:
+        used = next(done.channels[name].name for name in ("wind_speed", "wind_x") if name in done.channels)
+        found.append(
+            Finding(
+                kind="several-anemometers", severity=Severity.WARNING, count=len(done.rivals),
+                what=f"wind is read from {used!r}, the first of {len(done.rivals) + 1} columns of wind; not from "
+                f"{', '.join(column.name for column in done.rivals)}",
+                fix="to read the others, too, ingest the file with --as delimited, which asks for what the headings do "
+                "not state (such as --unit); where it does not read them, describe the file by a recipe that names "
+                "the column",
+            )
+        )  # fmt: skip
+    if done.unread:
+        # Columns that speak of the wind come first, so that none of them is lost among a hundred others.
+        names = sorted((column.name for column in done.unread), key=lambda name: "wind" not in name.lower())
+        more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+        what = ", ".join(name[:_WIDE] for name in names[:_NAMED]) + more
+        found.append(Finding(kind="columns-not-read", severity=Severity.NOTE, count=len(names), what=what))
     return tuple(found)
 
 
@@ -307,5 +575,6 @@ Icos = partial(Described, "icos")
 IcosEcosystem = partial(Described, "icos-ecosystem")
 Kestrel = partial(Described, "kestrel")
 Surfrad = partial(Described, "surfrad")
+WeatherLink = partial(Described, "weatherlink")
 Windographer = partial(Described, "windographer")
 Zentra = partial(Described, "zentra")

@@ -53,7 +53,7 @@ class HostStamped:
         most = 0.0
         for name in recipes.SENSORS.names():
             recipe = recipes.load(name)
-            if not recipe.file.host:
+            if not isinstance(recipe, Recipe) or not recipe.file.host:
                 continue
             share = sum(_in_range(recipe, line) for line in lines) / len(lines)
             if share > max(LEAST, most):
@@ -79,7 +79,7 @@ class HostStamped:
                 "the format host-stamped needs a recipe", where=str(source.path), fix="name one by --recipe"
             )
         recipe = recipes.load(options.recipe)
-        if not recipe.file.host:
+        if not isinstance(recipe, Recipe) or not recipe.file.host:
             raise UsageError(
                 f"the recipe {recipe.name} says nothing of a host's stamp", where=str(source.path),
                 fix="add host = \"iso\" to its [file], or use --as delimited",

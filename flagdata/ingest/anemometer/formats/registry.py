@@ -60,6 +60,7 @@ FORMATS = Registry(
         "vaisala": "flagdata.ingest.anemometer.formats.vaisala:Vaisala",
         "young": "flagdata.ingest.anemometer.formats.young:Young",
         "nrg": "flagdata.ingest.anemometer.formats.nrg:Nrg",
+        "weatherlink": "flagdata.ingest.anemometer.formats.described:WeatherLink",
         "windographer": "flagdata.ingest.anemometer.formats.described:Windographer",
         "zentra": "flagdata.ingest.anemometer.formats.described:Zentra",
         "host-stamped": "flagdata.ingest.anemometer.formats.host:HostStamped",

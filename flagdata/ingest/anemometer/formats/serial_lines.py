@@ -22,11 +22,10 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.formats.exports import described
 from flagdata.ingest.anemometer.instants.month_names import ENGLISH
 from flagdata.ingest.anemometer.instants.stamps import Stamps
 from flagdata.ingest.anemometer.instants.stamps import parse as parse_stamps
-from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.reading import Reading, described
 from flagdata.ingest.anemometer.samples import possible
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.table.rowclock import instants

@@ -14,9 +14,10 @@ from flagdata.ingest.anemometer.draft.doubts import doubts
 from flagdata.ingest.anemometer.draft.drafting import Draft, draft
 from flagdata.ingest.anemometer.draft.questions import Open, OpenFactsError
 from flagdata.ingest.anemometer.draft.words import meaning
+from flagdata.ingest.anemometer.formats.described import column_findings, complete
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
-from flagdata.ingest.anemometer.recipe import Recipe
+from flagdata.ingest.anemometer.recipe import OpenRecipe, Recipe
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
 from flagdata.ingest.anemometer.table.by_recipe import read_by_recipe
 from flagdata.ingest.anemometer.text.source import TextFile
@@ -39,7 +40,8 @@ class Delimited:
         """The recipe of the catalog whose columns the header names; the one with most columns in common."""
         best: Guess | None = None
         for name in recipes.SENSORS.names():
-            found = _match(recipes.load(name), name, head)
+            recipe = recipes.load(name)
+            found = _match(recipe, name, head) if isinstance(recipe, Recipe) else None
             if found and (best is None or found.score > best.score):
                 best = found
         return best
@@ -55,6 +57,10 @@ class Delimited:
                 f"the recipe says for itself: {', '.join(strange)}", where=where, fix="leave it out, or edit the recipe"
             )
         recipe = recipes.load(options.recipe)
+        if isinstance(recipe, OpenRecipe):
+            done = complete(recipe, source.head(HEAD_LINES), options, where=where)
+            reading = read_by_recipe(source, done.recipe, options, azimuth=options.azimuth)
+            return reading.with_findings((*done.findings, *column_findings(done)))
         if recipe.file.host:
             raise UsageError(
                 f"the recipe {recipe.name} is for host-stamped lines", where=where, fix="use --as host-stamped"

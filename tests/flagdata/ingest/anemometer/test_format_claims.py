@@ -39,6 +39,8 @@ SAMPLES = {
     "windographer": "Created 1-5-2026 by Windographer 5\n\nDate/Time\tSpd80m [m/s]\n2026-05-01 12:00\t5\n",
     "zentra": "z6-1,Port1,\n# Records: 2,ATMOS 22,\nTimestamps,m/s Wind Speed,° Wind Direction\n5/13/2026 12:00,3,90\n",
     "davis": '"Date & Time","Avg Wind Speed - km/h"\n"5/13/26 12:05 AM","18.0"\n',
+    "weatherlink": "\t\tWind\tWind\nDate\tTime\tSpeed\tDir\n"
+    + "".join(f"25/05/26\t10:3{i}a\t{speed}\tN\n" for i, speed in enumerate((1, 2, 3, 5, 8, 9))),
     "ecowitt": "Time,Outdoor Temperature(℃),Wind(m/s),Gust(m/s),Wind Direction(deg)\n2026-05-01 12:00,20,3,4,90\n",
     "hobo": '"Plot Title: x"\n"#","Date Time, GMT+00:00","Wind Speed, m/s (LGR S/N: 1)"\n1,07/15/26 12:00:00 PM,3\n',
     "eddypro": "filename,date,time,wind_speed,wind_dir\n,[yyyy-mm-dd],[HH:MM],[m+1s-1],[deg_from_north]\n"

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.errors import FlagdataError, InputError, TimeError
+from flagdata.errors import InputError, TimeError
 from flagdata.ingest.anemometer import WindOptions, anemometers
+from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
 from flagdata.timebase import iso
@@ -160,20 +161,47 @@ def test_a_toa5_table_whose_dates_could_be_either_order_is_refused_unless_told(r
     assert first(read(text, zone="UTC", date_order="mdy")) == "2026-09-01T12:00:00Z"
 
 
-WEATHERLINK = (
-    "\t\tTemp\tWind\tWind\nDate\tTime\tOut\tSpeed\tDir\n"
-    "25/05/26\t10:30a\t20.1\t2\tNNE\n25/05/26\t11:30a\t20.1\t3\tN\n25/05/26\t1:30p\t20.1\t5\t---\n"
-)
+def weatherlink(speeds: Sequence[float], *, blanks: bool = False, wind_above_dir: bool = True) -> str:
+    upper = ["", "", "Temp", "Hi", "Wind", "Wind" if wind_above_dir else "", "Hi", "Hi"]
+    lower = ["Date", "Time", "Out", "Temp", "Speed", "Dir", "Speed", "Dir"]
+    rows = [
+        [f"{25 + at // 3}/05/26", f"1{at % 3}:30{'ap'[at % 3 // 2]}", "20.1", "21", f"{speed:g}", "NNE", "9", "N"]
+        for at, speed in enumerate(speeds)
+    ]
+    if blanks:
+        padded = ["".join(f"{cell:>9}" for cell in row) for row in (upper, lower, *rows)]
+        return "\n".join([*padded[:2], "-" * 72, *padded[2:], ""])
+    return "\n".join("\t".join(row) for row in (upper, lower, *rows)) + "\n"
 
 
-def test_the_text_of_the_program_weatherlink_states_no_unit_and_is_read_by_what_its_user_gives(read: Read) -> None:
-    with pytest.raises(FlagdataError, match="unit of 'Speed'"):
-        read(WEATHERLINK, zone="UTC")
-    columns = "1=date[%d/%m/%y],2=time[%I:%M%p],4=wind_speed[mph],5=wind_direction[points]"
-    log = read(WEATHERLINK, zone="UTC", columns=columns)
-    assert (first(log), iso(int(log.series.time[2]))) == ("2026-05-25T10:30:00Z", "2026-05-25T13:30:00Z")
-    assert log.series.channels["wind_speed"].tolist() == pytest.approx([2 * 0.44704, 3 * 0.44704, 5 * 0.44704])
-    assert log.series.channels["wind_direction"][0] == pytest.approx(np.radians(22.5))
+MILES = (1, 2, 3, 5, 8, 9)
+"""Speeds in the whole miles per hour that a console keeps."""
+
+
+@pytest.mark.parametrize("layout", [{}, {"blanks": True}, {"blanks": True, "wind_above_dir": False}])
+@pytest.mark.parametrize(("unit", "scale"), [("mph", 1.0), ("km/h", 1.609344), ("m/s", 0.44704)])
+def test_the_unit_of_weatherlinks_print_shows_in_whole_miles_and_is_to_be_confirmed(
+    read: Read, unit: str, scale: float, layout: dict[str, bool]
+) -> None:
+    log = read(weatherlink([round(speed * scale, 1) for speed in MILES], **layout), zone="UTC")
+    assert (log.format, first(log), iso(int(log.series.time[2]))) == (
+        "weatherlink", "2026-05-25T10:30:00Z", "2026-05-25T12:30:00Z",
+    )  # fmt: skip
+    assert log.series.channels["wind_speed"] == pytest.approx(np.array(MILES) * 0.44704, abs=0.05)
+    assert log.series.channels["wind_direction"] == pytest.approx([np.radians(22.5)] * 6)
+    assert log.drafted
+    assert not log.stated
+    assert f"in {unit}" in log.reasons[1]
+    assert recipes.parse(log.drafted, where="the draft").channels["wind_speed"].unit == unit
+
+
+def test_a_unit_that_the_user_gives_of_weatherlinks_print_needs_no_confirmation(read: Read) -> None:
+    given = read(weatherlink((1.6, 3.2, 4.8)), zone="UTC", unit="km/h")
+    assert given.series.channels["wind_speed"] == pytest.approx(np.array([1.6, 3.2, 4.8]) / 3.6)
+    assert not given.drafted
+    with pytest.raises(InputError, match="states no unit of 'Wind Speed'") as caught:
+        read(weatherlink((1.6, 3.2, 4.8)), zone="UTC")
+    assert "--unit" in (caught.value.fix or "")
 
 
 def test_weatherlink_com_names_its_units(read: Read) -> None:
@@ -388,3 +416,5 @@ def test_icos_ecosystem_raw_files_have_one_stamp_and_fixed_units(read: Read) -> 
     assert log.format == "icos-ecosystem"
     assert log.series.channels["wind_speed"].tolist() == [4.2, 4.4]
     assert log.series.sensor.averaging is None
+    minutes = read("TIMESTAMP,WS_1_1_1\n" + "".join(f"2026050112{at:02d},{at}.5\n" for at in range(5)), zone="UTC")
+    assert np.diff(minutes.series.time).tolist() == [60_000_000_000] * 4

@@ -30,7 +30,7 @@ def kestrel_day(day: int, speed: str = "2.5") -> str:
 
 
 REFUSED = [
-    pytest.param({"content": kestrel(), "error": InputError, "where": "line 4", "says": "no rows"}, id="no-rows"),
+    pytest.param({"content": kestrel(), "error": InputError, "where": "line 6", "says": "no rows"}, id="no-rows"),
     pytest.param(
         {"content": kestrel(kestrel_day(13), kestrel_day(14)), "error": TimeError, "says": "--zone"}, id="no-zone"
     ),
