@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
 
 import pyarrow.compute as pc
 
@@ -13,15 +12,13 @@ from flagdata.lake.durable import disk_errors
 from flagdata.lake.leases import collecting
 from flagdata.lake.lineage import noted_view
 from flagdata.lake.refs import MAIN, View, as_json
+from flagdata.lake.store import Store
 from flagdata.lake.withdrawal import take_off
-
-if TYPE_CHECKING:
-    from flagdata.lake.lake import Lake
 
 _NOUNS = {"tags": "tag", "branches": "branch"}
 
 
-def delete(lake: Lake, kind: str, name: str, message: str | None, *, discard: bool) -> int:
+def delete(lake: Store, kind: str, name: str, message: str | None, *, discard: bool) -> int:
     """See `Lake.delete_tag` and `Lake.delete_branch`.
 
     Args:
@@ -56,7 +53,7 @@ def delete(lake: Lake, kind: str, name: str, message: str | None, *, discard: bo
     return version
 
 
-def _check_elsewhere(lake: Lake, noun: str, name: str, shown: set[str]) -> None:
+def _check_elsewhere(lake: Store, noun: str, name: str, shown: set[str]) -> None:
     """Whether other refs show all rows, too.
 
     Raises:
@@ -73,7 +70,7 @@ def _check_elsewhere(lake: Lake, noun: str, name: str, shown: set[str]) -> None:
         )
 
 
-def check_reuse(lake: Lake, name: str, view: View) -> None:
+def check_reuse(lake: Store, name: str, view: View) -> None:
     """Whether a tag may have a name: one that was published and deleted never shows anything else.
 
     Raises:
@@ -88,5 +85,5 @@ def check_reuse(lake: Lake, name: str, view: View) -> None:
             )
 
 
-def _shown(lake: Lake, view: View) -> set[str]:
+def _shown(lake: Store, view: View) -> set[str]:
     return set(lake.table(view)["artifact"].to_pylist())

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
@@ -16,10 +15,8 @@ from flagdata.findings import Finding, Severity
 from flagdata.lake.lineage import noted_hidden, noted_view
 from flagdata.lake.log import LogGapError
 from flagdata.lake.refs import MAIN, Slice
+from flagdata.lake.store import Store
 from flagdata.provenance import file_hash
-
-if TYPE_CHECKING:
-    from flagdata.lake.lake import Lake
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +35,7 @@ class Marked:
     findings: tuple[Finding, ...]
 
 
-def mark(lake: Lake, *, grace: timedelta) -> Marked:
+def mark(lake: Store, *, grace: timedelta) -> Marked:
     """Read every ref, and what was shown before each withdrawal and deletion younger than `grace`."""
     refs: dict[str, pa.Table] = {}
     recent: list[pa.Table] = []
@@ -67,7 +64,7 @@ def mark(lake: Lake, *, grace: timedelta) -> Marked:
     return Marked(refs=refs, objects=frozenset(objects), findings=tuple(findings))
 
 
-def catalog_files(lake: Lake) -> tuple[Finding, ...]:
+def catalog_files(lake: Store) -> tuple[Finding, ...]:
     """Re-hash the files of the catalog, of all its versions: an error for each that is missing or has changed, a note
     on how many were written before hashes were noted."""
     try:
@@ -125,7 +122,7 @@ def _lost(head: pa.Table, known: list[str]) -> list[Finding]:
     ]
 
 
-def _withdrawn(lake: Lake, *, since: datetime) -> Iterator[pa.Table]:
+def _withdrawn(lake: Store, *, since: datetime) -> Iterator[pa.Table]:
     limit = since.timestamp() * 1000
     for entry in lake.catalog.history():
         if entry["timestamp"] < limit:

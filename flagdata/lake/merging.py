@@ -12,7 +12,6 @@ import secrets
 from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
@@ -23,12 +22,10 @@ from flagdata.lake.leases import keeping_collectors_out
 from flagdata.lake.matching import matching
 from flagdata.lake.refs import Slice
 from flagdata.lake.removals import removals
+from flagdata.lake.store import Store
 from flagdata.lake.withdrawal import take_off
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
-
-if TYPE_CHECKING:
-    from flagdata.lake.lake import Lake
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +51,7 @@ class MergeResult:
     brought_back: dict[str, int]
 
 
-def merge(lake: Lake, branch: str, message: str, *, into: str) -> MergeResult:
+def merge(lake: Store, branch: str, message: str, *, into: str) -> MergeResult:
     """See `Lake.merge`."""
     if not message.strip():
         raise UsageError("the commit has no message", fix="say in a few words what it brings in")
@@ -65,7 +62,7 @@ def merge(lake: Lake, branch: str, message: str, *, into: str) -> MergeResult:
         return persist(lambda: _attempt(lake, branch, message, into), where=lake.catalog.path)
 
 
-def _attempt(lake: Lake, branch: str, message: str, into: str) -> MergeResult:
+def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:
     head = lake.catalog.head()
     mine, other = (lake.table(lake.refs.view(name, head)) for name in (into, branch))
     ours, theirs = Slice(branch=into, version=head), Slice(branch=branch, version=head)
@@ -116,7 +113,7 @@ def _published(rows: pa.Table, branch: str) -> pa.Table:
 
 
 def _decided(
-    lake: Lake, ours: Slice, theirs: Slice, candidates: frozenset[str], *, since: int
+    lake: Store, ours: Slice, theirs: Slice, candidates: frozenset[str], *, since: int
 ) -> tuple[dict[str, int], dict[str, int]]:
     """Of new rows of the branch that ours withdrew after `since`: those that stay withdrawn, since the branch had them
     when that was done, and those that are newer. Each with the version that withdrew it last."""
@@ -136,7 +133,7 @@ def _decided(
     return left_out, brought_back
 
 
-def _check_objects(lake: Lake, rows: pa.Table) -> None:
+def _check_objects(lake: Store, rows: pa.Table) -> None:
     for name in sorted(set(rows["object"].drop_null().to_pylist())):
         lake.objects.existing(name)
 

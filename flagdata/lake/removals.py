@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import TYPE_CHECKING
 
 from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.lake.lineage import noted_hidden
 from flagdata.lake.marking import mark
 from flagdata.lake.refs import MAIN
-
-if TYPE_CHECKING:
-    from flagdata.lake.lake import Lake
+from flagdata.lake.store import Store
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +30,7 @@ class Removal:
     objects: dict[str, str]
 
 
-def removals(lake: Lake, *, since: int = -1, branch: str | None = None) -> Iterator[Removal]:
+def removals(lake: Store, *, since: int = -1, branch: str | None = None) -> Iterator[Removal]:
     """Those after the version `since`, of one branch or of all, newest first; each is read when it is asked for."""
     for entry in lake.catalog.history():
         if "withdrawn" in entry and entry["version"] > since and branch in (None, entry.get("branch")):
@@ -50,7 +47,7 @@ def removals(lake: Lake, *, since: int = -1, branch: str | None = None) -> Itera
             )
 
 
-def explained(lake: Lake, name: str, missing: NotFoundError) -> NotFoundError:
+def explained(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
     """Why an object is missing: it was collected after a version withdrew what it held; `missing` where no version did,
     or where the catalog cannot be asked."""
     try:

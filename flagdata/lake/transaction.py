@@ -15,7 +15,6 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -26,11 +25,9 @@ from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Moved, persist
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.leases import Lease, collecting
+from flagdata.lake.store import Store
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
-
-if TYPE_CHECKING:
-    from flagdata.lake.lake import Lake
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +65,7 @@ class Transaction:
         UsageError: no message; or anything but `result` used outside the block.
     """
 
-    def __init__(self, lake: Lake, message: str, *, branch: str) -> None:
+    def __init__(self, lake: Store, message: str, *, branch: str) -> None:
         if not message.strip():
             raise UsageError("the commit has no message", fix="say in a few words what it brings in")
         self.branch = branch

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -18,10 +17,8 @@ from flagdata.errors import ConflictError, NotFoundError
 from flagdata.lake.catalog import persist
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.leases import keeping_collectors_out
+from flagdata.lake.store import Store
 from flagdata.schema import Kind, catalog_schema
-
-if TYPE_CHECKING:
-    from flagdata.lake.lake import Lake
 
 _COLUMNS = ["artifact", "branch", "kind", "name", "object", "parents"]
 
@@ -41,7 +38,7 @@ class Withdrawal:
     clips: tuple[str, ...]
 
 
-def withdraw(lake: Lake, artifacts: Collection[str], message: str, *, branch: str) -> Withdrawal:
+def withdraw(lake: Store, artifacts: Collection[str], message: str, *, branch: str) -> Withdrawal:
     """See `Lake.withdraw`."""
     asked = frozenset(artifacts)
 
@@ -61,7 +58,7 @@ def withdraw(lake: Lake, artifacts: Collection[str], message: str, *, branch: st
 
 
 def take_off(
-    lake: Lake,
+    lake: Store,
     leaving: Collection[str],
     *,
     branch: str,

@@ -1,0 +1,132 @@
+"""The parts of a lake and the rows that its refs show: what every operation on a lake reads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from flagdata.errors import NotFoundError, UnknownNameError
+from flagdata.lake import refs as references
+from flagdata.lake.artifact import Artifact
+from flagdata.lake.catalog import ROW_ORDER, Catalog
+from flagdata.lake.layout import STAGING, check_writable
+from flagdata.lake.lineage import Lineage
+from flagdata.lake.matching import Where, matching
+from flagdata.lake.objects import Objects
+from flagdata.lake.refs import Refs, Slice, View
+from flagdata.schema import CATALOG
+
+_ORDER = ", ".join(ROW_ORDER)
+
+
+class Store:
+    """A lake's catalog, objects and refs, and the rows that a ref shows. `Lake` adds what changes them.
+
+    Attributes:
+        path: the lake's folder.
+        staging: the folder in it in which new objects are written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.catalog = Catalog(path / "catalog", path / "refs" / "newest")
+        self.objects = Objects(path)
+        self.refs = Refs(path / "refs")
+        self.staging = path / STAGING
+
+    def check_writable(self) -> None:
+        """Whether this process may write here: called before the first second of work that ends in a commit.
+
+        Raises:
+            LinkError: a folder of the lake is a link, so that what is written would lie elsewhere.
+            FlagdataError: the lake can only be read.
+        """
+        check_writable(self.path)
+
+    def rows(
+        self, where: Where | None = None, *, at: str | None = None, columns: Sequence[str] | None = None
+    ) -> pa.Table:
+        """Rows of the catalog in the order of commit, then start, then frame.
+
+        Args:
+            where: the values that columns must have, {"kind": Kind.CLIP, "recording": identity}, see
+                `flagdata.lake.matching`; or an SQL expression as in `flagdata.query` ("kind = 'clip' and wind between
+                3 and 6"; the column "end" needs its quotes, `end_time` does not).
+            at: tag, branch, version number or commit id; the head of main if `None`.
+            columns: which to return, in this order; all if `None`.
+
+        Raises:
+            UsageError: the expression is not one, or reads anything but the catalog.
+            NotFoundError: no such ref.
+            UnknownNameError: no such column.
+        """
+        table = self.table(self.view(at))
+        if isinstance(where, str):
+            table = _filter(table, where)
+        elif where is not None:
+            table = matching(table, where)
+        if columns is None:
+            return table
+        for column in columns:
+            if column not in CATALOG:
+                raise UnknownNameError.of("column", column, CATALOG)
+        return table.select(list(columns))
+
+    def artifact(self, artifact: str, *, at: str | None = None) -> Artifact:
+        """The artifact of that id, of an id that begins so if only one does, or else of that name if only one has it.
+
+        Raises:
+            NotFoundError: none, or several.
+        """
+        table = self.table(self.view(at))
+        ids, names = table["artifact"].to_pylist(), table["name"].to_pylist()
+        matches = [row for row, known in enumerate(ids) if artifact and known.startswith(artifact)]
+        how = "begin with"
+        if not matches:
+            matches, how = [row for row, name in enumerate(names) if artifact and name == artifact], "are named"
+        if len(matches) != 1:
+            what = f"{len(matches)} artifacts {how} {artifact!r}" if matches else f"no artifact {artifact!r}"
+            fix = "give the id of one: flagdata ls lists them" if matches else "flagdata ls lists them"
+            raise NotFoundError(what, where=str(self.path), fix=fix)
+        return Artifact.from_row(table.slice(matches[0], 1).to_pylist()[0])
+
+    def view(self, at: str | None) -> View:
+        """What a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""
+        return references.resolve(self.refs, at, head=self.catalog.head(), commits=self._commits)
+
+    def table(self, view: View) -> pa.Table:
+        """All rows of a view, its base first. An identity is on one branch of a view only."""
+        *later, first = view
+        rows = self._own(first)
+        for part in reversed(later):
+            hidden = self.lineage().hidden(part)
+            if hidden:
+                rows = rows.filter(~pc.field("artifact").isin(sorted(hidden)))
+            rows = pa.concat_tables([rows, self._own(part)])
+        return rows
+
+    def lineage(self) -> Lineage:
+        """How branches came to be, as known at the head."""
+        return Lineage(self.catalog.history(), {name: ref.view for name, ref in self.refs.branches().items()})
+
+    def _own(self, part: Slice) -> pa.Table:
+        """The rows of one branch at one version."""
+        return self.catalog.rows(part.version).filter(pc.field("branch") == part.branch)
+
+    def _commits(self) -> dict[str, View]:
+        lineage = self.lineage()
+        parts = {
+            entry["commit"]: Slice(branch=entry["branch"], version=entry["version"])
+            for entry in self.catalog.history()
+            if "commit" in entry
+        }
+        return {commit: lineage.view(part) for commit, part in parts.items() if lineage.fork(part) is not None}
+
+
+def _filter(table: pa.Table, where: str) -> pa.Table:
+    from flagdata.query import Request, Selection  # it knows what a view is, so it imports this package
+
+    return Selection(table, Request(where=where, order=_ORDER)).table()
