@@ -1,6 +1,8 @@
-"""Names that come from outside, as text in Markdown: no HTML, no mark-up, no link and no second column."""
+"""Names that come from outside, as text in Markdown: no HTML, no mark-up, no link, no second column. Tables."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
 
 _ESCAPED = str.maketrans({sign: f"&#{ord(sign)};" for sign in "|`*\\"} | {"&": "&amp;", "<": "&lt;", ">": "&gt;"})
 
@@ -11,3 +13,13 @@ def plain(text: str) -> str:
     Entities, unlike backslashes, are text in every dialect, inside a table and outside.
     """
     return " ".join(text.split()).translate(_ESCAPED).replace("](", "&#93;(")
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str | Sequence[str]]]) -> str:
+    """A table, its cells as text; a cell of several lines is a sequence of them."""
+
+    def cell(content: str | Sequence[str]) -> str:
+        return plain(content) if isinstance(content, str) else "<br>".join(map(plain, content))
+
+    lines = [head, ["---"] * len(head), *(map(cell, row) for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

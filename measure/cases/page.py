@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 
 from flagdata.outputs import check_files, write_files
+from flagdata.pages.pictures import data_url, png
+from flagdata.pages.render import render
 from flagdata.provenance import code_version
 from measure.cases import plots
 from measure.cases.candidates import Candidate, Shear
@@ -21,7 +23,6 @@ from measure.cases.recipe import Case, Group
 from measure.cases.study import Cell, Outcome, Study
 from measure.cases.verdict import Verdict
 from measure.cases.words import candidates_tried, verdict_words
-from measure.pages.render import data_url, render
 
 _PAGE, _RESULT = "index.html", "result.json"
 _PICTURES = ("lines", "along", "lengths", "speeds", "plane")
@@ -46,7 +47,7 @@ def write(folder: Path, *, case: Case, seen: Observations, study: Study, verdict
         plots.speeds(case, seen, study),
         plots.plane(case, seen, study.tables[Candidate.REACTIVE]),
     )
-    pictures = {name: plots.png(figure) for name, figure in zip(_PICTURES, figures, strict=True)}
+    pictures = {name: png(figure) for name, figure in zip(_PICTURES, figures, strict=True)}
     values = {
         "case": case, "verdict": verdict, "words": verdict_words(seen, study, verdict),
         "images": {name: data_url(picture, "image/png") for name, picture in pictures.items()},

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -25,15 +24,7 @@ _COLOURS = {
     Candidate.REACTIVE_AND_LIFT: "#7a4a9a",
 }
 _INK, _QUIET = "#1c2326", "#8a969c"
-_DPI = 110
 _MET = 0.03  # of a mean log error: half again the step of the factors
-
-
-def png(figure: Figure) -> bytes:
-    """The figure as a file."""
-    target = io.BytesIO()
-    figure.savefig(target, format="png", dpi=_DPI)
-    return target.getvalue()
 
 
 def lines(case: Case, clip: Clip, study: Study) -> Figure:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections import Counter
 from collections.abc import Sequence
@@ -12,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flagdata.markdown import plain
+from flagdata.markdown import plain, table
 from flagdata.outputs import check_files, write_files
+from flagdata.pages.pictures import png
 from flagdata.provenance import code_version
 from measure.challenge.classes import class_of
 from measure.challenge.rates import Power
@@ -71,56 +71,58 @@ def confusion(sheet: Sheet) -> dict[str, dict[str, int]]:
 
 def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
     """The sheet for people."""
-    count = len(sheet.outcomes)
-    parts = [f"# Score: {plain(sheet.title)}", "", f"{count} sets: " + ", ".join(
-        f"{len(sheet.of_kind(kind))} {kind.value}" for kind in Kind) + f". Code {code_version()}.", ""]  # fmt: skip
-    parts += ["| gate | value | wanted | met |", "|---|---|---|---|"]
-    for gate in sheet.gates:
-        sign = "≤" if gate.at_most else "≥"
-        met = "yes" if gate.met else "no"
-        parts.append(f"| {plain(gate.name)} | {_number(gate.value)} | {sign} {gate.wanted:g} | {met} |")
-    parts += ["", "| share | of | value | Clopper–Pearson 90 % |", "|---|---|---|---|"]
-    for name, share in sheet.shares.items():
-        bounds = f"[{share.low:.2f}, {share.high:.2f}]"
-        parts.append(f"| {plain(name)} | {share.hits}/{share.count} | {_number(share.value)} | {bounds} |")
+    kinds = ", ".join(f"{len(sheet.of_kind(kind))} {kind.value}" for kind in Kind)
     levels = ", ".join(f"{100 * level:g} %" for level in sheet.coefficients.levels)
-    if levels:
-        parts += ["", f"The true strengths are to lie in intervals stated at {levels}."]
-    parts += ["", f"E_red: {_words(sheet.reductions, 0.1, 'worst decile')}."]
-    errors = [abs(error) for error in sheet.coefficients.errors]
-    parts += [f"Relative error of the strength: {_words(errors, 0.9, 'worst decile')}."]
-    parts += [f"Time for a set: {_words([o.seconds for o in sheet.outcomes], 0.9, 'slowest decile')} s.", ""]
-    parts.append(
+    acted = [o for o in sheet.outcomes if o.key.impact > 0]
+    half = _half_rows("class", sheet.power, Counter(_class_name(o) for o in sheet.of_kind(Kind.ONE)))
+    if sheet.power is not None:
+        half.append(_half_row("class: one not seen", sheet.power.overall, "–"))
+    half += _half_rows("noise, mm", sheet.by_noise, Counter(f"{_MILLI * o.key.noise:g}" for o in acted))
+    half += _half_rows("frames a second", sheet.by_rate, Counter(str(o.key.rate) for o in acted))
+    gates = [
+        (g.name, _number(g.value), f"{'≤' if g.at_most else '≥'} {g.wanted:g}", "yes" if g.met else "no")
+        for g in sheet.gates
+    ]
+    shares = [
+        (name, f"{one.hits}/{one.count}", _number(one.value), f"[{one.low:.2f}, {one.high:.2f}]")
+        for name, one in sheet.shares.items()
+    ]
+    strengths = [
+        (effect, f"{_digits(one.value)} [{_digits(one.low)}, {_digits(one.high)}]", one.unit)
+        for effect, one in sheet.half_strengths.items()
+    ]
+    sets = [
+        (o.key.name, _truth(o, strengths=True), f"{_MILLI * o.key.impact:.2g}", f"{_MILLI * o.key.noise:g}",
+         str(o.key.rate), o.key.numerics, _said(o), _number(o.reduction), _number(o.control_gap), f"{o.seconds:.0f}")
+        for o in sheet.outcomes
+    ]  # fmt: skip
+    said = [(true, name, str(n)) for true, row in confusion(sheet).items() for name, n in row.items()]
+    spreads = (
+        f"E_red: {_words(sheet.reductions, 0.1, 'worst decile')}.\n"
+        f"Relative error of the strength: {_words([abs(e) for e in sheet.coefficients.errors], 0.9, 'worst decile')}.\n"
+        f"Time for a set: {_words([o.seconds for o in sheet.outcomes], 0.9, 'slowest decile')} s."
+    )
+    strong = (
         "Half-detection strength, as displacement within 0.1 s, with 90 % bounds; strong effects are those of "
         f"{ENOUGH:g} times that, {len(sheet.strong)} sets; from outside the library {len(sheet.strong_outside)}, by "
         "that of a class that was not seen."
     )
-    parts += ["", "| group | half detected at | sets |", "|---|---|---|"]
-    parts += _half_rows("class", sheet.power, Counter(_class_name(o) for o in sheet.of_kind(Kind.ONE)))
-    if sheet.power is not None:
-        parts.append(_half_row("class: one not seen", sheet.power.overall, "–"))
-    acted = [o for o in sheet.outcomes if o.key.impact > 0]
-    parts += _half_rows("noise, mm", sheet.by_noise, Counter(f"{_MILLI * o.key.noise:g}" for o in acted))
-    parts += _half_rows("frames a second", sheet.by_rate, Counter(str(o.key.rate) for o in acted))
-    parts += ["", "| effect | half detected at | unit |", "|---|---|---|"]
-    for effect, half in sheet.half_strengths.items():
-        bounds = f"{_digits(half.value)} [{_digits(half.low)}, {_digits(half.high)}]"
-        parts.append(f"| {plain(effect)} | {bounds} | {plain(half.unit)} |")
-    if picture is not None:
-        parts += ["", f"![Power curves]({picture})"]
-    parts += ["", "| true | said | sets |", "|---|---|---|"]
-    parts += [
-        f"| {plain(true)} | {plain(said)} | {n} |" for true, row in confusion(sheet).items() for said, n in row.items()
-    ]
-    parts += ["", "| set | true | impact, mm | noise, mm | rate | numerics | said | E_red | control gap | s |",
-              "|---|---|---|---|---|---|---|---|---|---|"]  # fmt: skip
-    for o in sheet.outcomes:
-        cells = (
-            o.key.name, _truth(o, strengths=True), f"{_MILLI * o.key.impact:.2g}", f"{_MILLI * o.key.noise:g}",
-            str(o.key.rate), o.key.numerics, _said(o), _number(o.reduction), _number(o.control_gap), f"{o.seconds:.0f}",
-        )  # fmt: skip
-        parts.append("| " + " | ".join(plain(cell) for cell in cells) + " |")
-    return "\n".join(parts) + "\n"
+    parts = [
+        f"# Score: {plain(sheet.title)}",
+        f"{len(sheet.outcomes)} sets: {kinds}. Code {code_version()}.",
+        table(("gate", "value", "wanted", "met"), gates),
+        table(("share", "of", "value", "Clopper–Pearson 90 %"), shares),
+        f"The true strengths are to lie in intervals stated at {levels}." if levels else "",
+        spreads, strong,
+        table(("group", "half detected at", "sets"), half),
+        table(("effect", "half detected at", "unit"), strengths),
+        f"![Power curves]({picture})" if picture is not None else "",
+        table(("true", "said", "sets"), said),
+        table(
+            ("set", "true", "impact, mm", "noise, mm", "rate", "numerics", "said", "E_red", "control gap", "s"), sets
+        ),
+    ]  # fmt: skip
+    return "\n\n".join(part for part in parts if part) + "\n"
 
 
 def write(sheet: Sheet, folder: Path) -> tuple[Path, ...]:
@@ -155,9 +157,7 @@ def plot(sheet: Sheet) -> bytes:
     )
     _panel(panels[2], "any effect, by frames a second", sheet.by_rate, [(str(o.key.rate), o) for o in acted])
     panels[0].set_ylabel("chance of detection")
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png", dpi=110, metadata={"Software": None})
-    return picture.getvalue()
+    return png(figure)
 
 
 def _panel(axes: Axes, title: str, power: Power | None, cases: Sequence[tuple[str, Outcome]]) -> None:
@@ -183,15 +183,14 @@ def _panel(axes: Axes, title: str, power: Power | None, cases: Sequence[tuple[st
     axes.grid(alpha=0.3)
 
 
-def _half_rows(what: str, power: Power | None, counts: Counter[str]) -> list[str]:
-    if power is None:
-        return []
-    return [_half_row(f"{what}: {name}", bounds, str(counts[name])) for name, bounds in power.half.items()]
+def _half_rows(what: str, power: Power | None, counts: Counter[str]) -> list[tuple[str, str, str]]:
+    half = {} if power is None else power.half
+    return [_half_row(f"{what}: {name}", bounds, str(counts[name])) for name, bounds in half.items()]
 
 
-def _half_row(group: str, bounds: tuple[float, float, float], count: str) -> str:
+def _half_row(group: str, bounds: tuple[float, float, float], count: str) -> tuple[str, str, str]:
     half, low, high = (_digits(_MILLI * value) for value in bounds)
-    return f"| {plain(group)} | {half} [{low}, {high}] mm | {count} |"
+    return group, f"{half} [{low}, {high}] mm", count
 
 
 def _curve(power: Power | None) -> dict[str, Any] | None:

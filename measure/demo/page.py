@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,19 +10,19 @@ from typing import Any
 
 import numpy as np
 import torch
-from PIL import Image
 
 import flagdata
 from flagdata.align.clock import ClockModel
 from flagdata.dataset.sample import Sample
 from flagdata.lake import Lake
+from flagdata.pages.pictures import data_url, figure_url, moving
+from flagdata.pages.render import render
 from flagdata.provenance import code_version
 from flagdata.record import Record
 from flagdata.schema import CLIP_FRAMES, FRAME_RATE
 from flagdata.timebase import NANOSECONDS
 from measure.demo import estimates
 from measure.demo.field import BEFORE, WIND_RATE, Field
-from measure.pages.render import data_url, render
 from models.spectral import SpectralDecomposition
 
 _SHOWN = 6
@@ -103,7 +102,7 @@ def recovered(recording: dict[str, Any], truth: float) -> Recovered:
 
 def _clip_card(sample: Sample) -> dict[str, Any]:
     return {
-        "image": _animation(sample.clip),
+        "image": moving(sample.clip[0].numpy(), rate=FRAME_RATE, side=200),
         "wind": sample.wind,
         "sigma": sample.wind_sigma,
         "clock_sigma": sample.clock_sigma,
@@ -117,16 +116,6 @@ def dominant_frequency(clip: torch.Tensor) -> float:
     coarse = torch.nn.functional.avg_pool2d(clip.float(), 4)
     power, frequency = SpectralDecomposition(rate=FRAME_RATE)(coarse[None])[0]
     return float((power * frequency).sum() / power.sum())
-
-
-def _animation(clip: torch.Tensor) -> str:
-    """The clip as an endless WebP in a data URL, at its own speed."""
-    images = [Image.fromarray(frame).resize((200, 200)) for frame in clip[0].numpy()]
-    buffer = io.BytesIO()
-    images[0].save(
-        buffer, "WEBP", save_all=True, append_images=images[1:], duration=round(1000 / FRAME_RATE), loop=0, quality=70
-    )
-    return data_url(buffer.getvalue(), "image/webp")
 
 
 def _wind_plot(record: Record, lake: Lake, at: str, made: Field) -> tuple[str, str]:
@@ -153,13 +142,11 @@ def _wind_plot(record: Record, lake: Lake, at: str, made: Field) -> tuple[str, s
         xlabel="time since the first frame [s]", ylabel="wind speed [m/s]", xlim=(truth[0], truth[-1]), ylim=(0, None)
     )
     axes.legend(loc="lower right", fontsize=8, ncols=3)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=130)
     caption = (
         f"{len(logged.time)} one-second means on the common clock; the gap and the stretch that stuck are left out of "
         f"the averages. {len(clips)} clips of {CLIP_FRAMES} frames."
     )
-    return data_url(buffer.getvalue(), "image/png"), caption
+    return figure_url(figure, dpi=130), caption
 
 
 def _findings(lake: Lake, at: str) -> list[dict[str, Any]]:

@@ -7,13 +7,16 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
+from flagdata.pages.pictures import moving
+from flagdata.pages.render import render
 from flagdata.provenance import code_version
 from measure.estimate import pictures
 from measure.estimate.answer import SHORT, Quantity
 from measure.estimate.measuring import Measurement
 from measure.estimate.nearest import Neighbour
 from measure.estimate.series import Agreement, Beside
-from measure.pages.render import render
+
+_SIDE = 220  # px of a clip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +70,7 @@ def page(
         "reasons": [reason.what for reason in measured.verdict.reasons], "answer": measured.sentence,
         "rows": [_row(quantity, context.known) for quantity in measured.quantities],
         "simulated": bool(context.known), "level": f"{measured.options.level * 100:.3g} %",
-        "clip": pictures.animation(measured.clip, rate=clip_rate),
+        "clip": moving(measured.clip, rate=clip_rate, side=_SIDE),
         "neighbours": [_neighbour(one, context.rate) for one in context.neighbours], "compared": context.compared,
         "corner": pictures.corner(measured) if shown else None,
         "series": pictures.series(series, level=measured.verdict.level)
@@ -102,7 +105,7 @@ def _neighbour(one: Neighbour, rate: float) -> dict[str, str]:
         for name, digits, unit in (("wind_speed", 1, "m/s"), ("density", 3, "kg/m²")) if name in one.known
     ]  # fmt: skip
     return {
-        "name": one.name, "image": pictures.animation(one.frames, rate=rate), "known": ", ".join(known),
+        "name": one.name, "image": moving(one.frames, rate=rate, side=_SIDE), "known": ", ".join(known),
         "distance": f"{one.distance:.1f}",
     }  # fmt: skip
 

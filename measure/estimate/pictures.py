@@ -1,37 +1,20 @@
-"""Pictures of a measurement as data URLs: clips in motion, the posterior, the wind series with its spectra."""
+"""Pictures of a measurement as data URLs: the posterior, the wind series with its spectra."""
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
-from PIL import Image
 
+from flagdata.pages.pictures import figure_url
 from measure.estimate.answer import SHORT
 from measure.estimate.measuring import Measurement
 from measure.estimate.series import Beside, Spectrum
-from measure.pages.render import data_url
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    pass
 
-_SIDE = 220  # px of a clip
 _BLUE, _RUST, _GRAY = "#2b6f8f", "#c4622d", "0.6"
-
-
-def animation(frames: NDArray[np.uint8], *, rate: float) -> str:
-    """The largest centred square of a clip (frames, height, width), endless, at its own speed."""
-    side = min(frames.shape[1:])
-    top, left = (frames.shape[1] - side) // 2, (frames.shape[2] - side) // 2
-    cut = frames[:, top : top + side, left : left + side]
-    images = [Image.fromarray(frame).resize((_SIDE, _SIDE)) for frame in cut]
-    buffer = io.BytesIO()
-    images[0].save(
-        buffer, "WEBP", save_all=True, append_images=images[1:], duration=round(1000 / rate), loop=0, quality=60
-    )
-    return data_url(buffer.getvalue(), "image/webp")
 
 
 def corner(measured: Measurement) -> str:
@@ -62,7 +45,7 @@ def corner(measured: Measurement) -> str:
             if column == 0 and row:
                 axes.set_ylabel(_label(measured, row), fontsize=8)
             axes.tick_params(labelsize=7)
-    return _png(figure)
+    return figure_url(figure)
 
 
 def _label(measured: Measurement, place: int) -> str:
@@ -91,7 +74,7 @@ def series(found: Beside, *, level: float) -> str:
             axes.plot(found.time[own], found.wind[own], "o", markersize=4, color=_RUST, mfc=face, label=label)
     axes.set(xlabel="time since the first frame [s]", ylabel="wind speed [m/s]", ylim=(0, None))
     axes.legend(loc="best", fontsize=8, ncols=2)
-    return _png(figure)
+    return figure_url(figure)
 
 
 def spectra(found: Spectrum) -> str:
@@ -108,10 +91,4 @@ def spectra(found: Spectrum) -> str:
     coherent.axhline(found.chance, color=_GRAY, linestyle=":", label="of unrelated series, 1 in 20")
     coherent.set(xlabel="frequency [Hz]", ylabel="coherence", ylim=(0, 1))
     coherent.legend(fontsize=8)
-    return _png(figure)
-
-
-def _png(figure: Figure) -> str:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    return data_url(buffer.getvalue(), "image/png")
+    return figure_url(figure)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError
 from measure.gate.checks import measured
 from models.estimator import Estimator
-from models.handmade import FEATURES
 from models.handmade import features as handmade
 from models.outliers import Familiarity
 
@@ -38,11 +37,6 @@ class Features:
     summary: NDArray[np.float64]
     distance: float
     moved: NDArray[np.float64]
-
-    @property
-    def frequency(self) -> float:
-        """Dominant frequency of the motion, the mean over pixels by their power [Hz]."""
-        return float(self.handmade[FEATURES.index("local_frequency_mean")])
 
     def vector(self, model: Estimator) -> NDArray[np.float64]:
         """(f,) everything in one, the summary as the training clips' covariance whitens it, distances as logarithms."""

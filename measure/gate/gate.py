@@ -20,7 +20,6 @@ from measure.gate.checks import CHECKS
 from measure.gate.distortions import DISTORTIONS
 from measure.gate.features import MOVES
 from measure.gate.tail_probability import ExponentialTails, joint_p
-from models.handmade import FEATURES
 from models.outliers import shrunk_covariance
 
 Vector = NDArray[np.float64]
@@ -74,7 +73,6 @@ SCORES: tuple[Score, ...] = (
 _RESOLUTION = np.array(
     [*(CHECKS[name].resolution for name, *_ in _SIDED), 0.02, *(0.05 for _ in MOVES), 0.2, *(0.5 for _ in DISTORTIONS)]
 )
-_FREQUENCY = len(CHECKS) + FEATURES.index("local_frequency_mean")
 _LEARNING = 0.6
 """Share of the plain clips of the fit that covariances are learned from; the others tell the tails."""
 
@@ -90,8 +88,6 @@ class Gate:
         tails: of all scores.
         calibration: (n,) ascending joint scores of the calibration clips.
         statistics: (n, len(CHECKS)) of the calibration clips.
-        summaries: (n, d) of the calibration clips.
-        frequencies: (n,) dominant frequency of the calibration clips' motion [Hz].
     """
 
     centre: Vector
@@ -102,25 +98,15 @@ class Gate:
     tails: ExponentialTails
     calibration: Vector
     statistics: Vector
-    summaries: Vector
-    frequencies: Vector
 
     @classmethod
-    def of(
-        cls,
-        plain: Vector,
-        distorted: Mapping[str, Vector],
-        calibration: Vector,
-        *,
-        summaries: Vector,
-    ) -> Gate:
+    def of(cls, plain: Vector, distorted: Mapping[str, Vector], calibration: Vector) -> Gate:
         """Learn it from feature vectors (see `Features.vector`).
 
         Args:
             plain: (n, f) of simulated clips, one of a simulation, from the training side.
             distorted: name of `DISTORTIONS` → (m, f) of clips of other simulations.
             calibration: (k, f) of simulated clips that are in none of these and that the network was not trained on.
-            summaries: (k, d) of the calibration clips, as the network gives them.
 
         Raises:
             InputError: distortions that are missing, or too few clips.
@@ -147,7 +133,7 @@ class Gate:
         gate = cls(
             centre=centre, scale=scale, whitening=whitening, directions=np.array(directions),
             offsets=np.array(offsets), tails=blank, calibration=np.zeros(0),
-            statistics=calibration[:, : len(CHECKS)], summaries=summaries, frequencies=calibration[:, _FREQUENCY],
+            statistics=calibration[:, : len(CHECKS)],
         )  # fmt: skip
         return gate._calibrated(rest, calibration)
 

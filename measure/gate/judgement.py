@@ -63,9 +63,6 @@ class Judgement:
         level: p at or below which a clip is refused.
         false_alarm, confidence: what is kept by that level.
         reasons: why it is refused, the weightiest first; none for a familiar clip.
-        statistics: (len(CHECKS),) the picture's statistics; None for a clip that could not be measured.
-        summary: (d,) the network's; None for a clip that could not be measured.
-        frequency: dominant frequency of the motion [Hz]; None for a clip that could not be measured.
     """
 
     familiar: bool
@@ -74,9 +71,6 @@ class Judgement:
     false_alarm: float
     confidence: float
     reasons: tuple[Told, ...]
-    statistics: Vector | None
-    summary: Vector | None
-    frequency: float | None
 
     @property
     def sentence(self) -> str:
@@ -136,7 +130,6 @@ def judge(
     def refused(told: Told) -> Judgement:
         return Judgement(
             familiar=False, p=least, level=at, false_alarm=false_alarm, confidence=confidence, reasons=(told,),
-            statistics=None, summary=None, frequency=None,
         )  # fmt: skip
 
     if len(frames) < wanted:
@@ -155,7 +148,6 @@ def judge(
     reasons = () if p > at else _reasons(gate, scores, surprises, at, still=bool(still))
     return Judgement(
         familiar=p > at, p=p, level=at, false_alarm=false_alarm, confidence=confidence, reasons=reasons,
-        statistics=found.checks, summary=found.summary, frequency=found.frequency,
     )  # fmt: skip
 
 

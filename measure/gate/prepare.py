@@ -77,10 +77,7 @@ def calibrated(
                 rng = stream(seed, "distortion", name, index)
                 clips.append(measured(distortion.apply(training[plain + index], other, rng, count)).vector(model))
             made[name] = np.array(clips)
-    return Gate.of(
-        np.array(plains), made, np.array([one.vector(model) for one in references]),
-        summaries=np.array([one.summary for one in references]),
-    )  # fmt: skip
+    return Gate.of(np.array(plains), made, np.array([one.vector(model) for one in references]))
 
 
 class FilmsOf(Sequence[Film]):

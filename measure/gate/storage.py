@@ -17,9 +17,7 @@ from models.storage import read_tensors, renew, tensor_bytes
 
 GATE = "gate.safetensors"
 """Name of the file in a model's folder."""
-_DIRECT = (
-    "centre", "scale", "whitening", "directions", "offsets", "calibration", "statistics", "summaries", "frequencies",
-)  # fmt: skip
+_DIRECT = ("centre", "scale", "whitening", "directions", "offsets", "calibration", "statistics")
 
 
 def fingerprint(model: Estimator) -> NDArray[np.uint8]:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from PIL import Image
 
-from measure.pages.render import data_url
+from flagdata.pages.pictures import figure_url
 from measure.refine.evaluator import Evaluator
 from measure.refine.refinement import Refinement
 from measure.refine.space import WIND
@@ -19,7 +17,7 @@ from measure.refine.trace import Trace
 
 STEPS = (0, 10, 20, 40)
 """Steps that are shown: Runia et al. 2020, figure 8."""
-_SIDE = 200  # px of a frame on the page
+SIDE = 200  # px of a frame on the page
 _OWN, _TARGET, _OTHER = "#c4622d", "#2b6f8f", "#7a7a7a"
 
 
@@ -87,27 +85,4 @@ def trace_picture(refinement: Refinement, clip: int = 0) -> str:
         right.axhline(target.truth["wind_speed"], color=_TARGET, linewidth=1.0, linestyle="--", label="true wind")
     right.set(xlabel="evaluations", ylabel="wind speed [m/s]", ylim=(space.wind.low, space.wind.high))
     right.legend(fontsize=8)
-    return _png(figure)
-
-
-def still(frame: NDArray[np.uint8]) -> str:
-    """A frame as a JPEG in a data URL."""
-    buffer = io.BytesIO()
-    Image.fromarray(frame).resize((_SIDE, _SIDE), Image.Resampling.LANCZOS).save(buffer, "jpeg", quality=85)
-    return data_url(buffer.getvalue(), "image/jpeg")
-
-
-def moving(clip: NDArray[np.uint8], *, rate: float) -> str:
-    """A clip (frame, height, width) that plays for ever, as a WebP in a data URL."""
-    pictures = [Image.fromarray(frame).resize((_SIDE, _SIDE), Image.Resampling.LANCZOS) for frame in clip]
-    buffer = io.BytesIO()
-    pictures[0].save(
-        buffer, "webp", save_all=True, append_images=pictures[1:], duration=round(1000 / rate), loop=0, quality=60
-    )
-    return data_url(buffer.getvalue(), "image/webp")
-
-
-def _png(figure: Figure) -> str:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=130)
-    return data_url(buffer.getvalue(), "image/png")
+    return figure_url(figure, dpi=130)

@@ -1,11 +1,12 @@
-"""The refinement's section of a report: a fragment of HTML that stands in any page of `measure.pages`."""
+"""The refinement's section of a report: a fragment of HTML that stands in any page of `flagdata.pages`."""
 
 from __future__ import annotations
 
 from markupsafe import Markup
 
-from measure.pages.render import render
-from measure.refine.pictures import STEPS, frames, moving, still, trace_picture
+from flagdata.pages.pictures import moving, still
+from flagdata.pages.render import render
+from measure.refine.pictures import SIDE, STEPS, frames, trace_picture
 from measure.refine.refinement import METHOD, Refinement
 from measure.refine.space import QUANTITIES
 
@@ -26,10 +27,11 @@ def section(refinement: Refinement, *, in_motion: bool = True) -> Markup:
         clips.append(
             {
                 "name": target.name, "trace": trace_picture(refinement, number),
-                "target": still(target.clip[len(target.clip) // 2]),
-                "frames": [{"picture": None if s.frame is None else still(s.frame), "step": s.step,
+                "target": still(target.clip[len(target.clip) // 2], side=SIDE),
+                "frames": [{"picture": None if s.frame is None else still(s.frame, side=SIDE), "step": s.step,
                             "wind": f"{s.wind:.2f}", "distance": f"{s.distance:.3g}"} for s in shown],
-                "motion": None if nearest is None else (moving(target.clip, rate=rate), moving(nearest, rate=rate)),
+                "motion": nearest is not None
+                and [moving(clip, rate=rate, side=SIDE) for clip in (target.clip, nearest)],
             }
         )  # fmt: skip
     found = render(

@@ -15,7 +15,7 @@ from PIL import Image
 from scipy.interpolate import LinearNDInterpolator
 from scipy.spatial import Delaunay
 
-from measure.pages.render import data_url
+from flagdata.pages.pictures import data_url
 from measure.report.chart import Chart, Linear, beside, drawing
 from measure.verdict.quantity import Display, display
 from measure.verdict.record import Residual

@@ -11,7 +11,7 @@ from typing import Any
 from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup, escape
 
-from measure.pages.render import render
+from flagdata.pages.render import render
 from measure.report import cloth, figures, motion, rows, sentences
 from measure.report.sentences import readable
 from measure.verdict import quantity

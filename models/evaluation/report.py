@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from flagdata.errors import UsageError
 from flagdata.markdown import plain
+from flagdata.markdown import table as markdown_table
 from flagdata.outputs import check_files, write_files
+from flagdata.pages.render import render
 from flagdata.provenance import code_version
 from models.evaluation import figures, paper, table
 from models.evaluation.bootstrap import LEVEL
@@ -78,22 +79,12 @@ def _names(name: str) -> tuple[str, str, str]:
 
 def page(found: Evaluation) -> str:
     """The page, HTML."""
-    environment = Environment(
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        loader=PackageLoader("models.evaluation", "."),
-    )
-    return environment.get_template("page.html.j2").render(
-        found=found,
-        counts=_counts(found),
-        legend=table.LEGEND,
-        warning=paper.WARNING,
-        tables={title: make(found) for title, make in _TABLES.items()},
-        figures=_pictures(found),
-        version=f"flagdata {code_version()}",
-    )
+    values = {
+        "found": found, "counts": _counts(found), "legend": table.LEGEND, "warning": paper.WARNING,
+        "tables": {title: make(found) for title, make in _TABLES.items()}, "figures": _pictures(found),
+        "version": f"flagdata {code_version()}",
+    }  # fmt: skip
+    return render("models.evaluation", "page.html.j2", values)
 
 
 def markdown(found: Evaluation) -> str:
@@ -118,11 +109,7 @@ def markdown(found: Evaluation) -> str:
 
 
 def _grid(made: Grid) -> str:
-    def text(cell: Sequence[str]) -> str:
-        return "<br>".join(plain(line) for line in cell)
-
-    lines = [made.head, ["---"] * len(made.head), *([text(cell) for cell in line.cells] for line in made.body)]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown_table(made.head, (line.cells for line in made.body))
 
 
 def _counts(found: Evaluation) -> str:

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import base64
-import io
 import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
 from numpy.typing import NDArray
 from PIL import Image
 
 from flagdata.lake import Lake
 from flagdata.outputs import check_file, rewrite, write_file
+from flagdata.pages.pictures import still
+from flagdata.pages.render import render
 from flagdata.provenance import canonical, code_version
 from flagdata.record import Record
 from flagdata.rng import stream
@@ -71,17 +69,15 @@ def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path:
     """
     sides, rows = _sides(lake, recipe, branch)
     parameters = [json.loads(row["parameters"]) for row in rows]
-    page = Environment(autoescape=True, undefined=StrictUndefined).from_string(
-        files("sim.datasets").joinpath("card.html.j2").read_text(encoding="utf-8")
-    )
-    text = page.render(
-        recipe=recipe, sides=sides, version=code_version(), branch=branch,
-        sheet=_sheet(lake, recipe, rows), size=sum(row["object_bytes"] for row in rows),
-        frames=recipe.simulation.time.frames, rate=recipe.simulation.time.rate, bar=_BAR,
-        theta=distributions(parameters, rendered=False), zeta=distributions(parameters, rendered=True),
-        names=_names(parameters), recipe_text=json.dumps(json.loads(canonical(recipe.identity())), indent=1),
-        dataset=json.dumps(recipe.name, ensure_ascii=False),
-    )  # fmt: skip
+    values = {
+        "recipe": recipe, "sides": sides, "version": code_version(), "branch": branch,
+        "sheet": _sheet(lake, recipe, rows), "size": sum(row["object_bytes"] for row in rows),
+        "frames": recipe.simulation.time.frames, "rate": recipe.simulation.time.rate, "bar": _BAR,
+        "theta": distributions(parameters, rendered=False), "zeta": distributions(parameters, rendered=True),
+        "names": _names(parameters), "recipe_text": json.dumps(json.loads(canonical(recipe.identity())), indent=1),
+        "dataset": json.dumps(recipe.name, ensure_ascii=False),
+    }  # fmt: skip
+    text = render("sim.datasets", "card.html.j2", values)
     if path is not None:
         write_file(path, text, command=_COMMAND)
         return path
@@ -167,6 +163,4 @@ def _sheet(lake: Lake, recipe: DatasetRecipe, rows: Sequence[dict[str, Any]]) ->
     blank = np.full((_PICTURE, _PICTURE), 255, dtype=np.uint8)
     pictures += [blank] * (-len(pictures) % _COLUMNS)
     lines = [np.concatenate(pictures[i : i + _COLUMNS], axis=1) for i in range(0, len(pictures), _COLUMNS)]
-    stream_ = io.BytesIO()
-    Image.fromarray(np.concatenate(lines)).save(stream_, format="JPEG", quality=85)
-    return "data:image/jpeg;base64," + base64.b64encode(stream_.getvalue()).decode()
+    return still(np.concatenate(lines))

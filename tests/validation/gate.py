@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from flagdata.errors import NotFoundError
 from measure.gate.gate import Gate
 from measure.gate.judgement import CONFIDENCE, FALSE_ALARM, Judgement, judge
-from measure.gate.nearest import nearest
 from measure.gate.prepare import FilmsOf, calibrated, data_of
 from measure.gate.storage import read
 from measure.shares import Share
@@ -118,14 +117,7 @@ def _real(model: Estimator, gate: Gate) -> dict[str, Any]:
 
 def _window(window: NDArray[np.uint8], model: Estimator, gate: Gate) -> dict[str, Any]:
     one = judge(window, model, gate)
-    found: dict[str, Any] = {"familiar": one.familiar, "p": one.p, "reasons": [told.sentence for told in one.reasons]}
-    if one.summary is not None and one.statistics is not None and one.frequency is not None and model.cloud is not None:
-        near = nearest(
-            one.summary, gate.summaries, model.cloud, statistics=one.statistics, known=gate.statistics,
-            frequency=one.frequency, frequencies=gate.frequencies, count=1,
-        )  # fmt: skip
-        found["nearest"] = {"distance": near[0].distance, "differences": list(near[0].differences)}
-    return found
+    return {"familiar": one.familiar, "p": one.p, "reasons": [told.sentence for told in one.reasons]}
 
 
 def _page(result: dict[str, Any]) -> str:

@@ -10,13 +10,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flagdata.errors import InputError, NotFoundError, UsageError
-from measure.cases.robot_cloth.attribution import late, left_errors, lower, sought
-from measure.cases.robot_cloth.calibrate import Fit, calibrated, linear
-from measure.cases.robot_cloth.model import Cloth, Parameters, described, predicted, rigid
-from measure.cases.robot_cloth.reading import Floats, Swing, names, read
-from measure.cases.robot_cloth.repeats import features, shuffled, tail_probability
-from measure.cases.robot_cloth.tracker import CAMERA, LATENCY, OFFSETS, TRACKER, Tracker, errors, latencies, upper
 from sim.material import named
+from tests.validation.robot_cloth.attribution import late, left_errors, lower, sought
+from tests.validation.robot_cloth.calibrate import Fit, calibrated, linear
+from tests.validation.robot_cloth.model import Cloth, Parameters, described, predicted, rigid
+from tests.validation.robot_cloth.reading import Floats, Swing, names, read
+from tests.validation.robot_cloth.repeats import features, shuffled, tail_probability
+from tests.validation.robot_cloth.tracker import CAMERA, LATENCY, OFFSETS, TRACKER, Tracker, errors, latencies, upper
 
 SIDE, SIZE = 3, 0.3
 CAMEL = named("camel-ponte-roma")

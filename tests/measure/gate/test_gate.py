@@ -36,9 +36,7 @@ def distorted(seed: int, count: int, kind: str, strength: float = 40.0) -> NDArr
 
 def learned(seed: int, calibration: int = 199) -> Gate:
     made = {kind: distorted(1000 * seed + place, 80, kind) for place, kind in enumerate(KINDS)}
-    return Gate.of(
-        plain(seed, 300), made, plain(seed + 500, calibration), summaries=plain(seed + 500, calibration)[:, :4]
-    )
+    return Gate.of(plain(seed, 300), made, plain(seed + 500, calibration))
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +78,7 @@ def test_the_log_likelihood_ratio_is_that_of_linear_discriminant_analysis() -> N
     from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 
     clips, other = plain(3, 500), distorted(4, 300, "camera", strength=2.0)
-    gate = Gate.of(clips, dict.fromkeys(KINDS, other), clips[:100], summaries=clips[:100, :4])
+    gate = Gate.of(clips, dict.fromkeys(KINDS, other), clips[:100])
     first, second, fresh = (squashed(x, gate.centre, gate.scale) for x in (clips[:300], other, plain(5, 200)))
     _, shrinkage = ledoit_wolf(np.concatenate([first - first.mean(axis=0), second - second.mean(axis=0)]))
     theirs = LinearDiscriminantAnalysis(solver="lsqr", shrinkage=shrinkage, priors=[0.5, 0.5])
@@ -96,4 +94,4 @@ def test_every_score_has_a_reason_with_words() -> None:
 def test_a_distortion_without_clips_is_an_error() -> None:
     made = {kind: distorted(1, 30, kind) for kind in KINDS if kind != "camera"}
     with pytest.raises(InputError, match="no clips of camera"):
-        Gate.of(plain(1, 100), made, plain(2, 50), summaries=plain(2, 50)[:, :4])
+        Gate.of(plain(1, 100), made, plain(2, 50))

@@ -10,16 +10,12 @@ from numpy.typing import NDArray
 
 from flagdata.checksums import write_sums
 from flagdata.errors import CorruptError, InputError, NotFoundError
-from measure.gate.checks import CHECKS
 from measure.gate.distortions import DISTORTIONS
-from measure.gate.features import features_of
 from measure.gate.gate import Gate
 from measure.gate.judgement import judge
-from measure.gate.nearest import nearest
 from measure.gate.prepare import calibrated
 from measure.gate.storage import read, write
 from models.estimator import Estimator
-from models.outliers import Familiarity
 from tests.measure.gate.made import film, small_model
 
 PLAIN, DISTORTED, VALIDATION = 60, 4, 50
@@ -119,34 +115,6 @@ def test_a_gate_is_the_same_after_storing_and_fits_its_own_network_alone(
         assert (one.p, one.reasons) == (other.p, other.reasons)
     with pytest.raises(CorruptError, match="another network"):
         read(tmp_path, small_model(seed=1))
-
-
-def test_a_clip_is_nearest_to_itself_and_differs_in_nothing(model: Estimator, gate: Gate) -> None:
-    own = features_of(model, clip(1007)[:12])
-    assert model.cloud is not None
-    found = nearest(
-        own.summary, gate.summaries, model.cloud, statistics=own.checks, known=gate.statistics,
-        frequency=own.frequency, frequencies=gate.frequencies,
-    )  # fmt: skip
-    assert (found[0].index, found[0].differences) == (7, ())
-    assert found[0].distance == pytest.approx(0, abs=1e-5)
-    assert found[0].distance <= found[1].distance <= found[2].distance
-
-
-def test_what_a_clip_differs_in_is_told_the_largest_first() -> None:
-    """Half the area is 0.3 in log10, two of its steps; 60 gray levels are four, 1 Hz is one."""
-    names = list(CHECKS)
-    known, own = np.zeros((1, len(names))), np.zeros(len(names))
-    own[names.index("area")] = -np.log10(2)
-    own[names.index("level")] = -60
-    cloud = Familiarity(centre=np.zeros(2), whitening=np.eye(2), reference=np.ones(1))
-    (only,) = nearest(
-        np.array([3.0, 4.0]), np.zeros((1, 2)), cloud, statistics=own, known=known, frequency=4.0,
-        frequencies=np.array([2.5]),
-    )  # fmt: skip
-    assert only.distance == pytest.approx(5)
-    assert [words.partition(":")[0] for words in only.differences] == ["exposure", "scale", "dominant frequency"]
-    assert "takes less of the picture (2 times)" in only.differences[1]
 
 
 @pytest.mark.parametrize("name", DISTORTIONS)

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from flagdata.errors import UsageError
-from measure.cases.robot_cloth.reading import Floats, Swing
-from measure.cases.robot_cloth.tracker import instants
 from sim import handles
 from sim.anchors import AnchorTracks
 from sim.effects import EFFECTS, Effect, Parameter, apply
@@ -23,6 +21,8 @@ from sim.integrate.split import SplitEuler
 from sim.material import Material
 from sim.mesh import Mesh, grid
 from sim.scene import Scene, assemble
+from tests.validation.robot_cloth.reading import Floats, Swing
+from tests.validation.robot_cloth.tracker import instants
 
 PERIOD = 0.02  # s, of predictions and of the corners' tracks
 _SETTLE = 2.0  # s that a cloth hangs still before the first pose

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Callable, Mapping
 from importlib.resources import files
 from typing import Any
@@ -17,24 +16,20 @@ def render(
     """The page that `template` of `package` makes of `values`.
 
     Templates extend "base.html.j2" and may use `filters` and `asset(name)`, the text of a style or script of theirs.
-    Values are escaped unless they are `Markup`; a name the template uses and `values` lacks is an error.
+    Values are escaped unless they are `Markup`; a name the template uses and
+    `values` lacks is an error.
     """
     environment = Environment(
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-        loader=ChoiceLoader([PackageLoader(package, "."), PackageLoader("measure.pages", ".")]),
+        loader=ChoiceLoader([PackageLoader(package, "."), PackageLoader("flagdata.pages", ".")]),
     )
     environment.filters.update(filters or {})
-    environment.globals["base_style"] = Markup(_text("measure.pages", "base.css"))
+    environment.globals["base_style"] = Markup(_text("flagdata.pages", "base.css"))
     environment.globals["asset"] = lambda name: Markup(_text(package, name))
     return environment.get_template(template).render(**values)
-
-
-def data_url(data: bytes, media_type: str) -> str:
-    """The bytes as a URL that holds them."""
-    return f"data:{media_type};base64,{base64.b64encode(data).decode('ascii')}"
 
 
 def _text(package: str, name: str) -> str:

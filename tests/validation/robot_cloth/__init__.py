@@ -1,4 +1,4 @@
-"""A real cloth that a robot holds and swings in still air, tracked at about 10 Hz: see `measure.cases.robot_cloth`.
+"""A real cloth that a robot holds and swings in still air, tracked at about 10 Hz.
 
 Calibrated on the repeats of two programmes, judged on those of two others. The cloth's mass is not known, so that its
 density stands for the ratio of mass to drag. What the calibrated model lacks is sought among effects of the tracker and
@@ -15,11 +15,11 @@ from typing import Any
 
 import torch
 
-from measure.cases.robot_cloth.attribution import LEAD, Round
-from measure.cases.robot_cloth.calibrate import at_bounds
-from measure.cases.robot_cloth.model import described
-from measure.cases.robot_cloth.study import LEVEL, MOVED, SHUFFLES, Error, HeldCloth, study
 from sim.material import named
+from tests.validation.robot_cloth.attribution import LEAD, Round
+from tests.validation.robot_cloth.calibrate import at_bounds
+from tests.validation.robot_cloth.model import described
+from tests.validation.robot_cloth.study import LEVEL, MOVED, SHUFFLES, Error, HeldCloth, study
 
 FITTED, HELD_OUT = ("range30", "range90"), ("range60", "range120")
 MATERIAL = "camel-ponte-roma"
@@ -39,7 +39,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 def recordings() -> Path | None:
     """Where they are; None where they are absent."""
-    data = os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[3] / "shared" / "data")
+    data = os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[4] / "shared" / "data")
     folder = Path(data) / "cloth" / "robot-held"
     return folder if folder.is_dir() else None
 

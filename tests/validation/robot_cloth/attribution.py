@@ -16,10 +16,10 @@ import numpy as np
 from scipy.stats import rankdata
 
 from flagdata.rng import stream
-from measure.cases.robot_cloth.calibrate import Fit, calibrated
-from measure.cases.robot_cloth.model import Cloth, predicted
-from measure.cases.robot_cloth.reading import Floats, Swing
-from measure.cases.robot_cloth.tracker import TRACKER, latencies, left, shifts, upper
+from tests.validation.robot_cloth.calibrate import Fit, calibrated
+from tests.validation.robot_cloth.model import Cloth, predicted
+from tests.validation.robot_cloth.reading import Floats, Swing
+from tests.validation.robot_cloth.tracker import TRACKER, latencies, left, shifts, upper
 
 OF_CLOTH = (
     "tangential-linear-drag", "tangential-quadratic-drag", "power-law-drag", "lift", "added-mass", "reactive-loading",

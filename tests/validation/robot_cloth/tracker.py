@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from measure.cases.robot_cloth.reading import Floats, Swing
+from tests.validation.robot_cloth.reading import Floats, Swing
 
 OFFSETS, CAMERA, LATENCY = "node offsets", "camera pose and depth scale", "latency of single frames"
 TRACKER = (OFFSETS, CAMERA, LATENCY)

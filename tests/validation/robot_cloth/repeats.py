@@ -13,8 +13,8 @@ from itertools import product
 
 import numpy as np
 
-from measure.cases.robot_cloth.calibrate import Linear, weights
-from measure.cases.robot_cloth.reading import Floats, Swing
+from tests.validation.robot_cloth.calibrate import Linear, weights
+from tests.validation.robot_cloth.reading import Floats, Swing
 
 SEGMENT = 1.5  # s
 _FRAMES = 5  # frames that a segment must have

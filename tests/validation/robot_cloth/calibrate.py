@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from measure.cases.robot_cloth.model import NAMES, Cloth, Parameters, described, predicted
-from measure.cases.robot_cloth.reading import Floats, Swing
-from measure.cases.robot_cloth.tracker import (
+from tests.validation.robot_cloth.model import NAMES, Cloth, Parameters, described, predicted
+from tests.validation.robot_cloth.reading import Floats, Swing
+from tests.validation.robot_cloth.tracker import (
     CAMERA,
     LATENCY,
     OFFSETS,

@@ -12,14 +12,14 @@ import numpy as np
 
 from flagdata.console import progress
 from flagdata.rng import stream
-from measure.cases.robot_cloth.attribution import Late, Round, late, left_errors, lower, sought
-from measure.cases.robot_cloth.calibrate import Fit, Linear, at_bounds, calibrated, linear
-from measure.cases.robot_cloth.model import Cloth, Parameters, rigid
-from measure.cases.robot_cloth.reading import Floats, Swing, read_all
-from measure.cases.robot_cloth.repeats import features, shuffled, tail_probability
-from measure.cases.robot_cloth.tracker import LATENCY
 from measure.shares import Share
 from sim.material import Material
+from tests.validation.robot_cloth.attribution import Late, Round, late, left_errors, lower, sought
+from tests.validation.robot_cloth.calibrate import Fit, Linear, at_bounds, calibrated, linear
+from tests.validation.robot_cloth.model import Cloth, Parameters, rigid
+from tests.validation.robot_cloth.reading import Floats, Swing, read_all
+from tests.validation.robot_cloth.repeats import features, shuffled, tail_probability
+from tests.validation.robot_cloth.tracker import LATENCY
 
 LEVEL = 0.05
 """Level at which each pair of repeats is tested."""
