@@ -6,7 +6,7 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +82,38 @@ def from_json(text: str | bytes) -> Any:
     return content
 
 
+def from_stored_json(text: str) -> Any:
+    """The value of a JSON text that a lake holds; older versions stored numbers that are not finite.
+
+    Raises:
+        LimitsError: longer than `SIZE_LIMIT`, or nested deeper than `NESTING_LIMIT`.
+        ValueError: not JSON, or a number of thousands of digits.
+    """
+    _check_size(text)
+    try:
+        content = json.loads(text)
+    except RecursionError:
+        raise _deep() from None
+    for _ in _levels(content):
+        pass
+    return content
+
+
+def column_json(text: str, column: str, *, artifact: str) -> Any:
+    """The value of a JSON column of a catalog's row.
+
+    Raises:
+        CorruptError: as the errors of `from_stored_json`; it names the artifact.
+    """
+    try:
+        return from_stored_json(text)
+    except ValueError as error:
+        where = f"artifact {artifact}"
+        raise CorruptError(
+            f"its {column} cannot be read: {error}", where=where, fix="run flagdata verify; withdraw the artifact"
+        ) from None
+
+
 def read_json(path: Path, *, noun: str, fix: str = "restore it from a copy") -> dict[str, Any]:
     """The object in a JSON file that flagdata wrote.
 
@@ -109,14 +141,24 @@ def _check_size(text: str | bytes) -> None:
 
 def _check(content: Any) -> None:
     """Make sure that all numbers are finite, and that tables and lists are not nested too deep."""
+    for level in _levels(content):
+        for value in level:
+            if isinstance(value, float) and not math.isfinite(value):
+                raise ValueError(f"a number that is not finite, {value}")
+
+
+def _levels(content: Any) -> Iterator[list[Any]]:
+    """The values of each level of nesting below the whole.
+
+    Raises:
+        LimitsError: there are more than `NESTING_LIMIT` levels.
+    """
     level: list[Any] = [content]
     for _ in range(NESTING_LIMIT):
         level = [item for value in level for item in _inside(value)]
         if not level:
             return
-        for value in level:
-            if isinstance(value, float) and not math.isfinite(value):
-                raise ValueError(f"a number that is not finite, {value}")
+        yield level
     raise _deep()
 
 

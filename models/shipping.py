@@ -21,6 +21,7 @@ from torch import Tensor
 
 from flagdata.checksums import write_sums
 from flagdata.console import LocalPath, progress, say
+from flagdata.documents import column_json
 from flagdata.errors import UsageError
 from flagdata.outputs import check_folder, fresh_folder
 from flagdata.schema import Kind
@@ -141,12 +142,12 @@ def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Pa
     check_folder(out / recipe.name)
     source = flagdata.open(lake_path)
     networks = {"kind": Kind.NETWORK, "name": recipe.name}
-    rows = source.lake.rows(networks, columns=["object", "recipe"]).to_pylist()
+    rows = source.lake.rows(networks, columns=["artifact", "object", "recipe"]).to_pylist()
     wanted = _seedless(recipe.identity())
     members = [
         source.lake.object_path(row["object"])
         for row in rows
-        if _seedless(json.loads(row["recipe"])["recipe"]) == wanted
+        if _seedless(column_json(row["recipe"], "recipe", artifact=row["artifact"])["recipe"]) == wanted
     ]
     if not members:
         raise UsageError(f"no network {recipe.name!r} was trained by its recipe", where=str(lake_path), fix="train it")

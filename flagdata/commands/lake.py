@@ -328,12 +328,15 @@ def size_text(size: float | None) -> str:
 
 
 def _line(row: Mapping[str, Any]) -> list[object]:
+    from flagdata.documents import column_json
     from flagdata.schema import Kind
     from flagdata.timebase import iso
 
     wind = "" if row["wind"] is None else f"{row['wind']:.2f}"
     if row["kind"] == Kind.WIND:  # a log's mean, over all of it
-        mean = (json.loads(row["report"]) if row["report"] else {}).get("mean_speed")
+        mean = (column_json(row["report"], "report", artifact=row["artifact"]) if row["report"] else {}).get(
+            "mean_speed"
+        )
         wind = "" if mean is None else f"{mean:.2f}"
     if row["wind"] is not None and row["wind_sigma"] is not None:
         wind += f" ± {row['wind_sigma']:.2f}"

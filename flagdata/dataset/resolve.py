@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, replace
 
@@ -16,6 +15,7 @@ from flagdata.dataset.lineage import origins_of, superseded
 from flagdata.dataset.splits import ExplicitSplit, HashedSplit, check_side, groups, refuse_leaks
 from flagdata.dataset.table import COLUMNS, PairTable
 from flagdata.dataset.tolerance import Refusal, Tolerance, judge
+from flagdata.documents import column_json
 from flagdata.errors import NotFoundError, RefusedError, UsageError
 from flagdata.lake import Lake
 from flagdata.lake.matching import Where
@@ -149,7 +149,11 @@ def explicit_sides(catalog: pa.Table, split_by: ExplicitSplit) -> dict[str, pa.T
 
 def _windows(clips: pa.Table, table: PairTable) -> NDArray[np.float64]:
     """Window (n,) of the catalog's ground truth of each pair [s], NaN where its recipe has none."""
-    stated = {text: json.loads(text).get("window", math.nan) for text in set(clips["recipe"].to_pylist()) if text}
+    owners = dict(zip(clips["recipe"].to_pylist(), clips["artifact"].to_pylist(), strict=True))
+    stated = {
+        text: column_json(text, "recipe", artifact=artifact).get("window", math.nan)
+        for text, artifact in owners.items() if text
+    }  # fmt: skip
     by_artifact = {
         artifact: stated.get(text, math.nan)
         for artifact, text in zip(clips["artifact"].to_pylist(), clips["recipe"].to_pylist(), strict=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Self
@@ -12,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from flagdata.documents import column_json
 from flagdata.errors import CorruptError
 
 # Columns of the catalog that a pair is made of.
@@ -77,7 +77,7 @@ class PairTable:
                 artifact = rows.filter(rows[column].is_null())["artifact"][0].as_py()
                 raise CorruptError(f"a clip without {column}", where=f"artifact {artifact}", fix="run flagdata doctor")
         objects, index = np.unique(_text(rows, "object"), return_inverse=True)
-        parameters, names = _parameters(rows["parameters"].to_pylist())
+        parameters, names = _parameters(rows["parameters"].to_pylist(), rows["artifact"].to_pylist())
         return cls(
             artifact=_text(rows, "artifact"),
             recording=_text(rows, "recording"),
@@ -141,9 +141,12 @@ def _number(rows: pa.Table, column: str, *, null: float) -> NDArray[np.float64]:
     return rows[column].fill_null(null).to_numpy().astype(np.float64)
 
 
-def _parameters(texts: Sequence[str | None]) -> tuple[NDArray[np.float64], NDArray[np.str_]]:
+def _parameters(texts: Sequence[str | None], artifacts: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.str_]]:
     """Numbers of JSON objects as columns. Texts and lists among the parameters stay in the catalog only."""
-    parsed = {text: dict(_numbers(json.loads(text))) for text in set(texts) if text}
+    owners = {text: artifact for text, artifact in zip(texts, artifacts, strict=True) if text}
+    parsed = {
+        text: dict(_numbers(column_json(text, "parameters", artifact=artifact))) for text, artifact in owners.items()
+    }
     names = sorted({name for values in parsed.values() for name in values})
     column = {name: k for k, name in enumerate(names)}
     out = np.full((len(texts), len(names)), np.nan)

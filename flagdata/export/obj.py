@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from flagdata.documents import column_json
 from flagdata.errors import CorruptError
 from flagdata.export.source import Source
 from flagdata.ingest.meshes import write_folder
@@ -44,7 +44,7 @@ def _scene(sequence: MeshSequence | RaggedMeshSequence, row: Mapping[str, Any]) 
     own = sequence.attributes.get("scene")
     if isinstance(own, Mapping):
         return {**own, "frame_time": frame_time}
-    parameters: dict[str, Any] = json.loads(row["parameters"] or "{}")
+    parameters: dict[str, Any] = column_json(row["parameters"] or "{}", "parameters", artifact=row["artifact"])
     scene: dict[str, Any] = {
         "frame_time": frame_time,
         "flagdata": {"first": int(sequence.time[0]) / NANOSECONDS, "seed": row["seed"], "parameters": parameters},

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from flagdata.documents import column_json
 from flagdata.errors import CorruptError
 from flagdata.lake import Lake
 from flagdata.record import Coding, Record
@@ -79,7 +79,7 @@ class Entry:
         if not self.count:
             return -(2**63), 2**63 - 1
         times = self.frame_times
-        recipe = json.loads(self.row["recipe"]) if self.row.get("recipe") else {}
+        recipe = self._stated("recipe") if self.row.get("recipe") else {}
         window = recipe.get("window", recipe.get("truth", {}).get("window", TRUTH_WINDOW))
         return int(times[0]) - round(window * NANOSECONDS), int(times[-1])
 
@@ -96,6 +96,14 @@ class Entry:
         else:
             yield from map(self.record.jpeg, range(self.first, self.first + self.count))
 
+    @property
+    def parameters(self) -> Any:
+        """What it was made with, as strict JSON; unknown numbers are null."""
+        return _strict(self._stated("parameters")) if self.row["parameters"] else None
+
+    def _stated(self, column: str) -> Any:
+        return column_json(self.row[column], column, artifact=self.row["artifact"])
+
     def label(self) -> dict[str, Any]:
         """Identity, ground truth with σ, times and parameters as strict JSON; unknown numbers are null."""
         row = self.row
@@ -108,7 +116,7 @@ class Entry:
             "start_time": None if row["start"] is None else iso(row["start"]),
             "end_time": None if row["end"] is None else iso(row["end"]),
             "frame_times": times.tolist(),
-            "parameters": json.loads(row["parameters"] or "null", parse_constant=lambda name: None),
+            "parameters": self.parameters,
         }
 
 
@@ -119,6 +127,10 @@ def label_units() -> dict[str, str]:
 
 
 def _strict(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _strict(part) for name, part in value.items()}
+    if isinstance(value, list):
+        return [_strict(part) for part in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

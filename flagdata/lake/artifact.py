@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import operator
 import re
@@ -16,6 +15,7 @@ from typing import Any
 import pyarrow as pa
 
 from flagdata import provenance
+from flagdata.documents import from_stored_json
 from flagdata.errors import CorruptError, InputError
 from flagdata.schema import CATALOG, FORMAT_VERSION, Kind
 
@@ -112,7 +112,7 @@ class Artifact:
             text = getattr(self, column)
             if text is not None:
                 try:
-                    json.loads(text)
+                    from_stored_json(text)
                 except (TypeError, ValueError) as error:
                     raise self._bad(column, str(error), "JSON text") from None
 
@@ -186,7 +186,7 @@ class Artifact:
         names = {f.name for f in dataclasses.fields(cls)}
         values = {column: value for column, value in row.items() if column in names}
         try:
-            values["recipe"] = json.loads(row["recipe"]) if row.get("recipe") else {}
+            values["recipe"] = from_stored_json(row["recipe"]) if row.get("recipe") else {}
             artifact = cls(**values)
         except (TypeError, ValueError, AttributeError) as error:
             raise CorruptError(

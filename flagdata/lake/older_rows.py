@@ -7,11 +7,10 @@ states both exactly, whatever hyphens the data set's own name has. Clips belong 
 
 from __future__ import annotations
 
-import json
-
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from flagdata.documents import column_json
 from flagdata.schema import CATALOG, Kind
 
 _SIDES = ("train", "validation", "test")
@@ -34,7 +33,7 @@ def with_data_sets(rows: pa.Table) -> pa.Table:
     stated = {
         artifact: of
         for artifact, name, recipe in zip(*(films[c].to_pylist() for c in ("artifact", "name", "recipe")), strict=True)
-        if (of := _stated(name)) is not None and "film" in json.loads(recipe or "{}")
+        if (of := _stated(name)) is not None and "film" in column_json(recipe or "{}", "recipe", artifact=artifact)
     }
     if not stated:
         return rows

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from flagdata.documents import column_json
 from flagdata.lake import Lake
 from flagdata.outputs import check_file, rewrite, write_file
 from flagdata.pages.pictures import still
@@ -68,7 +69,7 @@ def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path:
         InputError: its folder is not there or cannot be written.
     """
     sides, rows = _sides(lake, recipe, branch)
-    parameters = [json.loads(row["parameters"]) for row in rows]
+    parameters = [column_json(row["parameters"], "parameters", artifact=row["artifact"]) for row in rows]
     values = {
         "recipe": recipe, "sides": sides, "version": code_version(), "branch": branch,
         "sheet": _sheet(lake, recipe, rows), "size": sum(row["object_bytes"] for row in rows),
