@@ -73,11 +73,7 @@ def from_json(text: str | bytes) -> Any:
         LimitsError: longer than `SIZE_LIMIT`, or nested deeper than `NESTING_LIMIT`.
         ValueError: not JSON, or a number that is not finite or of thousands of digits.
     """
-    _check_size(text)
-    try:
-        content = json.loads(text)
-    except RecursionError:
-        raise _deep() from None
+    content = _parsed(text)
     _check(content)
     return content
 
@@ -89,11 +85,7 @@ def from_stored_json(text: str) -> Any:
         LimitsError: longer than `SIZE_LIMIT`, or nested deeper than `NESTING_LIMIT`.
         ValueError: not JSON, or a number of thousands of digits.
     """
-    _check_size(text)
-    try:
-        content = json.loads(text)
-    except RecursionError:
-        raise _deep() from None
+    content = _parsed(text)
     for _ in _levels(content):
         pass
     return content
@@ -109,9 +101,7 @@ def column_json(text: str, column: str, *, artifact: str) -> Any:
         return from_stored_json(text)
     except ValueError as error:
         where = f"artifact {artifact}"
-        raise CorruptError(
-            f"its {column} cannot be read: {error}", where=where, fix="run flagdata verify; withdraw the artifact"
-        ) from None
+        raise CorruptError(f"its {column} cannot be read: {error}", where=where, fix="run flagdata doctor") from None
 
 
 def read_json(path: Path, *, noun: str, fix: str = "restore it from a copy") -> dict[str, Any]:
@@ -132,6 +122,14 @@ def read_json(path: Path, *, noun: str, fix: str = "restore it from a copy") -> 
     if not isinstance(content, dict):
         raise CorruptError(f"the {noun} is no JSON object", where=str(path), fix=fix)
     return content
+
+
+def _parsed(text: str | bytes) -> Any:
+    _check_size(text)
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise _deep() from None
 
 
 def _check_size(text: str | bytes) -> None:

@@ -289,7 +289,7 @@ def withdraw(
     from flagdata.lake import Lake
 
     lake = Lake.open(lake_path)
-    named = {lake.artifact(artifact, at=branch_name).id for artifact in artifacts}
+    named = {lake.identity(artifact, at=branch_name) for artifact in artifacts}
     made = lake.descendants(named, at=branch_name) if with_descendants else frozenset()
     done = lake.withdraw(sorted(named | made), message, branch=branch_name)
     if as_json:

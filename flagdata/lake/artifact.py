@@ -192,7 +192,7 @@ class Artifact:
             raise CorruptError(
                 f"the row of {row['artifact']} is damaged: {error}",
                 where=f"artifact {row.get('name')!r}",
-                fix="run flagdata verify",
+                fix="run flagdata doctor",
             ) from None
         if artifact.id != row["artifact"]:
             raise CorruptError(

@@ -80,7 +80,19 @@ class Store:
 
         Raises:
             NotFoundError: none, or several.
+            InputError, CorruptError: its row is malformed.
         """
+        return Artifact.from_row(self._row(artifact, at).to_pylist()[0])
+
+    def identity(self, artifact: str, *, at: str | None = None) -> str:
+        """The full id of what `artifact` means, as in `artifact`; its row may be malformed.
+
+        Raises:
+            NotFoundError: none, or several.
+        """
+        return self._row(artifact, at)["artifact"][0].as_py()
+
+    def _row(self, artifact: str, at: str | None) -> pa.Table:
         table = self.table(self.view(at))
         ids, names = table["artifact"].to_pylist(), table["name"].to_pylist()
         matches = [row for row, known in enumerate(ids) if artifact and known.startswith(artifact)]
@@ -91,7 +103,7 @@ class Store:
             what = f"{len(matches)} artifacts {how} {artifact!r}" if matches else f"no artifact {artifact!r}"
             fix = "give the id of one: flagdata ls lists them" if matches else "flagdata ls lists them"
             raise NotFoundError(what, where=str(self.path), fix=fix)
-        return Artifact.from_row(table.slice(matches[0], 1).to_pylist()[0])
+        return table.slice(matches[0], 1)
 
     def view(self, at: str | None) -> View:
         """What a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""

@@ -13,6 +13,7 @@ from flagdata.dataset.table import COLUMNS, PairTable
 from flagdata.errors import CorruptError, InputError
 from flagdata.export.source import Entry
 from flagdata.lake import Artifact, Lake
+from flagdata.lake.health import doctor
 from flagdata.lake.older_rows import with_data_sets
 from flagdata.record import Record
 from flagdata.schema import Kind, catalog_schema
@@ -72,3 +73,21 @@ def test_commands_on_a_nested_row_end_with_an_error_that_names_it(
     assert "deep" in error
     assert "unforeseen" not in error
     assert artifact.id in error or artifact.name in error
+
+
+@pytest.mark.parametrize("column", ["recipe", "report"])
+def test_a_nested_row_is_withdrawn_as_doctor_says(
+    column: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    artifact = Artifact(kind=Kind.WIND, name="log", source_hash="1" * 64)
+    stated = Artifact.row
+    monkeypatch.setattr(Artifact, "row", lambda self: {**stated(self), column: DEEP})
+    lake = Lake.create(tmp_path / "lake")
+    with lake.transaction("made by another program") as transaction:
+        transaction.add(artifact)
+    (found,) = doctor(lake)
+    assert (found.kind, "withdraw" in str(found.fix)) == ("row-malformed", True)
+    with pytest.raises(SystemExit) as ended:
+        main(["withdraw", artifact.id[:12], "-m", "malformed", "--lake", str(lake.path)])
+    assert ended.value.code in (0, None), capsys.readouterr().err
+    assert not doctor(Lake.open(lake.path))
