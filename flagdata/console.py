@@ -148,6 +148,27 @@ def following(published: str, doing: str) -> Iterator[None]:
         _report(f"warning: {published} is published, but {doing} failed: {known.what}", known)
 
 
+@contextmanager
+def in_steps(published: Callable[[], str]) -> Iterator[None]:
+    """Work that publishes one part after the other: an error in it says which parts are published and stay.
+
+    Args:
+        published: what is published by now, e.g. "2 recordings on branch main"; "" if nothing is.
+    """
+    try:
+        yield
+    except Exception as error:
+        known = foreseen(error)
+        try:
+            done = published()
+        except (OSError, FlagdataError):
+            done = "what was finished before (flagdata log lists it)"
+        if not done:
+            raise
+        fix = f"{known.fix}. Published, and kept: {done}; give the same command again for the rest"
+        raise type(known)(known.what, where=known.where, fix=fix) from error
+
+
 def fail(error: FlagdataError, *, as_json: bool) -> int:
     """Report an error the way the command's user asked for; returns the exit code."""
     if as_json:

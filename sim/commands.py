@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.console import document, json_option, lake_option, progress, say
+from flagdata.console import document, in_steps, json_option, lake_option, progress, say
 
 if TYPE_CHECKING:
     from sim.run import RunReport
@@ -50,6 +50,7 @@ def simulate(
       flagdata simulate my-flag.toml --lake lake --batch 64 --device cuda
     """
     from flagdata.lake import Lake
+    from flagdata.lake.difference import added_since
     from sim.run import simulate as run
     from sim.run.models import load
 
@@ -57,7 +58,8 @@ def simulate(
     lake.check_writable()
     loaded = load(recipe, lake, branch=branch)
     loaded = replace(loaded, count=count or loaded.count, batch=batch or loaded.batch)
-    with progress(loaded.count, label=loaded.name, unit="flag") as advance:
+    steps = in_steps(added_since(lake, branch))
+    with steps, progress(loaded.count, label=loaded.name, unit="flag") as advance:
         report = run(lake, loaded, branch=branch, device=device, workers=workers or _cores(device), progress=advance)
     if as_json:
         document("simulate", {"lake": str(lake.path), "recipe": loaded.name, **report.as_dict()})

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from flagdata.console import LocalPath, document, json_option, lake_option, progress
+from flagdata.console import LocalPath, document, in_steps, json_option, lake_option, progress
 
 
 @click.command("declare-cloths")
@@ -34,13 +34,14 @@ def declare_cloths(table: Path, crop: str, branch: str, as_json: bool, lake_path
     from flagdata.ingest.cloths import read_cloths
     from flagdata.ingest.store import CameraIngest, Labels, ingest_camera
     from flagdata.lake import Lake
+    from flagdata.lake.difference import added_since
 
     box = parse_crop(crop)
     lake = Lake.open(lake_path)
     lake.check_writable()
     cloths = read_cloths(table)
     made = []
-    with progress(len(cloths), label="films", unit="film") as advance:
+    with in_steps(added_since(lake, branch)), progress(len(cloths), label="films", unit="film") as advance:
         for cloth in cloths:
             options = CameraIngest(camera=CameraOptions(start=UNKNOWN, crop=box))
             film = ingest_camera(lake, cloth.film, options, labels=Labels(session=cloth.fabric), branch=branch)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import pyarrow as pa
@@ -38,6 +40,23 @@ def difference(lake: Lake, before: str | None, after: str | None) -> Difference:
         objects_added=tuple(sorted(new_objects - old_objects)),
         objects_removed=tuple(sorted(old_objects - new_objects)),
     )
+
+
+def added_since(lake: Lake, branch: str) -> Callable[[], str]:
+    """What a branch has gained since this call, in words, such as "on branch main: camera 2, recording 1"; "" if
+    nothing. For `flagdata.console.in_steps`.
+
+    Raises:
+        NotFoundError: no such branch.
+    """
+    before = lake.rows(at=branch, columns=["artifact", "kind"])
+
+    def words() -> str:
+        added = Counter(_without(lake.rows(at=branch, columns=["artifact", "kind"]), before)["kind"].to_pylist())
+        kinds = ", ".join(f"{kind} {count}" for kind, count in sorted(added.items()))
+        return f"on branch {branch}: {kinds}" if kinds else ""
+
+    return words
 
 
 def _without(table: pa.Table, other: pa.Table) -> pa.Table:

@@ -15,7 +15,7 @@ import click
 from click.core import ParameterSource
 
 from flagdata.commands.confirm import on_command_line
-from flagdata.console import LocalPath, document, json_option, say
+from flagdata.console import LocalPath, document, in_steps, json_option, say
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.findings import Finding
 from measure.closing.command_line import null_options, refuse, said_of_nulls, stage_bars, told
@@ -184,7 +184,8 @@ def close_loop(
         models=models(verdict, observed.experiment, name=called, seed=seed),
     )  # fmt: skip
     _write(out, closed)
-    kept = None if lake is None else keep(lake, closed, branch=branch)
+    with in_steps(lambda: f"the report and the models in {out}"):
+        kept = None if lake is None else keep(lake, closed, branch=branch)
     _tell(closed, kept, out, as_json=as_json)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from flagdata.addresses import local_path
-from flagdata.console import LocalPath, document, following, json_option, lake_option, progress, say, table
+from flagdata.console import LocalPath, document, following, in_steps, json_option, lake_option, progress, say, table
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -73,6 +73,7 @@ def build(
             _print_plan(planned)
         return
 
+    from flagdata.lake.difference import added_since
     from sim.datasets import card as cards
     from sim.datasets.build import Build
     from sim.datasets.cluster import connected
@@ -80,7 +81,7 @@ def build(
     cards.check(card)
     lake = _lake(lake_path) or _made(lake_path)
     lake.check_writable()
-    with connected(scheduler, workers=workers or _cores()) as client:
+    with in_steps(added_since(lake, branch)), connected(scheduler, workers=workers or _cores()) as client:
         report = Build(
             lake=lake, recipe=loaded, client=client, bars=progress, say=_beside_bar, branch=branch, device=device
         ).run()

@@ -108,3 +108,26 @@ def test_a_wrong_row_leaves_the_lake_as_it_was(run: Run, lake: Lake, table: Path
     assert code == 1
     assert "gone.mp4" in err
     assert lake.rows(columns=["artifact"]).num_rows == 0
+
+
+def test_an_error_midway_says_what_stays_published_and_a_repeat_makes_the_rest(
+    run: Run, lake: Lake, table: Path
+) -> None:
+    silk = table.with_name("silk.mp4")
+    whole = silk.read_bytes()
+    silk.write_bytes(whole[:100])
+    code, _, err = run(table)
+    assert code == 1
+    assert "on branch main: camera 1, clip 1, recording 1; give the same command again for the rest" in err
+    silk.write_bytes(whole)
+    code, _, err = run(table)
+    assert code == 0, err
+    assert [row["name"] for row in lake.rows("kind = 'recording'").to_pylist()] == ["felt", "silk"]
+
+
+def test_an_error_before_anything_is_published_promises_nothing(run: Run, lake: Lake, table: Path) -> None:
+    table.with_name("felt.mp4").write_bytes(b"no film")
+    code, _, err = run(table)
+    assert code == 1
+    assert "Published" not in err
+    assert not len(lake.rows())
