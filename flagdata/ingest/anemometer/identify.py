@@ -10,7 +10,6 @@ from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.ingest.anemometer import untimed
 from flagdata.ingest.anemometer.containers import json_lines, spreadsheet
 from flagdata.ingest.anemometer.draft.drafting import Draft
-from flagdata.ingest.anemometer.formats import ft, sentences_in_lines, thies
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
 from flagdata.ingest.anemometer.options import Limits, WindOptions
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKind, Head
@@ -20,28 +19,22 @@ from flagdata.ingest.anemometer.text.source import TextFile
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
 _MESHES = {".obj", ".ply", ".stl", ".off"}
-_AS_TABLE = (json_lines, thies, ft)
 
 
 def opened(path: Path, options: WindOptions, encoding: str | None = None) -> TextFile:
-    """A log as lines: telegrams and JSON lines as a table, rows that carry no time on the clock that was given.
+    """A log as lines: JSON lines as a table, rows that carry no time on the clock that was given.
 
     Raises:
         FlagdataError: it cannot be read as text, or does not fit the options.
     """
     source = open_text(path, limits=options.limits, encoding=options.encoding or encoding)
+    flat = json_lines.matches(source.head())
     if options.rate is not None:
-        kind = next((one for one in _AS_TABLE if one.matches(source.head())), None)
-        source = source if kind is None else kind.as_table(source) or source
-        return untimed.timed(source, rate=options.rate, start=options.start, columns=options.columns)
-    if options.recipe is None and sentences_in_lines.matches(source.head()):
-        return sentences_in_lines.as_table(source)
-    if options.format is not None or options.recipe is not None or recognised(source):
+        table = (json_lines.as_table(source) or source) if flat else source
+        return untimed.timed(table, rate=options.rate, start=options.start, columns=options.columns)
+    if not flat or options.format is not None or options.recipe is not None or recognised(source):
         return source
-    for kind in _AS_TABLE:
-        if kind.matches(source.head()):
-            return kind.as_table(source) or source
-    return source
+    return json_lines.as_table(source) or source
 
 
 def recognised(source: TextFile) -> tuple[Guess, ...]:

@@ -18,7 +18,7 @@ from flagdata.errors import TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.draft.shape import Shape, shape_of
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
-from flagdata.ingest.anemometer.formats.serial_lines import split_stamp
+from flagdata.ingest.anemometer.formats.serial_lines import NOTHING, split_stamp
 from flagdata.ingest.anemometer.instants.month_names import ENGLISH
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Head
 from flagdata.ingest.anemometer.text.rows import cells_of_lines
@@ -195,7 +195,7 @@ def _key(text: str) -> str:
 
 
 def _stamped(source: TextFile, rate: float, start: int) -> Iterator[str]:
-    filled = (line for line in _all_lines(source) if line.strip())
+    filled = (line for line in _all_lines(source) if line.strip(NOTHING))
     for count, line in enumerate(filled):
         yield f"{_stamp(start, count, rate)} {line.strip()}"
 

@@ -19,41 +19,30 @@ still (theoretical). JSON says by "units" in its first line whether angles are r
 
 from __future__ import annotations
 
-import datetime as dt
 import json
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from flagdata.errors import InputError, TimeError, UsageError
-from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.formats import analyzer_clock
+from flagdata.errors import InputError
+from flagdata.ingest.anemometer.formats import over_ground
 from flagdata.ingest.anemometer.formats.serial_lines import Defect, Instrument, Sample, read_lines
-from flagdata.ingest.anemometer.instants.zones import contradiction
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
+from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import SampleFlag
-from flagdata.signals import Instants, Sensor, Series
+from flagdata.signals import Sensor
 from flagdata.units import UNITS
 
-CHANNELS = (
-    "wind_speed", "wind_direction", "wind_direction_magnetic", "apparent_wind_speed", "apparent_wind_direction",
-    "theoretical_wind_speed", "theoretical_wind_direction",
-)  # fmt: skip
-MOVING = 0.26
-"""Speed over ground that a moored or fixed receiver does not report in the median [m/s]."""
 _CANDUMP = re.compile(
     r"\((?P<stamp>\d{10}\.\d{1,9})\)\s+\S+\s+(?P<id>[0-9A-F]{8})#(?P<bytes>(?:[0-9A-F]{2}){0,8})\s*[RT]?"
 )
 _GATEWAY = re.compile(
-    r"(?P<stamp>\d{2}:\d{2}:\d{2}\.\d{3})\s+[RT]\s+(?P<id>[0-9A-F]{8})(?P<bytes>(?:\s+[0-9A-F]{2}){0,8})\s*"
+    r"(?:(?P<date>\d{4}-\d{2}-\d{2})T)?(?P<stamp>\d{2}:\d{2}:\d{2}\.\d{3})\s+[RT]\s+(?P<id>[0-9A-F]{8})(?P<bytes>(?:\s+[0-9A-F]{2}){0,8})\s*"
 )
 _WIND = 130306
 _OVER_GROUND = 129026
@@ -69,7 +58,12 @@ _REFERENCES: Mapping[str, int] = {
     "true (ground referenced to north)": 0, "true": 0, "magnetic (ground referenced to magnetic north)": 1,
     "apparent": 2, "true (boat referenced)": 3, "true (water referenced)": 4,
 }  # fmt: skip
-_COLUMNS = {0: (0, 1), 1: (0, 2), 2: (3, 4), 3: (5, 6), 4: (5, 6)}
+_CHANNELS = {
+    0: ("wind_speed", "wind_direction"), 1: ("wind_speed", "wind_direction_magnetic"),
+    2: ("apparent_wind_speed", "apparent_wind_direction"), 3: ("theoretical_wind_speed", "theoretical_wind_direction"),
+    4: ("theoretical_wind_speed", "theoretical_wind_direction"),
+}  # fmt: skip
+"""Reference of a wind → its channels."""
 
 
 class Canboat:
@@ -77,7 +71,7 @@ class Canboat:
 
     name = "canboat"
     about = "NMEA 2000: frames of candump and gateways; canboat's text, raw, analyzed or JSON"
-    uses = frozenset({"zone", "platform", "azimuth", "talker", "date"})
+    uses = frozenset({"zone", "platform", "azimuth", "talker"})
 
     def recognise(self, head: Head) -> Guess | None:
         """Lines that are canboat's, some of them of wind."""
@@ -98,40 +92,24 @@ class Canboat:
         where = str(source.path)
         network = _Network(options.talker)
         instrument = Instrument(
-            name="wind on NMEA 2000 (PGN 130306)", channels=CHANNELS, parse=network, split=split,
+            name="wind on NMEA 2000 (PGN 130306)", parse=network, splits=lambda: split,
+            channels=tuple(name for pair in _CHANNELS.values() for name in pair),
             sensor=Sensor(name="NMEA 2000 wind sensor", resolution=0.01),
         )  # fmt: skip
-        in_utc = analyzer_clock.in_utc(source.head(HEAD_LINES))
-        zone_name = options.zone or ("UTC" if in_utc else None)
-        reading = read_lines(_dated(source, options), instrument, zone_name=zone_name)
+        reading = read_lines(source, instrument, zone_name=options.zone)
         if len(network.devices) > 1:
             listed = ", ".join(sorted(network.devices, key=int))
             raise InputError(
                 f"several devices send wind: {listed}; they are different instruments", where=where,
                 fix=f"choose one by its address, e.g. --talker {min(network.devices, key=int)}",
             )  # fmt: skip
-        dropped = {"non-data-lines"}
-        found = (
-            *(finding for finding in reading.findings if finding.kind not in dropped),
-            *_zone(options.zone, reading.time, in_utc),
+        found = tuple(finding for finding in reading.findings if finding.kind != "non-data-lines")
+        knots = [speed / UNITS["kn"].scale for speed in network.speeds]
+        channels, about = over_ground.settled(
+            reading.channels, options, speeds=knots, source=f"PGN {_WIND}", where=where
         )
-        speed = float(np.median(network.speeds)) if network.speeds else None
-        channels, about = _over_ground(dict(reading.channels), speed, options, where)
         sensor = Sensor(name=f"NMEA 2000 device {next(iter(network.devices))}", resolution=0.01)
-        return Reading(
-            time=reading.time, channels=channels, flags=reading.flags, line=reading.line, sensor=sensor,
-            step=reading.step, findings=(*found, about),
-        )  # fmt: skip
-
-
-def _zone(given: str | None, time: Instants, in_utc: bool) -> tuple[Finding, ...]:
-    """What is said of the zone where lines of canboat's own program show that the messages are in UTC."""
-    if not in_utc:
-        return ()
-    if given is not None:
-        return contradiction("the program's own lines between the messages say", "UTC", given, time)
-    what = "the messages carry no zone: taken as UTC, in which the program's own lines between them have the same times"
-    return (Finding(kind="zone-by-program", severity=Severity.NOTE, what=what),)
+        return replace(reading, channels=channels, sensor=sensor, findings=(*found, about))
 
 
 def split(line: str) -> tuple[str, str]:
@@ -143,12 +121,13 @@ def split(line: str) -> tuple[str, str]:
     match = _RAW.fullmatch(text) or _TEXT.fullmatch(text)
     if match is not None:
         return _iso(match), match["rest"]
-    date, text = (text[:10], text[11:]) if re.match(r"\d{4}-\d{2}-\d{2} ", text) else ("", text)
-    frame = _CANDUMP.fullmatch(text) or _GATEWAY.fullmatch(text)
+    frame = _CANDUMP.fullmatch(text)
+    if frame is not None:
+        return frame["stamp"], _message(frame)
+    frame = _GATEWAY.fullmatch(text)
     if frame is None:
         return "", text
-    stamp = f"{date}T{frame['stamp']}Z" if date else frame["stamp"] if "(" in text[:1] else ""
-    return stamp, _message(frame)
+    return f"{frame['date']}T{frame['stamp']}Z" if frame["date"] else "", _message(frame)
 
 
 def _message(frame: re.Match[str]) -> str:
@@ -159,56 +138,6 @@ def _message(frame: re.Match[str]) -> str:
     number = number if (number >> 8) & 0xFF >= 240 else number & 0x1FF00
     listed = "".join(f",{byte:02x}" for byte in data)
     return f"{(identifier >> 26) & 7},{number},{identifier & 0xFF},255,{len(data)}{listed}"
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Dated(TextFile):
-    """The same lines, frames after a time of day with the day before it.
-
-    Attributes:
-        date: of the first line.
-    """
-
-    date: dt.date
-
-    def blocks(self, size: int = 200_000) -> Iterator[tuple[int, list[str]]]:
-        """See `TextFile.blocks`."""
-        day, before = self.date, ""
-        for first, lines in super().blocks(size):
-            stamped: list[str] = []
-            for line in lines:
-                frame = _GATEWAY.fullmatch(line.strip())
-                if frame is None:
-                    stamped.append(line)
-                    continue
-                if before[:2] > "18" and frame["stamp"][:2] < "06":
-                    day += dt.timedelta(days=1)
-                before = frame["stamp"]
-                stamped.append(f"{day.isoformat()} {line.strip()}")
-            yield first, stamped
-
-
-def _dated(source: TextFile, options: WindOptions) -> TextFile:
-    """The file with the day that the user gives before times of day.
-
-    Raises:
-        TimeError: times of day, and no day given.
-        UsageError: a day for stamps that have one.
-    """
-    timed = any(_GATEWAY.fullmatch(line.strip()) for line in source.head())
-    if timed and options.date is None:
-        raise TimeError(
-            "the stamps are times of day without a date", where=f"{source.path}, line 1",
-            fix="give the day of the first row, in UTC: --date 2026-05-01",
-        )  # fmt: skip
-    if options.date is None:
-        return source
-    if not timed:
-        raise UsageError(
-            "the stamps say when they were: --date is not used", where=str(source.path), fix="leave it out"
-        )
-    own = {item.name: getattr(source, item.name) for item in fields(TextFile)}
-    return _Dated(**own, date=options.date)
 
 
 def _iso(match: re.Match[str]) -> str:
@@ -295,13 +224,10 @@ class _Network:
         return self._wind(device, speed, _number(angle) * scale, reference)
 
     def _wind(self, device: str, speed: float, angle: float, reference: int) -> Sample | Defect:
-        if reference not in _COLUMNS or (self._device is not None and device != self._device):
+        if reference not in _CHANNELS or (self._device is not None and device != self._device):
             return Defect.OTHER
         self.devices[device] += 1
-        values = [math.nan] * len(CHANNELS)
-        at = _COLUMNS[reference]
-        values[at[0]], values[at[1]] = speed, angle
-        return values, int(SampleFlag.OK)
+        return dict(zip(_CHANNELS[reference], (speed, angle), strict=True)), SampleFlag.OK
 
 
 def _word(data: bytes, at: int, scale: float) -> float:
@@ -314,49 +240,3 @@ def _number(value: object) -> float:
     """A number, alone or before its unit; NaN where there is none."""
     match = re.match(r"-?\d+(?:\.\d+)?", str(value).strip())
     return float(match[0]) if match else math.nan
-
-
-def _over_ground(
-    channels: dict[str, Series], speed: float | None, options: WindOptions, where: str
-) -> tuple[dict[str, Series], Finding]:
-    """Which channels are wind over ground, by what is known of the platform.
-
-    Raises:
-        InputError: a platform that was said to be fixed moves.
-        UsageError: an azimuth that nothing can be turned by.
-    """
-    kind = "apparent" if "apparent_wind_speed" in channels else "theoretical"
-    stated = "wind_speed" in channels
-    relative = f"{kind}_wind_direction"
-    if options.azimuth is not None and (options.platform != "fixed" or stated or relative not in channels):
-        raise UsageError(
-            "an azimuth turns the relative wind of a fixed platform alone", where=where,
-            fix="add --platform fixed, or leave --azimuth out",
-        )  # fmt: skip
-    if options.platform == "fixed":
-        if speed is not None and speed > MOVING:
-            raise InputError(
-                f"the platform was said to be fixed, but moves at {speed:.2f} m/s over ground in the median",
-                where=where, fix="leave out --platform",
-            )  # fmt: skip
-        if not stated:
-            channels["wind_speed"] = channels.pop(f"{kind}_wind_speed")
-        if options.azimuth is not None:
-            channels["wind_direction"] = np.mod(channels.pop(relative) + options.azimuth, 2 * np.pi)
-        text = f"fixed platform, as given: {'ground-referenced' if stated else kind} wind is wind over ground"
-        return channels, Finding(kind="fixed-platform", severity=Severity.NOTE, what=text)
-    if stated:
-        moves = (speed is not None and speed > MOVING) or options.platform in ("moving", "corrected")
-        text = "wind over ground was computed on the network from a moving platform's heading and speed"
-        if not moves:
-            text = "wind over ground: if its platform moves, it was computed on the network from its heading and speed"
-        return channels, Finding(
-            kind="computed-true-wind", severity=Severity.WARNING, what=text,
-            fix=None if moves else "if the sensor stands on a mast, say so: --platform fixed",
-        )  # fmt: skip
-    known = f"at {speed:.2f} m/s over ground" if speed is not None else "of unknown motion"
-    return channels, Finding(
-        kind="apparent-wind-only", severity=Severity.WARNING, value=speed,
-        what=f"wind relative to a platform {known}: no ground truth",
-        fix="if the sensor stands on a mast, say so: --platform fixed",
-    )  # fmt: skip

@@ -16,27 +16,14 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import replace
+from functools import partial
 
-from flagdata.ingest.anemometer.formats.serial_lines import (
-    Defect,
-    Instrument,
-    Sample,
-    checksum,
-    guess,
-    read_lines,
-    turned,
-)
-from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.table.sonic import with_horizontal
-from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.ingest.anemometer.formats.sentences import checksum
+from flagdata.ingest.anemometer.formats.serial_lines import Defect, Instrument, InstrumentLines, Sample
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor
 from flagdata.units import UNITS
 
-CHANNELS = ("wind_speed", "wind_direction", "wind_x", "wind_y", "wind_z", "sonic_temperature")
 _LINE = re.compile(r"(?:\x02|<STX>)?\s*(?P<body>[A-Z],.*?)(?P<end>\x03|<ETX>)?\s*(?P<sum>[0-9A-F]{2})?\s*", re.DOTALL)
 _BEGINS = re.compile(r"(?:\x02|<STX>)?\s*[A-Z],\s*(?:[+-]?\d|,)")
 _POLAR = re.compile(r"(?:\d{1,3}(?:\.\d)?)?")
@@ -51,35 +38,6 @@ _SOUND = 100.0
 
 GILL = {"M": "m/s", "N": "kn", "P": "mph", "K": "km/h", "F": "ft/min"}
 """Gill Instruments, WindSonic User Manual (1405-PS-0019, issue 28), 9.1: the unit's letter behind the speed."""
-
-
-class Gill:
-    """Format "gill"."""
-
-    name = "gill"
-    about = "Gill WindSonic, WindObserver or WindMaster ASCII lines, each after a computer's stamp"
-    uses = frozenset({"zone", "azimuth"})
-
-    def recognise(self, head: Head) -> Guess | None:
-        """Lines of identifier, two or three numbers, unit and status."""
-        return guess(head, self.name, "Gill ASCII (identifier, wind, unit, status)", parse)
-
-    def read(self, source: TextFile, options: WindOptions) -> Reading:
-        """Read every line whose checksum is right or absent."""
-        instrument = Instrument(
-            name="a Gill anemometer", channels=CHANNELS, parse=parse,
-            sensor=Sensor(name="Gill ultrasonic anemometer", resolution=0.01),
-            described_by="Gill's manuals of WindSonic, WindObserver and WindMaster",
-        )  # fmt: skip
-        where = str(source.path)
-        reading = read_lines(source, instrument, zone_name=options.zone)
-        if "wind_x" not in reading.channels:
-            return turned(reading, options.azimuth, where=where)
-        # with_horizontal takes wind along +x to come from the azimuth; along +U it comes from the south mark.
-        own = {name: reading.channels[name] for name in ("wind_x", "wind_y")}
-        facing = replace(reading, channels={**reading.channels, **{name: -values for name, values in own.items()}})
-        done = with_horizontal(facing, options.azimuth, where=where)
-        return replace(done, channels={**done.channels, **own})
 
 
 def parse(raw: str) -> Sample | Defect:
@@ -105,24 +63,32 @@ def _fields(body: str) -> Sample | None:
     if at is None or any(len(cell) > 12 for cell in cells):
         return None
     scale = UNITS[GILL[cells[at]]].scale
-    vertical = math.nan
-    if at == 4:
-        if not _SIGNED.fullmatch(cells[3]):
-            return None
-        vertical = float(cells[3]) * scale
     rest = cells[at + 1 :]
     numbers: list[float] = []
     while rest and _SIGNED.fullmatch(rest[0]) and len(numbers) < 2:
         numbers.append(float(rest.pop(0)))
-    if not rest or not _STATUS.fullmatch(rest[0]):
+    if not rest or not _STATUS.fullmatch(rest[0]) or (at == 4 and not _SIGNED.fullmatch(cells[3])):
         return None
     temperature = next((value for value in numbers if abs(value) < _SOUND), math.nan)
-    flag = int(SampleFlag.OK if rest[0] in RIGHT else SampleFlag.SENSOR_FAULT)
+    values = {"sonic_temperature": temperature + UNITS["degC"].offset}
+    if at == 4:
+        values["wind_z"] = float(cells[3]) * scale
     first, second = cells[1], cells[2]
-    tail = (vertical, temperature + UNITS["degC"].offset)
     if _SIGNED.fullmatch(first) and _SIGNED.fullmatch(second):
-        return (math.nan, math.nan, float(first) * scale, float(second) * scale, *tail), flag
-    if _POLAR.fullmatch(first) and _SPEED.fullmatch(second):
-        direction = math.radians(float(first)) if first else math.nan
-        return (float(second) * scale, direction, math.nan, math.nan, *tail), flag
-    return None
+        values |= {"wind_x": float(first) * scale, "wind_y": float(second) * scale}
+    elif _POLAR.fullmatch(first) and _SPEED.fullmatch(second):
+        values |= {"wind_speed": float(second) * scale}
+        values |= {"wind_direction": math.radians(float(first))} if first else {}
+    else:
+        return None
+    return values, SampleFlag.OK if rest[0] in RIGHT else SampleFlag.SENSOR_FAULT
+
+
+INSTRUMENT = Instrument(
+    format="gill", about="Gill WindSonic, WindObserver or WindMaster ASCII lines", name="a Gill anemometer",
+    line="Gill ASCII (identifier, wind, unit, status)", parse=parse, axes_from_south=True,
+    channels=("wind_speed", "wind_direction", "wind_x", "wind_y", "wind_z", "sonic_temperature"),
+    sensor=Sensor(name="Gill ultrasonic anemometer", resolution=0.01),
+    described_by="Gill's manuals of WindSonic, WindObserver and WindMaster",
+)  # fmt: skip
+Gill = partial(InstrumentLines, INSTRUMENT)

@@ -16,25 +16,13 @@ from __future__ import annotations
 
 import math
 import re
+from functools import partial
 
-from flagdata.ingest.anemometer.formats.serial_lines import (
-    Defect,
-    Instrument,
-    Sample,
-    guess,
-    read_lines,
-    split_stamp,
-    turned,
-)
-from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.ingest.anemometer.formats.serial_lines import Defect, Instrument, InstrumentLines, Sample, split_stamp
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor
 from flagdata.units import UNITS
 
-CHANNELS = ("wind_speed", "wind_direction", "wind_x", "wind_y", "wind_z", "sonic_temperature")
 _DATA = re.compile(r"(?P<kind>[A-Z]):(?P<pairs>(?:\s*[xyzvdtq]\s*=\s*-?\d+(?:\s*,)?)+)\s*")
 _PAIR = re.compile(r"([xyzvdtq])\s*=\s*(-?\d+)")
 _CLOCK = re.compile(r"T:\s*(\d{2})\.(\d{2})\.(\d{2})\s+(\d{2}:\d{2}:\d{2})\s*")
@@ -44,29 +32,6 @@ _NEWEST_BEGINS = re.compile(r"[0-9A-Fa-f]{32};")
 _CENTI = 0.01
 _NOTHING = -9999
 _RIGHT = ("M", "H")
-
-
-class Metek:
-    """Format "metek"."""
-
-    name = "metek"
-    about = "METEK uSonic and USA-1 telegrams"
-    uses = frozenset({"zone", "azimuth"})
-
-    def recognise(self, head: Head) -> Guess | None:
-        """Telegrams of one letter, a colon and named integers, or of a status and numbers between semicolons."""
-        lines = [line for line in head.lines if not _CLOCK.fullmatch(split_stamp(line)[1])]
-        return guess(Head(lines=tuple(lines)), self.name, "METEK telegrams (M:x = …, M:v=… or status;x;y;z;T)", parse)
-
-    def read(self, source: TextFile, options: WindOptions) -> Reading:
-        """Read speed and direction or components, stamped by the computer or else by the instrument."""
-        instrument = Instrument(
-            name="a METEK sonic", channels=CHANNELS, parse=parse, split=_Clock(),
-            sensor=Sensor(name="METEK sonic", resolution=0.01),
-            described_by="METEK's manuals of uSonic-2 and USA-1, or a published sample",
-        )  # fmt: skip
-        reading = read_lines(source, instrument, zone_name=options.zone)
-        return turned(reading, options.azimuth, where=str(source.path))
 
 
 class _Clock:
@@ -86,30 +51,44 @@ class _Clock:
 
 def parse(raw: str) -> Sample | Defect:
     """One telegram. A kind other than M and H is the instrument's mark of a fault."""
+    if _CLOCK.fullmatch(raw):
+        return Defect.BESIDE
     newest = _NEWEST.fullmatch(raw)
     if newest is not None:
-        return _newest(newest["values"].split(";")[1:])
+        return _newest([float(cell) if cell.strip() else math.nan for cell in newest["values"].split(";")[1:]])
     match = _DATA.fullmatch(raw)
     if match is None:
         return Defect.CUT if _BEGINS.match(raw) or _NEWEST_BEGINS.match(raw) else Defect.OTHER
     values = {name: float(text) for name, text in _PAIR.findall(match["pairs"])}
     if not ({"v", "d"} <= set(values) or {"x", "y"} <= set(values)):
         return Defect.CUT
-    known = {name: value if value != _NOTHING else math.nan for name, value in values.items()}
-    missing = math.nan
-    x, y, z = (known.get(name, missing) * _CENTI for name in "xyz")
-    speed = known["v"] * _CENTI if "v" in known else math.hypot(x, y)
-    temperature = known.get("t", missing) * _CENTI + UNITS["degC"].offset
-    flag = int(SampleFlag.OK if match["kind"] in _RIGHT else SampleFlag.SENSOR_FAULT)
-    return (speed, math.radians(known.get("d", missing)), x, y, z, temperature), flag
+    known = {name: value * _CENTI if value != _NOTHING else math.nan for name, value in values.items()}
+    degrees = values["d"] if values.get("d", _NOTHING) != _NOTHING else math.nan
+    sample = _sample(known, known.get("v"), degrees, known.get("t", math.nan))
+    return sample, SampleFlag.OK if match["kind"] in _RIGHT else SampleFlag.SENSOR_FAULT
 
 
-def _newest(cells: list[str]) -> Sample | Defect:
+def _newest(values: list[float]) -> Sample | Defect:
     """A telegram with semicolons: x, y, z, T and, where they are sent, speed and direction."""
-    values = [float(cell) if cell.strip() else math.nan for cell in cells]
     if len(values) not in (4, 6, 8):
         return Defect.CUT
-    x, y, z, temperature = values[:4]
-    speed, direction = values[4:6] if len(values) > 4 else (math.hypot(x, y), math.nan)
-    kelvin = temperature + UNITS["degC"].offset
-    return (speed, math.radians(direction), x, y, z, kelvin), int(SampleFlag.OK)
+    speed, degrees = values[4:6] if len(values) > 4 else (None, math.nan)
+    return _sample(dict(zip("xyz", values, strict=False)), speed, degrees, values[3]), SampleFlag.OK
+
+
+def _sample(axes: dict[str, float], speed: float | None, degrees: float, celsius: float) -> dict[str, float]:
+    x, y, z = (axes.get(name, math.nan) for name in "xyz")
+    return {
+        "wind_speed": math.hypot(x, y) if speed is None else speed, "wind_direction": math.radians(degrees),
+        "wind_x": x, "wind_y": y, "wind_z": z, "sonic_temperature": celsius + UNITS["degC"].offset,
+    }  # fmt: skip
+
+
+INSTRUMENT = Instrument(
+    format="metek", about="METEK uSonic and USA-1 telegrams", name="a METEK sonic", parse=parse, splits=_Clock,
+    line="METEK telegrams (M:x = …, M:v=… or status;x;y;z;T)",
+    channels=("wind_speed", "wind_direction", "wind_x", "wind_y", "wind_z", "sonic_temperature"),
+    sensor=Sensor(name="METEK sonic", resolution=0.01),
+    described_by="METEK's manuals of uSonic-2 and USA-1, or a published sample",
+)  # fmt: skip
+Metek = partial(InstrumentLines, INSTRUMENT)

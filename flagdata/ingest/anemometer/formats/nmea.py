@@ -20,6 +20,7 @@ import numpy as np
 
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.formats import over_ground
 from flagdata.ingest.anemometer.formats.marks import NO_TIME, NO_TIME_FIX, Placed, TimeLine
 from flagdata.ingest.anemometer.formats.sentences import (
     SPEED_UNITS,
@@ -42,8 +43,6 @@ from flagdata.signals import Instants, Sensor
 from flagdata.timebase import NANOSECONDS
 from flagdata.units import UNITS
 
-MOVING = 0.5
-"""Speed over ground that a moored or fixed receiver does not report in the median [kn]."""
 _OTHERS = {"VWR": "apparent_wind", "VWT": "theoretical_wind", "MDA": "wind"}
 """Older sentences → the wind they hold."""
 _NEWER = {"apparent_wind": "MWV,R", "theoretical_wind": "MWV,T", "wind": "MWD"}
@@ -159,12 +158,14 @@ class Nmea:
             raise InputError(
                 "every wind sentence is empty or invalid", where=f"{where}, line {line[0]}", fix="check the sensor"
             )
-        channels, about = _platform(channels, stream, options, where)
+        channels, about = over_ground.settled(
+            channels, options, speeds=stream.speeds, source=_sources(stream, "wind"), where=where
+        )
         flags = np.array(stream.flags, dtype=np.uint16) | np.uint16(SampleFlag.TIME_UNSURE)
         return Reading(
             time=placed.time, channels=channels, flags=flags, line=line,
             sensor=Sensor(name=f"NMEA 0183 talker {next(iter(talkers))}"), step=NANOSECONDS,
-            stamped=False, findings=(*_kinds(stream, placed.time), *_findings(stream, placed), *found, *about),
+            stamped=False, findings=(*_kinds(stream, placed.time), *_findings(stream, placed), *found, about),
         )  # fmt: skip
 
 
@@ -328,65 +329,6 @@ def _add(stream: _Stream, sentence: Sentence, at: int, row: dict[str, float], fl
     stream.line.append(at)
     stream.values.append(row)
     stream.flags.append(int(flag))
-
-
-def _platform(
-    channels: dict[str, np.ndarray], stream: _Stream, options: WindOptions, where: str
-) -> tuple[dict[str, np.ndarray], tuple[Finding, ...]]:
-    """Which channels are wind over ground, by what is known of the platform."""
-    moving = float(np.median(stream.speeds)) if stream.speeds else None
-    if options.platform == "fixed":
-        if moving is not None and moving > MOVING:
-            raise InputError(
-                f"the platform was said to be fixed, but moves at {moving:.1f} kn over ground in the median",
-                where=where, fix="leave out --platform",
-            )  # fmt: skip
-        return _fixed(channels, stream, options, where)
-    if options.azimuth is not None:
-        raise UsageError(
-            "an azimuth belongs to a fixed platform", where=where, fix="add --platform fixed, or leave it out"
-        )
-    fix = None
-    if moving and moving > MOVING:
-        known = f"a platform that moves at {moving:.1f} kn"
-    elif options.platform in ("moving", "corrected"):
-        known = "a moving platform, as given"
-    else:
-        known = "a platform of unknown motion"
-        fix = "if the sensor stands on a mast, say so: --platform fixed"
-    if "wind_speed" in channels:
-        text = f"wind over ground ({_sources(stream, 'wind')})"
-        if fix is None:
-            text += f" was computed by the instrument from heading and speed of {known}"
-        else:
-            text += ": if its platform moves, the instrument computed it from that platform's heading and speed"
-        return channels, (Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text, fix=fix),)
-    return channels, (
-        Finding(
-            kind="apparent-wind-only", severity=Severity.WARNING, value=moving,
-            what=f"wind relative to {known}: no ground truth", fix=fix,
-        ),
-    )  # fmt: skip
-
-
-def _fixed(
-    channels: dict[str, np.ndarray], stream: _Stream, options: WindOptions, where: str
-) -> tuple[dict[str, np.ndarray], tuple[Finding, ...]]:
-    kind = "apparent" if "apparent_wind_speed" in channels else "theoretical"
-    speed, angle = f"{kind}_wind_speed", f"{kind}_wind_direction"
-    out = dict(channels)
-    stated = "wind_speed" in out
-    if not stated and speed in out:
-        out["wind_speed"] = out.pop(speed)
-    if options.azimuth is not None:
-        if stated or angle not in out:
-            what = "the stream states wind over ground itself" if stated else "the stream has no directions"
-            raise UsageError(f"an azimuth was given, but {what}", where=where, fix="leave out --azimuth")
-        out["wind_direction"] = np.mod(out.pop(angle) + options.azimuth, 2 * np.pi)
-    text = f"fixed platform, as given: {kind} wind is wind over ground"
-    if stated:
-        text = f"fixed platform, as given: the wind over ground is that of {_sources(stream, 'wind')}"
-    return out, (Finding(kind="fixed-platform", severity=Severity.NOTE, what=text),)
 
 
 def _kinds(stream: _Stream, time: Instants) -> tuple[Finding, ...]:

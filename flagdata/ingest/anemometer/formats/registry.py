@@ -59,6 +59,8 @@ FORMATS = Registry(
         "trisonica": "flagdata.ingest.anemometer.formats.trisonica:TriSonica",
         "vaisala": "flagdata.ingest.anemometer.formats.vaisala:Vaisala",
         "young": "flagdata.ingest.anemometer.formats.young:Young",
+        "thies": "flagdata.ingest.anemometer.formats.thies:Thies",
+        "ft": "flagdata.ingest.anemometer.formats.ft:Ft",
         "nrg": "flagdata.ingest.anemometer.formats.nrg:Nrg",
         "weatherlink": "flagdata.ingest.anemometer.formats.described:WeatherLink",
         "windographer": "flagdata.ingest.anemometer.formats.described:Windographer",

@@ -1,20 +1,19 @@
 """Lines that an instrument sent over a serial port, as a computer or logger wrote them down.
 
 The instruments do not know the time: it is the stamp that the logging computer wrote before each line, ISO 8601 or Unix
-seconds or milliseconds, alone or in brackets, set off by a comma, semicolon, tab or blank. Signal K's server writes the
-connection's name between stamp and sentence, other programs what they have to say about it. Each instrument's file says
-what its lines mean; the rest is here.
+time, alone or in brackets, set off by a comma, semicolon, tab or blank. Signal K's server writes the connection's name
+between stamp and sentence, other programs what they have to say about it; an NMEA sentence is found wherever its line
+holds a stamp. Each instrument's file declares what its lines mean; the rest is here.
 """
 
 from __future__ import annotations
 
 import re
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
-from functools import lru_cache, reduce
-from operator import xor
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -22,24 +21,30 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.formats.sentences import tag_time
+from flagdata.ingest.anemometer.instants.abbreviations import ABBREVIATED
 from flagdata.ingest.anemometer.instants.month_names import ENGLISH
 from flagdata.ingest.anemometer.instants.stamps import Stamps
 from flagdata.ingest.anemometer.instants.stamps import parse as parse_stamps
+from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading, described
 from flagdata.ingest.anemometer.samples import possible
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.table.rowclock import instants
+from flagdata.ingest.anemometer.table.sonic import with_horizontal
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Sensor
 
+_CLOCK = r"(?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9})?)"
+_RAW = r"[\"\])]?[\s,;>|]+(?P<raw>\S.*)"
 _STAMP = re.compile(
     r"\s*(?:[A-Za-z]\w{0,15}[ ,;:\t]+|[A-Za-z][\w.-]{0,60}\t)?"
     r"[\"\[(]?(?P<date>\d{4}[-/]\d{2}[-/]\d{2})[T ,;\t](?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9}|,\d{3}(?=[\s\])]))?)"
     r"(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?[\s,;>|]+"
     r"(?:(?:\w{0,40}[,;]){1,2}(?=\"?[$!])|[^$!]{1,120}(?=[$!][A-Z]{2}[A-Z0-9]{3},))?(?P<raw>\S.*)"
 )
-_AFTER = re.compile(r"(?<=\*[0-9A-Fa-f]{2})\s.*")
+_AFTER = re.compile(r"(?<=\*[0-9A-Fa-f]{2})[\"\s].*")
 """What a program wrote behind a sentence."""
 _EPOCH = re.compile(
     r"\s*[\"\[(]?(?P<epoch>\d{10}(?:\.\d{1,9})?|\d{13})[\"\])]?(?:\[[^\]]{0,10}\])?[\s,;>|]+"
@@ -47,20 +52,31 @@ _EPOCH = re.compile(
 )
 _MONTH = re.compile(
     r"\s*[\"\[(]?(?P<day>\d{1,2})[-/ ](?P<month>[A-Za-z]{3})[-/ ](?P<year>\d{4})[T ,;:\t]"
-    r"(?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9})?)[\"\])]?[\s,;>|]+(?P<raw>\S.*)"
+    + _CLOCK
+    + "(?P<zone>)"
+    + _RAW
 )
 _CTIME = re.compile(
-    r"\s*[\"\[(]?(?:[A-Za-z]{3},? )?(?P<month>[A-Za-z]{3}) +(?P<day>\d{1,2}) (?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9})?) "
-    r"(?P<year>\d{4})[\"\])]?[\s,;>|]+(?P<raw>\S.*)"
-)
-"""As C's asctime and Python's time.asctime write it, perhaps with a fraction: "Tue Jul 17 12:48:36.971 2018"."""
+    r"\s*[\"\[(]?(?:[A-Za-z]{3},? )?(?P<month>[A-Za-z]{3}) +(?P<day>\d{1,2}) "
+    + _CLOCK + r" (?:(?P<zone>[A-Z]{3,4}) )?(?P<year>\d{4})" + _RAW
+)  # fmt: skip
+"""As C's asctime and the command date write it, perhaps with a fraction: "Tue Jul 17 12:48:36.971 2018"."""
 _COMPACT = re.compile(
     r"\s*[\"\[(]?(?P<year>(?:19|20)\d{2})(?P<month>\d{2})(?P<day>\d{2})[T _-]?"
     r"(?P<hour>\d{2}):?(?P<minute>\d{2}):?(?P<second>\d{2}(?:\.\d{1,9})?)(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?"
     r"[\s,;>|]+(?P<raw>[$!]\S.*)"
 )
 """A stamp without signs between its numbers, before a sentence: "20260501 120000+00:00 $WIMWV,…"."""
+_SENTENCE = re.compile(r"[$!][A-Z]{2}[A-Z0-9]{3},[^*$!\"]*\*[0-9A-Fa-f]{2}")
+_ANYWHERE = re.compile(
+    r"(?<!\d)(?P<date>\d{4}[-/]\d{2}[-/]\d{2})[T ,;\t]+(?P<time>\d{2}:\d{2}:\d{2}(?:[.,]\d{1,9})?)\s?"
+    r"(?P<zone>Z|UTC|[+-]\d{2}:?\d{2})?(?![\d:])"
+)
+_UNIX = re.compile(r"(?<![\d.])(?P<whole>1\d{9})(?:\.(?P<part>\d{1,9})|(?P<rest>(?:\d{3}){0,3}))(?![\d.])")
+"""Seconds, perhaps with a fraction, and milli-, micro- and nanoseconds since 1970."""
 GIVEN_CLOCK = "they carry no time of their own: they are on the clock that was given"
+NOTHING = " \t\x00\x02\x03\x1a"
+"""What an empty line may hold."""
 LONGEST = 2000
 """Characters of the longest line of an instrument; longer ones are something else."""
 _SECONDS = re.compile(r"\d{10}(\.\d+)?")
@@ -75,10 +91,14 @@ class Defect(Enum):
     """Its checksum is wrong."""
     CUT = auto()
     """It begins as a reading, but is not whole."""
+    BESIDE = auto()
+    """It is another message of the instrument."""
+    UNIT = auto()
+    """It is a reading that states no unit of speed, which the user has to give."""
 
 
-Sample: TypeAlias = tuple[Sequence[float], int]
-"""Values in the order of the instrument's channels (SI, NaN where missing) and bits of SampleFlag."""
+Sample: TypeAlias = tuple[Mapping[str, float], SampleFlag]
+"""Values (SI, NaN or not there where missing) by names of schema.CHANNELS, and what the instrument says of itself."""
 Parse: TypeAlias = Callable[[str], Sample | Defect]
 Split: TypeAlias = Callable[[str], tuple[str, str]]
 
@@ -89,11 +109,15 @@ class Instrument:
 
     Attributes:
         name: of the instrument, for messages.
-        channels: names of schema.CHANNELS, in the order of a sample's values.
+        channels: names of schema.CHANNELS that its lines may have.
         parse: a line without its stamp → sample or defect.
         sensor: the instrument.
         described_by: the maker's description that `parse` follows, where no file of the instrument was at hand.
-        split: a line → stamp ("" where there is none; ISO 8601 or Unix time) and the rest.
+        splits: makes, for a file, what divides a line into stamp ("" where there is none; ISO 8601 or Unix time) and
+            the rest.
+        format, about, line: name and description of its format, and what a line is, where it has one of its own.
+        axes_from_south: whether wind along +x comes from the south mark, and not from the azimuth.
+        in_unit: of a unit that the user gives, the `parse` that reads lines with `Defect.UNIT` in it.
     """
 
     name: str
@@ -101,12 +125,17 @@ class Instrument:
     parse: Parse
     sensor: Sensor
     described_by: str | None = None
-    split: Split | None = None
+    splits: Callable[[], Split] = lambda: split_stamp
+    format: str = ""
+    about: str = ""
+    line: str = ""
+    axes_from_south: bool = False
+    in_unit: Callable[[str], Parse] | None = None
 
 
 @dataclass
 class _Gathered:
-    channels: list[array[float]]
+    channels: dict[str, array[float]]
     stamps: list[str] = field(default_factory=list)
     line: list[int] = field(default_factory=list)
     flags: list[int] = field(default_factory=list)
@@ -117,22 +146,47 @@ class _Gathered:
 
 @lru_cache(maxsize=2048)
 def split_stamp(line: str) -> tuple[str, str]:
-    """The stamp that a computer wrote before a line ("" where there is none), and the line, out of its quotes."""
+    """The stamp that a computer wrote before a line ("" where there is none), and the line, out of its quotes.
+
+    The stamp of an NMEA sentence may stand anywhere in its line.
+    """
+    if line.startswith("\\"):
+        instant = tag_time(line)
+        fraction = f".{instant % 1000:03d}" if instant is not None and instant % 1000 else ""
+        return ("", line) if instant is None else (f"{instant // 1000}{fraction}", line[line.rfind("\\") + 1 :])
     match = _STAMP.match(line)
     if match is not None:
-        stamp = f"{match['date']}T{match['time']}{match['zone'] or ''}"
-        raw = _unquoted(match["raw"])
+        stamp, raw = f"{match['date']}T{match['time']}{match['zone'] or ''}", _unquoted(match["raw"])
         return stamp, _AFTER.sub("", raw) if raw.startswith(("$", "!")) else raw
     match = _MONTH.match(line) or _CTIME.match(line)
     if match is not None and match["month"].lower() in ENGLISH:
         month = ENGLISH.index(match["month"].lower()) + 1
-        return f"{match['year']}-{month:02d}-{match['day']:0>2}T{match['time']}", _unquoted(match["raw"])
+        east = {"UTC": 0, "GMT": 0, **ABBREVIATED}.get(match["zone"] or "")
+        zone = "" if east is None else f"{east:+03d}:00"
+        return f"{match['year']}-{month:02d}-{match['day']:0>2}T{match['time']}{zone}", _unquoted(match["raw"])
     match = _COMPACT.match(line)
     if match is not None:
         stamp = "{year}-{month}-{day}T{hour}:{minute}:{second}".format(**match.groupdict()) + (match["zone"] or "")
         return stamp, _AFTER.sub("", match["raw"])
     match = _EPOCH.match(line)
-    return (match["epoch"], _unquoted(match["raw"])) if match is not None else ("", _unquoted(line))
+    if match is not None:
+        return match["epoch"], _unquoted(match["raw"])
+    found = _SENTENCE.findall(line)
+    if len(found) == 1:
+        stamp = _stamp_of(_SENTENCE.sub(" ", line))
+        if stamp:
+            return stamp, found[0]
+    return "", _unquoted(line)
+
+
+def _stamp_of(text: str) -> str:
+    """The stamp in a line without its sentence; "" where there is none."""
+    if (match := _ANYWHERE.search(text)) is not None:
+        zone = "Z" if match["zone"] == "UTC" else match["zone"] or ""
+        return f"{match['date'].replace('/', '-')}T{match['time'].replace(',', '.')}{zone}"
+    match = _UNIX.search(text)
+    part = "" if match is None else match["part"] or match["rest"]
+    return "" if match is None else f"{match['whole']}.{part}" if part else match["whole"]
 
 
 def most_stamped(head: Head) -> bool:
@@ -153,27 +207,46 @@ def is_comment(line: str) -> bool:
     return line.lstrip().startswith("#")
 
 
-def checksum(text: str) -> int:
-    """Exclusive or of all characters."""
-    return reduce(xor, text.encode("latin-1", "replace"), 0)
+class InstrumentLines:
+    """The format of an instrument's lines."""
 
+    def __init__(self, instrument: Instrument) -> None:
+        self.instrument = instrument
+        self.name, self.about = instrument.format, f"{instrument.about}, each after a computer's stamp"
+        self.uses = frozenset({"zone", "azimuth", *(["unit"] if instrument.in_unit else [])})
 
-def guess(head: Head, format_name: str, what: str, parse: Parse, split: Split = split_stamp) -> Guess | None:
-    """The guess that lines are of an instrument: most of them are its readings.
+    def recognise(self, head: Head) -> Guess | None:
+        """Most lines are of the instrument, some of them readings."""
+        split, parse = self.instrument.splits(), self.instrument.parse
+        lines = [split(line) for line in head.lines if line.strip(NOTHING)]
+        found = [parse(raw) if len(raw) <= LONGEST else Defect.OTHER for _, raw in lines]
+        readings = sum(not isinstance(one, Defect) or one is Defect.UNIT for one in found)
+        right = readings + found.count(Defect.BESIDE)
+        if not readings or right < max(1, len(lines) // 2):
+            return None
+        stamps = sum(bool(stamp) for stamp, _ in lines)
+        reasons = (
+            f"{right} of the first {len(lines)} lines are {self.instrument.line}",
+            GIVEN_CLOCK if head.counted else f"{stamps} of them carry the stamp of the computer that logged them",
+        )
+        return Guess(format=self.name, score=0.95, reasons=reasons)
 
-    Args:
-        what: an instrument's line, for the reason.
-    """
-    lines = [line for line in head.lines if line.strip(" \t\x00")]
-    right = sum(len(line) <= LONGEST and not isinstance(parse(split(line)[1]), Defect) for line in lines)
-    if right < max(1, len(lines) // 2):
-        return None
-    stamps = sum(bool(split(line)[0]) for line in lines)
-    reasons = (
-        f"{right} of the first {len(lines)} lines are {what}",
-        GIVEN_CLOCK if head.counted else f"{stamps} of them carry the stamp of the computer that logged them",
-    )
-    return Guess(format=format_name, score=0.95, reasons=reasons)
+    def read(self, source: TextFile, options: WindOptions) -> Reading:
+        """Read speed and direction, or components, of every line whose checksum is right or absent."""
+        instrument, where = self.instrument, str(source.path)
+        if options.unit is not None and instrument.in_unit is not None:
+            split = instrument.splits()
+            if not any(instrument.parse(split(line)[1]) is Defect.UNIT for line in source.head()):
+                raise UsageError("the lines state the unit of speed", where=where, fix="leave out --unit")
+            instrument = replace(instrument, parse=instrument.in_unit(options.unit))
+        reading = read_lines(source, instrument, zone_name=options.zone)
+        if not instrument.axes_from_south or "wind_x" not in reading.channels:
+            return turned(reading, options.azimuth, where=where)
+        # with_horizontal takes wind along +x to come from the azimuth; here it comes from the opposite.
+        own = {name: reading.channels[name] for name in ("wind_x", "wind_y")}
+        facing = replace(reading, channels={**reading.channels, **{name: -values for name, values in own.items()}})
+        done = with_horizontal(facing, options.azimuth, where=where)
+        return replace(done, channels={**done.channels, **own})
 
 
 def read_lines(source: TextFile, instrument: Instrument, *, zone_name: str | None) -> Reading:
@@ -186,6 +259,12 @@ def read_lines(source: TextFile, instrument: Instrument, *, zone_name: str | Non
     where = str(source.path)
     gathered = _gather(source, instrument)
     count = len(gathered.line)
+    if gathered.defects[Defect.UNIT]:
+        raise UsageError(
+            f"the lines of {instrument.name} state no unit of speed",
+            where=f"{where}, line {gathered.defects[Defect.UNIT][0]}",
+            fix="give the one that the instrument is set to: --unit m/s (or km/h, mph, kn)",
+        )  # fmt: skip
     if count == 0 and gathered.unstamped:
         raise TimeError(
             f"the lines of {instrument.name} carry no time", where=f"{where}, line {gathered.unstamped[0]}",
@@ -204,7 +283,7 @@ def read_lines(source: TextFile, instrument: Instrument, *, zone_name: str | Non
     keep = stamps.valid
     time, found = instants(stamps.ns[keep], stamps.utc[keep], line=line[keep], zone_name=zone_name, where=where)
     flags = np.array(gathered.flags, dtype=np.uint16)[keep]
-    channels, about = _channels(instrument, gathered, line, keep)
+    channels, about = _channels(gathered, line, keep)
     if not channels:
         raise InputError(
             f"every reading of {instrument.name} is empty", where=f"{where}, line {line[0]}", fix="check the sensor"
@@ -253,11 +332,11 @@ def _unquoted(raw: str) -> str:
 
 
 def _gather(source: TextFile, instrument: Instrument) -> _Gathered:
-    gathered = _Gathered(channels=[array("d") for _ in instrument.channels])
-    split = instrument.split or split_stamp
+    gathered = _Gathered(channels={name: array("d") for name in instrument.channels})
+    split = instrument.splits()
     for first, lines in source.blocks():
         for number, text in enumerate(lines, start=first):
-            if not text.strip(" \t\x00\x1a"):
+            if not text.strip(NOTHING):
                 continue
             gathered.last = number
             stamp, raw = split(text)
@@ -270,17 +349,17 @@ def _gather(source: TextFile, instrument: Instrument) -> _Gathered:
                 gathered.stamps.append(stamp)
                 gathered.line.append(number)
                 gathered.flags.append(sample[1])
-                for column, value in zip(gathered.channels, sample[0], strict=True):
-                    column.append(value)
+                for name, column in gathered.channels.items():
+                    column.append(sample[0].get(name, np.nan))
     return gathered
 
 
 def _channels(
-    instrument: Instrument, gathered: _Gathered, line: NDArray[np.int64], keep: NDArray[np.bool_]
+    gathered: _Gathered, line: NDArray[np.int64], keep: NDArray[np.bool_]
 ) -> tuple[dict[str, NDArray[np.float64]], list[Finding]]:
     channels: dict[str, NDArray[np.float64]] = {}
     found: list[Finding] = []
-    for name, column in zip(instrument.channels, gathered.channels, strict=True):
+    for name, column in gathered.channels.items():
         values = np.frombuffer(column, dtype=np.float64)[keep].copy()
         if not np.isfinite(values).any():
             continue
@@ -325,6 +404,7 @@ def _findings(
     note(places[Defect.CUT], "malformed-lines", Severity.ERROR, f"incomplete lines of {instrument.name}; left out")
     note(places[Defect.OTHER], "non-data-lines", Severity.WARNING, f"lines without a reading of {instrument.name}")
     note(gathered.unstamped, "no-stamp", Severity.ERROR, "readings without a stamp; left out")
+    note(places[Defect.BESIDE], "other-messages", Severity.NOTE, f"other messages of {instrument.name}; not read")
     note([0] * unreadable, "unreadable-stamps", Severity.ERROR, "readings whose stamp is no date; left out")
     faults = line[(flags & SampleFlag.SENSOR_FAULT) != 0].tolist()
     note(faults, "sensor-fault", Severity.WARNING, "readings that the instrument marks as faulty; left out of averages")

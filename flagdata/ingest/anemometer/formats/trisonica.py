@@ -13,20 +13,17 @@ from __future__ import annotations
 
 import math
 import re
+from functools import partial
 
-from flagdata.ingest.anemometer.formats.serial_lines import Defect, Instrument, Sample, guess, read_lines, turned
-from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.ingest.anemometer.formats.serial_lines import Defect, Instrument, InstrumentLines, Sample
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor
 from flagdata.units import UNITS
 
-CHANNELS = (
-    "wind_speed", "wind_direction", "wind_x", "wind_y", "wind_z", "sonic_temperature", "relative_humidity",
-    "air_pressure",
-)  # fmt: skip
+_CHANNELS = {
+    "U": ("wind_x", "m/s"), "V": ("wind_y", "m/s"), "W": ("wind_z", "m/s"), "T": ("sonic_temperature", "degC"),
+    "H": ("relative_humidity", "%"), "P": ("air_pressure", "hPa"),
+}  # fmt: skip
 _LINE = re.compile(r"(?:[A-Z][A-Z0-9]{0,2}[ ,:]+(?:-?\d+(?:\.\d+)?|nan)(?:[ ,;]+|$))++")
 _PAIR = re.compile(r"([A-Z][A-Z0-9]{0,2})[ ,:]+(-?\d+(?:\.\d+)?|nan)")
 _BEGINS = re.compile(r"S[23]?[ ,:]+-?\d")
@@ -36,29 +33,8 @@ _TAGS = frozenset(
 _CODE = -99.0
 
 
-class TriSonica:
-    """Format "trisonica"."""
-
-    name = "trisonica"
-    about = "TriSonica Mini tagged lines, each after a computer's stamp"
-    uses = frozenset({"zone", "azimuth"})
-
-    def recognise(self, head: Head) -> Guess | None:
-        """Lines of nothing but the instrument's tags and numbers."""
-        return guess(head, self.name, "tags and values of a TriSonica (S, D, U, V, W, …)", parse)
-
-    def read(self, source: TextFile, options: WindOptions) -> Reading:
-        """Read the horizontal speed (S2, else of U and V, else S) and the direction."""
-        instrument = Instrument(
-            name="a TriSonica", channels=CHANNELS, parse=parse,
-            sensor=Sensor(name="TriSonica Mini", resolution=0.01), described_by="the TriSonica Mini user manual",
-        )  # fmt: skip
-        reading = read_lines(source, instrument, zone_name=options.zone)
-        return turned(reading, options.azimuth, where=str(source.path))
-
-
 def parse(raw: str) -> Sample | Defect:
-    """One line."""
+    """One line: of its speeds the horizontal one, S2, else of U and V, else S."""
     text = raw.strip()
     if not _LINE.fullmatch(text):
         return Defect.CUT if _BEGINS.match(text) else Defect.OTHER
@@ -69,18 +45,19 @@ def parse(raw: str) -> Sample | Defect:
     if len(values) < 3 or not wind or not set(values) <= _TAGS:
         return Defect.OTHER
     known = {tag: number if number > _CODE else math.nan for tag, number in values.items()}
-    missing = math.nan
-    u, v = known.get("U", missing), known.get("V", missing)
-    speed = known.get("S2", math.hypot(u, v))
+    speed = known.get("S2", math.hypot(known.get("U", math.nan), known.get("V", math.nan)))
     if math.isnan(speed) and "S2" not in known:
-        speed = known.get("S", known.get("S3", missing))
-    return (
-        speed,
-        math.radians(known.get("D", missing)),
-        u,
-        v,
-        known.get("W", missing),
-        known.get("T", missing) + UNITS["degC"].offset,
-        known.get("H", missing) * UNITS["%"].scale,
-        known.get("P", missing) * UNITS["hPa"].scale,
-    ), int(SampleFlag.OK)
+        speed = known.get("S", known.get("S3", math.nan))
+    sample = {"wind_speed": speed, "wind_direction": math.radians(known.get("D", math.nan))}
+    for tag, (name, unit) in _CHANNELS.items():
+        sample[name] = known.get(tag, math.nan) * UNITS[unit].scale + UNITS[unit].offset
+    return sample, SampleFlag.OK
+
+
+INSTRUMENT = Instrument(
+    format="trisonica", about="TriSonica Mini tagged lines", name="a TriSonica", parse=parse,
+    line="tags and values of a TriSonica (S, D, U, V, W, …)",
+    channels=("wind_speed", "wind_direction", *(name for name, _ in _CHANNELS.values())),
+    sensor=Sensor(name="TriSonica Mini", resolution=0.01), described_by="the TriSonica Mini user manual",
+)  # fmt: skip
+TriSonica = partial(InstrumentLines, INSTRUMENT)

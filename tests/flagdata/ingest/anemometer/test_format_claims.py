@@ -35,6 +35,8 @@ SAMPLES = {
     "trisonica": stamped("S 00.08 S2 00.07 D 245 U 00.06 V 00.03 W 00.05 T 21.40"),
     "vaisala": stamped("0R1,Dn=236D,Dm=283D,Dx=031D,Sn=0.0M,Sm=1.0M,Sx=2.2M"),
     "young": stamped(" 2.50 100.0 0.0 346.70 25.14", " 2.60 100.0 0.0 346.70 25.14"),
+    "thies": stamped("\x02002.4 213 +21.5 M 00*66\x03", "\x02002.4 213 +21.5 M 00*66\x03"),
+    "ft": stamped("$WI,WVP=007.4,212,0*72", "$WI,WVP=007.4,212,0*72"),
     "nrg": "NRG Export Service\nTime Zone:\tUTC-5:00\nTimestamp\tCh1_Anem_40.00m_N_Avg_m/s\n2026-05-01 12:00:00\t5\n",
     "windographer": "Created 1-5-2026 by Windographer 5\n\nDate/Time\tSpd80m [m/s]\n2026-05-01 12:00\t5\n",
     "zentra": "z6-1,Port1,\n# Records: 2,ATMOS 22,\nTimestamps,m/s Wind Speed,° Wind Direction\n5/13/2026 12:00,3,90\n",

@@ -9,6 +9,7 @@ from operator import xor
 import numpy as np
 import pytest
 
+from flagdata.errors import UsageError
 from flagdata.signals import WindLog
 
 Read = Callable[..., WindLog]
@@ -57,7 +58,15 @@ def test_a_wrong_checksum_is_left_out_and_no_value_is_none(read: Read) -> None:
     found = read(log(told).replace(" 204 ", " 304 "), zone="UTC", unit="m/s")
     assert len(found.series) == 29
     assert np.flatnonzero(np.isnan(found.series.channels["wind_speed"])).tolist() == [8]
-    assert {"thies-telegrams", "malformed-lines"} <= {finding.kind for finding in found.findings}
+    assert {"checksum-errors", "missing-values"} <= {finding.kind for finding in found.findings}
+
+
+def test_a_unit_is_asked_for_where_the_telegrams_state_none_and_refused_where_they_do(read: Read) -> None:
+    with pytest.raises(UsageError, match="state no unit") as caught:
+        read(log(bodies("VDT")), zone="UTC")
+    assert "--unit" in (caught.value.fix or "")
+    with pytest.raises(UsageError, match="state the unit"):
+        read(log(bodies("V4DT")), zone="UTC", unit="m/s")
 
 
 def test_without_stamps_the_rate_and_the_start_are_asked_for_and_taken(read: Read) -> None:
