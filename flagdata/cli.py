@@ -47,7 +47,6 @@ VERBS: dict[str, tuple[str, str]] = {
     "gc": ("flagdata.commands.upkeep:gc", "Delete what nothing refers to."),
     "recover": ("flagdata.commands.upkeep:recover", "Salvage a record that was cut off."),
     "challenge": ("measure.challenge.command:challenge", "Grade closing the loop on sealed data sets."),
-    "case": ("measure.cases.command:case", "Study a real case: measure it, model it, report what the model lacked."),
     "blender-setup": ("sim.blender.command:blender_setup", "Make the environment that Blender renders in."),
     "demo": ("measure.demo.command:demo", "Make a small field recording and take it through everything."),
 }

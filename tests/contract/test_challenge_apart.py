@@ -9,7 +9,7 @@ from tests.contract.imports import ROOT, imported_from, modules
 
 FITTING = (
     "sim", "models", "measure/observe", "measure/verdict", "measure/forecasting", "measure/probes", "measure/inference",
-    "measure/nulls", "measure/loop", "measure/report", "measure/closing", "measure/propose", "measure/cases",
+    "measure/nulls", "measure/loop", "measure/report", "measure/closing", "measure/propose",
 )  # fmt: skip
 MODULES = modules(*FITTING)
 

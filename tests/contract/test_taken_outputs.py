@@ -20,7 +20,6 @@ CASES: dict[str, tuple[tuple[str, ...], str]] = {
     "measure --zarr": (("measure", "nowhere.mp4", "--zarr", "{out}"), "mine"),
     "evaluate --out": (("evaluate", "flow", "--lake", "nowhere", "--out", "{out}"), "evaluation.md"),
     "close-loop --out": (("close-loop", "nowhere.csv", "--lake", "nowhere", "--out", "{out}"), "model.toml"),
-    "case --out": (("case", "paper-flag", ".", "--out", "{out}"), "plane.png"),
     "propose --out, log": (("propose", "nowhere.toml", "--out", "{out}"), "proposal/proposals.json"),
     "propose --out, effect": (("propose", "nowhere.toml", "--out", "{out}"), "proposal/pyproject.toml"),
     "challenge make": (("challenge", "make", "{out}", "--seed", "1"), "mine"),

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from flagdata.ingest.anemometer.recipe import parse as parse_sensor
 from flagdata.recipes import parsed
-from measure.cases.recipe import parse_case
 from measure.challenge.recipe import parse as parse_challenge
 from measure.observe.recipe import load as load_experiment
 from models.training.recipe import parse as parse_training
@@ -135,7 +134,6 @@ FORMS: dict[str, tuple[str, Callable[[str, Path], object]]] = {
         first("datasets"), lambda text, folder: parse_dataset(text, name="recipe", folder=folder, where="recipe")
     ),
     "challenge": (first("challenges"), lambda text, _: parse_challenge(text, where="recipe")),
-    "case": (first("cases"), lambda text, _: parse_case(text, where="recipe")),
     "material": (
         first("materials"), lambda text, _: Material.from_mapping(parsed(text, where="recipe"), name="recipe")
     ),

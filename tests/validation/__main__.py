@@ -21,7 +21,7 @@ VALIDATIONS = {
     "hanging-cloth": "tests.validation.hanging_cloth",
     "hostile": "tests.validation.hostile",
     "measure-windows": "tests.validation.measure_windows",
-    "paper-flag": "tests.validation.paper_flag",
+    "paper-flag": "tests.validation.paper_flag.validate",
     "pictures": "tests.validation.pictures",
     "real-flag": "tests.validation.real_flag",
     "refinement": "tests.validation.refinement",

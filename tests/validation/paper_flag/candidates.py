@@ -15,13 +15,13 @@ from enum import StrEnum
 import numpy as np
 import torch
 
-from measure.cases.sheet import Sheet
 from sim.effects import Effect
 from sim.effects.added_mass import AddedMass
 from sim.effects.internal_damping import InternalDamping
 from sim.effects.lift import Lift
 from sim.effects.reactive_loading import ReactiveLoading
 from sim.effects.tangential_linear_drag import TangentialLinearDrag
+from tests.validation.paper_flag.sheet import Sheet
 
 
 class Candidate(StrEnum):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.rng import stream
-from measure.cases.waves import Estimate, waves
+from tests.validation.paper_flag.waves import Estimate, waves
 
 RATE = 500.0
 X = np.linspace(0, 0.14, 15)

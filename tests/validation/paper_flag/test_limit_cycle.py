@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from measure.cases.candidates import Load, effects
-from measure.cases.limit_cycle import StripMotion, StripRun, as_columns, simulate
+from tests.validation.paper_flag.candidates import Load, effects
+from tests.validation.paper_flag.limit_cycle import StripMotion, StripRun, as_columns, simulate
 
 LENGTH, DENSITY = 0.1385, 1.0888
 RUN = StripRun(columns=12, stretching=40.0, settle=0.35, duration=0.25, rate=250.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from flagdata.errors import NotFoundError
 from flagdata.provenance import file_hash
 from flagdata.rng import stream
-from measure.cases import edge
-from measure.cases.cached import cached
-from measure.cases.edge import EdgeTrack, Seen, scatter, track_edge
-from measure.cases.evidence import Condition, Kind
-from measure.cases.recipe import Case, ClipSpec, Group
-from measure.cases.stretch import Stretch, stretch
-from measure.cases.thresholds import Threshold, authors_thresholds, digitised_curves, speeds_by_length
-from measure.cases.waves import Estimate, Waves, waves
+from tests.validation.paper_flag import edge
+from tests.validation.paper_flag.cached import cached
+from tests.validation.paper_flag.edge import EdgeTrack, Seen, scatter, track_edge
+from tests.validation.paper_flag.evidence import Condition, Kind
+from tests.validation.paper_flag.recipe import Case, ClipSpec, Group
+from tests.validation.paper_flag.stretch import Stretch, stretch
+from tests.validation.paper_flag.thresholds import Threshold, authors_thresholds, digitised_curves, speeds_by_length
+from tests.validation.paper_flag.waves import Estimate, Waves, waves
 
 _DRAWN = 16
 _EVERY = 8
@@ -141,14 +141,11 @@ def measure_clip(track: EdgeTrack, spec: ClipSpec, case: Case) -> Clip:
     )  # fmt: skip
 
 
-def observe(
-    case: Case, data: Path, *, keep: Path | None = None, advance: Callable[[int], None] = lambda _: None
-) -> Observations:
+def observe(case: Case, data: Path, *, keep: Path | None = None) -> Observations:
     """Track and measure all clips of a case and read its tables.
 
     Args:
         keep: folder of tracks; None keeps none.
-        advance: called with the number of clips done.
 
     Raises:
         NotFoundError: a file of the case is not there.
@@ -161,7 +158,6 @@ def observe(
         if not path.is_file():
             raise NotFoundError("no such clip", where=str(path), fix="give the folder that holds video/ and flutter/")
         clips.append(measure_clip(_tracked(path, case, keep), spec, case))
-        advance(1)
     return Observations(clips=tuple(clips), thresholds=thresholds)
 
 
@@ -178,7 +174,7 @@ def read_thresholds(case: Case, data: Path) -> Thresholds:
     """The tables of a case.
 
     Raises:
-        NotFoundError, InputError: see `measure.cases.thresholds`.
+        NotFoundError, InputError: see `tests.validation.paper_flag.thresholds`.
     """
     bistable, flutter = authors_thresholds(data / case.tables["authors"])
     return Thresholds(

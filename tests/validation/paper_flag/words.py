@@ -7,12 +7,12 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from measure.cases.candidates import Candidate, Shear
-from measure.cases.evidence import NEVER
-from measure.cases.observe import Observations
-from measure.cases.recipe import Group
-from measure.cases.study import IN_TIME, Outcome, Study
-from measure.cases.verdict import Verdict, free
+from tests.validation.paper_flag.candidates import Candidate, Shear
+from tests.validation.paper_flag.evidence import NEVER
+from tests.validation.paper_flag.observe import Observations
+from tests.validation.paper_flag.recipe import Group
+from tests.validation.paper_flag.study import IN_TIME, Outcome, Study
+from tests.validation.paper_flag.verdict import Verdict, free
 
 
 def verdict_words(seen: Observations, study: Study, verdict: Verdict) -> list[str]:

@@ -2,44 +2,30 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from flagdata.outputs import check_files, write_files
-from flagdata.pages.pictures import data_url, png
+from flagdata.pages.pictures import figure_url
 from flagdata.pages.render import render
 from flagdata.provenance import code_version
-from measure.cases import plots
-from measure.cases.candidates import Candidate, Shear
-from measure.cases.evidence import NEVER, Kind
-from measure.cases.observe import Clip, Observations
-from measure.cases.recipe import Case, Group
-from measure.cases.study import Cell, Outcome, Study
-from measure.cases.verdict import Verdict
-from measure.cases.words import candidates_tried, verdict_words
+from tests.validation.paper_flag import plots
+from tests.validation.paper_flag.candidates import Candidate, Shear
+from tests.validation.paper_flag.evidence import NEVER, Kind
+from tests.validation.paper_flag.observe import Clip, Observations
+from tests.validation.paper_flag.recipe import Case, Group
+from tests.validation.paper_flag.study import Cell, Outcome, Study
+from tests.validation.paper_flag.verdict import Verdict
+from tests.validation.paper_flag.words import candidates_tried, verdict_words
 
-_PAGE, _RESULT = "index.html", "result.json"
 _PICTURES = ("lines", "along", "lengths", "speeds", "plane")
-_COMMAND = "case"
 
 
-def check(folder: Path) -> None:
-    """Refuse a folder in which `write` cannot write, before anything is studied; raises as `write`."""
-    check_files(folder, *(f"{name}.png" for name in _PICTURES), _PAGE, _RESULT, command=_COMMAND)
-
-
-def write(folder: Path, *, case: Case, seen: Observations, study: Study, verdict: Verdict) -> Path:
-    """Write `index.html`, its pictures and `result.json` into `folder`, which is made; returns the page's path.
-
-    Raises:
-        ConflictError: one of them is there and was not written by a case, or was changed since.
-    """
+def page(case: Case, seen: Observations, study: Study, verdict: Verdict) -> str:
+    """The report, with its pictures inside."""
     figures = (
         plots.lines(case, _whole_held_out(case, seen), study),
         plots.along(seen, study, case),
@@ -47,10 +33,9 @@ def write(folder: Path, *, case: Case, seen: Observations, study: Study, verdict
         plots.speeds(case, seen, study),
         plots.plane(case, seen, study.tables[Candidate.REACTIVE]),
     )
-    pictures = {name: png(figure) for name, figure in zip(_PICTURES, figures, strict=True)}
     values = {
         "case": case, "verdict": verdict, "words": verdict_words(seen, study, verdict),
-        "images": {name: data_url(picture, "image/png") for name, picture in pictures.items()},
+        "images": {name: figure_url(figure) for name, figure in zip(_PICTURES, figures, strict=True)},
         "clips": [_clip_row(clip, case) for clip in seen.clips],
         "stretches": [(c.spec.name, c.stretch) for c in seen.clips if c.stretch is not None], "far": _far(case, seen),
         "declared": [_declared_row(cell) for cell in study.declared],
@@ -64,11 +49,7 @@ def write(folder: Path, *, case: Case, seen: Observations, study: Study, verdict
         "candidates_tried": candidates_tried(study, verdict),
         "version": f"flagdata {code_version()}",
     }  # fmt: skip
-    content = json.dumps(as_json(case, seen, study, verdict), indent=2, allow_nan=False, ensure_ascii=False)
-    files: dict[str, str | bytes | None] = {f"{name}.png": picture for name, picture in pictures.items()}
-    files |= {_RESULT: content + "\n", _PAGE: render("measure.cases", "page.html.j2", values)}
-    write_files(folder, files, command=_COMMAND)
-    return folder / _PAGE
+    return render("tests.validation.paper_flag", "page.html.j2", values)
 
 
 def as_json(case: Case, seen: Observations, study: Study, verdict: Verdict) -> dict[str, Any]:
@@ -216,13 +197,3 @@ def _listed(values: Any) -> str:
 def _whole_held_out(case: Case, seen: Observations) -> Clip:
     name = next(clip.name for clip in case.of(Group.HELD_OUT) if clip.whole)
     return next(clip for clip in seen.clips if clip.spec.name == name)
-
-
-def summary(study: Study, verdict: Verdict) -> Mapping[str, str]:
-    """The lines a person wants on the terminal."""
-    best = verdict.best
-    return {
-        "verdict": verdict.conclusion.value,
-        "best model": f"{model_name(best)}: {best.load}, s = {best.factor:.2f}",
-        **{f"{kind.value}, held out": f"before: no flutter; after: {_mean(v)}" for kind, v in best.held_out.items()},
-    }

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.errors import InputError, NotFoundError
-from measure.cases.thresholds import Threshold, authors_thresholds, digitised_curves, speeds_by_length
+from tests.validation.paper_flag.thresholds import Threshold, authors_thresholds, digitised_curves, speeds_by_length
 
 
 def test_decimal_commas_are_read_and_zero_is_no_measurement(tmp_path: Path) -> None:

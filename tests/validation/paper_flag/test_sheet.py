@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from measure.cases.sheet import Sheet, leading, onset, rates
+from tests.validation.paper_flag.sheet import Sheet, leading, onset, rates
 from tests.verification.flutter.beam import Strip
 from tests.verification.flutter.beam import leading as beam_leading
 from tests.verification.flutter.beam import onset as beam_onset

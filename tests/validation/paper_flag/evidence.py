@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from flagdata.errors import UsageError
-from measure.cases.candidates import Load, Shear, loaded
-from measure.cases.sheet import Sheet, leading, onset
+from tests.validation.paper_flag.candidates import Load, Shear, loaded
+from tests.validation.paper_flag.sheet import Sheet, leading, onset
 
 NEVER = math.log(10.0)
 """The error where a model has no prediction."""

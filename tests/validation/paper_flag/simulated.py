@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from measure.cases import limit_cycle
-from measure.cases import waves as waves_module
-from measure.cases.cached import cached
-from measure.cases.candidates import Load, effects
-from measure.cases.evidence import Condition, Kind, LinearTable
-from measure.cases.limit_cycle import StripMotion, as_columns, simulate
-from measure.cases.recipe import Case
-from measure.cases.waves import waves
+from tests.validation.paper_flag import limit_cycle
+from tests.validation.paper_flag import waves as waves_module
+from tests.validation.paper_flag.cached import cached
+from tests.validation.paper_flag.candidates import Load, effects
+from tests.validation.paper_flag.evidence import Condition, Kind, LinearTable
+from tests.validation.paper_flag.limit_cycle import StripMotion, as_columns, simulate
+from tests.validation.paper_flag.recipe import Case
+from tests.validation.paper_flag.waves import waves
 
 _COLUMNS = 110
 _STILL = 0.01  # lengths: a tip that moves less does not flutter
@@ -67,25 +67,20 @@ def observed(motion: StripMotion, member: int) -> Flutter:
     )  # fmt: skip
 
 
-def flutters(
-    loads: Sequence[Load], speeds: Sequence[float], *, case: Case, keep: Path | None, advance: Callable[[int], None]
-) -> list[Flutter]:
+def flutters(loads: Sequence[Load], speeds: Sequence[float], *, case: Case, keep: Path | None) -> list[Flutter]:
     """One member a pair of load and speed at the sheet [m/s], in batches.
 
     Args:
         keep: folder of intermediate results; None keeps none.
-        advance: called with the number of members done.
     """
     return [
         one
         for start in range(0, len(loads), _BATCH)
-        for one in _batch(loads[start : start + _BATCH], speeds[start : start + _BATCH], case, keep, advance)
+        for one in _batch(loads[start : start + _BATCH], speeds[start : start + _BATCH], case, keep)
     ]
 
 
-def _batch(
-    loads: Sequence[Load], speeds: Sequence[float], case: Case, keep: Path | None, advance: Callable[[int], None]
-) -> list[Flutter]:
+def _batch(loads: Sequence[Load], speeds: Sequence[float], case: Case, keep: Path | None) -> list[Flutter]:
     def make() -> dict[str, NDArray[Any]]:
         motion = simulate(
             length=case.sheet.length, mass=case.sheet.mass, rigidity=case.sheet.rigidity, density=case.density,
@@ -99,7 +94,6 @@ def _batch(
         "density": case.density, "run": asdict(case.run),
     }  # fmt: skip
     arrays = cached(keep, inputs, (limit_cycle, waves_module, sys.modules[__name__]), make)
-    advance(len(loads))
     return [
         Flutter(
             frequency=float(arrays["frequency"][i]), wave=float(arrays["wave"][i]),

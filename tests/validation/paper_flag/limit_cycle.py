@@ -7,7 +7,7 @@ integrators as a user's cloth does; here is only its geometry, its start and wha
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,6 @@ from sim.scene import Scene, assemble
 
 _GRID_RIGIDITY = 5.0
 """A grid with alternating diagonals has a fifth of its table's rigidity (verified on the heavy elastica)."""
-_CHUNK = 25
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +82,6 @@ def simulate(
     speeds: Sequence[float],
     effects: Sequence[Effect],
     run: StripRun,
-    advance: Callable[[int], None] = lambda _: None,
 ) -> StripMotion:
     """One member a stream speed [m/s], with the base model's air of this density [kg/m³] and these effects.
 
@@ -119,8 +117,6 @@ def simulate(
             state = integrator.advance(system, state, interval)
             if index >= skipped:
                 frames.append(state.position.numpy()[order].mean(axis=1))
-            if index % _CHUNK == _CHUNK - 1:
-                advance(_CHUNK)
     track = np.stack(frames)
     track[~np.isfinite(track)] = np.nan
     return StripMotion(

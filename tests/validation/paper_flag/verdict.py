@@ -9,11 +9,11 @@ from enum import StrEnum
 
 import numpy as np
 
-from measure.cases.candidates import Candidate, Shear
-from measure.cases.evidence import Condition, Kind
-from measure.cases.observe import Observations
-from measure.cases.recipe import Case, Group
-from measure.cases.study import Outcome, Study
+from tests.validation.paper_flag.candidates import Candidate, Shear
+from tests.validation.paper_flag.evidence import Condition, Kind
+from tests.validation.paper_flag.observe import Observations
+from tests.validation.paper_flag.recipe import Case, Group
+from tests.validation.paper_flag.study import Outcome, Study
 
 _ERRORS = 2.0
 """Standard errors by which a candidate must be worse than the best to be left out."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
-from measure.cases.edge import EdgeOptions, EdgeTrack, Seen, line_in, scatter, track_edge
+from tests.validation.paper_flag.edge import EdgeOptions, EdgeTrack, Seen, line_in, scatter, track_edge
 
 ROWS, COLUMNS = 240, 320
 

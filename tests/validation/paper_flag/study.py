@@ -20,12 +20,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from measure.cases.candidates import Candidate, Load, Shear, effects, tried
-from measure.cases.evidence import Condition, Interval, Kind, LinearTable, Predictor, errors, fit, paired
-from measure.cases.limit_cycle import StripMotion, simulate
-from measure.cases.observe import Observations
-from measure.cases.recipe import Case, Group
-from measure.cases.simulated import Flutter, SimulatedTable, flutters
+from tests.validation.paper_flag.candidates import Candidate, Load, Shear, effects, tried
+from tests.validation.paper_flag.evidence import Condition, Interval, Kind, LinearTable, Predictor, errors, fit, paired
+from tests.validation.paper_flag.limit_cycle import StripMotion, simulate
+from tests.validation.paper_flag.observe import Observations
+from tests.validation.paper_flag.recipe import Case, Group
+from tests.validation.paper_flag.simulated import Flutter, SimulatedTable, flutters
 
 IN_TIME = (Candidate.REACTIVE, Candidate.LIFT, Candidate.REACTIVE_AND_LIFT)
 _FITTED = (Kind.FREQUENCY, Kind.STOP)
@@ -146,18 +146,15 @@ class _Evidence:
         )  # fmt: skip
 
 
-def study(
-    case: Case, seen: Observations, *, keep: Path | None = None, advance: Callable[[int], None] = lambda _: None
-) -> Study:
+def study(case: Case, seen: Observations, *, keep: Path | None = None) -> Study:
     """Everything of the module's head, about what was seen.
 
     Args:
         keep: folder of intermediate results; None keeps none.
-        advance: called with the number of strips simulated; `strips` says how many there will be.
     """
 
     def simulated(loads: Sequence[Load], speeds: Sequence[float], of: Case = case, /) -> list[Flutter]:
-        return flutters(loads, speeds, case=of, keep=keep, advance=advance)
+        return flutters(loads, speeds, case=of, keep=keep)
 
     evidence = _Evidence(case=case, seen=seen)
     lengths = (*case.fit_lengths, *case.held_out_lengths)
@@ -185,13 +182,6 @@ def study(
         in_time=tuple(in_time), linear_tables=linear_tables, tables=tables, shapes=_shapes(case, in_time),
         floor=_floor(case, best, simulated),
     )  # fmt: skip
-
-
-def strips(case: Case) -> int:
-    """How many strips a study simulates."""
-    candidates = len(case.shares) + len(case.lifts) + len(case.pair_shares) * len(case.pair_lifts)
-    clips = len(case.of(Group.FIT)) + len(case.of(Group.HELD_OUT))
-    return candidates * len(case.speeds) + 4 * clips + 2 * len(case.of(Group.HELD_OUT))
 
 
 def _simulated_tables(

@@ -7,13 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from measure.cases.observe import observe
-from measure.cases.page import as_json, write
-from measure.cases.recipe import load_case
-from measure.cases.study import study
-from measure.cases.verdict import judge
+from tests.validation.paper_flag.observe import observe
+from tests.validation.paper_flag.page import as_json, page
+from tests.validation.paper_flag.recipe import load_case
+from tests.validation.paper_flag.study import study
+from tests.validation.paper_flag.verdict import judge
 
-_ROOT = Path(__file__).parents[2]
+_ROOT = Path(__file__).parents[3]
 _DATA = Path(os.environ.get("FLAGDATA_REFERENCE", _ROOT.parent / "shared" / "data"))
 _WORK = _ROOT / "out" / "paper-flag"
 
@@ -22,12 +22,11 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     """The study; the page goes to docs/cases. That it was left out, and why, where the recordings are absent."""
     if not _DATA.is_dir():
         return {"left_out": "no reference data; set FLAGDATA_REFERENCE to their folder"}
-    case = replace(load_case("paper-flag"), seed=seed)
+    case = replace(load_case(), seed=seed)
     seen = observe(case, _DATA, keep=_WORK / "kept")
     found = study(case, seen, keep=_WORK / "kept")
     verdict = judge(case, seen, found)
-    page = write(_WORK, case=case, seen=seen, study=found, verdict=verdict)
     target = out.parent / "cases" / "paper-flag.html"
     target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_bytes(page.read_bytes())
+    target.write_text(page(case, seen, found, verdict), encoding="utf-8")
     return as_json(case, seen, found, verdict)

@@ -9,14 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from measure.cases.candidates import Candidate, Shear
-from measure.cases.evidence import Condition, Kind, factor_that_meets
-from measure.cases.limit_cycle import as_columns
-from measure.cases.observe import Clip, Observations, median_by_length
-from measure.cases.recipe import Case, Group
-from measure.cases.simulated import SimulatedTable
-from measure.cases.study import IN_TIME, Outcome, Study
-from measure.cases.waves import waves
+from tests.validation.paper_flag.candidates import Candidate, Shear
+from tests.validation.paper_flag.evidence import Condition, Kind, factor_that_meets
+from tests.validation.paper_flag.limit_cycle import as_columns
+from tests.validation.paper_flag.observe import Clip, Observations, median_by_length
+from tests.validation.paper_flag.recipe import Case, Group
+from tests.validation.paper_flag.simulated import SimulatedTable
+from tests.validation.paper_flag.study import IN_TIME, Outcome, Study
+from tests.validation.paper_flag.waves import waves
 
 _COLOURS = {
     Candidate.REACTIVE: "#1f6f9c",

@@ -7,8 +7,8 @@ import pytest
 
 from flagdata.errors import InputError
 from flagdata.rng import stream
-from measure.cases.edge import EdgeTrack, Seen
-from measure.cases.stretch import arc_lengths, stretch
+from tests.validation.paper_flag.edge import EdgeTrack, Seen
+from tests.validation.paper_flag.stretch import arc_lengths, stretch
 
 LENGTH, RATIO = 300.0, 0.5625
 

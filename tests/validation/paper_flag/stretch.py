@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from flagdata.errors import InputError
-from measure.cases.edge import EdgeTrack
+from tests.validation.paper_flag.edge import EdgeTrack
 
 _SMOOTH = 15  # columns of a running parabola; the scatter of single heights would lengthen the line
 _UPPER = (75.0, 98.0)  # percentiles between which the pile is measured

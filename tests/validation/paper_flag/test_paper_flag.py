@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from measure.cases.candidates import Load, loaded
-from measure.cases.edge import Seen, scatter, track_edge
-from measure.cases.observe import median_by_length, read_thresholds
-from measure.cases.recipe import load_case
-from measure.cases.sheet import onset
-from measure.cases.waves import waves
+from tests.validation.paper_flag.candidates import Load, loaded
+from tests.validation.paper_flag.edge import Seen, scatter, track_edge
+from tests.validation.paper_flag.observe import median_by_length, read_thresholds
+from tests.validation.paper_flag.recipe import load_case
+from tests.validation.paper_flag.sheet import onset
+from tests.validation.paper_flag.waves import waves
 
 pytestmark = pytest.mark.reference
 
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.reference
 def test_the_clips_flutter_as_fast_as_their_column_centroids_said(
     reference_data: Path, name: str, expected: float
 ) -> None:
-    case = load_case("paper-flag")
+    case = load_case()
     path = reference_data / case.folder / f"{name}{case.suffix}"
     track = track_edge(path, true_rate=case.true_rate, rate=125.0)  # six times the third harmonic's need
     found = waves(track.time, np.arange(0, 1080, 40.0), track.height[:, ::40], band=(5.0, 25.0)).frequency
@@ -35,7 +35,7 @@ def test_the_clips_flutter_as_fast_as_their_column_centroids_said(
 
 
 def test_the_reactive_onset_lies_below_the_experiments_of_argentina_and_mahadevan(reference_data: Path) -> None:
-    case = load_case("paper-flag")
+    case = load_case()
     experiments = read_thresholds(case, reference_data).curves["experiments"]
     ratios = []
     for mass_ratio, reduced in experiments:
@@ -49,7 +49,7 @@ def test_the_reactive_onset_lies_below_the_experiments_of_argentina_and_mahadeva
 
 
 def test_flutter_stops_far_below_where_it_starts(reference_data: Path) -> None:
-    thresholds = read_thresholds(load_case("paper-flag"), reference_data)
+    thresholds = read_thresholds(load_case(), reference_data)
     stops, starts = dict(median_by_length(thresholds.stop)), dict(median_by_length(thresholds.onset))
     assert set(stops) == set(starts)
     assert all(starts[length] > 1.2 * stops[length] for length in stops)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from flagdata.errors import UsageError
-from measure.cases.candidates import Candidate, Load, Shear, loaded, tried
-from measure.cases.evidence import NEVER, Condition, Interval, Kind, LinearTable, errors, fit, paired
-from measure.cases.sheet import Sheet, leading, onset
+from tests.validation.paper_flag.candidates import Candidate, Load, Shear, loaded, tried
+from tests.validation.paper_flag.evidence import NEVER, Condition, Interval, Kind, LinearTable, errors, fit, paired
+from tests.validation.paper_flag.sheet import Sheet, leading, onset
 
 BARE = Sheet(length=0.1385, mass=0.08, rigidity=1.315e-4)
 LENGTHS = (0.08, 0.12)

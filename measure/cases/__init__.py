@@ -1,1 +1,0 @@
-"""Real cases: recordings made by others, measured, modelled and reported with what the model lacked."""
