@@ -64,12 +64,6 @@ class NothingMeasuredError(InputError):
     kind = "nothing-measured"
 
 
-class SeveralDevicesError(InputError):
-    """Rows of several devices that a table's heading does not tell apart."""
-
-    kind = "several-devices"
-
-
 class ZoneMissingError(TimeError):
     """Stamps of a wall clock whose zone nobody named."""
 

@@ -120,10 +120,6 @@ class Material:
             bending=self.bending * bending,
         )
 
-    def thickened(self, factor: float) -> Material:
-        """`factor` layers as one: density, stretching and bending multiplied together (ArcSim's `thicken`)."""
-        return self.scaled(density=factor, stretching=factor, bending=factor)
-
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max

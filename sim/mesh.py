@@ -161,13 +161,6 @@ class Mesh:
         edge = np.abs(self.rest[self.hinges[:, 1]] - self.rest[self.hinges[:, 0]])
         return np.arctan2(edge[:, 1], edge[:, 0])
 
-    @cached_property
-    def shortest_altitude(self) -> float:
-        """The smallest height of any triangle [m]."""
-        corners = self.rest[self.faces]
-        longest = np.sqrt(np.max(np.sum((corners - np.roll(corners, 1, axis=1)) ** 2, axis=2), axis=1))
-        return float(np.min(2 * self.areas / longest))
-
     def components(self) -> NDArray[np.int64]:
         """(vertex,) label of the connected piece each vertex belongs to."""
         from scipy.sparse import coo_array

@@ -160,11 +160,6 @@ class Chart:
         if self.x.shows(x):
             self.marks.append(f'<path class="line {kind}" d="M{self.x(x):.1f} {self.y.start:.1f}V{self.y.stop:.1f}"/>')
 
-    def spread_up(self, x: float, low: float, high: float, kind: str) -> None:
-        """An upright interval at `x`."""
-        if self.x.shows(x) and self.y.shows(low) and self.y.shows(high):
-            self.marks.append(f'<path class="line {kind}" d="M{self.x(x):.1f} {self.y(low):.1f}V{self.y(high):.1f}"/>')
-
     def note(self, x: float, y: float, text: str, anchor: str) -> None:
         """Text at a place of the chart, in the chart's units."""
         self.marks.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(text)}</text>')

@@ -127,12 +127,6 @@ def _covered(level: float, shares: list[Array], resamples: Resamples) -> Coverag
     return Coverage(level=level, share=estimate(values, clips=len(shares[0]), groups=resamples.groups))
 
 
-def pit(predictions: Predictions, target: str) -> Array:
-    """Probability integral transform (n,): the share of draws below the truth, at the middle of its cell."""
-    found = cells(predictions, target)
-    return (found.low + found.high) / 2
-
-
 def rank_histogram(runs: tuple[Predictions, ...], target: str, *, bins: int = BINS) -> RankHistogram:
     """Ranks of the truths among the draws in `bins` bins, mean over runs of one model, with a calibrated model's band.
 

@@ -70,32 +70,6 @@ def accuracy_values(
     return resamples.pair_ratio(hits, of)
 
 
-def all_accuracy_values(embedding: NDArray[np.floating], resamples: Resamples) -> NDArray[np.float64]:
-    """(1 + draws,): triplet accuracy over every triplet there is, n · (own - 1) · (n - own) of them.
-
-    Raises:
-        InputError: there is no triplet.
-    """
-    _check(resamples.index)
-    order = np.argsort(resamples.index, kind="stable")
-    points, index = embedding[order].astype(np.float64), resamples.index[order]
-    start = np.searchsorted(index, np.arange(resamples.groups))
-    size = np.diff(np.append(start, len(index)))
-    hits, of = (np.zeros((resamples.groups, resamples.groups)) for _ in range(2))
-    for anchor, own in enumerate(index):
-        distance = ((points - points[anchor]) ** 2).sum(axis=1)
-        positive = np.delete(distance[start[own] : start[own] + size[own]], anchor - start[own])
-        if positive.size == 0:
-            continue
-        positive.sort()
-        farther = np.searchsorted(positive, distance, side="left") + np.searchsorted(positive, distance, side="right")
-        hits[own] += np.add.reduceat(farther / 2, start)
-        of[own] += positive.size * size
-    np.fill_diagonal(hits, 0.0)
-    np.fill_diagonal(of, 0.0)
-    return resamples.pair_ratio(hits, of)
-
-
 def _check(group: NDArray[np.int64]) -> None:
     if not possible(group):
         raise InputError(

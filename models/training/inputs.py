@@ -289,10 +289,6 @@ def _unsound(places: Sequence[tuple[int, Path]], workers: int) -> list[tuple[int
         return [place for place, good in zip(places, sound, strict=True) if not good]
 
 
-def _say_waiting() -> None:
-    _LOG.warning("flagdata: another process prepares inputs here; this one goes on when it has ended")
-
-
 def _warn_of_damage(paths: Sequence[Path]) -> None:
     if paths:
         _LOG.warning(

@@ -59,7 +59,7 @@ def test_a_fingerprint_tells_cloths_by_their_mass_and_stiffness_alone() -> None:
 
 def test_thicker_cloth_is_heavier_and_stiffer_by_the_same_factor() -> None:
     thin = material.named("gray-interlock")
-    thick = thin.thickened(2)
+    thick = thin.scaled(density=2, stretching=2, bending=2)
     assert thick.density == 2 * thin.density
     np.testing.assert_allclose(thick.stretching, 2 * thin.stretching)
     np.testing.assert_allclose(thick.bending, 2 * thin.bending)

@@ -27,7 +27,6 @@ def test_hinges_of_two_triangles_by_hand() -> None:
     assert mesh.hinge_lengths[0] == pytest.approx(np.sqrt(2))
     assert mesh.hinge_areas[0] == pytest.approx(1.0)
     assert mesh.hinge_directions[0] == pytest.approx(np.pi / 4)
-    assert mesh.shortest_altitude == pytest.approx(1 / np.sqrt(2))
 
 
 def test_gradients_differentiate_a_linear_field_exactly(distorted: Mesh) -> None:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from sim.integrate.implicit import AirShape, BackwardEuler
 from sim.integrate.symplectic import Symplectic
 from sim.material import named
-from sim.motion import EdgeMotion, edge_motion
 from sim.scene import Scene, assemble, flag
+from tests.verification.motion import EdgeMotion, edge_motion
 
 pytestmark = pytest.mark.reference
 CAMEL = named("camel-ponte-roma")

@@ -20,9 +20,9 @@ from flagdata.rng import stream
 from sim.integrate import Integrator
 from sim.integrate.implicit import AirShape, BackwardEuler
 from sim.integrate.symplectic import Symplectic
-from sim.motion import edge_motion
 from sim.scene import assemble, flag
 from tests.validation.flags_runs import CAMEL, one_core
+from tests.verification.motion import edge_motion
 
 RATE = 25.0
 RUNS = {("0.5 ms", 0.0): "flag_w0_dt05", ("0.5 ms", 4.0): "flag_w4_dt05", ("5 ms", 0.0): "flag_w0_dt5",

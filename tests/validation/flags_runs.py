@@ -20,11 +20,11 @@ from sim.integrate import Integrator
 from sim.integrate.implicit import BackwardEuler
 from sim.integrate.symplectic import Symplectic
 from sim.material import named
-from sim.motion import edge_motion
 from sim.run.diagnostics import principal_strains
 from sim.scene import Scene, assemble, flag
 from sim.state import State
 from sim.system import System
+from tests.verification.motion import edge_motion
 
 RATE = 50.0
 """Looks a second [Hz]: twice the cameras', so that what a picture at 25 Hz would fold back shows in the spectra."""

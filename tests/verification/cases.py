@@ -24,9 +24,9 @@ from sim.integrate.stability import stable_step
 from sim.integrate.symplectic import Symplectic, advance
 from sim.material import isotropic, named
 from sim.mesh import grid
-from sim.motion import edge_motion
 from sim.scene import assemble, flag
 from sim.state import State
+from tests.verification.motion import edge_motion
 from tests.verification.systems import build, settle
 
 G = 9.81

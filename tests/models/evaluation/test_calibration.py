@@ -10,7 +10,7 @@ from scipy import stats
 
 from flagdata.errors import InputError
 from models.evaluation.bootstrap import Resamples
-from models.evaluation.calibration import LEVELS, Cells, coverage, pit, rank_histogram, tarp
+from models.evaluation.calibration import LEVELS, Cells, cells, coverage, rank_histogram, tarp
 from models.evaluation.predictions import Predictions
 from tests.models.evaluation.made import generator, of_wind, posterior
 
@@ -51,6 +51,12 @@ def test_cells_by_hand() -> None:
     np.testing.assert_allclose([found.low, found.high], [[0.25, 0.0], [0.75, 0.25]])
     np.testing.assert_allclose(found.central(0.5), [1.0, 0.0])
     np.testing.assert_allclose(found.central(0.8), [1.0, 0.6])  # [0.1, 0.9] holds 0.15 of the 0.25
+
+
+def pit(predictions: Predictions, target: str) -> np.ndarray:
+    """Probability integral transform (n,): the share of draws below the truth, at the middle of its cell."""
+    found = cells(predictions, target)
+    return (found.low + found.high) / 2
 
 
 def test_pit_is_the_truths_quantile() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import UsageError
-from sim.motion import edge_motion
+from tests.verification.motion import edge_motion
 
 RATE = 100.0
 
