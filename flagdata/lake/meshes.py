@@ -273,7 +273,7 @@ def _layout(group: zarr.Group, path: Path) -> str:
 
 
 @contextmanager
-def store_errors(path: Path, what: str) -> Iterator[None]:
+def store_errors(path: Path, what: str, *, fix: str = _RESTORE) -> Iterator[None]:
     """Whatever a damaged or foreign Zarr store makes its reader raise becomes one error.
 
     Raises:
@@ -284,10 +284,10 @@ def store_errors(path: Path, what: str) -> Iterator[None]:
     except (LimitError, CorruptError):
         raise
     except FlagdataError as error:
-        raise CorruptError(f"{what}: {error.what}", where=str(path), fix=_RESTORE) from error
+        raise CorruptError(f"{what}: {error.what}", where=str(path), fix=fix) from error
     except Exception as error:
         said = " ".join(f"{type(error).__name__}: {error}".split())
-        raise CorruptError(f"{what}: {said[:300]}", where=str(path), fix=_RESTORE) from error
+        raise CorruptError(f"{what}: {said[:300]}", where=str(path), fix=fix) from error
 
 
 def read_part(group: zarr.Group, name: str, first: int | None, last: int | None, *, where: str) -> NDArray[Any]:
@@ -384,3 +384,14 @@ def _check_offsets(offset: Instants, frames: int, total: int, name: str) -> None
         raise _wrong(
             f"{name} does not fit {frames} frames and {total} rows", "int64 from 0 to the number of rows, rising"
         )
+
+
+def write_plain(group: zarr.Group, name: str, values: NDArray[Any], dims: tuple[str, ...] | None = None) -> None:
+    """Write an array of a measurement into a Zarr group, in one chunk."""
+    from zarr.codecs import BloscCodec
+
+    array = group.create_array(
+        name, shape=values.shape, dtype=values.dtype, chunks=tuple(max(1, n) for n in values.shape),
+        dimension_names=dims, compressors=BloscCodec(cname="zstd", clevel=5, typesize=values.dtype.itemsize),
+    )  # fmt: skip
+    array[...] = values

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from flagdata.errors import CorruptError
 from flagdata.findings import Finding, quality_flags
 from flagdata.lake import Artifact, Lake
+from flagdata.lake.meshes import check_format, read_part, store_errors, write_plain
 from flagdata.provenance import canonical, digest, file_hash
 from flagdata.schema import Kind
 from measure.closing.models import NamedModel, acting
@@ -89,7 +89,6 @@ def _models_of(lake: Lake, measurement: str, branch: str) -> tuple[str, ...]:
 def write(path: Path, verdict: Verdict) -> None:
     """A new Zarr folder: `verdict` (UTF-8 JSON), `report` (UTF-8 HTML) and `nulls` (statistic of each)."""
     import zarr
-    from zarr.codecs import BloscCodec
 
     group = zarr.open_group(path, mode="w-", zarr_format=3)
     group.update_attributes({
@@ -97,34 +96,27 @@ def write(path: Path, verdict: Verdict) -> None:
         "words": verdict.words,
     })  # fmt: skip
     texts = {"verdict": json.dumps(as_document(verdict), allow_nan=False), "report": page(verdict)}
-    arrays = {name: np.frombuffer(text.encode(), dtype=np.uint8) for name, text in texts.items()}
-    for name, values in (*arrays.items(), ("nulls", np.array(verdict.test.null, dtype=np.float64))):
-        array = group.create_array(
-            name, shape=values.shape, dtype=values.dtype, chunks=(max(1, len(values)),),
-            compressors=BloscCodec(cname="zstd", clevel=5, typesize=values.dtype.itemsize),
-        )  # fmt: skip
-        array[...] = values
+    for name, text in texts.items():
+        write_plain(group, name, np.frombuffer(text.encode(), dtype=np.uint8))
+    write_plain(group, "nulls", np.array(verdict.test.null, dtype=np.float64))
 
 
 def read(path: Path) -> tuple[Verdict, str]:
     """The verdict and the report of a measurement's object.
 
     Raises:
-        CorruptError: not such a folder, or damaged.
+        CorruptError: not such a folder, damaged, or of a newer format.
+        LimitError: arrays larger than the limits of `flagdata.lake.meshes`.
     """
     import zarr
 
-    try:
+    with store_errors(path, "the measurement is damaged", fix="run flagdata verify; close the loop again"):
         group = zarr.open_group(path, mode="r", zarr_format=3)
-        head: Any = group.attrs.get(_HEAD)
-        if not isinstance(head, Mapping) or head["format"] != _FORMAT:
-            raise CorruptError("not a measurement of this version", where=str(path), fix="open it with zarr")
-        verdict, report = (np.asarray(group[name][...]).tobytes().decode() for name in ("verdict", "report"))  # type: ignore[index]
+        check_format(group.attrs.get(_HEAD), _FORMAT, path, noun="verdicts")
+        verdict, report = (
+            read_part(group, name, None, None, where=str(path)).tobytes().decode() for name in ("verdict", "report")
+        )
         return from_document(json.loads(verdict)), report
-    except (KeyError, ValueError, TypeError, OSError) as error:
-        raise CorruptError(
-            f"the measurement is damaged: {error}", where=str(path), fix="run flagdata verify; close the loop again"
-        ) from error
 
 
 def fingerprint(experiment: Experiment) -> str:

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.errors import CorruptError
 from flagdata.findings import quality_flags
 from flagdata.lake import Artifact, Lake
+from flagdata.lake.meshes import check_format, read_part, store_errors, write_plain
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
@@ -93,41 +93,29 @@ def write(path: Path, measured: Measurement, series: Beside, refinement: Mapping
     Dimensions are named, so that xarray opens it as a data set.
     """
     import zarr
-    from zarr.codecs import BloscCodec
 
     group = zarr.open_group(path, mode="w-", zarr_format=3)
     group.update_attributes({
         _HEAD: {"format": _FORMAT}, "targets": list(measured.names), "answer": dict(measured.as_dict(anyway=True)),
         "series": series.as_dict(), "refinement": None if refinement is None else dict(refinement),
     })  # fmt: skip
-    arrays = {"draws": (measured.draws.astype(np.float32), ("draw", "target"))}
-    arrays |= {name: (values.astype(np.float32), ("time",)) for name, values in series.columns().items()}
-    arrays["time"] = (series.time.astype(np.float64), ("time",))  # type: ignore[assignment]
-    for name, (values, dimensions) in arrays.items():
-        array = group.create_array(
-            name, shape=values.shape, dtype=values.dtype, chunks=tuple(max(1, n) for n in values.shape),
-            dimension_names=dimensions,
-            compressors=BloscCodec(cname="zstd", clevel=5, typesize=values.dtype.itemsize),
-        )  # fmt: skip
-        array[...] = values
+    write_plain(group, "draws", measured.draws.astype(np.float32), ("draw", "target"))
+    for name, values in {**series.columns(), "time": series.time}.items():
+        write_plain(group, name, values.astype(np.float64 if name == "time" else np.float32), ("time",))
 
 
 def read(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """The answer of a measurement's object as JSON values, and its arrays.
 
     Raises:
-        CorruptError: not such a folder, or damaged.
+        CorruptError: not such a folder, damaged, or of a newer format.
+        LimitError: arrays larger than the limits of `flagdata.lake.meshes`.
     """
     import zarr
 
-    try:
+    with store_errors(path, "the measurement is damaged", fix="run flagdata verify; measure again"):
         group = zarr.open_group(path, mode="r", zarr_format=3)
-        head: Any = group.attrs.get(_HEAD)
-        if not isinstance(head, Mapping) or head["format"] != _FORMAT:
-            raise CorruptError("not a measurement of this version", where=str(path), fix="open it with zarr")
+        check_format(group.attrs.get(_HEAD), _FORMAT, path, noun="measurements")
         answer: Any = json.loads(json.dumps(group.attrs["answer"]))
-        return answer, {name: np.asarray(array[...]) for name, array in group.arrays()}
-    except (KeyError, ValueError, TypeError, OSError) as error:
-        raise CorruptError(
-            f"the measurement is damaged: {error}", where=str(path), fix="run flagdata verify; measure again"
-        ) from error
+        names = sorted(group.array_keys())
+        return answer, {name: read_part(group, name, None, None, where=str(path)) for name in names}
