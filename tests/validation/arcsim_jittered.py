@@ -3,9 +3,8 @@
 Each is three winds of 10 s on an irregular mesh of 486 vertices: nothing undeclared, the pressure of the air × 1.6, a
 linear tangential drag, and an internal damping of 30 ms. A verdict is right if it names what acted, alone or as one of
 several, and names nothing where only a calibrated parameter differs. All four are judged by the same bank of nulls, and
-then by banks that were drawn anew: verdicts that differ between them depend on the draw. Beside these stands p by all
-kinds of all draws, and how it spreads over smaller draws of them. The verdicts are made twice: with nothing said of how
-well the cloth was weighed, and weighed to 2 %.
+then by banks that were drawn anew: verdicts that differ between them depend on the draw. The verdicts
+are made twice: with nothing said of how well the cloth was weighed, and weighed to 2 %.
 
 The other three are damped by ArcSim's steps alone, like 2.5 ms where a motion is slow beside them and less where it is
 not, so that whether the interval of damping holds is told of the fourth alone.
@@ -15,7 +14,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,7 +31,6 @@ from measure.observe.trajectory import DENSITY_UNCERTAINTY, Experiment, WindTrac
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Conclusion, Estimate, Verdict
 from tests.validation.arcsim import RATE, folder
-from tests.validation.arcsim_jittered_draws import by_draws, page_of_all
 from tests.validation.flags_runs import CAMEL
 
 WINDS = (3, 5, 7)
@@ -43,8 +40,6 @@ KNOWN = tuple(float(known) for known in os.environ.get("FLAGDATA_KNOWN", f"{DENS
 """Relative standard uncertainties of the density that is declared: where nothing is said of it, and of a cloth that was
 weighed; FLAGDATA_KNOWN says which are tried."""
 _UNIT = 1e-4  # m, of the stored positions
-_PARTS = (40,)
-"""Kinds of the smaller draws: as many as one draw has."""
 _SHOWN = 7
 """Candidates that are told."""
 
@@ -87,35 +82,12 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         for draw in DRAWS:
             place = out / f"arcsim-jittered-{seed}-{draw}"
             told[_heading(draw, known)] = {name: _once(place, name, own, seed) for name, own in group.items()}
-        if known == DENSITY_UNCERTAINTY:
-            told[_all(known)] = _together(out / f"arcsim-jittered-{seed}-all", group, seed)
     (out / "validate-arcsim-jittered.md").write_text(_page(told), encoding="utf-8")
     return told
 
 
 def _heading(draw: int, known: float) -> str:
     return f"draw {draw}, density known to {100 * known:.0f} %"
-
-
-def _all(known: float) -> str:
-    return f"all draws, density known to {100 * known:.0f} %"
-
-
-def _together(place: Path, experiments: Mapping[str, Experiment], seed: int) -> dict[str, Any]:
-    """p by the kinds of all draws, from its file where it was made before."""
-    kept = place / f"{len(DRAWS)}.json"
-    if not kept.exists():
-        nulls = place / f"nulls-of-{len(DRAWS)}"
-        nulls.mkdir(parents=True, exist_ok=True)
-        made = [
-            path for draw in DRAWS for path in banks.files(place.parent / f"arcsim-jittered-{seed}-{draw}" / "nulls")
-        ]
-        for number, path in enumerate(made):
-            shutil.copyfile(path, nulls / path.with_stem(f"nulls-{number:04d}").name)
-        parts = [count for count in _PARTS if count < len(made)]
-        found = by_draws(experiments, banks.load(nulls, words="all draws"), kinds=parts, seed=seed)
-        kept.write_text(json.dumps(found, allow_nan=False), encoding="utf-8")
-    return json.loads(kept.read_text(encoding="utf-8"))
 
 
 def _once(place: Path, name: str, experiment: Experiment, seed: int) -> dict[str, Any]:
@@ -185,8 +157,6 @@ def _page(told: Mapping[str, Any]) -> str:
         for draw in DRAWS:
             heading = _heading(draw, known)
             lines += _table(f"Nulls of {heading}", told[heading])
-        if _all(known) in told:
-            lines += page_of_all(told[_all(known)], heading=_all(known).capitalize())
     return "\n".join(lines)
 
 

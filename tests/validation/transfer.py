@@ -3,9 +3,6 @@
 Each change is filmed anew from flags that no model has seen: another mesh, another integrator, another renderer, other
 textures, a noisier camera; and runs of the reference simulator (../shared/data/arcsim), which share no code with ours,
 filmed by our rasteriser. What the model's own doubt says of them is told beside the errors.
-
-Where `tests.validation.maps_ablation` finds a lake to learn from, two small networks are told of the same clips, one of
-which learned from the whole film alone, without crops of several sizes and mirror images.
 """
 
 from __future__ import annotations
@@ -38,8 +35,6 @@ from sim.datasets.recipe import DatasetRecipe, Side
 from sim.render import Meshes
 from sim.render.raster import Raster
 from sim.run.recipe import IntegratorSpec
-from tests.validation.flow_ablation import ABLATION
-from tests.validation.maps_ablation import ALL, Ground
 
 FLAGS = int(os.environ.get("FLAGDATA_TRANSFER_FLAGS", "60"))
 """Flags of each change; Cycles, which takes two minutes a film, has a quarter of them."""
@@ -60,42 +55,20 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     torch.set_num_threads(1)
     model = estimator.shipped()
     result: dict[str, Any] = {"model": model.name, "level": LEVEL, "false_alarm": FALSE_ALARM, "of": {}}
-    small = _small_networks()
-    result |= {label: {} for label in small}
     for name, change in CHANGES.items():
         recipe = change(unseen(FLAGS // 4 if name == "rendered by Cycles" else FLAGS, seed))
         clips = [_clip(frames, stated) for frames, stated in filmed(recipe)]
         result["of"][name] = _scores(model, clips, seed)
-        for label, network in small.items():
-            result[label][name] = _scores(network, clips, seed)
     data = os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[3] / "shared" / "data")
     runs = Path(data) / "arcsim"
     if runs.is_dir():
         clips = [clip for _, clip in reference_clips(runs, seed, model.front_end.frames, views=VIEWS)]
         result["of"]["simulated by ArcSim"] = _scores(model, clips, seed)
-        for label, network in small.items():
-            result[label]["simulated by ArcSim"] = _scores(network, clips, seed)
         if any(t.name == "density" and t.low < WEIGHED[0] and WEIGHED[1] < t.high for t in model.targets):
             result["of"]["simulated by ArcSim, the flag weighed to 5 %"] = _scores(model, clips, seed, known=WEIGHED)
     else:
         result["left_out"] = "ArcSim's runs: no reference data; set FLAGDATA_REFERENCE to their folder"
     return result
-
-
-def _small_networks() -> dict[str, estimator.Estimator]:
-    """One with the augmentation of the recipe `flow` and one without, if there is a lake to learn from."""
-    ground = Ground.stated(ABLATION.branch)
-    if ground is None:
-        return {}
-    with_it = ABLATION.recipe(ALL, ABLATION.known, seed=1)
-    without = replace(
-        with_it, name="flow-without-augmentation", title="flow, without augmentation", variants=1,
-        cropping=replace(with_it.cropping, scales=(1.0,), mirror=False),
-    )  # fmt: skip
-    return {
-        "small network, with augmentation": ground.network(with_it),
-        "small network, without augmentation": ground.network(without),
-    }
 
 
 Clip = tuple[NDArray[np.uint8], float, float]
