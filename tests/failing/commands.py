@@ -13,22 +13,8 @@ import numpy as np
 from flagdata.ingest.store import ingest_camera, ingest_wind
 from flagdata.lake import Lake
 from tests.failing.trial import Command
+from tests.small import SCENE
 
-RECIPE = """
-seed = 3
-count = 1
-batch = 1
-[scene]
-columns = 6
-start-noise = 1e-3
-[material]
-name = "camel-ponte-roma"
-[wind]
-speed = 4.0
-[time]
-settle = 0.04
-frames = 2
-"""
 CLOTHS = "film,fabric,area_weight,wind_speed,wind_sigma\nthird.mp4,felt,0.3,2.0,0.2\nfourth.mp4,silk,0.1,,\n"
 
 
@@ -55,7 +41,7 @@ def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callab
     lake.withdraw([spare.id], "spare")
     (lake.staging / "left").mkdir()
     (folder / "cut.mcap").write_bytes(lake.object_path(str(third.object)).read_bytes()[:-200])
-    (folder / "small.toml").write_text(RECIPE)
+    (folder / "small.toml").write_text(SCENE)
     (folder / "cloths.csv").write_text(CLOTHS)
     (folder / "meshes").mkdir()
     for frame in range(2):

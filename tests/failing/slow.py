@@ -38,6 +38,7 @@ from sim.material import named
 from sim.mesh import grid
 from tests.failing.commands import Scene, artifacts, files, rows
 from tests.failing.trial import Command
+from tests.small import DATA_SET, SIMULATION, TRAINING
 
 WIDTH, HEIGHT, RATE, SECONDS, NOISE = 0.75, 0.5, 25.0, 4.6, 5e-4
 SPEEDS = (3.5, 4.3, 5.1, 6.0)
@@ -61,38 +62,7 @@ noise = {noise}
 [recording.wind]
 velocity = [{speed}, 0.0, 0.0]
 """
-DATA_SET = """
-title = "A tiny data set"
-licence = "CC0-1.0"
-seed = 1
-[simulation]
-scene = "scene.toml"
-[render]
-prior = "flags"
-width = 32
-height = 32
-raster-samples = 2
-[sides.train]
-sequences = 2
-renders = 2
-[sides.test]
-sequences = 1
-renders = 1
-[camera]
-frame-slot = 2048
-"""
-SIMULATED = """
-batch = 2
-[scene]
-columns = 6
-[material]
-name = "camel-ponte-roma"
-[wind]
-speed = { low = 2.0, high = 6.0 }
-[time]
-settle = 0.1
-frames = 30
-"""
+FEW = DATA_SET.replace("4\nrenders = 11", "2\nrenders = 2").replace("2\nrenders = 4", "1\nrenders = 1")
 _LAKE = ("--lake", "{folder}/lake")
 
 
@@ -142,8 +112,8 @@ def _tracks(path: Path, markers: NDArray[np.float64], recordings: Sequence[NDArr
 def build_scene(folder: Path) -> Scene:
     """The recipe of a tiny data set; beside the folder, what workers make of its jobs."""
     started(folder)
-    (folder / "scene.toml").write_text(SIMULATED)
-    (folder / "tiny.toml").write_text(DATA_SET)
+    (folder / "scene.toml").write_text(SIMULATION)
+    (folder / "tiny.toml").write_text(FEW)
     kept = folder.with_name(f"{folder.name}.kept")
     kept.mkdir()
     return Scene(folder=folder, ids={"kept": str(kept)})
@@ -151,11 +121,11 @@ def build_scene(folder: Path) -> Scene:
 
 def train_scene(folder: Path) -> Scene:
     """A lake of small films, and a recipe that learns from them."""
-    from tests.models.conftest import RECIPE, fill
+    from tests.models.conftest import fill
 
     lake = Lake.create(folder / "lake")
     fill(lake)
-    (folder / "small.toml").write_text(RECIPE.replace("epochs = 3", "epochs = 1"))
+    (folder / "small.toml").write_text(TRAINING.replace("epochs = 3", "epochs = 1"))
     return Scene(folder=folder)
 
 

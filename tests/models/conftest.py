@@ -13,6 +13,7 @@ from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
+from tests.small import TRAINING
 
 PERIOD = 40_000_000
 START = 1_577_836_800_000_000_000
@@ -81,37 +82,8 @@ def lake_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-RECIPE = """
-title = "small"
-seed = 1
-[data]
-dataset = "made"
-[input]
-maps = "wave-maps"
-size = 24
-frames = 12
-scales = [1.0, 0.9]
-variants = 2
-[network]
-name = "wave"
-dimension = 4
-widths = [6, 6, 6]
-[loss]
-name = "posterior"
-targets = ["wind_speed"]
-components = 2
-[optimiser]
-rate = 1e-2
-decay = 1e-4
-batch = 4
-epochs = 3
-schedule = "cosine"
-patience = 9
-"""
-
-
 @pytest.fixture
 def recipe_path(tmp_path: Path) -> Path:
     path = tmp_path / "small.toml"
-    path.write_text(RECIPE)
+    path.write_text(TRAINING)
     return path

@@ -24,7 +24,7 @@ from models.training import checkpoint
 from models.training.recipe import TrainingRecipe, parse
 from tests.damage import QUICK, changed, paths, wild
 from tests.hostile.models import IDENTITY, WORDS, standing, write_checkpoint, write_model
-from tests.models.conftest import RECIPE
+from tests.small import TRAINING
 
 SECONDS = 5.0
 """Within which a card is read or refused: none takes more than a tenth of one alone."""
@@ -48,7 +48,7 @@ def test_the_small_model_and_recipe_are_whole(folder: Path, tmp_path: Path) -> N
     copy = Path(shutil.copytree(folder, tmp_path / "small"))
     write_sums(copy)
     assert estimator.load(copy).name == "small"
-    assert read(RECIPE).optimiser.batch == 4
+    assert read(TRAINING).optimiser.batch == 4
 
 
 @QUICK
@@ -90,7 +90,7 @@ def test_absurd_numbers_of_a_training_recipe_are_refused_before_any_work(
     old: str, new: str, error: type[FlagdataError]
 ) -> None:
     with pytest.raises(error):
-        read(RECIPE.replace(old, new))
+        read(TRAINING.replace(old, new))
 
 
 @pytest.mark.parametrize(

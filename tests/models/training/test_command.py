@@ -34,6 +34,7 @@ from models.training import inputs
 from models.training.command import sides_of
 from models.training.inputs import prepare_clips, prepare_films
 from models.training.recipe import TRAININGS, load, parse
+from tests.small import TRAINING
 
 
 def run(*arguments: str) -> dict[str, Any]:
@@ -45,12 +46,10 @@ def run(*arguments: str) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def lake(lake_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy that models are committed to: two seeds of the small recipe."""
-    from tests.models.conftest import RECIPE
-
     path = tmp_path_factory.mktemp("trained") / "lake"
     shutil.copytree(lake_path, path)
     recipe = path.parent / "small.toml"
-    recipe.write_text(RECIPE)
+    recipe.write_text(TRAINING)
     for seed in (1, 2):
         run("train", str(recipe), "--at", "v1", "--seed", str(seed), "--lake", str(path), "--workers", "1")
     return path
@@ -166,10 +165,8 @@ def test_clips_beyond_the_range_of_their_target_are_refused_before_anything_is_p
     lake: Path, tmp_path: Path
 ) -> None:
     """The range of "cloth_wind" ends at 6 m/s, the winds of the lake at 10."""
-    from tests.models.conftest import RECIPE
-
     path = tmp_path / "small-cloth.toml"
-    path.write_text(RECIPE.replace('["wind_speed"]', '["cloth_wind"]'))
+    path.write_text(TRAINING.replace('["wind_speed"]', '["cloth_wind"]'))
     strong = [seed for seed in range(10) if np.random.default_rng(seed).uniform(0, 10) > 6.03]
     arguments = ["train", str(path), "--at", "v1", "--lake", str(lake), "--cache", str(tmp_path / "cache")]
     done = CliRunner().invoke(root, arguments)
@@ -185,13 +182,13 @@ def test_a_model_of_hanging_cloth_tells_the_same_quantities_in_its_own_ranges(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Trained, shipped and judged by the commands that are there for flags."""
-    from tests.models.conftest import RECIPE, fill
+    from tests.models.conftest import fill
 
     lake = tmp_path / "lake"
     fill(Lake.create(lake), strongest=6.0)
     Lake.open(lake).tag("v1")
     path = tmp_path / "small-cloth.toml"
-    path.write_text(RECIPE.replace('["wind_speed"]', '["cloth_wind", "cloth_density"]'))
+    path.write_text(TRAINING.replace('["wind_speed"]', '["cloth_wind", "cloth_density"]'))
     trained = run("train", str(path), "--at", "v1", "--lake", str(lake), "--workers", "1", "--branch", "main")
     options = ["--lake", str(lake), "--at", "v1", "--out", str(tmp_path / "shipped")]
     done = CliRunner().invoke(shipping.main, [str(path), *options], catch_exceptions=False)
@@ -326,20 +323,18 @@ def test_a_part_of_the_sequences_is_the_beginning_of_one_order(lake: Path, tmp_p
 
 
 def test_clips_of_another_rate_are_refused(tmp_path: Path) -> None:
-    from tests.models.conftest import RECIPE, fill
+    from tests.models.conftest import fill
 
     lake = Lake.create(tmp_path / "lake")
     fill(lake, period=33_333_333)
-    recipe = parse(RECIPE, name="small", where="test")
+    recipe = parse(TRAINING, name="small", where="test")
     pairs = sides_of(flagdata.open(tmp_path / "lake"), recipe, "validation", at=None)
     with pytest.raises(InputError, match="another rate than 25 Hz"):
         prepare_clips(pairs, recipe.front_end, recipe.cropping, folder=tmp_path, workers=1, advance=lambda n: None)
 
 
 def test_clips_that_the_network_does_not_take_are_refused_before_they_are_prepared(lake: Path, tmp_path: Path) -> None:
-    from tests.models.conftest import RECIPE
-
-    small = RECIPE.replace('maps = "wave-maps"', 'maps = "frames"').replace('name = "wave"', 'name = "cardona"')
+    small = TRAINING.replace('maps = "wave-maps"', 'maps = "frames"').replace('name = "wave"', 'name = "cardona"')
     recipe = tmp_path / "small.toml"
     recipe.write_text(small.replace("dimension = 4\nwidths = [6, 6, 6]\n", ""))
     arguments = ["train", str(recipe), "--at", "v1", "--lake", str(lake), "--cache", str(tmp_path / "cache")]
@@ -372,10 +367,8 @@ def test_every_recipe_of_the_catalog_is_read_and_makes_its_network(name: str) ->
     ],
 )
 def test_a_recipe_that_does_not_fit_says_what_and_how(old: str, new: str, error: type[Exception], named: str) -> None:
-    from tests.models.conftest import RECIPE
-
     with pytest.raises(error) as caught:
-        parse(RECIPE.replace(old, new), name="small", where="test").learner()
+        parse(TRAINING.replace(old, new), name="small", where="test").learner()
     assert named in f"{caught.value} {getattr(caught.value, 'fix', '')}"
 
 

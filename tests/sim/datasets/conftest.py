@@ -17,50 +17,8 @@ import pytest
 from flagdata.lake import Lake
 from sim.datasets.reading import parse
 from sim.datasets.recipe import DatasetRecipe
+from tests.small import DATA_SET, SIMULATION
 
-SCENE = """
-batch = 2
-[scene]
-columns = 6
-[material]
-name = "camel-ponte-roma"
-density = { low = 0.10, high = 0.17 }
-bending-factors = { low = 0.1, high = 10.0 }
-[wind]
-speed = { low = 0.0, high = 10.0 }
-[time]
-settle = 0.2
-frames = 30
-"""
-RECIPE = """
-title = "A tiny data set"
-licence = "CC0-1.0"
-seed = 1
-[simulation]
-scene = "scene.toml"
-[render]
-prior = "flags"
-width = 32
-height = 32
-raster-samples = 2
-[sides.train]
-sequences = 4
-renders = 11
-[sides.test]
-sequences = 2
-renders = 4
-[camera]
-jpeg-quality = { low = 70, high = 90 }
-read-noise = 1.0
-shot-noise = 2.0
-frame-slot = 2048
-[anemometer]
-noise = 0.1
-[anemometer.effects.anemometer-lag]
-distance = { low = 1.0, high = 3.0 }
-[anemometer.effects.anemometer-gain]
-gain = { low = 0.95, high = 1.05 }
-"""
 WORKER = Path(__file__).with_name("build_worker.py")
 Rows = dict[str, tuple[str, ...]]
 
@@ -69,8 +27,8 @@ Rows = dict[str, tuple[str, ...]]
 def recipe_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The tiny data set's recipe beside its scene."""
     folder = tmp_path_factory.mktemp("recipe")
-    (folder / "scene.toml").write_text(SCENE)
-    (folder / "tiny.toml").write_text(RECIPE)
+    (folder / "scene.toml").write_text(SIMULATION)
+    (folder / "tiny.toml").write_text(DATA_SET)
     return folder / "tiny.toml"
 
 
@@ -79,12 +37,12 @@ def make(recipe_file: Path) -> Callable[..., DatasetRecipe]:
     """The tiny recipe with pieces of its text replaced: old → new."""
 
     def made(replaced: dict[str, str] | None = None, *, scene: dict[str, str] | None = None) -> DatasetRecipe:
-        text = _replaced(RECIPE, replaced or {})
+        text = _replaced(DATA_SET, replaced or {})
         folder = recipe_file.parent
         if scene:
             folder = folder / str(abs(hash(tuple(scene.items()))))
             folder.mkdir(exist_ok=True)
-            (folder / "scene.toml").write_text(_replaced(SCENE, scene))
+            (folder / "scene.toml").write_text(_replaced(SIMULATION, scene))
         return parse(text, name="tiny", folder=folder, where="tiny.toml")
 
     return made
