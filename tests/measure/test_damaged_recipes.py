@@ -180,13 +180,14 @@ def test_a_bank_of_an_earlier_version_is_refused(tmp_path: Path, monkeypatch: py
         bank._content(tmp_path / "nulls-0000.npz")
 
 
-@pytest.mark.parametrize("name", sorted(arrays()))
-@pytest.mark.parametrize("values", [np.zeros(0), np.array("x"), np.zeros((5, 1)), np.array([None, None]), None])
-def test_a_bank_whose_arrays_do_not_fit_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, values: np.ndarray | None
-) -> None:
+def test_a_bank_whose_arrays_do_not_fit_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bank, "names", lambda: ("a", "b"))
-    made = {key: array for key, array in {**arrays(), name: values}.items() if array is not None}
-    np.savez(tmp_path / "nulls-0000.npz", **made)
-    with pytest.raises(CorruptError):
-        bank._content(tmp_path / "nulls-0000.npz")
+    taken: list[tuple[str, np.ndarray | None]] = []
+    for name in sorted(arrays()):
+        for values in (np.zeros(0), np.array("x"), np.zeros((5, 1)), np.array([None, None]), None):
+            made = {key: array for key, array in {**arrays(), name: values}.items() if array is not None}
+            np.savez(tmp_path / "nulls-0000.npz", **made)
+            with suppress(CorruptError):
+                bank._content(tmp_path / "nulls-0000.npz")
+                taken.append((name, values))
+    assert taken == []
