@@ -11,6 +11,7 @@ import pytest
 
 from flagdata.errors import NotFoundError
 from sim.blender import environment
+from tests.evidence import REFERENCE
 
 # A busy machine is no defect: what may take how long is the claim of tests of its own (pytest-timeout ends a hang).
 hypothesis.settings.register_profile("whatever-the-load", deadline=None)
@@ -22,10 +23,9 @@ REPOSITORY = Path(__file__).resolve().parent.parent
 @pytest.fixture(scope="session")
 def reference_data() -> Path:
     """The folder of real recordings and reference outputs; it is not part of the project."""
-    folder = Path(os.environ.get("FLAGDATA_REFERENCE", REPOSITORY.parent / "shared" / "data"))
-    if not folder.is_dir():
-        pytest.skip(f"reference data absent: no folder {folder} (set FLAGDATA_REFERENCE)")
-    return folder
+    if not REFERENCE.is_dir():
+        pytest.skip(f"reference data absent: no folder {REFERENCE} (set FLAGDATA_REFERENCE)")
+    return REFERENCE
 
 
 @pytest.fixture(scope="session")

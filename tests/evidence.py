@@ -16,6 +16,10 @@ from typing import Any
 from flagdata.provenance import code_version
 from flagdata.timebase import NANOSECONDS, iso
 
+REFERENCE = Path(os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[2] / "shared" / "data"))
+"""The folder of real recordings and of others' results, which may be absent; it is not part of the project."""
+ABSENT = {"left_out": "no reference data; set FLAGDATA_REFERENCE to their folder"}
+"""Result of what needs it."""
 _VERSIONS = ("numpy", "scipy", "torch", "pyarrow", "deltalake", "zarr", "mcap", "av", "duckdb")
 
 

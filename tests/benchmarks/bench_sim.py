@@ -29,6 +29,7 @@ from sim.material import named
 from sim.scene import assemble, flag
 from sim.state import State
 from sim.system import System
+from tests.evidence import REFERENCE
 
 FRAME = 0.04
 BATCH = 16
@@ -164,8 +165,7 @@ def _batches() -> list[dict[str, float]]:
 
 def _accuracy() -> dict[str, Any]:
     """Mean vertex distance to the reference's 0.5 ms run after 1, 5 and 10 frames [mm], float32, as timed."""
-    folder = Path(os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[3] / "shared" / "data"))
-    path = folder / "arcsim" / "flag_w4_dt05.npz"
+    path = REFERENCE / "arcsim" / "flag_w4_dt05.npz"
     if not path.is_file():
         return {"skipped": f"no reference data at {path.name}"}
     with np.load(path) as run_:

@@ -5,7 +5,6 @@ Vertex by vertex while the motion is predictable, then in the statistics of repl
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +20,7 @@ from sim.integrate import Integrator
 from sim.integrate.implicit import AirShape, BackwardEuler
 from sim.integrate.symplectic import Symplectic
 from sim.scene import assemble, flag
+from tests.evidence import ABSENT, REFERENCE
 from tests.validation.flags_runs import CAMEL, one_core
 from tests.verification.motion import edge_motion
 
@@ -51,8 +51,7 @@ class ReferenceMotion:
 
 def folder() -> Path | None:
     """Where the reference runs are; None where they are absent."""
-    data = os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[3] / "shared" / "data")
-    runs = Path(data) / "arcsim"
+    runs = REFERENCE / "arcsim"
     return runs if all((runs / f"{name}.npz").is_file() for name in RUNS.values()) else None
 
 
@@ -75,7 +74,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     """Distances, statistics and their picture; what is missing where the reference runs are."""
     runs = folder()
     if runs is None:
-        return {"left_out": "no reference data; set FLAGDATA_REFERENCE to their folder"}
+        return dict(ABSENT)
     with one_core():
         result = {"mean_vertex_distance_m": distances(runs), "settled": settled(runs, seed)}
     draw_reference(result["mean_vertex_distance_m"], result["settled"], out / "validate-arcsim.png")

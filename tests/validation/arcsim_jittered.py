@@ -30,6 +30,7 @@ from measure.observe import Hold, Observation, Setup, from_arrays, observe
 from measure.observe.trajectory import DENSITY_UNCERTAINTY, Experiment, WindTrack
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Conclusion, Estimate, Verdict
+from tests.evidence import ABSENT
 from tests.validation.arcsim import RATE, folder
 from tests.validation.flags_runs import CAMEL
 
@@ -70,7 +71,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     that was stopped goes on where it was."""
     runs = folder()
     if runs is None or not (runs / "jittered").is_dir():
-        return {"missing": "no ArcSim runs in the reference data (set FLAGDATA_REFERENCE)"}
+        return dict(ABSENT)
     experiments = {known: {name: _experiment(runs / "jittered", name, known) for name in CASES} for known in KNOWN}
     told: dict[str, Any] = {"criteria": CRITERIA.as_dict()}
     for draw in DRAWS:

@@ -22,7 +22,6 @@ too fast.
 from __future__ import annotations
 
 import csv
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,9 +30,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from tests.evidence import ABSENT, REFERENCE
 from tests.verification.flutter.beam import Strip, leading, onset, pipe_onset
 
-_FOLDER = Path(os.environ.get("FLAGDATA_REFERENCE", Path(__file__).parents[3] / "shared" / "data")) / "flutter"
+_FOLDER = REFERENCE / "flutter"
 
 _SHARES = (0.25, 0.5, np.pi / 4)
 """M/(ρ L). π/4: a plate moving broadside, averaged over its chord; ½: what is often taken; ¼: waves of 0.8 L on both
@@ -110,7 +110,7 @@ def _dadamo() -> dict[str, Any]:
 def compared() -> dict[str, Any]:
     """The comparison; that it was left out, and why, where the reference data are absent."""
     if not _FOLDER.is_dir():
-        return {"left_out": "no reference data; set FLAGDATA_REFERENCE to their folder"}
+        return dict(ABSENT)
     return {"argentina_mahadevan_2005": _argentina_mahadevan(), "dadamo_2024": _dadamo()}
 
 

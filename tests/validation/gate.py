@@ -26,6 +26,7 @@ from measure.gate.prepare import FilmsOf, calibrated, data_of
 from measure.gate.storage import read
 from measure.shares import Share
 from models.estimator import SHIPPED, Estimator, shipped
+from tests.evidence import ABSENT, REFERENCE
 from tests.validation.gate_clips import KINDS, made, seed_of
 
 LAKE = "FLAGDATA_LAKE"
@@ -104,10 +105,9 @@ def _kind(judged: list[Judgement], name: str) -> dict[str, Any]:
 
 def _real(model: Estimator, gate: Gate) -> dict[str, Any]:
     """What is said of the windows of a real recording of two flags (DynTex 571c110), if it is there."""
-    data = os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[3] / "shared" / "data")
-    path = Path(data) / _CLIP
+    path = REFERENCE / _CLIP
     if not path.exists():
-        return {"left_out": "no reference data; set FLAGDATA_REFERENCE to their folder"}
+        return dict(ABSENT)
     with av.open(str(path)) as container:
         film = np.array([frame.to_ndarray(format="gray") for frame in container.decode(video=0)], dtype=np.uint8)
     count = model.front_end.frames

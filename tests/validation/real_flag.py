@@ -7,7 +7,6 @@ was not trained on such pictures.
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ import av
 import numpy as np
 
 from models import estimator
+from tests.evidence import ABSENT, REFERENCE
 
 _CLIP = "video/dyntex_flag_571c110.avi"
 _LEVEL = 0.9
@@ -22,10 +22,9 @@ _LEVEL = 0.9
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
     """Estimates of non-overlapping windows, and a picture of them."""
-    data = os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[3] / "shared" / "data")
-    path = Path(data) / _CLIP
+    path = REFERENCE / _CLIP
     if not path.exists():
-        return {"left_out": "no reference data; set FLAGDATA_REFERENCE to their folder"}
+        return dict(ABSENT)
     with av.open(str(path)) as container:
         film = np.stack([frame.to_ndarray(format="gray") for frame in container.decode(video=0)])
     model = estimator.shipped()

@@ -46,6 +46,7 @@ from models.evaluation.handmade import TARGETS, Fitted, fitted
 from models.training.recipe import DataSpec
 from sim.assets import Assets
 from sim.render.prior import named
+from tests.evidence import REFERENCE
 from tests.validation.peers.registry import PEERS, minimise
 from tests.validation.transfer import (
     REFERENCE_RUNS,
@@ -185,9 +186,8 @@ def _changed(count: int, space: Space, *, frames: int, seed: int, folder: Path) 
 
 def _arcsim(count: int, *, frames: int, seed: int) -> list[Target]:
     """Runs of the reference simulator, of as many views as there must be; how they were filmed is not told."""
-    data = os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[3] / "shared" / "data")
     otherwise = DrawnView(prior=named(RENDERS), assets=Assets())
-    clips = reference_clips(Path(data) / "arcsim", seed, frames, views=-(-count // REFERENCE_RUNS))
+    clips = reference_clips(REFERENCE / "arcsim", seed, frames, views=-(-count // REFERENCE_RUNS))
     return [
         Target(name=name, clip=film[:frames], view=otherwise, truth={"wind_speed": wind, "density": density})
         for name, (film, wind, density) in list(clips)[:count]

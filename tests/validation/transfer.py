@@ -35,6 +35,7 @@ from sim.datasets.recipe import DatasetRecipe, Side
 from sim.render import Meshes
 from sim.render.raster import Raster
 from sim.run.recipe import IntegratorSpec
+from tests.evidence import ABSENT, REFERENCE
 
 FLAGS = int(os.environ.get("FLAGDATA_TRANSFER_FLAGS", "60"))
 """Flags of each change; Cycles, which takes two minutes a film, has a quarter of them."""
@@ -59,15 +60,14 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         recipe = change(unseen(FLAGS // 4 if name == "rendered by Cycles" else FLAGS, seed))
         clips = [_clip(frames, stated) for frames, stated in filmed(recipe)]
         result["of"][name] = _scores(model, clips, seed)
-    data = os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[3] / "shared" / "data")
-    runs = Path(data) / "arcsim"
+    runs = REFERENCE / "arcsim"
     if runs.is_dir():
         clips = [clip for _, clip in reference_clips(runs, seed, model.front_end.frames, views=VIEWS)]
         result["of"]["simulated by ArcSim"] = _scores(model, clips, seed)
         if any(t.name == "density" and t.low < WEIGHED[0] and WEIGHED[1] < t.high for t in model.targets):
             result["of"]["simulated by ArcSim, the flag weighed to 5 %"] = _scores(model, clips, seed, known=WEIGHED)
     else:
-        result["left_out"] = "ArcSim's runs: no reference data; set FLAGDATA_REFERENCE to their folder"
+        result |= ABSENT
     return result
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from tests.evidence import ABSENT, REFERENCE
 from tests.validation.paper_flag.observe import observe
 from tests.validation.paper_flag.page import as_json, page
 from tests.validation.paper_flag.recipe import load_case
@@ -14,16 +14,15 @@ from tests.validation.paper_flag.study import study
 from tests.validation.paper_flag.verdict import judge
 
 _ROOT = Path(__file__).parents[3]
-_DATA = Path(os.environ.get("FLAGDATA_REFERENCE", _ROOT.parent / "shared" / "data"))
 _WORK = _ROOT / "out" / "paper-flag"
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
     """The study; the page goes to docs/cases. That it was left out, and why, where the recordings are absent."""
-    if not _DATA.is_dir():
-        return {"left_out": "no reference data; set FLAGDATA_REFERENCE to their folder"}
+    if not REFERENCE.is_dir():
+        return dict(ABSENT)
     case = replace(load_case(), seed=seed)
-    seen = observe(case, _DATA, keep=_WORK / "kept")
+    seen = observe(case, REFERENCE, keep=_WORK / "kept")
     found = study(case, seen, keep=_WORK / "kept")
     verdict = judge(case, seen, found)
     target = out.parent / "cases" / "paper-flag.html"

@@ -8,7 +8,6 @@ the same all the time at a node, what a frame's nodes share, and the rest.
 
 from __future__ import annotations
 
-import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from typing import Any
 import torch
 
 from sim.material import named
+from tests.evidence import ABSENT, REFERENCE
 from tests.validation.robot_cloth.attribution import LEAD, Round
 from tests.validation.robot_cloth.calibrate import at_bounds
 from tests.validation.robot_cloth.model import described
@@ -27,21 +27,14 @@ MATERIAL = "camel-ponte-roma"
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
     """The study; what is missing where the recordings are."""
-    folder = recordings()
-    if folder is None:
-        return {"missing": "no recordings of a held cloth in the reference data (set FLAGDATA_REFERENCE)"}
+    folder = REFERENCE / "cloth" / "robot-held"
+    if not folder.is_dir():
+        return dict(ABSENT)
     torch.set_num_threads(1)
     found = study(folder, named(MATERIAL), fitted=FITTED, held_out=HELD_OUT, seed=seed)
     (out / "validate-robot-cloth.md").write_text(page(found), encoding="utf-8")
     told = {"nominal": MATERIAL, "level": LEVEL, "moved": MOVED}
     return {**told, **asdict(found), "apart": found.apart.as_dict(), "apart_moved": found.apart_moved.as_dict()}
-
-
-def recordings() -> Path | None:
-    """Where they are; None where they are absent."""
-    data = os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[4] / "shared" / "data")
-    folder = Path(data) / "cloth" / "robot-held"
-    return folder if folder.is_dir() else None
 
 
 def page(found: HeldCloth) -> str:
