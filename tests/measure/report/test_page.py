@@ -17,10 +17,7 @@ from measure.verdict.record import Conclusion, Estimate, Verdict
 from tests.measure.report.pages import parsed
 from tests.measure.report.verdicts import Size, residual, verdict, with_holes
 
-MADE = [*(verdict(c) for c in Conclusion), with_holes(verdict(Conclusion.EFFECT))]
-NAMES = [*(c.name.lower() for c in Conclusion), "holes"]
-KINDS = [(whole, page(whole)) for whole in MADE]
-every_kind = pytest.mark.parametrize(("whole", "html"), KINDS, ids=NAMES)
+KINDS = [*(c.name.lower() for c in Conclusion), "holes"]
 POWERS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
 NUMBER = re.compile(r"(−?\d+(?:\.(\d+))?)(?: × 10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?")
 
@@ -51,6 +48,20 @@ def estimates(value: Any) -> Iterator[Estimate]:
             yield from estimates(item)
 
 
+@pytest.fixture(scope="module", params=KINDS)
+def whole(request: pytest.FixtureRequest) -> Verdict:
+    """A verdict of each kind."""
+    if request.param == "holes":
+        return with_holes(verdict(Conclusion.EFFECT))
+    return verdict(Conclusion[request.param.upper()])
+
+
+@pytest.fixture(scope="module")
+def html(whole: Verdict) -> str:
+    """Its page."""
+    return page(whole)
+
+
 def rounds_to(value: float, text: str, factor: float) -> bool:
     """Whether the first number of `text` is `value · factor`, to half of its last digit that is not a zero."""
     if math.isinf(value):
@@ -63,7 +74,6 @@ def rounds_to(value: float, text: str, factor: float) -> bool:
     return abs(float(found[1].translate(POWERS)) * power - value * factor) <= 0.5001 * place * power
 
 
-@every_kind
 def test_every_number_on_the_page_is_one_of_the_verdict_rounded(whole: Verdict, html: str) -> None:
     known = set(numbers(whole))
     shown = parsed(html).all("data")
@@ -75,7 +85,6 @@ def test_every_number_on_the_page_is_one_of_the_verdict_rounded(whole: Verdict, 
         assert rounds_to(value, element.text, factor), (value, element.text)
 
 
-@every_kind
 def test_every_interval_on_the_page_is_that_of_its_value(whole: Verdict, html: str) -> None:
     held = list(estimates(whole))
     elements = parsed(html).elements
@@ -92,7 +101,6 @@ def test_every_interval_on_the_page_is_that_of_its_value(whole: Verdict, html: s
     assert seen > 10
 
 
-@every_kind
 def test_the_page_is_well_formed(whole: Verdict, html: str) -> None:
     read = parsed(html)
     assert read.faults == []
@@ -101,7 +109,6 @@ def test_the_page_is_well_formed(whole: Verdict, html: str) -> None:
     assert len(identities) == len(set(identities))
 
 
-@every_kind
 def test_the_page_refers_to_no_other_file(whole: Verdict, html: str) -> None:
     for element in parsed(html).elements:
         for name in ("src", "href", "data", "action", "srcset", "poster"):
@@ -112,7 +119,6 @@ def test_the_page_refers_to_no_other_file(whole: Verdict, html: str) -> None:
     assert not re.search(r"url\((?!\s*[\"']?data:)", html)
 
 
-@every_kind
 def test_what_cannot_be_seen_is_told(whole: Verdict, html: str) -> None:
     """Every chart has a name, every table's heads have a scope, every control a label."""
     read = parsed(html)
@@ -125,7 +131,6 @@ def test_what_cannot_be_seen_is_told(whole: Verdict, html: str) -> None:
     assert parsed(html).all("html")[0].attributes["lang"] == "en"
 
 
-@every_kind
 def test_the_page_says_the_verdicts_words_assumptions_and_remarks(whole: Verdict, html: str) -> None:
     text = re.sub(r"\s+", " ", parsed(html).all("body")[0].text)
     told = [whole.words, whole.separating, whole.proposal, whole.test.nulls, *whole.assumptions]
