@@ -29,6 +29,9 @@ SYSTEM := python3.11-venv g++ git libegl1 libgl1 libice6 libsm6 libx11-6 libxcb1
 # Two processes of two threads each would wait for each other on two cores: tests take 2.5 times the processor's time.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 
+# Two workers, a file each at a time, in the order that tests/conftest.py gives: the longest first.
+IN_TWO := -n 2 --dist loadfile --no-loadscope-reorder
+
 # Tests start the program many times: without its bytecode each start would compile the package anew.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -38,11 +41,11 @@ demo: $(STAMP)
 	$(BIN)/flagdata demo --out $(OUT)/demo
 
 test: lint $(BLENDER_STAMP) $(MUJOCO_STAMP)
-	FLAGDATA_BLENDER=$(BLENDER) FLAGDATA_MUJOCO=$(MUJOCO) $(ONE_THREAD) $(BIN)/python -m pytest -n 2 --dist loadfile
+	FLAGDATA_BLENDER=$(BLENDER) FLAGDATA_MUJOCO=$(MUJOCO) $(ONE_THREAD) $(BIN)/python -m pytest $(IN_TWO)
 
 test-oldest: $(OLDEST_STAMP) $(BLENDER_STAMP) $(MUJOCO_STAMP)
 	FLAGDATA_BLENDER=$(BLENDER) FLAGDATA_MUJOCO=$(MUJOCO) $(ONE_THREAD) \
-	  $(OLDEST_VENV)/bin/python -m pytest -n 2 --dist loadfile
+	  $(OLDEST_VENV)/bin/python -m pytest $(IN_TWO)
 
 blender: $(BLENDER_STAMP)
 

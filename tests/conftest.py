@@ -18,6 +18,19 @@ hypothesis.settings.register_profile("whatever-the-load", deadline=None)
 hypothesis.settings.load_profile("whatever-the-load")
 
 REPOSITORY = Path(__file__).resolve().parent.parent
+LONGEST = (
+    "measure/loop/test_run.py", "measure/propose/test_propose.py", "sim/datasets/test_build.py", "test_readme.py",
+    "flagdata/test_failing_calls.py", "test_hostile.py", "docs/test_pages.py", "docs/test_notebooks.py",
+    "models/training/test_command.py", "verification/flutter/test_flutter.py", "sim/blender/test_environment.py",
+)  # fmt: skip
+"""Files that take longest, begun first, so that the two workers of `make test` end together."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    place = {REPOSITORY / "tests" / name: number for number, name in enumerate(LONGEST)}
+    if missing := [path for path in place if not path.is_file()]:
+        raise pytest.UsageError(f"LONGEST in tests/conftest.py names files that are not there: {missing}")
+    items.sort(key=lambda item: place.get(item.path, len(place)))
 
 
 @pytest.fixture(scope="session")

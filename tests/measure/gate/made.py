@@ -1,4 +1,5 @@
-"""Small made films of a waving patch before a still background, and a small network that was never trained."""
+"""Small made films of a waving patch before a still background, a small network that was never trained, and gates
+learned from drawn feature vectors."""
 
 from __future__ import annotations
 
@@ -7,15 +8,20 @@ import torch
 from numpy.typing import NDArray
 
 from measure.gate.checks import CHECKS
+from measure.gate.distortions import DISTORTIONS
+from measure.gate.gate import Gate
 from measure.gate.seen import Seen
 from models.crops import Cropping
 from models.estimator import Estimator
 from models.frontend import FrontEnd
+from models.handmade import FEATURES
 from models.learner import Learner, Loss
 from models.outliers import Familiarity
 from models.registry import NETWORKS
 
 SIZE, FRAMES = 112, 30
+DIMENSION = len(CHECKS) + len(FEATURES) + 4 + 3
+KINDS = list(DISTORTIONS)
 
 
 def background(seed: int = 0) -> NDArray[np.float64]:
@@ -59,3 +65,22 @@ def small_model(seed: int = 0) -> Estimator:
         name="small", learners=(learner,), front_end=front_end,
         cropping=Cropping(frames=12, size=32), widening=torch.ones(1), cloud=cloud, card={"name": "small"},
     )  # fmt: skip
+
+
+def plain(seed: int, count: int) -> NDArray[np.float64]:
+    """(count, DIMENSION) of a heavy-tailed law: Student's t with five degrees of freedom, correlated."""
+    rng = np.random.default_rng(seed)
+    mixing = np.eye(DIMENSION) + 0.3 * np.random.default_rng(0).normal(size=(DIMENSION, DIMENSION)) / DIMENSION**0.5
+    return rng.standard_t(5, (count, DIMENSION)) @ mixing
+
+
+def distorted(seed: int, count: int, kind: str, strength: float = 40.0) -> NDArray[np.float64]:
+    """Plain vectors moved along a direction of the distortion's own, among the hand-made features."""
+    moved = plain(seed, count)
+    moved[:, len(CHECKS) + 2 * KINDS.index(kind)] += strength
+    return moved
+
+
+def learned(seed: int, calibration: int = 199) -> Gate:
+    made = {kind: distorted(1000 * seed + place, 80, kind) for place, kind in enumerate(KINDS)}
+    return Gate.of(plain(seed, 300), made, plain(seed + 500, calibration))

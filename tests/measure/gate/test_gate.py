@@ -6,37 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from flagdata.errors import InputError
-from measure.gate.checks import CHECKS
-from measure.gate.distortions import DISTORTIONS
 from measure.gate.gate import SCORES, Gate, squashed
 from measure.gate.reasons import REASONS
 from measure.gate.tail_probability import level
-from models.handmade import FEATURES
-
-DIMENSION = len(CHECKS) + len(FEATURES) + 4 + 3
-KINDS = list(DISTORTIONS)
-
-
-def plain(seed: int, count: int) -> NDArray[np.float64]:
-    """(count, DIMENSION) of a heavy-tailed law: Student's t with five degrees of freedom, correlated."""
-    rng = np.random.default_rng(seed)
-    mixing = np.eye(DIMENSION) + 0.3 * np.random.default_rng(0).normal(size=(DIMENSION, DIMENSION)) / DIMENSION**0.5
-    return rng.standard_t(5, (count, DIMENSION)) @ mixing
-
-
-def distorted(seed: int, count: int, kind: str, strength: float = 40.0) -> NDArray[np.float64]:
-    """Plain vectors moved along a direction of the distortion's own, among the hand-made features."""
-    moved = plain(seed, count)
-    moved[:, len(CHECKS) + 2 * KINDS.index(kind)] += strength
-    return moved
-
-
-def learned(seed: int, calibration: int = 199) -> Gate:
-    made = {kind: distorted(1000 * seed + place, 80, kind) for place, kind in enumerate(KINDS)}
-    return Gate.of(plain(seed, 300), made, plain(seed + 500, calibration))
+from tests.measure.gate.made import KINDS, distorted, learned, plain
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from flagdata.checksums import write_sums
 from flagdata.errors import CorruptError, InputError, NotFoundError
+from measure.estimate.checked import CheckedGate
+from measure.estimate.gate import verdict
 from measure.gate.distortions import DISTORTIONS
 from measure.gate.gate import Gate
 from measure.gate.judgement import judge
@@ -93,6 +95,23 @@ def test_too_few_frames_and_a_black_film_are_refused_before_anything_is_measured
     black = judge(np.zeros((12, 64, 64), dtype=np.uint8), model, gate)
     assert [one.kind for one in black.reasons] == ["too-dark"]
     assert black.p == pytest.approx(1 / (VALIDATION + 1))
+
+
+def test_measuring_refuses_a_still_film_with_the_checks_own_reason_and_fix(model: Estimator, gate: Gate) -> None:
+    asked = CheckedGate(model=model, calibrated=gate, false_alarm=0.05)
+    still = np.repeat(clip(42)[:1], 12, axis=0)
+    reasons = asked.judge(still, model.summaries(model.inputs(still[None]))[0].numpy())
+    found = verdict([[reasons]], false_alarm=0.05, level=asked.level)
+    assert found.refused
+    assert found.reasons[0].kind == "no-motion"
+    assert "crop" in found.reasons[0].fix
+    known = clip(1005)[:12]  # one that it was calibrated by
+    usual = asked.judge(known, model.summaries(model.inputs(known[None]))[0].numpy())
+    assert usual[0].p > asked.level(0.05)
+
+
+def test_the_level_leaves_room_for_few_calibration_clips(model: Estimator, gate: Gate) -> None:
+    assert 0 < CheckedGate(model=model, calibrated=gate, false_alarm=0.05).level(0.05) < 0.05
 
 
 def test_frames_that_are_no_window_are_an_error(model: Estimator, gate: Gate) -> None:

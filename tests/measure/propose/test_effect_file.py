@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -106,28 +107,28 @@ def test_its_strengths_can_be_tested_on_other_recordings(two: Outcome, tmp_path:
     assert columns[0].at(0.3).upward_lower == 0.3  # pyright: ignore[reportAttributeAccessIssue]
 
 
-@pytest.mark.parametrize("which", ["two", "heavy"])
-def test_its_own_contract_tests_and_the_librarys_pass(
-    which: str, request: pytest.FixtureRequest, tmp_path: Path
-) -> None:
-    """As if it were installed: an entry point makes it one of the library's effects."""
-    outcome: Outcome = request.getfixturevalue(which)
-    made = write(outcome, tmp_path)
-    info = tmp_path / "proposed-1.dist-info"
+def test_its_own_contract_tests_and_the_librarys_pass(two: Outcome, heavy: Outcome, tmp_path: Path) -> None:
+    """Two files as if they were installed: entry points make them effects of the library."""
+    outcomes = (two, replace(heavy, proposed_from="ef56" * 16))
+    made = {f"proposed-{place}": write(outcome, tmp_path / str(place)) for place, outcome in enumerate(outcomes)}
+    info = tmp_path / "0" / "proposed-1.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: proposed\nVersion: 1\n")
-    (info / "entry_points.txt").write_text(f"[flagdata.effects]\nproposed-ab = {made.path.stem}:{made.class_name}\n")
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)]), "OMP_NUM_THREADS": "1"}
-    files = [made.path.with_name(f"test_{made.path.name}"), ROOT / "tests/contract/test_effects.py"]
-    options = ["-q", "-p", "no:cacheprovider", "-k", f"proposed-ab or test_{made.path.stem}"]
+    points = [f"{name} = {own.path.stem}:{own.class_name}\n" for name, own in made.items()]
+    (info / "entry_points.txt").write_text("".join(["[flagdata.effects]\n", *points]))
+    folders = [str(own.path.parent) for own in made.values()]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([*folders, str(ROOT)]), "OMP_NUM_THREADS": "1"}
+    own_tests = [own.path.with_name(f"test_{own.path.name}") for own in made.values()]
+    chosen = " or ".join([*made, *(path.stem for path in own_tests)])
+    files = [*own_tests, ROOT / "tests/contract/test_effects.py"]
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", *options, *map(str, files)],
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", chosen, *map(str, files)],
         cwd=ROOT, env=environment, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-1000:]
     passed = int(done.stdout.rsplit(" passed", 1)[0].split()[-1])
-    # Of the file's own five and a gradient for each strength, and one for each law of the library's contract.
-    assert passed >= 5 + len(outcome.strengths) + 14
+    # Of each file's own five and a gradient for each strength, and one for each law of the library's contract.
+    assert passed >= sum(5 + len(outcome.strengths) + 14 for outcome in outcomes)
 
 
 @pytest.mark.parametrize(
