@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flagdata.addresses import local_path
 from flagdata.errors import InputError, NothingMeasuredError, TimeError, UsageError, ZoneMissingError
@@ -22,7 +20,7 @@ from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.plan import understood
 from flagdata.ingest.anemometer.preview import shown_rows
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
-from flagdata.ingest.anemometer.samples import calm_zeros, future, platform, possible, quality, steady, zero
+from flagdata.ingest.anemometer.samples import platform, rules, zero
 from flagdata.ingest.anemometer.samples.order import in_order
 from flagdata.ingest.anemometer.table.delimited import Delimited, drafted
 from flagdata.ingest.anemometer.text.source import TextFile
@@ -71,10 +69,10 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     try:
         reading = reader.read(source, options)
     except ZoneMissingError as error:
-        hint = zones.hint(statement, source.head(zones.LINES))
-        if not hint:
+        if statement is None:
             raise
-        raise ZoneMissingError(error.what, where=error.where, fix=f"{error.fix}; {hint}") from None
+        fix = f"{error.fix}; {statement.advice()}"
+        raise ZoneMissingError(error.what, where=error.where, fix=fix) from None
     reported = {finding.kind for finding in reading.findings}
     if (
         statement is not None
@@ -91,21 +89,12 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         raise InputError("no samples in the file", where=str(path), fix="check that the logger recorded anything")
     zero.check(reading, options.zero_offset, where=str(path))
     choice = options.zero_offset if options.zero_offset is not None else reading.rules.zero_offset
-    ordered = in_order(reading, where=str(path), choice=options.clock, source=source)
-    reading = calm_zeros.without(zero.settle(possible.impossible(ordered), choice))
-    for check in (
-        quality.faults,
-        quality.negative,
-        quality.dead_zone,
-        quality.idle,
-        quality.one_direction,
-        quality.stale,
-        quality.at_nyquist,
-    ):
-        reading = _apply(reading, check)
-    findings = (*reading.findings, *quality.gaps(reading), *future.report(reading, now=time.time_ns()))
-    findings = (*findings, *steady.report(reading))
-    findings = (*findings, *_nothing_measured(reading, where=str(path)))
+    ordered = in_order(reading, where=str(path), choice=options.clock)
+    reading = zero.settle(rules.impossible(ordered), choice)
+    for rule in rules.RULES:
+        reading = rule(reading)
+    reading = rules.future(reading, now=time.time_ns())
+    findings = (*reading.findings, *_nothing_measured(reading, where=str(path)))
     series = WindSeries(
         time=reading.time, channels=reading.channels, flags=reading.flags, sensor=reading.sensor,
         host_time=reading.host_time,
@@ -145,7 +134,7 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
     what = f"not one value of the wind in {len(reading.time)} rows can be used{f' ({why})' if why else ''}"
     if not others:
         fix = "check the sensor, and which columns are read"
-        below = any((values < 0).any() for name, values in reading.channels.items() if name in quality.SPEEDS)
+        below = any((values < 0).any() for name, values in reading.channels.items() if name in rules.SPEEDS)
         fix += "; if calm air reads below zero, give --zero-offset" if below else ""
         doubt = next((finding for finding in reading.findings if finding.kind == "unit-doubtful"), None)
         if doubt is not None:
@@ -158,11 +147,6 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
             what=text, fix="check the sensor and the recipe's columns",
         ),
     )  # fmt: skip
-
-
-def _apply(reading: Reading, check: Callable[[Reading], tuple[NDArray[np.uint16], tuple[Finding, ...]]]) -> Reading:
-    flags, found = check(reading)
-    return reading.with_findings(found, flags=reading.flags | flags)
 
 
 def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, tuple[str, ...]]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.recipe import QualityRules
+from flagdata.schema import SampleFlag
 from flagdata.signals import Instants, Sensor, Series
 
 WIND_CHANNELS = frozenset(
@@ -82,6 +83,33 @@ class Reading:
         return replace(
             self, findings=(*self.findings, *found), flags=self.flags if flags is None else flags.astype(np.uint16)
         )
+
+    def marked(
+        self, rows: NDArray[np.bool_], kind: str, what: str, *, flag: SampleFlag = SampleFlag.OK,
+        severity: Severity = Severity.WARNING, value: float | None = None, fix: str | None = None,
+    ) -> Reading:  # fmt: skip
+        """The same rows with a finding about some of them, at the first of these, and a flag at each.
+
+        Args:
+            rows: (n,); where there are none, nothing is found.
+            what: the sentence, in which {n} stands for their number.
+        """
+        if not rows.any():
+            return self
+        count = int(rows.sum())
+        found = Finding(
+            kind=kind, severity=severity, count=count, value=value, fix=fix, where=f"line {self.line[rows][0]}",
+            what=what.replace("{n}", str(count)),
+        )  # fmt: skip
+        return self.with_findings((found,), flags=np.where(rows, self.flags | flag, self.flags))
+
+    def without(
+        self, rows: NDArray[np.bool_], kind: str, what: str, *, severity: Severity = Severity.WARNING,
+        value: float | None = None, fix: str | None = None,
+    ) -> Reading:  # fmt: skip
+        """The other rows, with a finding about those left out; see `marked`."""
+        marked = self.marked(rows, kind, f"{what}; left out", severity=severity, value=value, fix=fix)
+        return marked.take(~rows) if rows.any() else marked
 
 
 def described(by: str) -> Finding:

@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from flagdata.errors import FlagdataError, InputError, UnknownNameError, UsageError
-from flagdata.ingest.anemometer.instants import counted
+from flagdata.ingest.anemometer.instants import dates
 from flagdata.ingest.anemometer.instants.stamps import EPOCH, pattern
 from flagdata.ingest.anemometer.options import ZeroOffset, check_zero_offset
 from flagdata.recipes import Shelf, parsed
@@ -96,7 +96,7 @@ class TimeLayout:
     Attributes:
         columns: names or numbers (from 1) of the columns that are joined with a blank; none where the host's stamp is
             all there is.
-        format: "iso", "epoch-s", "epoch-ms", strptime directives (see stamps.py), or a count (see counted.py).
+        format: "iso", "epoch-s", "epoch-ms", strptime directives or a count (see instants/stamps.py).
         zone: of wall-clock stamps; `None` leaves it to the user.
     """
 
@@ -106,7 +106,7 @@ class TimeLayout:
 
     def __post_init__(self) -> None:
         if self.columns:
-            counted.check(self.format)
+            dates.check(self.format)
         if self.zone is not None:
             zone(self.zone, where="[time] zone")
 

@@ -19,7 +19,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.draft.shape import Shape, shape_of
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
 from flagdata.ingest.anemometer.formats.serial_lines import NOTHING, split_stamp
-from flagdata.ingest.anemometer.instants.month_names import ENGLISH
+from flagdata.ingest.anemometer.instants.stamps import ENGLISH
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Head
 from flagdata.ingest.anemometer.text.rows import cells_of_lines
 from flagdata.ingest.anemometer.text.source import RATE_GIVEN, TableText, TextFile

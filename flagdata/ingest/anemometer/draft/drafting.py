@@ -17,7 +17,7 @@ from flagdata.ingest.anemometer.draft.shape import Shape, is_missing, is_number,
 from flagdata.ingest.anemometer.draft.times import TimeFields, find_time, of_columns
 from flagdata.ingest.anemometer.draft.toml import ChannelText, recipe_text
 from flagdata.ingest.anemometer.draft.words import MOVING, Meaning, fits, meaning
-from flagdata.ingest.anemometer.instants import counted, yearless
+from flagdata.ingest.anemometer.instants import dates
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.units import canonical, spelled
 
@@ -194,12 +194,12 @@ def _time(
     else:
         origin = "given" if options.date_order is not None else "inferred"
     parts.facts.append(Fact(what="time", value=f"{shown} as {time.form}", origin=origin, evidence=time.evidence))
-    if counted.is_elapsed(time.form):
+    if dates.is_elapsed(time.form):
         if options.start is None:
             question = f"{shown} counts from a start: at what instant was the first row?"
             parts.open.append(Open(key="start", question=question, example="TIME (as 2026-05-01T12:00:00+02:00)"))
         return time
-    if (counted.is_time_of_day(time.form) or yearless.is_yearless(time.form)) and options.date is None:
+    if dates.needs_date(time.form) and options.date is None:
         question = f"{shown} has no whole date: of what day is the first row?"
         parts.open.append(Open(key="date", question=question, example="DATE (as 2026-05-01)"))
     epoch = time.form.startswith("epoch")

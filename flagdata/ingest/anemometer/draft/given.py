@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer.draft.shape import Shape
-from flagdata.ingest.anemometer.instants import counted
+from flagdata.ingest.anemometer.instants.stamps import ELAPSED
 from flagdata.schema import CHANNELS
 from flagdata.units import canonical
 
@@ -26,7 +26,7 @@ PARTS = {
     "year": "%Y", "month": "%m", "day": "%d", "day_of_year": "%j", "hour": "%H", "minute": "%M", "second": "%S%f",
 }  # fmt: skip
 _TIMES = ("date", "time", *PARTS)
-_COUNTS = {form.removeprefix("elapsed-"): form for form in counted.UNITS}
+_COUNTS = {form.removeprefix("elapsed-"): form for form in ELAPSED}
 _NAMES = tuple(name for name, channel in CHANNELS.items() if channel.dims == ("time",))
 _ENTRY = re.compile(r"(?:(?P<column>.*)=)?\s*(?P<name>[^\[\]=]*?)\s*(?:\[(?P<detail>[^\]]*)\])?\s*", re.DOTALL)
 

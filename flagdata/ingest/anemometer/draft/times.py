@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from flagdata.ingest.anemometer.draft.shape import Shape
 from flagdata.ingest.anemometer.draft.words import Meaning
-from flagdata.ingest.anemometer.instants import counted, stamps
-from flagdata.ingest.anemometer.instants.midnight import parse_as
+from flagdata.ingest.anemometer.instants import stamps
+from flagdata.ingest.anemometer.instants.dates import is_time_of_day, parse
 from flagdata.ingest.anemometer.instants.stamps import Stamps
 
 _CLOCKS = ("%H:%M:%S%f", "%H:%M", "%I:%M:%S%f %p", "%I:%M %p", "%H%M%S", "%H%M", "%H")
@@ -66,7 +66,7 @@ def find_time(shape: Shape, meanings: Sequence[Meaning], order: str | None) -> T
     for columns in choices:
         found = of_columns(shape, columns, order)
         dated = not dates or any(i in dates for i in columns)
-        if found is not None and (dated or not any(map(counted.is_time_of_day, found.forms))):
+        if found is not None and (dated or not any(map(is_time_of_day, found.forms))):
             utc = any(meanings[i].utc for i in columns)
             return TimeFields(
                 columns=columns, forms=found.forms, zoned=found.zoned, utc=utc, evidence=found.evidence
@@ -84,7 +84,7 @@ def of_columns(shape: Shape, columns: tuple[int, ...], order: str | None, form: 
     if not fitting:
         return None
     kept = _distinct(fitting, texts)
-    read = parse_as(texts, kept[0])[0]
+    read = parse(texts, kept[0])[0]
     evidence = f"first {texts[0]!r}"
     swapped = [one for one in forms if _same_but_order(one, kept[0]) and one not in fitting]
     if len(kept) == 1 and order is not None:
@@ -107,14 +107,14 @@ def _candidates(texts: Sequence[str], columns: tuple[int, ...]) -> list[str]:
 def _reads_any(texts: Sequence[str], form: str) -> bool:
     """Whether a form fits one of the first stamps by its letters, so that all are worth a look."""
     if "%" not in form:
-        return bool(parse_as(list(texts), form)[0].valid.any())
-    day = "%Y-%m-%d " if counted.is_time_of_day(form) else ""
+        return bool(parse(list(texts), form)[0].valid.any())
+    day = "%Y-%m-%d " if is_time_of_day(form) else ""
     expression = re.compile(stamps.pattern(f"{day}{form}"))
     return any(expression.fullmatch(f"{'1970-01-01 ' if day else ''}{text.strip()}") for text in texts)
 
 
 def _reads(texts: Sequence[str], form: str) -> bool:
-    found = parse_as(list(texts), form)[0]
+    found = parse(list(texts), form)[0]
     return bool(len(texts)) and float(found.valid.mean()) >= _FITS
 
 
@@ -138,7 +138,7 @@ def _distinct(forms: Sequence[str], texts: Sequence[str]) -> tuple[str, ...]:
     """The forms but for those that read the same instants as one before, where both read any."""
     kept: dict[str, Stamps] = {}
     for form in forms:
-        read = parse_as(list(texts), form)[0]
+        read = parse(list(texts), form)[0]
         if not any(_alike(read, other) for other in kept.values()):
             kept[form] = read
     return tuple(kept)

@@ -35,7 +35,7 @@ from flagdata.documents import to_toml
 from flagdata.errors import InputError, TimeError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import recipe as recipes
-from flagdata.ingest.anemometer.instants.dates import decide
+from flagdata.ingest.anemometer.instants.dates import date_form
 from flagdata.ingest.anemometer.instants.stamps import parse
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading, described
@@ -372,7 +372,7 @@ def stamp_format(
         TimeError: no date and time in them, or nothing that decides between day and month.
     """
     filled = [text.strip() for text in texts if text.strip()]
-    decision = decide(filled, given=options.date_order, where=where)
+    date, order, reason = date_form(filled, given=options.date_order, where=where)
     found = [match for text in filled if (match := _REST.search(text))]
     rest = next(iter(found), None)
     if rest is None:
@@ -381,11 +381,11 @@ def stamp_format(
     clock = ("%I" if rest["p"] else "%H") + ":%M" + (":%S" if rest["s"] else "")
     clock += "%f" if any(match["f"] for match in found) else ""  # some loggers drop zeros at the end
     half = f"{' ' if rest['b'] else ''}%p" if rest["p"] else ""
-    form = f"{decision.directives()} {clock}{half}{'%z' if rest['z'] else ''}"
-    if decision.order == "ymd":
+    form = f"{date} {clock}{half}{'%z' if rest['z'] else ''}"
+    if order == "ymd":
         return form, ()
     other = claim.upper().startswith("YYYY")
-    text = f"dates are read as {decision.order}: {decision.reason}" + (f"; the heading says {claim!r}" if other else "")
+    text = f"dates are read as {order}: {reason}" + (f"; the heading says {claim!r}" if other else "")
     return form, (Finding(kind="date-order", severity=Severity.WARNING if other else Severity.NOTE, what=text),)
 
 

@@ -35,7 +35,7 @@ from flagdata.ingest.anemometer.formats.sentences import (
 from flagdata.ingest.anemometer.formats.serial_lines import is_comment, most_stamped
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.samples import possible
+from flagdata.ingest.anemometer.samples import rules
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import SampleFlag
@@ -150,7 +150,7 @@ class Nmea:
         found: list[Finding] = []
         for name in channels:
             if name.endswith(("direction", "magnetic")):
-                angle, impossible = possible.direction(name, channels[name], line)
+                angle, impossible = rules.direction(name, channels[name], line)
                 channels[name] = np.mod(angle, 2 * np.pi)
                 found.extend(impossible)
         channels = {name: values for name, values in channels.items() if np.isfinite(values).any()}

@@ -22,15 +22,13 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.formats.sentences import tag_time
-from flagdata.ingest.anemometer.instants.abbreviations import ABBREVIATED
-from flagdata.ingest.anemometer.instants.month_names import ENGLISH
-from flagdata.ingest.anemometer.instants.stamps import Stamps
+from flagdata.ingest.anemometer.instants.stamps import ABBREVIATED, ENGLISH, Stamps
 from flagdata.ingest.anemometer.instants.stamps import parse as parse_stamps
+from flagdata.ingest.anemometer.instants.zones import instants
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading, described
-from flagdata.ingest.anemometer.samples import possible
+from flagdata.ingest.anemometer.samples import rules
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.table.rowclock import instants
 from flagdata.ingest.anemometer.table.sonic import with_horizontal
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import CHANNELS, SampleFlag
@@ -364,7 +362,7 @@ def _channels(
         if not np.isfinite(values).any():
             continue
         if CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from"):
-            values, beyond = possible.direction(name, values, line[keep])
+            values, beyond = rules.direction(name, values, line[keep])
             values = np.mod(values, 2 * np.pi)
             found.extend(beyond)
         channels[name] = values

@@ -19,10 +19,10 @@ from flagdata.ingest.anemometer.formats import receiver_clock
 from flagdata.ingest.anemometer.formats.nmea import WINDS, Nmea, no_wind
 from flagdata.ingest.anemometer.formats.sentences import ChecksumError, checksum, split
 from flagdata.ingest.anemometer.formats.serial_lines import GIVEN_CLOCK, split_stamp, stamps_of, without_comments
+from flagdata.ingest.anemometer.instants.zones import instants
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.table.rowclock import instants
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import SampleFlag
 

@@ -1,151 +1,238 @@
-"""Which number of a date is the day: decided by evidence in the log, or not at all."""
+"""Dates that stamps leave open: the order of their numbers, a year, a day, a start. The user gives what is lacking.
+
+%H:%M:%S and the like       of the day that the user gives, and those that follow
+%b %d %H:%M and the like    of the year of that day; the next year begins where the date falls by half a year
+elapsed-s and the like      since the instant that the user gives; a counter of 32 bits in ms or us may run over
+"""
 
 from __future__ import annotations
 
+import datetime as dt
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from flagdata.errors import TimeError
-from flagdata.ingest.anemometer.instants.stamps import DAY, parse
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.instants import stamps
+from flagdata.ingest.anemometer.instants.stamps import DAY, HOUR, Stamps
+from flagdata.timebase import NANOSECONDS, iso
 
 Order = Literal["ymd", "dmy", "mdy"]
-_ISO = re.compile(r"^\s*\d{4}[-/.]")
-_PARTS = re.compile(r"^\s*(\d{1,2})([-/.])(\d{1,2})\2(\d{4}|\d{2})(?!\d)")
-
-
+_DATE = re.compile(r"^\s*(\d{4}|\d{1,2})([-/.])(\d{1,2})\2(\d{4}|\d{1,2})(?!\d)")
 _TWELVE = re.compile(r"\d\s*[AaPp]\.?[Mm]\b")
-"""A clock of twelve hours, which no such locale has: program settings were mixed."""
+"""A clock of twelve hours, which no locale has beside points."""
+_LEAP = "2000"
+"""The year in which stamps are read that name none: it has a 29 February."""
+_OVERFLOW = {"elapsed-ms": 2**32 * 1_000_000, "elapsed-us": 2**32 * 1_000}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Decision:
-    """The order of the numbers of a date.
+def _letters(form: str) -> set[str]:
+    return set(re.findall(r"%(.)", form))
 
-    Attributes:
-        order: "ymd", "dmy" or "mdy".
-        separator: between them.
-        long_year: whether the year has four digits.
-        reason: the evidence.
+
+def is_elapsed(form: str) -> bool:
+    """Whether a format counts from a start that the file does not state."""
+    return form in stamps.ELAPSED
+
+
+def is_time_of_day(form: str) -> bool:
+    """Whether a format has directives of the time of day alone."""
+    return bool(_letters(form) & set("HI")) and not _letters(form) & set("YymdjbBhe")
+
+
+def is_yearless(form: str) -> bool:
+    """Whether a format has a date in it but no year."""
+    return bool(_letters(form) & set("mdjbBhe")) and not _letters(form) & set("Yy")
+
+
+def needs_date(form: str) -> bool:
+    """Whether a format lacks the date, or the year of one, so that the user gives that of the first row."""
+    return is_time_of_day(form) or is_yearless(form)
+
+
+def _whole(form: str) -> tuple[str, str]:
+    """A format with the date that it lacks, and that date in text."""
+    if is_time_of_day(form):
+        return f"%Y-%m-%d {form}", "1970-01-01"
+    return (f"%Y {form}", _LEAP) if is_yearless(form) else (form, "")
+
+
+def check(form: str) -> None:
+    """Refuse a format that cannot be read.
+
+    Raises:
+        UsageError: see `stamps.pattern`.
     """
-
-    order: Order
-    separator: str
-    long_year: bool
-    reason: str
-
-    def directives(self) -> str:
-        """The date as strptime directives."""
-        year = "%Y" if self.long_year else "%y"
-        return self.separator.join({"y": year, "m": "%m", "d": "%d"}[letter] for letter in self.order)
+    if form not in stamps.NAMED:
+        stamps.pattern(_whole(form)[0])
 
 
-def decide(texts: Sequence[str], *, given: Order | None, where: str) -> Decision:
-    """The order in which dates at the start of `texts` are written.
+def parse(texts: Sequence[str] | pa.StringArray, form: str) -> tuple[Stamps, int]:
+    """Stamps of any format, as `stamps.parse_mixed` reads them: times of day as of 1970-01-01, dates without a year as
+    of 2000."""
+    whole, before = _whole(form)
+    return stamps.parse_mixed(texts, whole, before=before)
 
-    Evidence: a number above 12 is a day; where there is none, points between the numbers (every locale of the Unicode
-    CLDR that writes them so puts the day first; not beside AM and PM), or the order in which the log moves on by less
-    than two days between rows while the other jumps. Years of two digits may also stand first, between hyphens
-    ("26-03-14").
+
+def date_form(texts: Sequence[str], *, given: Order | None, where: str) -> tuple[str, Order, str]:
+    """The date at the start of texts as directives, the order of its numbers, and what decides it.
+
+    A number above 12 is a day, one above 31 a year; points stand between numbers of which the first is the day (every
+    locale of the Unicode CLDR that writes them so). Nothing else decides.
 
     Args:
-        given: the user's word; refused when a date contradicts it.
+        given: by the user; refused when a date contradicts it.
 
     Raises:
-        TimeError: no date, contradictory dates, or no evidence.
+        TimeError: no date, none that fits the order, or several orders that all fit.
     """
-    dated = [text for text in texts if text.strip()]
-    year_first = [text.strip() for text in dated if _ISO.match(text)]
-    if len(year_first) * 2 > len(dated):
-        first = year_first[0]
-        if given not in (None, "ymd"):
-            raise TimeError(f"dates are not {given}, but {first[:10]}", where=where, fix="leave out --date-order")
-        return Decision(order="ymd", separator=first[4], long_year=True, reason=f"dates are written as {first[:10]}")
-    parts = [match for text in dated if (match := _PARTS.match(text))]
-    if len(parts) * 2 <= len(dated) or not parts:
+    filled = [text for text in texts if text.strip()]
+    dated = [match for text in filled if (match := _DATE.match(text))]
+    if not dated or 2 * len(dated) <= len(filled):
         raise TimeError("the rows do not begin with a date", where=where, fix="describe the file by a recipe")
-    separator, long_year = parts[0][2], len(parts[0][4]) == 4
-    first = np.array([int(match[1]) for match in parts])
-    second = np.array([int(match[3]) for match in parts])
-    if not long_year and (given == "ymd" or (given is None and separator == "-")):
-        third = np.array([int(match[4]) for match in parts])
-        found = _short_year_first(first, second, third, given=given, separator=separator, text=dated[0], where=where)
-        if found is not None:
-            return found
-    days_first, days_second = int((first > 12).sum()), int((second > 12).sum())
-    if days_first and days_second:
-        raise TimeError(
-            f"{days_first} dates have a first number above 12 and {days_second} a second one", where=where,
-            fix="the file mixes two orders: split it",
-        )  # fmt: skip
-    if days_first or days_second:
-        order: Order = "dmy" if days_first else "mdy"
-        number = "first" if days_first else "second"
-        reason = f"{days_first or days_second} of the first {len(parts)} dates have a {number} number above 12"
-        if given is not None and given != order:
-            raise TimeError(
-                f"dates are not {given}: {reason}", where=where, fix=f"leave out --date-order, it is {order}"
-            )
-        return Decision(order=order, separator=separator, long_year=long_year, reason=reason)
-    if given == "ymd":
-        raise TimeError("years of four digits do not come first here", where=where, fix="give --date-order dmy or mdy")
-    if given is not None:
-        return Decision(
-            order=given, separator=separator, long_year=long_year, reason=f"the date order {given} was given"
-        )
-    if separator == "." and not any(map(_TWELVE.search, dated)):
-        reason = "dates whose numbers are divided by points are written with the day first"
-        return Decision(order="dmy", separator=separator, long_year=long_year, reason=reason)
-    candidates: tuple[Literal["dmy", "mdy"], ...] = ("dmy", "mdy")
-    smooth: list[Literal["dmy", "mdy"]] = [
-        order for order in candidates if _moves_on(dated, order, separator, long_year)
-    ]
-    if len(smooth) == 1:
-        reason = "no number above 12, but only in this order the log moves on from day to day"
-        return Decision(order=smooth[0], separator=separator, long_year=long_year, reason=reason)
-    raise TimeError(
-        f"{dated[0].strip()[:10]} may be day/month or month/day, and nothing in the log decides it", where=where,
-        fix="give --date-order dmy or mdy",
-    )  # fmt: skip
+    first, sign = dated[0][0].strip(), dated[0][2]
+    widths = [len(dated[0][group]) for group in (1, 3, 4)]
+    numbers = np.array([[int(match[group]) for group in (1, 3, 4)] for match in dated])
+    orders: list[Order] = ["ymd"] if widths[0] == 4 else ["dmy", "mdy"]
+    orders += ["ymd"] if 4 not in widths and (sign == "-" or given == "ymd") else []
+    highest = {"d": 31, "m": 12, "y": 9999}
+    fit = [one for one in orders if bool((numbers <= [highest[letter] for letter in one]).all())]
+    chosen = [one for one in (fit if given is None else [given]) if one in fit]
+    points = len(chosen) > 1 and sign == "." and not any(map(_TWELVE.search, filled))
+    if not fit:
+        raise TimeError("the dates mix several orders", where=where, fix="split the file")
+    if not chosen:
+        what = f"dates are not {given}: {first} and the others are {' or '.join(fit)}"
+        raise TimeError(what, where=where, fix="correct --date-order, or leave it out")
+    if len(chosen) > 1 and not points:
+        what = f"{first} may be {' or '.join(chosen)}, and nothing in the log decides it"
+        raise TimeError(what, where=where, fix=f"give --date-order {' or '.join(chosen)}")
+    reason = f"no other order fits the first {len(dated)} dates"
+    if given is not None or points:
+        reason = f"the order {given} was given" if given else "dates with points are written with the day first"
+    parts = {"y": "%Y" if 4 in widths else "%y", "m": "%m", "d": "%d"}
+    return sign.join(parts[letter] for letter in chosen[0]), chosen[0], reason
 
 
-def _short_year_first(
-    first: NDArray[np.int64],
-    second: NDArray[np.int64],
-    third: NDArray[np.int64],
-    *,
-    given: Order | None,
-    separator: str,
-    text: str,
-    where: str,
-) -> Decision | None:
-    """That dates are year, month, day with years of two digits; `None` where they are not.
+def refuse_twelve(wall: NDArray[np.int64], *, line: NDArray[np.int64], where: str) -> None:
+    """Refuse stamps of a clock of twelve hours without AM or PM.
+
+    They have hours of 1 to 12 alone and go on, but for the falls from 12:59 to 1:00 within a day.
+
+    Args:
+        wall: (n,) nanoseconds as read with hours of 0 to 23, in the order of the rows.
 
     Raises:
-        TimeError: they may be, and as well day, month, year.
+        TimeError: the file does not say which half of the day a row is of.
     """
-    possible = bool(np.all((second >= 1) & (second <= 12) & (third >= 1) & (third <= 31)))
-    if given == "ymd" or (possible and bool((first > 31).any() or (first < 1).any())):
-        reason = "the date order ymd was given" if given else "first numbers are no days"
-        return Decision(order="ymd", separator=separator, long_year=False, reason=reason)
-    if not possible or len(set(first.tolist())) > len(set(third.tolist())):
-        return None
-    if len(set(third.tolist())) > len(set(first.tolist())):
-        reason = "the last number of the dates changes more often than the first"
-        return Decision(order="ymd", separator=separator, long_year=False, reason=reason)
-    raise TimeError(
-        f"{text.strip()[:8]} may be year-month-day or day-month-year, and nothing in the log decides it", where=where,
-        fix="give --date-order ymd or dmy",
-    )  # fmt: skip
+    hours, half = wall % DAY // HOUR, wall % (12 * HOUR)
+    falls = np.flatnonzero((np.diff(wall) < 0) & (np.diff(wall // DAY) == 0))
+    if len(falls) == 0 or int(hours.min()) < 1 or int(hours.max()) != 12 or not np.all(hours[falls] == 12):
+        return
+    forward = np.diff(half)
+    usual = int(np.median(forward[forward > 0])) if np.any(forward > 0) else 0
+    if np.all((wall[falls + 1] - wall[falls]) % (12 * HOUR) <= max(3 * usual, 1)):
+        raise TimeError(
+            "the hours run from 1 to 12 without AM or PM, so that the file does not say of which half of the day they "
+            "are", where=f"{where}, line {line[falls[0] + 1]}",
+            fix="export the log with a clock of 24 hours, or with AM and PM",
+        )  # fmt: skip
 
 
-def _moves_on(texts: Sequence[str], order: Literal["dmy", "mdy"], separator: str, long_year: bool) -> bool:
-    decision = Decision(order=order, separator=separator, long_year=long_year, reason="")
-    dates = [text.split()[0] + " 0" for text in texts]
-    stamps = parse(dates, decision.directives() + " %H")
-    steps = np.diff(np.unique(stamps.ns[stamps.valid]))
-    return bool(stamps.valid.all()) and len(steps) > 0 and int(steps.max()) <= 2 * DAY
+def completed(
+    wall: NDArray[np.int64], form: str, *, date: dt.date | None, line: NDArray[np.int64], where: str
+) -> tuple[NDArray[np.int64], tuple[Finding, ...]]:
+    """Wall-clock nanoseconds of stamps without a date or a year that `parse` has read, in the order of time.
+
+    Args:
+        wall: (n,) as read; n > 0.
+        date: of the first row.
+
+    Raises:
+        TimeError: no date is given, the first row's is another, or a year has no such day.
+    """
+    place = f"{where}, line {line[0]}"
+    if is_time_of_day(form):
+        if date is None:
+            fix = "give the day of the first row: --date 2026-05-01"
+            raise TimeError("the stamps are times of day without a date", where=place, fix=fix)
+        midnight = np.concatenate(([False], np.diff(wall) < -DAY // 2))
+        time = wall + ((date - dt.date(1970, 1, 1)).days + np.cumsum(midnight)) * DAY
+        return time, _date_given("times of day", date, f"{int(midnight.sum())} midnights")
+    day = wall // DAY
+    month_and_day = str(np.datetime64(int(day[0]), "D"))[5:]
+    if date is None:
+        fix = "give the day of the first row with its year: --date YYYY-"
+        fix += "MM-DD" if "%j" in form else f"{month_and_day}, the year in place of YYYY"
+        raise TimeError("the stamps have no year", where=place, fix=fix)
+    passed = np.concatenate(([False], np.diff(wall) < -183 * DAY))
+    start = (date.year + np.cumsum(passed) - 1970).astype("datetime64[Y]")
+    month = day.astype("datetime64[D]").astype("datetime64[M]")
+    first = start.astype("datetime64[M]") + (month - np.datetime64(f"{_LEAP}-01", "M"))
+    into = day - month.astype("datetime64[D]").astype(np.int64)
+    length = (first + 1).astype("datetime64[D]") - first.astype("datetime64[D]")
+    if "%j" in form:
+        first, into = start.astype("datetime64[M]"), day - np.datetime64(f"{_LEAP}-01-01", "D").astype(np.int64)
+        length = (start + 1).astype("datetime64[D]") - start.astype("datetime64[D]")
+    lost = np.flatnonzero(into >= length.astype(np.int64))
+    if len(lost):
+        what = f"{start[lost[0]]} has no such day as this row's"
+        fix = "give --date with the year in which the log began"
+        raise TimeError(what, where=f"{where}, line {line[lost[0]]}", fix=fix)
+    time = (first.astype("datetime64[D]").astype(np.int64) + into) * DAY + wall % DAY
+    given = (date - dt.date(1970, 1, 1)).days * DAY
+    if not given <= int(time[0]) <= given + DAY:  # 24:00 is of the day that ends
+        shown = np.datetime64(int(time[0]), "ns").astype("datetime64[D]")
+        what = f"the first row is of {shown}, if of {date.year}, and not of {date.isoformat()}"
+        raise TimeError(what, where=place, fix=f"give its day with its year, such as --date {shown}")
+    return time, _date_given("stamps without a year", date, f"{int(passed.sum())} new years")
+
+
+def _date_given(what: str, date: dt.date, follow: str) -> tuple[Finding, ...]:
+    text = f"{what}; the first row is of {date.isoformat()}, as given, and {follow} follow"
+    return (Finding(kind="date-given", severity=Severity.NOTE, what=text),)
+
+
+def since_start(
+    count: NDArray[np.int64], form: str, *, start: int | None, line: NDArray[np.int64], where: str
+) -> tuple[NDArray[np.int64], tuple[Finding, ...]]:
+    """UTC nanoseconds of counts since a start; `start` is the instant of the first row.
+
+    Raises:
+        TimeError: no start is given, or the count starts again: the file does not say when its second stretch began.
+    """
+    if start is None:
+        raise TimeError(
+            f"the stamps count from a start ({form}), not from a date", where=f"{where}, line {line[0]}",
+            fix="give the instant of the first row: --start 2026-05-01T12:00:00+02:00",
+        )  # fmt: skip
+    found: list[Finding] = []
+    span = _OVERFLOW.get(form)
+    over = np.concatenate(([False], np.diff(count) < -0.9 * span if span else np.zeros(len(count) - 1, dtype=bool)))
+    if span and over.any():
+        what = f"the counter of 32 bits runs over {int(over.sum())} times; the rows after it go on"
+        found.append(Finding(
+            kind="counter-overflow", severity=Severity.NOTE, count=int(over.sum()), what=what,
+            where=f"line {line[over][0]}",
+        ))  # fmt: skip
+        count = count + np.cumsum(over) * span
+    steps = np.diff(count)
+    usual = int(np.median(steps[steps > 0])) if np.any(steps > 0) else 0
+    again = (steps[:-1] < 0) & (count[1:-1] <= count[0] + 2 * usual) & (steps[1:] >= 0) & (count[2:] < count[:-2])
+    if again.any():
+        row, times = int(np.flatnonzero(again)[0]) + 1, f"{int(again.sum())} times" if again.sum() > 1 else "once"
+        raise TimeError(
+            f"the count starts again {times}, first at line {line[row]}, and the file does not say how long after",
+            where=where, fix="make a file of each stretch and give each its own --start",
+        )  # fmt: skip
+    what = f"the stamps count from a start; the first row was at {iso(start)}, as given"
+    if int(count[0]) > max(int(np.diff(count[:2]).max(initial=0)), NANOSECONDS):
+        what += f", its count being {count[0] / NANOSECONDS:g} s; if that was the zero of the count instead, "
+        what += f"give --start {iso(start + int(count[0]))}"
+    found.append(Finding(kind="elapsed-time", severity=Severity.NOTE, what=what))
+    return count - count[0] + start, tuple(found)

@@ -1,16 +1,18 @@
-"""From stamps as text to nanoseconds, in bulk: ISO 8601, Unix time and strptime directives.
+"""From stamps as text to nanoseconds, in bulk: ISO 8601, counts, and strptime directives.
 
-Directives: %Y %y %m %d %j %H %I %p %M %S %b %a, and %f, which stands for an optional fraction with its mark ("" or
+Directives: %Y %y %m %d %e %j %H %I %p %M %S %b %a, and %f, which stands for an optional fraction with its mark ("" or
 ".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read 00.05, 00.1, 00.15. %z stands for an
 optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02", "CEST"), %Z for letters of a zone that are not read, %p
-for "AM", "p.m." or a bare "a" or "p" (with %H it may be left out: 13:05 beside 1:05 PM), %a for a day of the week,
-which is not read, %b for the name of a month, whole or short, in the languages of `month_names`. %Q is the hour with
-its fraction, %J the day of the year with its own (1.5 is noon of 1 January); behind a clock only its day is read. %E is
-the hour of the year since New Year, %G the minute and %K the second of the day, each with a fraction or none.
-%s is Unix time in seconds; %L, %U and %N are the milli-, micro- and nanoseconds of a second in a number of their own
-("12:00:01 50" with %L is 01.050). %D is a day numbered from a start that the user gives. Numbers between blanks may
-end in ".0", as tables of floats have them. 24:00 is the midnight that ends a day (ISO 8601:2004, 4.2.3). A blank
-stands for any run of blanks or a "T". Two-digit years are 1970 to 2069.
+for "AM", "p.m." or a bare "a" or "p", %a for a day of the week, which is not read, %b for an English month, whole or
+cut short. Numbers between blanks may end in ".0", as tables of floats have them. 24:00 is the midnight that ends a day
+(ISO 8601:2004, 4.2.3). A blank stands for any run of blanks or a "T". Two-digit years are 1970 to 2069.
+
+Names of counts:
+
+    epoch-s, -ms, -us, -ns      Unix time
+    excel-days                  days since 1899-12-30 (ECMA-376, part 1, 18.17.4.1), of the wall clock
+    datenum                     days since year 0, 1 January being 1 (MATLAB, datenum), of the wall clock
+    elapsed-s, -ms, -us, -min, -h, -d   since a start that the user gives (see `dates`)
 """
 
 # pyarrow.compute makes its functions at import, where a type checker cannot see them.
@@ -20,7 +22,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,26 +31,35 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
-from flagdata.ingest.anemometer.instants.abbreviations import ABBREVIATED
-from flagdata.ingest.anemometer.instants.month_names import ENGLISH, LETTERS, NUMBERS
 from flagdata.timebase import NANOSECONDS
 
-DAY = 86_400 * NANOSECONDS
+HOUR = 3600 * NANOSECONDS
+DAY = 24 * HOUR
+_MINUTE = 60 * NANOSECONDS
+ABBREVIATED = {
+    "WEST": 1, "CET": 1, "CEST": 2, "MEZ": 1, "MESZ": 2, "EET": 2, "EEST": 3, "MSK": 3, "JST": 9, "KST": 9, "AEST": 10,
+    "AEDT": 11, "AWST": 8, "NZST": 12, "NZDT": 13, "SAST": 2, "HKT": 8, "EST": -5, "EDT": -4, "CDT": -5, "MDT": -6,
+    "PST": -8, "PDT": -7, "AKST": -9, "AKDT": -8, "HST": -10, "BRT": -3,
+}  # fmt: skip
+"""Hours east of UTC of the abbreviations that mean one offset (tz database)."""
+ENGLISH = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+_ENDS = ("uary", "ruary", "ch", "il", "", "e", "y", "ust", "tember", "ober", "ember", "ember")
+_MONTHS = {
+    short + end[:letters]: 1 + at
+    for at, (short, end) in enumerate(zip(ENGLISH, _ENDS, strict=True)) for letters in range(len(end) + 1)
+}  # fmt: skip
+"""The month of each name, whole or cut short."""
+_OFFSET = rf"\s*(?P<z>Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-](?:0\d|1[0-5])(?::?[0-5]\d)?)?"
+_LETTERS = "A-Za-zÀ-ɏА-яё"
 _GROUPS: dict[str, str] = {
     "Y": r"(?P<Y>\d{4})", "y": r"(?P<y>\d{2})", "m": r"(?P<m>\d{1,2})", "d": r"(?P<d>\d{1,2})", "j": r"(?P<j>\d{1,3})",
     "H": r"(?P<H>\d{1,2})", "I": r"(?P<I>\d{1,2})", "M": r"(?P<M>\d{1,2})", "S": r"(?P<S>\d{1,2})",
-    "E": r"(?P<E>\d{1,4}(?:\.\d{0,9})?)", "G": r"(?P<G>\d{1,4}(?:\.\d{0,9})?)", "K": r"(?P<K>\d{1,5}(?:\.\d{0,9})?)",
-    "s": r"(?P<s>\d{9,10})", "L": r"(?P<L>\d{1,3})", "U": r"(?P<U>\d{1,6})", "N": r"(?P<N>\d{1,9})",
-    "D": r"(?P<D>\d{1,5})",
-    "Q": r"(?P<Q>\d{1,2}(?:\.\d{1,9})?)", "J": r"(?P<J>\d{1,3}(?:\.\d{1,9})?)",
-    "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp](?:\.?\s?[Mm]\.?)?)",
-    "b": rf"(?P<b>[{LETTERS}]{{3,13}})\.?", "a": rf"(?:(?P<a>[{LETTERS}]{{2,13}})\.?,?)",
-    "z": rf"\s*(?P<z>Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-](?:0\d|1[0-5])(?::?[0-5]\d)?)?",
-    "Z": r"\s*(?:[A-Z]{3,4})?",
+    "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp](?:\.?\s?[Mm]\.?)?)", "b": r"(?P<b>[A-Za-z]{3,9})\.?",
+    "a": rf"(?:(?P<a>[{_LETTERS}]{{2,13}})\.?,?)", "z": _OFFSET, "Z": r"\s*(?:[A-Z]{3,4})?",
 }  # fmt: skip
 _SAME = {"B": "b", "h": "b", "A": "a", "e": "d"}
 """Directives of C's strftime that others here read as well: a month's name may be whole or cut short."""
-_CLOCK_RUN = re.compile(r"%H%M(?:%S)?")
+_TOKEN = re.compile(r"(?P<run>(?<![^ ])%H%M(?:%S)?)|%(?P<directive>.?)|[.,](?=%f)|(?P<sign>.)", re.DOTALL)
 _CLOCK_RUNS = {
     "%H%M": r"(?P<H>\d{0,2}?)(?P<M>\d{1,2})",
     "%H%M%S": r"(?P<H>\d{1,2})(?P<M>\d{2})(?P<S>\d{2})",
@@ -56,19 +67,11 @@ _CLOCK_RUNS = {
 """Clocks written as one number. Loggers leave out its zeros: 59 is 00:59, 100 is 01:00; of HHMMSS only the first."""
 _NUMERIC = re.compile(r"%[YymdjHIMS]")
 """Directives of numbers; those with nothing between them have all their digits."""
-_WHOLE = re.compile(r"%[YmdjHMSLUNsD](?= |$)")
-"""Directives of whole numbers, where a blank or the end follows."""
-_DECIMALS = (
-    ("Q", 3600 * NANOSECONDS, 0.0, 24.0), ("E", 3600 * NANOSECONDS, 0.0, 8784.0),
-    ("G", 60 * NANOSECONDS, 0.0, 1440.0), ("K", NANOSECONDS, 0.0, 86_400.0), ("J", DAY, 1.0, 367.0),
-)  # fmt: skip
-"""Directives of counts with a fraction: letter, length of one [ns], first and last. The day comes behind the clocks."""
-_SUBSECONDS = {"L": 1_000_000, "U": 1_000, "N": 1}
-"""Directives of parts of a second [ns]."""
+_ALONE = re.compile(r"(?<![^ ])%[YmdjHMS](?= |$)")
+"""Directives of whole numbers between blanks."""
 _ISO = (
     r"^(?P<Y>\d{4})[-/](?P<m>\d{1,2})[-/](?P<d>\d{1,2})[T ]+(?P<H>\d{1,2}):(?P<M>\d{2})"
-    r"(?::(?P<S>\d{2})(?:[.,](?P<f>\d{1,9}))?)?"
-    rf"\s*(?P<z>Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-](?:0\d|1[0-5])(?::?[0-5]\d)?)?$"
+    rf"(?::(?P<S>\d{{2}})(?:[.,](?P<f>\d{{1,9}}))?)?{_OFFSET}$"
 )
 YEARS = (1970, 2200)
 """First and last year of a stamp that is taken for a date."""
@@ -76,7 +79,17 @@ _CENTURY = YEARS[0] % 100
 """The first year of two digits that is of the 1900s: no log is of the years to come, and some are of the 1990s."""
 PLAIN_FORMS = ("iso", "%Y-%m-%d %H:%M:%S%f")
 """Forms of which 2021-05-14 00:00:00.05 is one."""
-EPOCH = {"epoch-s": NANOSECONDS, "epoch-ms": 1_000_000}
+EPOCH = {"epoch-s": NANOSECONDS, "epoch-ms": 1_000_000, "epoch-us": 1_000, "epoch-ns": 1}
+_SINCE, _UNTIL = 631_152_000, 4_102_444_800
+"""1990 and 2100 in Unix time: what lies beyond is a counter or another unit."""
+_SERIAL = {"excel-days": 25_569, "datenum": 719_529}
+"""Number of the day 1970-01-01."""
+ELAPSED = {
+    "elapsed-s": NANOSECONDS, "elapsed-ms": 1_000_000, "elapsed-us": 1_000, "elapsed-min": _MINUTE, "elapsed-h": HOUR,
+    "elapsed-d": DAY,
+}  # fmt: skip
+NAMED = (*EPOCH, *_SERIAL, *ELAPSED)
+"""Forms that are names of counts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +97,7 @@ class Stamps:
     """Parsed stamps, in the order of the rows.
 
     Attributes:
-        ns: (n,) nanoseconds since 1970 of the wall clock, or of UTC where `utc`.
+        ns: (n,) nanoseconds since 1970 of the wall clock, or of UTC where `utc`; since the start of what is elapsed.
         utc: (n,) whether the stamp itself says its zone.
         valid: (n,) whether it could be read at all and is a calendar date within `YEARS`.
         distant: (n,) whether it is written as a stamp, but of a year outside `YEARS`: a clock that was never set.
@@ -108,72 +121,58 @@ def pattern(form: str) -> str:
     """The regular expression of a format.
 
     Raises:
-        UsageError: an unknown directive, one given twice, or no whole date in it. A date alone is its midnight.
+        UsageError: an unknown directive, one given twice, hours of 1 to 12 without their half of the day, or no whole
+            date in it. A date alone is its midnight.
     """
     if form == "iso":
         return _ISO
+    where = f"time format {form!r}"
     out: list[str] = []
     used: list[str] = []
-    position = 0
-    while position < len(form):
-        letter = form[position]
-        if letter == "%":
-            directive = form[position + 1 : position + 2]
-            directive = _SAME.get(directive, directive)
-            if directive == "p" and "%H" in form:
-                used.append("p")
-                out.append(rf"(?:\s*{_GROUPS['p']})?")
-                position += 2
-                continue
+    for token in _TOKEN.finditer(form):
+        if token["run"]:
+            used.extend(token["run"].replace("%", ""))
+            out.append(_CLOCK_RUNS[token["run"]])
+        elif token["directive"] is not None:
+            directive = _SAME.get(token["directive"], token["directive"])
             if directive not in _GROUPS:
-                raise UsageError(
-                    f"unknown directive %{directive}", where=f"time format {form!r}",
-                    fix=f"use {' '.join('%' + g for g in _GROUPS)}, iso, epoch-s or epoch-ms",
-                )  # fmt: skip
-            run = _CLOCK_RUN.match(form, position)
-            if run is not None and (position == 0 or form[position - 1] == " "):
-                used.extend(run[0].replace("%", ""))
-                out.append(_CLOCK_RUNS[run[0]])
-                position = run.end()
-                continue
+                known = " ".join("%" + one for one in _GROUPS)
+                fix = f"use {known}, iso, or one of {', '.join(NAMED)}"
+                raise UsageError(f"unknown directive %{directive}", where=where, fix=fix)
             used.append(directive)
-            if directive == "f" and form[position - 1 : position] in ("_", "-", ":"):
-                out.append(r"(?P<f>\d{1,9})")  # the sign before it stands for the point
-                position += 2
-                continue
-            beside = _NUMERIC.match(form, position + 2) or (position > 1 and _NUMERIC.match(form, position - 2))
-            fixed = bool(beside) and directive in "mdHMSI"
-            out.append(f"(?P<{directive}>\\d{{2}})" if fixed else _GROUPS[directive])
-            if _WHOLE.match(form, position) and (position == 0 or form[position - 1] == " "):
-                out.append(r"(?:\.0*)?")
-            position += 2
-            continue
-        if not (letter in ".," and form.startswith("%f", position + 1)):  # %f reads the sign before it
-            out.append(r"[T\s]+" if letter == " " else re.escape(letter))
-        position += 1
-    if len(set(used)) < len(used):
-        raise UsageError("a directive occurs twice", where=f"time format {form!r}", fix="name each once")
-    if not _dated(frozenset(used)):
-        raise UsageError(
-            "no whole date in it", where=f"time format {form!r}",
-            fix="name year, month and day; year and month alone are read as the month's first day",
-        )  # fmt: skip
-    if not {"H", "I", "Q", "E", "G", "K"} & set(used) and {"M", "S", "f", "p"} & set(used):
-        raise UsageError("no hour in it", where=f"time format {form!r}", fix="name the hour, or the date alone")
+            out.append(_group(form, directive, token.start()))
+        elif token["sign"]:
+            out.append(r"[T\s]+" if token["sign"] == " " else re.escape(token["sign"]))
+    letters = set(used)
+    if len(letters) < len(used):
+        raise UsageError("a directive occurs twice", where=where, fix="name each once")
+    if not (letters & {"Y", "y"} and ("j" in letters or (letters & {"m", "b"} and "d" in letters))):
+        raise UsageError("no whole date in it", where=where, fix="name year, month and day")
+    if not {"H", "I"} & letters and {"M", "S", "f", "p"} & letters:
+        raise UsageError("no hour in it", where=where, fix="name the hour, or the date alone")
+    if ("I" in letters) != ("p" in letters):
+        fix = "name the hours of a clock of 12 by %I with %p, those of 24 by %H; export the log so where it has neither"
+        raise UsageError("the half of the day goes with hours of 12", where=where, fix=fix)
     return "^" + "".join(out) + "$"
 
 
-def _dated(used: frozenset[str]) -> bool:
-    """Whether directives make a date: a day of a month or of the year, a count, or a month that stands by itself."""
-    if "s" in used or ("Y" in used and used & {"j", "J", "E", "D"}) or {"y", "j"} <= used:
-        return True
-    month = bool(used & {"Y", "y"} and used & {"m", "b"})
-    return month and ("d" in used or len(used) == 2)
+def _group(form: str, directive: str, at: int) -> str:
+    """The regular expression of the directive at a place of a form."""
+    if directive == "f" and form[at - 1 : at] in ("_", "-", ":"):
+        return r"(?P<f>\d{1,9})"  # the sign before it stands for the point
+    beside = _NUMERIC.match(form, at + 2) or (at > 1 and _NUMERIC.match(form, at - 2))
+    found = f"(?P<{directive}>\\d{{2}})" if beside and directive in "mdHMSI" else _GROUPS[directive]
+    return found + (r"(?:\.0*)?" if _ALONE.match(form, at) else "")
 
 
 def is_date_alone(form: str) -> bool:
     """Whether a format has directives of a date, but none of the time of day."""
-    return "%" in form and not any(f"%{letter}" in form for letter in "HIMSfQJEGKs")
+    return "%" in form and not any(f"%{letter}" in form for letter in "HIMSf")
+
+
+def array(texts: Sequence[str] | pa.StringArray) -> pa.StringArray:
+    """Texts as Arrow has them."""
+    return texts if isinstance(texts, pa.StringArray) else pa.array(texts, pa.string())
 
 
 def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
@@ -182,72 +181,43 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
     Raises:
         UsageError: see `pattern`.
     """
-    text = pc.utf8_trim_whitespace(texts if isinstance(texts, pa.StringArray) else pa.array(texts, pa.string()))
+    text = pc.utf8_trim_whitespace(array(texts))
     if form in EPOCH:
         return _epoch(text, EPOCH[form])
+    if form in _SERIAL:
+        return _serial(text, _SERIAL[form])
+    if form in ELAPSED:
+        return _elapsed(text, form)
     if form in PLAIN_FORMS and (plain := _plain(text)) is not None:
         return plain
     found = pc.extract_regex(text, pattern(form))
     written = found.is_valid().to_numpy(zero_copy_only=False).astype(bool)
-    valid = written.copy()
-    part = functools.partial(_part, found)
-    year = part("Y") if part("Y") is not None else _whole_year(part("y"))
-    hour, ok = _hour(found, part)
-    valid &= ok
-    minute, second = part("M"), part("S")
+    year, month, day, of_year, hour, twelve, minute, second = (_part(found, name) for name in "YmdjHIMS")
     zero = np.zeros(len(text), dtype=np.int64)
-    minute, second = zero if minute is None else minute, zero if second is None else second
+    if year is None:
+        short = _part(found, "y")
+        year = zero if short is None else np.where(short < _CENTURY, 2000, 1900) + short
+    valid = written & (year >= YEARS[0]) & (year <= YEARS[1])
+    distant = written & ~valid
+    if twelve is not None:
+        valid &= (twelve >= 1) & (twelve <= 12)
+        half = pc.starts_with(pc.utf8_lower(pc.coalesce(_field(found, "p"), "")), "p").to_numpy(zero_copy_only=False)
+        hour = twelve % 12 + 12 * half.astype(np.int64)
+    hour, minute, second = (zero if one is None else one for one in (hour, minute, second))
     valid &= ((hour < 24) | ((hour == 24) & (minute == 0) & (second == 0))) & (minute < 60) & (second < 60)
-    year = np.full_like(zero, 1970 if "%s" in form else 0) if year is None else year
-    distant = written & ((year < YEARS[0]) | (year > YEARS[1]))
-    days, ok = _days(found, part, year)
-    valid &= ok
+    if of_year is None:
+        month = _month(found) if month is None else month
+        days, dated = _days(year, month, zero + 1 if day is None else day)
+    else:
+        first = _midnight(year, zero + 1)
+        days, dated = first + of_year - 1, (of_year >= 1) & (of_year <= _midnight(year + 1, zero + 1) - first)
+    valid &= dated
     fraction, digits = _fraction(found)
-    ns = days * DAY + ((hour * 60 + minute) * 60 + second) * NANOSECONDS + fraction
-    decimal_step = 0
-    for name, length, first, last in _DECIMALS:
-        decimal = _decimal(found, name, length)
-        if decimal is None:
-            continue
-        count, rounded, last_digit = decimal
-        if name == "J" and any(_field(found, clock) is not None for clock in "HIQGK"):
-            # The clock says what the fraction of the day does, which may be rounded up to the next day.
-            rounded = np.round(count - (ns - days * DAY) / DAY).astype(np.int64) * length
-        else:
-            decimal_step = last_digit
-        ns = ns + rounded - round(first) * length
-        valid &= (count >= first) & (count <= last)
     offset, utc = _offset(found, len(text))
-    if (unix := part("s")) is not None:
-        ns, utc, distant = ns + unix * NANOSECONDS, np.ones_like(valid), np.zeros_like(valid)
-    for name, length in _SUBSECONDS.items():
-        if (parts := part(name)) is not None:
-            ns, digits = ns + parts * length, {"L": 3, "U": 6, "N": 9}[name]
-    step = NANOSECONDS if np.any(second[valid]) else DAY if is_date_alone(form) else 60 * NANOSECONDS
+    ns = days * DAY + ((hour * 60 + minute) * 60 + second) * NANOSECONDS + fraction - offset
+    step = NANOSECONDS if np.any(second[valid]) else DAY if is_date_alone(form) else _MINUTE
     step = 10 ** (9 - digits) if digits else step
-    step = decimal_step or step
-    return Stamps(ns=np.where(valid, ns - offset, 0), utc=utc & valid, valid=valid, distant=distant, step=step)
-
-
-def _decimal(
-    found: pa.StructArray, name: str, length: int
-) -> tuple[NDArray[np.float64], NDArray[np.int64], int] | None:
-    """Hours or days with their fraction, in nanoseconds, and the resolution of the last digit; `None` where absent.
-
-    What is within half a digit of a whole minute or second is that: 10.1667 h is 10:10.
-    """
-    column = _field(found, name)
-    if column is None:
-        return None
-    text = pc.coalesce(column, "0")
-    count = pc.cast(text, pa.float64()).to_numpy(zero_copy_only=False)
-    digits = int(pc.max(pc.binary_length(pc.replace_substring_regex(text, r"^[^.]*\.?", ""))).as_py() or 0)
-    step = max(1_000, round(length / 10**digits))
-    ns = np.round(count * length).astype(np.int64)
-    for whole in (NANOSECONDS, 60 * NANOSECONDS):
-        near = np.round(ns / whole).astype(np.int64) * whole
-        ns = np.where(2 * np.abs(ns - near) <= step, near, ns)
-    return count, ns, step
+    return Stamps(ns=np.where(valid, ns, 0), utc=utc & valid, valid=valid, distant=distant, step=step)
 
 
 def _plain(text: pa.StringArray) -> Stamps | None:
@@ -266,25 +236,69 @@ def _plain(text: pa.StringArray) -> Stamps | None:
     low, high = (int(np.datetime64(f"{year}-01-01", "ns").astype(np.int64)) for year in (YEARS[0], YEARS[1] + 1))
     if int(ns.min()) < low or int(ns.max()) >= high:
         return None
-    step = 60 * NANOSECONDS if longest < 20 and not np.any(ns % (60 * NANOSECONDS)) else NANOSECONDS
+    step = _MINUTE if longest < 20 and not np.any(ns % _MINUTE) else NANOSECONDS
     step = 10 ** (20 + 9 - longest) if longest > 20 else step
-    valid, no = np.ones(len(ns), dtype=bool), np.zeros(len(ns), dtype=bool)
-    return Stamps(ns=ns, utc=no, valid=valid, distant=no.copy(), step=step)
+    return _counts(ns, np.ones(len(ns), dtype=bool), step)
+
+
+def _counts(ns: NDArray[np.int64], valid: NDArray[np.bool_], step: int, *, utc: bool = False) -> Stamps:
+    """Stamps of one kind, all with their zone or all without."""
+    none = np.zeros(len(ns), dtype=bool)
+    return Stamps(ns=np.where(valid, ns, 0), utc=valid.copy() if utc else none, valid=valid, distant=none, step=step)
 
 
 def _epoch(text: pa.StringArray, scale: int) -> Stamps:
     """Unix time, exact in integers: a double holds today's seconds to 0.2 µs only."""
-    found = pc.extract_regex(text, r"^(?P<whole>\d{1,13})(?:[.,](?P<f>\d{1,9})\d*)?$")
-    valid = found.is_valid().to_numpy(zero_copy_only=False).astype(bool)
+    found = pc.extract_regex(text, r"^(?P<whole>\d{1,18}|[1-8]\d{18})(?:[.,](?P<f>\d{1,9})\d*)?$")
     whole = _part(found, "whole")
     fraction, digits = _fraction(found)
     whole = np.zeros(len(text), dtype=np.int64) if whole is None else whole
-    # years 1990 to 2100: anything else is a counter or another unit
-    valid &= (whole * (scale / NANOSECONDS) > 631_152_000) & (whole * (scale / NANOSECONDS) < 4_102_444_800)
+    seconds = whole * (scale / NANOSECONDS)
+    valid = found.is_valid().to_numpy(zero_copy_only=False) & (seconds > _SINCE) & (seconds < _UNTIL)
     ns = np.where(valid, whole, 0) * scale + fraction // (NANOSECONDS // scale)
-    step = max(1, scale // 10**digits)
-    distant = np.zeros(len(text), dtype=bool)
-    return Stamps(ns=np.where(valid, ns, 0), utc=valid.copy(), valid=valid, distant=distant, step=step)
+    return _counts(ns, valid, max(1, scale // 10**digits), utc=True)
+
+
+def _numbers(text: pa.StringArray) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
+    """Numbers, which cells are any, and the most digits behind the point."""
+    pointed = pc.replace_substring(text, ",", ".")
+    number = pc.match_substring_regex(pointed, r"^\d{1,15}(\.\d*)?([eE][-+]?\d{1,2})?$")
+    value = pc.cast(pc.if_else(number, pointed, "0"), pa.float64()).to_numpy(zero_copy_only=False)
+    fraction = pc.replace_substring_regex(pointed, r"^[^.]*\.?|[eE].*$", "")
+    digits = int(pc.max(pc.binary_length(fraction)).as_py() or 0)
+    return value, number.to_numpy(zero_copy_only=False).astype(bool), digits
+
+
+def _serial(text: pa.StringArray, base: int) -> Stamps:
+    """Serial days. A double holds a day's number to a microsecond or so, and days have no round seconds: noise of the
+    last digits below a millisecond is rounding, and so is what is within the last digit of whole minutes."""
+    value, valid, digits = _numbers(text)
+    days = value - base
+    valid = valid & (days > _SINCE / 86_400) & (days < _UNTIL / 86_400)
+    ns = np.round(np.where(valid, days, 0.0) * 86_400e6).astype(np.int64) * 1_000
+    ns = _snapped(ns, 1_000_000, 100_000)
+    step = max(1_000, round(DAY / 10**digits))
+    minute = _snapped(ns, _MINUTE, step)
+    ns = minute if step > 1_000_000 and not np.any(minute % _MINUTE) else ns
+    return _counts(ns, valid, step)
+
+
+def _elapsed(text: pa.StringArray, form: str) -> Stamps:
+    """Counts since a start, up to ten years. Thirds and sixths of an hour are no decimal fractions: what is within the
+    last digit of a whole second is one."""
+    value, valid, digits = _numbers(text)
+    scale = ELAPSED[form]
+    valid = valid & (value * (scale / NANOSECONDS) < 3.2e8)
+    ns = np.round(np.where(valid, value, 0.0) * scale).astype(np.int64)
+    step = max(1, scale // 10 ** min(digits, 9))
+    ns = _snapped(ns, NANOSECONDS, step) if scale > NANOSECONDS and step < NANOSECONDS else ns
+    return _counts(ns, valid, step)
+
+
+def _snapped(ns: NDArray[np.int64], whole: int, within: int) -> NDArray[np.int64]:
+    """Instants, those within so much of a multiple of `whole` on it."""
+    near = np.round(ns / whole).astype(np.int64) * whole
+    return np.where(np.abs(ns - near) <= within, near, ns)
 
 
 def _field(found: pa.StructArray, name: str) -> Any:
@@ -301,67 +315,26 @@ def _part(found: pa.StructArray, name: str) -> NDArray[np.int64] | None:
     return pc.cast(filled, pa.int64()).to_numpy(zero_copy_only=False)
 
 
-def _whole_year(values: NDArray[np.int64] | None) -> NDArray[np.int64] | None:
-    return None if values is None else np.where(values < _CENTURY, 2000, 1900) + values
+def _midnight(year: NDArray[np.int64], month: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Days since 1970 of the first day of a month."""
+    months = (12 * (year - 1970) + month - 1).astype("datetime64[M]")
+    return months.astype("datetime64[D]").astype(np.int64)
 
 
-def _hour(found: pa.StructArray, part: Any) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    hour = part("H")
-    half = _field(found, "p")
-    if hour is not None and half is not None:
-        # 13:05 beside 1:05 PM, and 13:05 PM: what says its half of the day is of 12 hours where it can be.
-        after = pc.starts_with(pc.utf8_lower(pc.coalesce(half, "")), "p").to_numpy(zero_copy_only=False)
-        stated = pc.not_equal(pc.coalesce(half, ""), "").to_numpy(zero_copy_only=False).astype(bool)
-        twelve = stated & (hour >= 1) & (hour <= 12)
-        return np.where(twelve, hour % 12 + 12 * after.astype(np.int64), hour), np.ones(len(hour), dtype=bool)
-    if hour is not None:
-        return hour, np.ones(len(hour), dtype=bool)
-    twelve = part("I")
-    if twelve is None:
-        return np.zeros(len(found), dtype=np.int64), np.ones(len(found), dtype=bool)
-    ok = (twelve >= 1) & (twelve <= 12)
-    if half is None:
-        return twelve, ok
-    after = pc.starts_with(pc.utf8_lower(pc.coalesce(half, "")), "p").to_numpy(zero_copy_only=False)
-    return twelve % 12 + 12 * after.astype(np.int64), ok
-
-
-def _days(found: pa.StructArray, part: Any, year: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Days since 1970 and whether the date exists (Hinnant, "chrono-compatible low-level date algorithms")."""
-    of_year = part("j")
-    if any(_field(found, name) is not None for name in ("J", "E", "s")):
-        of_year = np.ones_like(year)  # the days are counted with their fraction
-    if (numbered := part("D")) is not None:
-        return _civil(year, np.ones_like(year), np.ones_like(year)) + numbered, np.ones(len(year), dtype=bool)
-    if of_year is not None:
-        first = _civil(year, np.ones_like(year), np.ones_like(year))
-        leap = (year % 4 == 0) & ((year % 100 != 0) | (year % 400 == 0))
-        return first + of_year - 1, (of_year >= 1) & (of_year <= 365 + leap) & (year >= YEARS[0]) & (year <= YEARS[1])
-    month = part("m") if part("m") is not None else _month(found)
-    day = part("d") if part("d") is not None else np.ones_like(year)
-    leap = (year % 4 == 0) & ((year % 100 != 0) | (year % 400 == 0))
-    lengths = np.array([0, 31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31])
-    known = (month >= 1) & (month <= 12)
-    length = lengths[np.where(known, month, 0)] + (leap & (month == 2))
-    ok = known & (day >= 1) & (day <= length) & (year >= YEARS[0]) & (year <= YEARS[1])
-    return _civil(np.where(ok, year, 1970), np.where(ok, month, 1), np.where(ok, day, 1)), ok
+def _days(
+    year: NDArray[np.int64], month: NDArray[np.int64], day: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Days since 1970 and whether the date exists."""
+    first = _midnight(year, month)
+    known = (month >= 1) & (month <= 12) & (day >= 1) & (day <= _midnight(year, month + 1) - first)
+    return first + day - 1, known
 
 
 def _month(found: pa.StructArray) -> NDArray[np.int64]:
-    """The month of each name, 0 for none: of another language, else of English by its first three letters."""
+    """The month of each name, 0 for none."""
     names = pc.utf8_lower(pc.coalesce(_field(found, "b"), ""))
-    other = pc.fill_null(pc.index_in(names, pa.array(list(NUMBERS))), -1).to_numpy(zero_copy_only=False)
-    short = pc.utf8_slice_codeunits(names, 0, 3)
-    english = pc.fill_null(pc.index_in(short, pa.array(ENGLISH)), -1).to_numpy(zero_copy_only=False)
-    return np.where(other >= 0, np.array([*NUMBERS.values(), 0])[other], english + 1).astype(np.int64)
-
-
-def _civil(year: NDArray[np.int64], month: NDArray[np.int64], day: NDArray[np.int64]) -> NDArray[np.int64]:
-    shifted = year - (month <= 2)
-    era = shifted // 400
-    of_era = shifted - era * 400
-    of_year = (153 * (month + np.where(month > 2, -3, 9)) + 2) // 5 + day - 1
-    return era * 146_097 + of_era * 365 + of_era // 4 - of_era // 100 + of_year - 719_468
+    place = pc.fill_null(pc.index_in(names, pa.array(list(_MONTHS))), -1).to_numpy(zero_copy_only=False)
+    return np.array([*_MONTHS.values(), 0], dtype=np.int64)[place]
 
 
 def _fraction(found: pa.StructArray) -> tuple[NDArray[np.int64], int]:
@@ -377,20 +350,48 @@ def _fraction(found: pa.StructArray) -> tuple[NDArray[np.int64], int]:
 
 def _offset(found: pa.StructArray, n: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Nanoseconds east of UTC that each stamp states, and whether it states any."""
+    offset = np.zeros(n, dtype=np.int64)
     column = _field(found, "z")
     if column is None:
-        return np.zeros(n, dtype=np.int64), np.zeros(n, dtype=bool)
-    offset = np.zeros(n, dtype=np.int64)
+        return offset, np.zeros(n, dtype=bool)
     text = pc.coalesce(column, "")
     stated = pc.not_equal(text, "").to_numpy(zero_copy_only=False).astype(bool)
-    for value in pc.unique(text).to_pylist():
-        if value in ("", "Z", "UTC", "GMT"):
-            continue
+    for value in set(pc.unique(text).to_pylist()) - {"", "Z", "UTC", "GMT"}:
         rows = pc.equal(text, value).to_numpy(zero_copy_only=False).astype(bool)
-        if value in ABBREVIATED:
-            offset[rows] = ABBREVIATED[value] * 3600 * NANOSECONDS
-            continue
-        sign = -1 if value[0] == "-" else 1
-        minutes = int(value[1:3]) * 60 + int(value[3:].lstrip(":") or 0)
-        offset[rows] = sign * minutes * 60 * NANOSECONDS
+        hours, minutes = value[1:3], value[3:].lstrip(":") or "0"
+        seconds = ABBREVIATED[value] * 3600 if value in ABBREVIATED else int(hours) * 3600 + int(minutes) * 60
+        offset[rows] = (-seconds if value[0] == "-" else seconds) * NANOSECONDS
     return offset, stated
+
+
+_BARE_END = re.compile(r"(?<![\d:.])24:00(?![:\d])")
+_TO_THE_MINUTE = re.compile(r"(%[HI])([:.])%M(?!\W?%S)")
+_CLOCK = {"%f": "", "%I": "12", "%p": "AM", "%H": "00", "%M": "00", "%S": "00"}
+
+
+def parse_mixed(texts: Sequence[str] | pa.StringArray, form: str, *, before: str = "") -> tuple[Stamps, int]:
+    """Stamps written as `form`; where most are, also those with seconds beside it, a 24:00 without them, and dates
+    alone, which are midnight as R and spreadsheets write it; and how many dates alone there are.
+
+    Args:
+        before: date that the texts lack, as `form` has it.
+
+    Raises:
+        UsageError: see `pattern`.
+    """
+    text = pc.binary_join_element_wise(before, array(texts), " ") if before else array(texts)
+    found = parse(text, form)
+    if form in NAMED or bool(found.valid.all()) or 2 * int(found.valid.sum()) <= len(text):
+        return found, 0
+    at = np.flatnonzero(~found.valid)
+    rest = [other or "" for other in text.take(pa.array(at)).to_pylist()]
+    clock = "00:00:00" if form == "iso" else re.sub(r"%[fIpHMS]", lambda one: _CLOCK[one[0]], form.partition(" ")[2])
+    ends = [_BARE_END.sub("24:00:00", other) for other in rest]
+    dates = ["" if before else f"{other} {clock}" for other in rest]
+    ns, utc, valid, step, bare = found.ns.copy(), found.utc.copy(), found.valid.copy(), found.step, 0
+    for others, one in ((ends, _TO_THE_MINUTE.sub(r"\1\2%M\2%S", form)), (dates, form)):
+        read = parse(others, one)
+        good = read.valid & ~valid[at]
+        ns[at[good]], utc[at[good]], valid[at[good]] = read.ns[good], read.utc[good], True
+        step, bare = min(step, read.step) if good.any() else step, int(good.sum())
+    return replace(found, ns=ns, utc=utc, valid=valid, step=step), bare

@@ -1,7 +1,11 @@
-"""The zone that a log states above its rows ("UTC Offset,+2", "Timezone=UTC", "GMT Offset: -5"), whatever its format.
+"""From the wall clock of a place to UTC for a whole log, and the zone that a log states above its rows.
 
-What the lines above the rows say of the clock is a hint, not the stamps' own word: a logger's setting may be one thing
-and its export another. So it is named where a zone is missing, and held against the zone that the user gives.
+A wall time in the hour that daylight saving repeats is settled only by the log itself: its rows run through the hour
+twice, or follow without a gap from before it, or lead without a gap to after it. Otherwise the log is refused.
+
+What lines above the rows say of the clock ("UTC Offset,+2", "Timezone=UTC") is a hint, not the stamps' own word: a
+logger's setting may be one thing and its export another. It is named where a zone is missing, and held against the zone
+that the user gives.
 """
 
 from __future__ import annotations
@@ -11,32 +15,144 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta, tzinfo
 
-from flagdata.errors import FlagdataError
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import FlagdataError, TimeError, ZoneMissingError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.instants import abbreviations
-from flagdata.ingest.anemometer.instants.wall import offset_at
+from flagdata.ingest.anemometer.instants.clock import usual
+from flagdata.ingest.anemometer.instants.stamps import HOUR
 from flagdata.signals import Instants
 from flagdata.timebase import NANOSECONDS, zone
 
 LINES = 100
-"""Lines at the beginning of a file in which a statement is looked for."""
+"""Lines at the beginning of a file in which a zone is looked for."""
 _LONGEST = 300
 """Characters of a line that are looked at."""
-_KEY = (
-    r"(?:time[ _-]?zone(?:[ _]name)?(?:\s*\((?:utc|gmt)\s*[+±]?\s*\))?|"
-    r"(?:utc|gmt)[ _-]?(?:time[ _]?)?offset|offset[ _](?:from|to)[ _](?:utc|gmt)|"
-    r"zeitzone|fuseau(?: horaire)?|zona horaria|tijdzone)"
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_FIX = (
+    "give the fixed offset that the logger's clock ran on, e.g. +01:00 (many loggers stay on winter time); if its "
+    "clock was set at another time than those of the zone, the offset of its first rows and --clock first, or that of "
+    "its last rows and --clock last"
+)
+_MISSING = (
+    "name the zone of the logger's clock: the place whose clocks it followed through summer and winter time, e.g. "
+    "--zone Europe/Amsterdam, or its offset if it was never set, e.g. --zone +01:00"
 )
 _STATED = re.compile(
-    rf"(?<![A-Za-z]){_KEY}(?P<count>[ _]?(?:in[ _])?\(?(?:seconds|minutes|hours)\)?)?[\"']?"
-    r"\s*(?:->|[=:,;|\t(]|\s)+\s*[\"']?"
-    r"(?P<zone>[A-Z][A-Za-z]+/[A-Za-z_]+(?:/[A-Za-z_]+)?(?:[+-]\d{1,2})?|(?:UTC|GMT)?\s?[+-]?\d{1,5}(?::?\d{2})?|UTC|GMT|Z)"
+    r"(?<![A-Za-z])(?:time[ _-]?zone(?:[ _]name)?(?:\s*\((?:utc|gmt)\s*[+±]?\s*\))?|(?:utc|gmt)[ _-]?(?:time[ _]?)?"
+    r"offset|offset[ _](?:from|to)[ _](?:utc|gmt))[\"']?\s*(?:->|[=:,;|\t(]|\s)+\s*[\"']?(?P<zone>"
+    r"[A-Z][A-Za-z]+/[A-Za-z_]+(?:/[A-Za-z_]+)?(?:[+-]\d{1,2})?|(?:UTC|GMT)?\s?[+-]?\d{1,4}(?::?\d{2})?|UTC|GMT|Z)"
     r"(?![A-Za-z/\d.]|\s?[+±]\s?\))",
     re.IGNORECASE,
 )
-_KEY_ALONE = re.compile(rf"{_KEY}(?P<count>[ _]?\(?(?:seconds|minutes|hours)\)?)?", re.IGNORECASE)
-_HOURS = 14
-"""Hours from UTC that no zone goes beyond."""
+
+
+def to_utc(
+    wall: NDArray[np.int64], place: tzinfo, *, lines: NDArray[np.int64], where: str
+) -> tuple[NDArray[np.int64], tuple[Finding, ...]]:
+    """UTC nanoseconds of wall-clock nanoseconds, in the order of the rows.
+
+    Args:
+        wall: (n,) nanoseconds since 1970 as the wall clock shows them.
+        lines: (n,) line numbers, for messages.
+
+    Raises:
+        TimeError: a wall time that never occurred there, or one that occurred twice without evidence which.
+    """
+    if len(wall) == 0:
+        return wall.copy(), ()
+    first, last = int(wall.min()) - 26 * HOUR, int(wall.max()) + 26 * HOUR
+    offset = np.full(len(wall), offset_at(place, first), dtype=np.int64)
+    found: list[Finding] = []
+    for instant, before, after in _changes(place, first, last):
+        start, end = instant + min(before, after), instant + max(before, after)
+        rows = np.flatnonzero((wall >= start) & (wall < end))
+        offset[wall >= end] = after
+        if not len(rows):
+            continue
+        if after > before:
+            raise TimeError(
+                f"{_show(int(wall[rows[0]]))} does not exist in {place}: the clocks were set forward over it",
+                where=f"{where}, line {lines[rows[0]]}", fix=_FIX,
+            )  # fmt: skip
+        late = _second_pass(wall, rows, end - start, place, f"{where}, line {lines[rows[0]]}")
+        offset[late] = after
+        what = f"the hour from {_show(start)} occurs twice in {place}; by their order {len(rows) - len(late)} rows are "
+        what += f"of its first pass, {len(late)} of its second"
+        found.append(Finding(
+            kind="clocks-set-back", severity=Severity.NOTE, count=len(rows), where=f"line {lines[rows[0]]}", what=what
+        ))  # fmt: skip
+    return wall - offset, tuple(found)
+
+
+def _second_pass(
+    wall: NDArray[np.int64], rows: NDArray[np.int64], length: int, place: tzinfo, where: str
+) -> NDArray[np.int64]:
+    """Which of the rows in a repeated interval [ns] are of its second pass."""
+    steps, step = np.diff(wall[rows[0] : rows[-1] + 1]), usual(wall)
+    back = np.flatnonzero((steps < -length // 2) | ((steps == 0) & (step >= length)))
+    if len(back) == 1:
+        return rows[rows > rows[0] + back[0]]
+    reach = max(10 * step, 2 * NANOSECONDS)
+    before = rows[0] > 0 and wall[rows[0]] - wall[rows[0] - 1] <= reach
+    after = rows[-1] + 1 < len(wall) and wall[rows[-1] + 1] - wall[rows[-1]] <= reach
+    if len(back) == 0 and before != after:
+        return rows if after else rows[:0]
+    reason = "nothing in the log says which pass it is"
+    if len(back):
+        reason = "the log goes back more than once within that hour"
+    elif before:
+        reason = "the log runs through it once without a break, so its clock was not set back"
+    raise TimeError(f"{_show(int(wall[rows[0]]))} occurs twice in {place} and {reason}", where=where, fix=_FIX)
+
+
+def instants(
+    wall: NDArray[np.int64], utc: NDArray[np.bool_], *, line: NDArray[np.int64], zone_name: str | None, where: str
+) -> tuple[Instants, tuple[Finding, ...]]:
+    """UTC nanoseconds of stamps, some of which may state their own zone.
+
+    Raises:
+        TimeError: stamps without a zone and none named, or impossible in it.
+    """
+    if utc.all():
+        return wall, ()
+    if zone_name is None:
+        place = f"{where}, line {line[np.flatnonzero(~utc)[0]]}"
+        raise ZoneMissingError("the stamps carry no time zone", where=place, fix=_MISSING)
+    time = wall.copy()
+    time[~utc], found = to_utc(wall[~utc], zone(zone_name), lines=line[~utc], where=where)
+    return time, found
+
+
+def offset_at(place: tzinfo, instant: int) -> int:
+    """How far a zone's clocks are east of UTC at an instant [ns]."""
+    delta = (_EPOCH + timedelta(seconds=instant // NANOSECONDS)).astimezone(place).utcoffset()
+    return 0 if delta is None else (delta.days * 86_400 + delta.seconds) * NANOSECONDS
+
+
+def _changes(place: tzinfo, low: int, high: int) -> Sequence[tuple[int, int, int]]:
+    """Changes of the zone's offset between two instants: (UTC ns, offset before, after [ns east]).
+
+    Each is found to the second by bisection of steps of a day.
+    """
+    found: list[tuple[int, int, int]] = []
+    edge, known = low, offset_at(place, low)
+    while edge < high:
+        upper = min(edge + 24 * HOUR, high)
+        value = offset_at(place, upper)
+        if value != known:
+            left, right = edge // NANOSECONDS, upper // NANOSECONDS
+            while right - left > 1:
+                middle = (left + right) // 2
+                left, right = (middle, right) if offset_at(place, middle * NANOSECONDS) == known else (left, middle)
+            found.append((right * NANOSECONDS, known, value))
+        edge, known = upper, value
+    return found
+
+
+def _show(wall: int) -> str:
+    return (_EPOCH + timedelta(seconds=wall // NANOSECONDS)).strftime("%Y-%m-%d %H:%M:%S")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,24 +175,26 @@ class Statement:
 
 
 def stated(lines: Sequence[str]) -> Statement | None:
-    """The zone that the first lines of a file state first; `None` where none does, or another always contradicts it."""
-    found: list[Statement] = []
-    for number, line in enumerate(lines[:LINES], start=1):
-        text = line[:_LONGEST]
-        for match in _STATED.finditer(text):
-            name = _name(match["zone"], match["count"] or "")
-            if name is not None:
-                found.append(Statement(line=number, text=" ".join(match[0].split()), name=name))
-        below = lines[number][:_LONGEST] if number < len(lines) else ""
-        found.extend(_below(text, below, number))
-    offsets = [_offsets(zone(one.name)) for one in found]
-    agree = all(any(one == other for one, other in zip(offsets[0], offset, strict=True)) for offset in offsets)
-    return found[0] if found and agree else None
+    """The zone that the first lines of a file state; `None` where none does, or they state several."""
+    found = [
+        Statement(line=number, text=" ".join(match[0].split()), name=name)
+        for number, line in enumerate(lines[:LINES], start=1)
+        for match in _STATED.finditer(line[:_LONGEST]) if (name := _name(match["zone"].strip())) is not None
+    ]  # fmt: skip
+    winters, summers = ({offset_at(zone(one.name), at) for one in found} for at in (0, 182 * 24 * HOUR))
+    return found[0] if len(winters) == 1 or len(summers) == 1 else None
 
 
-def hint(statement: Statement | None, lines: Sequence[str]) -> str:
-    """What the first lines say to a user who named no zone: a statement, else an abbreviation; "" for neither."""
-    return abbreviations.advice(lines) if statement is None else statement.advice()
+def _name(word: str) -> str | None:
+    """The zone that a value spells, as `flagdata.timebase.zone` reads it; a number alone is hours, or hours and
+    minutes."""
+    number = re.fullmatch(r"(?:UTC|GMT)?\s?([+-]?)(\d{1,2})(\d{2})?", word, re.IGNORECASE)
+    name = f"{number[1] or '+'}{int(number[2]):02d}:{number[3] or '00'}" if number is not None else word
+    try:
+        zone(name)
+    except FlagdataError:
+        return None
+    return name
 
 
 def contradiction(says: str, theirs: str, given: str, time: Instants) -> tuple[Finding, ...]:
@@ -87,60 +205,10 @@ def contradiction(says: str, theirs: str, given: str, time: Instants) -> tuple[F
         theirs: the zone that is stated.
         given: the zone by which `time` [UTC ns] was read.
     """
-    if not len(time):
-        return ()
-    parts = [
-        (offset_at(zone(given), instant) - offset_at(zone(theirs), instant)) / (3600 * NANOSECONDS)
-        for instant in (int(time.min()), int(time.max()))
-    ]
-    apart = max(parts, key=abs)
+    ends = (int(time.min()), int(time.max())) if len(time) else ()
+    apart = max((offset_at(zone(given), at) - offset_at(zone(theirs), at) for at in ends), key=abs, default=0) / HOUR
     if not apart:
         return ()
-    return (
-        Finding(
-            kind="zone-contradicts", severity=Severity.WARNING, value=apart,
-            what=f"{says} that the stamps are of {theirs}; {given} was given and is used, {abs(apart):g} h away",
-            fix=f"give --zone {theirs}, unless the file is known to be wrong",
-        ),
-    )  # fmt: skip
-
-
-def _below(line: str, below: str, number: int) -> list[Statement]:
-    """Statements of which one line is a row of names and the next one of their values."""
-    for delimiter in (",", ";", "\t"):
-        names, values = ([cell.strip().strip('"') for cell in text.split(delimiter)] for text in (line, below))
-        if len(names) < 2 or len(names) != len(values):
-            continue
-        found: list[Statement] = []
-        for name, value in zip(names, values, strict=True):
-            match = _KEY_ALONE.fullmatch(name)
-            place = _name(value, match["count"] or "") if match is not None else None
-            if place is not None:
-                found.append(Statement(line=number + 1, text=f"{name} = {value}", name=place))
-        return found
-    return []
-
-
-def _name(text: str, count: str) -> str | None:
-    """The zone that a value spells, as `flagdata.timebase.zone` reads it; a number alone is hours, unless said."""
-    word = text.strip()
-    number = re.fullmatch(r"(?:UTC|GMT)?\s?([+-]?)(\d{1,5})", word, re.IGNORECASE)
-    if number is not None:
-        size = {"s": 1, "m": 60}.get(re.sub(r"[^a-z]", "", count.lower()).removeprefix("in")[:1], 3600)
-        digits = int(number[2])
-        together = size == 3600 and len(number[2]) > 2  # +0530
-        seconds = digits // 100 * 3600 + digits % 100 * 60 if together else digits * size
-        if seconds > _HOURS * 3600 or seconds % 60:
-            return None
-        sign = "-" if number[1] == "-" else "+"
-        return f"{sign}{seconds // 3600:02d}:{seconds % 3600 // 60:02d}"
-    try:
-        zone(word)
-    except FlagdataError:
-        return None
-    return word
-
-
-def _offsets(place: tzinfo) -> tuple[timedelta | None, ...]:
-    """A zone's offsets in January and July."""
-    return tuple(datetime(2025, month, 1, tzinfo=UTC).astimezone(place).utcoffset() for month in (1, 7))
+    what = f"{says} that the stamps are of {theirs}; {given} was given and is used, {abs(apart):g} h away"
+    fix = f"give --zone {theirs}, unless the file is known to be wrong"
+    return (Finding(kind="zone-contradicts", severity=Severity.WARNING, value=apart, what=what, fix=fix),)

@@ -47,7 +47,7 @@ def hours_off(series: WindSeries, other: WindSeries, *, name: str) -> Finding | 
     if length is None:
         return None
     mine, theirs = _changes(series, length), _changes(other, length)
-    scores = {lag: _score(mine, theirs, lag // length) for lag in range(-FARTHEST, FARTHEST + 1, STEP)}
+    scores = {lag: _score(*mine, *theirs, lag // length) for lag in range(-FARTHEST, FARTHEST + 1, STEP)}
     best = max(scores, key=lambda lag: scores[lag][0])
     score, correlation, n = scores[best]
     if best == 0 or score < SCORE or score < scores[0][0] + LEAD:
@@ -61,25 +61,23 @@ def hours_off(series: WindSeries, other: WindSeries, *, name: str) -> Finding | 
     )  # fmt: skip
 
 
-def _changes(series: WindSeries, length: int) -> dict[int, float]:
-    """Change of the mean speed from the bin before, by the bin's number since 1970."""
+def _changes(series: WindSeries, length: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Numbers of bins since 1970 and the change of the logarithm of their mean speed from the bin before."""
     means = average(series, float(length))
     number = (means.time // (length * NANOSECONDS)).astype(np.int64)
-    speed = np.log(np.maximum(means.speed, 0.1))
-    follows = np.flatnonzero(np.diff(number) == 1) + 1
-    return dict(zip(number[follows].tolist(), (speed[follows] - speed[follows - 1]).tolist(), strict=True))
+    change = np.diff(np.log(np.maximum(means.speed, 0.1)))
+    follows = np.diff(number) == 1
+    return number[1:][follows], change[follows]
 
 
-def _score(mine: dict[int, float], theirs: dict[int, float], lag: int) -> tuple[float, float, int]:
+def _score(
+    mine: NDArray[np.int64], one: NDArray[np.float64], theirs: NDArray[np.int64], two: NDArray[np.float64], lag: int
+) -> tuple[float, float, int]:
     """Score and correlation with `mine` moved later by `lag` bins, and the number of bins; 0 where they are few."""
-    common = [number for number in mine if number + lag in theirs]
+    common, here, there = np.intersect1d(mine + lag, theirs, assume_unique=True, return_indices=True)
     if len(common) < FEWEST:
         return 0.0, 0.0, len(common)
-    one: NDArray[np.float64] = np.array([mine[number] for number in common])
-    two: NDArray[np.float64] = np.array([theirs[number + lag] for number in common])
-    one, two = one - one.mean(), two - two.mean()
+    one, two = one[here] - one[here].mean(), two[there] - two[there].mean()
     power = float(np.sqrt((one @ one) * (two @ two)))
-    if power == 0:
-        return 0.0, 0.0, len(common)
-    r = min(max(float(one @ two) / power, -0.999999), 0.999999)
+    r = min(max(float(one @ two) / power, -0.999999), 0.999999) if power else 0.0
     return math.atanh(r) * math.sqrt(len(common) - 3), r, len(common)

@@ -1,385 +1,315 @@
 """Rows into strictly increasing time; what is out of order, repeated or too coarse is reported, flagged or left out.
 
 Rules, in order:
-1. Rows without any value whose stamps run back are left out, and rows that the file lists out of order are sorted
-   (`disorder`), by evidence or by the user's word.
-2. A stretch that comes again with the same stamps and values, as when downloads overlap, is left out.
+1. Rows without any value that do not follow the row before them are left out. Rows are sorted where the user says so.
+2. Copies are left out: rows equal in stamp and values to the row before, and a stretch that comes again with the same
+   stamps and values, as when downloads overlap. Stamps that several readings share are no sign of a copy: those change
+   as often within a stamp as from one to the next.
 3. Few rows whose stamps leave the log's time and come back to it are left out.
 4. Where time runs back and stays there, the clock was set back (`clock`): the rows are kept and continue the clock of
    those before, or those before are made to fit the ones after, as the user says; without a word of the user it is
-   reported as a doubt, and the rows that were shifted are flagged TIME_UNSURE. So it is where the clock was set on,
-   except that without a word of the user nothing is changed, and where one row of a steady log repeats the stamp before
-   it, since the clock may have been set back by one step. Refused: time that runs back again and again, or by no
-   whole hour to where the log never was, as in files that were joined.
+   reported as a doubt, and the rows that were shifted are flagged TIME_UNSURE. Where the clock may have been set on,
+   nothing is changed without a word of the user. Refused: rows that sorting would put in their place, and time that
+   runs back again and again, or by no whole hour to where the log never was.
 5. Rows less than `JITTER` late are sorted in and flagged TIME_UNSURE, unless all that follow stay late: then 4 holds.
-6. Rows equal in stamp and values, and in every cell that is not read, are the same row written several times: one is
-   kept.
-7. Rows that share a stamp are given instants of their own (`spread`).
+6. Rows that share a stamp are given instants of their own. Where most do and stamps are a second apart or less, or
+   stand for rows at one rate, rows are spread evenly from one stamp to the next; a longer time that rows share is
+   refused, since they may have come in bursts. Where few do, they waited in a buffer: they are spread over the room
+   that their neighbours leave; of a slow log that leaves none the first is kept. All that are moved are flagged
+   TIME_UNSURE.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import TimeError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.instants import clock, disorder
-from flagdata.ingest.anemometer.instants.clock import DAY, JITTER, ClockChoice, Jump
+from flagdata.ingest.anemometer.instants import clock
+from flagdata.ingest.anemometer.instants.clock import JITTER, ClockChoice, Jump
+from flagdata.ingest.anemometer.instants.stamps import DAY
 from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.samples.spread import FAST, PAIRS, distinct
-from flagdata.ingest.anemometer.samples.written import written_otherwise
-from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.ingest.anemometer.text.source import RATE_GIVEN
 from flagdata.schema import SampleFlag
 from flagdata.timebase import NANOSECONDS, iso
 
-FEW, SHARE = 10, 4
+_FEW, _SHARE = 10, 4
 """Rows, or a thousandth of all if that is more, that may be left out for wild stamps; no more than one in four."""
-SMALL = 60 * NANOSECONDS
+_SMALL = 60 * NANOSECONDS
 """A clock may be set back by any constant up to this where nothing else speaks for it."""
-AGAIN = 0.9
-"""Share of a stretch's rows that must come with the stamps and values of earlier ones to be taken for a repetition."""
-DATES_SHARED = 0.5
-"""Share of the rows that share a date without a time of day, from which they are refused."""
-ISOLATED = 0.2
+_AGAIN = 0.9
+"""Share of the rows that go back which must come with the stamps and values of earlier ones to be a repetition."""
+_ISOLATED = 0.2
 """Share of the pairs of neighbours that share a stamp, up to which the alike among them are taken for copies."""
-_JOINED = 3
-"""Places where time runs backwards from which on the rows are in no order, and no clock was set back."""
-_FINE = 60
-"""Steps of the stamps' resolution that lie between two readings where it cannot be the reason that they share one."""
-COPIES, COPIED = 2.0, 0.1
+_CHANGES, _COPIED = 2.0, 0.1
 """Changes of the values within stamps that readings would have shown, and the share of them that copies may show."""
+_FAST = NANOSECONDS
+"""Period below which two rows of one stamp are two samples, and not two records that claim one instant [ns]."""
+_COARSE = NANOSECONDS
+"""Time between stamps within which rows may be spread, however they came [ns]."""
+_EVEN = 0.9
+"""Share of the stamps whose rows must fit a period for the rows to have come evenly."""
+_STATIONS = "if they are of several stations, read one by a recipe: [rows] column = its column, value = its name"
 
 
-def in_order(
-    reading: Reading, *, where: str, choice: ClockChoice | None = None, source: TextFile | None = None
-) -> Reading:
+def in_order(reading: Reading, *, where: str, choice: ClockChoice | None = None) -> Reading:
     """Apply the rules above.
 
     Args:
-        source: the file, whose lines show whether rows are equal in the cells that are not read.
         choice: whose stamps are right where the clock was set anew, or that the rows are out of order; `None` where
             nobody said.
 
     Raises:
-        TimeError: time runs back in a way that no rule explains, or most rows share a date without a time of day.
+        TimeError: time runs back in a way that no rule explains, or rows share a stamp for too long.
     """
-    reading = _put_in_order(_without_empty_twins(_without_empty_rows(reading)), choice)
-    reading = _without_repeated_stretches(reading)
-    reading = _sorted(reading, where, None if choice == "sort" else choice)
-    reading = _without_repeats(reading, source)
-    _refuse_bare_dates(reading, where)
-    return distinct(reading)
+    reading = _without_empty(reading)
+    sorting = clock.sorted_as_given(reading.time, reading.line, choice)
+    if sorting is not None:
+        reading = reading.with_findings((sorting[1],)).take(sorting[0])
+    reading = _on_one_clock(_without_copies(reading), where, None if choice == "sort" else choice)
+    lag = np.maximum.accumulate(reading.time) - reading.time
+    late = f"{{n}} rows come up to {lag.max() / NANOSECONDS:.3f} s after later ones; sorted and flagged"
+    worst = float(lag.max()) / NANOSECONDS
+    reading = reading.marked(lag > 0, "time-backwards", late, flag=SampleFlag.TIME_UNSURE, value=worst)
+    reading = reading.take(np.argsort(reading.time, kind="stable")) if lag.any() else reading
+    if choice is not None and {"rows-sorted", "clock-set-back", "clock-set-on"}.isdisjoint(
+        one.kind for one in reading.findings
+    ):
+        what = f"the rows are in the order of their stamps, and no clock was set: --clock {choice} is not used"
+        reading = reading.with_findings((Finding(kind="clock-not-set", severity=Severity.NOTE, what=what),))
+    return _distinct(reading, where)
 
 
-def _refuse_bare_dates(reading: Reading, where: str) -> None:
-    """Refuse rows whose stamps are dates alone, and are shared by most.
+def _without_empty(reading: Reading) -> Reading:
+    empty = np.logical_and.reduce([np.isnan(values) for values in reading.channels.values()])
+    steps = np.diff(reading.time)
+    stuck = (steps < 0) | (reading.stamped & (steps == 0))
+    beside = np.concatenate(([False], stuck)) | np.concatenate((stuck, [False]))
+    what = "{n} rows hold no value, and do not come after the row before them"
+    rows = empty & beside if not empty.all() else np.zeros(len(empty), dtype=bool)
+    return reading.without(rows, "empty-rows", what, severity=Severity.NOTE)
+
+
+def _without_copies(reading: Reading) -> Reading:
+    """The rows without those that come again with the stamp and the values of another."""
+    time = reading.time
+    if not np.any(np.diff(time) <= 0):
+        return reading
+    order = np.argsort(time, kind="stable")
+    at = np.flatnonzero(np.diff(time[order]) == 0)
+    earlier, later = order[at], order[at + 1]
+    alike, beside = ~_differ(reading, earlier, later), later == earlier + 1
+    again, twice = np.zeros((2, len(time)), dtype=bool)
+    again[later[alike & ~beside]], twice[later[alike & beside]] = True, True
+    back = (time[1:] <= np.maximum.accumulate(time)[:-1]) & (np.diff(time) != 0)
+    varied = any(len(np.unique(values[again & np.isfinite(values)])) > 1 for values in reading.channels.values())
+    if varied and int(again.sum()) >= _AGAIN * int(back.sum()):
+        what = "{n} rows bring earlier stamps and values again, as when downloads of a logger overlap"
+        return _without_copies(reading.without(again, "repeated-stretch", what))
+    shared = np.diff(time) == 0
+    differ = _differ(reading, np.arange(len(time) - 1), np.arange(1, len(time)))
+    changes = float(differ[~shared].mean()) * int(shared.sum()) if not shared.all() else 0.0
+    copied = changes >= _CHANGES and int((differ & shared).sum()) <= _COPIED * changes
+    if not (copied or (shared.all() and not differ.any())):
+        # Coarse stamps make equal rows too: isolated pairs alone are the same row written twice, and not those beside
+        # which a fast logger left out a step: there the second is a sample that came late.
+        period = clock.usual(time)
+        wide = np.concatenate(([False], (np.diff(time) > 1.5 * period) & (period < _FAST), [False, False]))
+        twice &= ~(wide[:-2] | wide[2:]) & (int(shared.sum()) <= max(1.0, _ISOLATED * len(shared)))
+    what = "{n} rows repeat the row before in stamp and in all values that are read: copies"
+    return reading.without(twice, "duplicate-rows", what)
+
+
+def _differ(reading: Reading, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(m,) whether rows have other values than others."""
+    differ = np.zeros(len(one), dtype=bool)
+    for values in reading.channels.values():
+        first, second = values[one], values[other]
+        differ |= ~((first == second) | (np.isnan(first) & np.isnan(second)))
+    return differ if reading.host_time is None else differ | (reading.host_time[one] != reading.host_time[other])
+
+
+def _on_one_clock(reading: Reading, where: str, choice: ClockChoice | None) -> Reading:
+    """The rows on one clock, without those of wild stamps.
 
     Raises:
-        TimeError: the file does not say when within its day a row was read.
+        TimeError: time runs back, and no clock was set.
     """
-    again = np.diff(reading.time) == 0
-    shared = np.concatenate(([False], again)) | np.concatenate((again, [False]))
-    if reading.step < DAY or len(again) == 0 or float(shared.mean()) < DATES_SHARED:
-        return
-    raise TimeError(
-        f"the stamps are dates without a time of day, and {int(shared.sum())} of {len(shared)} rows share theirs with "
-        f"others: the file does not say when within {iso(int(reading.time[shared][0]))[:10]} each was read",
-        where=f"{where}, line {reading.line[shared][0]}",
-        fix="name the column of the time of day beside that of the date; if the rows came at a steady rate, read the "
-        "wind alone (--columns) with --start TIME --rate HZ; else export the log with the time of each row",
-    )  # fmt: skip
+    time, n = reading.time, len(reading.time)
+    lag = np.maximum.accumulate(time) - time
+    if not np.any(lag > JITTER):
+        return _continued(reading, clock.set_back_a_little(time, choice), choice)
+    few = max(min(_FEW, n // _SHARE), n // 1000)
+    scattered = len(clock.set_back(time)) > few
+    wild = np.zeros(n, dtype=bool) if scattered else clock.excursions(time, most=few)
+    jumps = clock.set_back(time[~wild])
+    was_set = choice is not None or all(_believable(time[~wild], jump) for jump in jumps)
+    if int(wild.sum()) > max(few, n // _SHARE) or len(jumps) > clock.MOST or not was_set:
+        wild = np.ones(n, dtype=bool)
+        wild[clock.longest_rise(time)] = False
+        if int(wild.sum()) > few:
+            raise _runs_back(reading, where, settable=choice is None and len(jumps) <= clock.MOST)
+        jumps = ()
+    elif jumps and choice is None and clock.disordered(time[~wild]):
+        raise _runs_back(reading, where, settable=True)
+    first = iso(int(time[np.argmax(wild)]))
+    what = f"{{n}} rows with stamps far from their neighbours' ({first})"
+    worst = float(lag.max()) / NANOSECONDS
+    settled = reading.without(
+        wild, "time-backwards", what, severity=Severity.ERROR, value=worst, fix=clock.SORT if reading.stamped else None
+    )
+    return _continued(settled, jumps, choice)
 
 
-def _empty(reading: Reading) -> NDArray[np.bool_]:
-    """Rows that hold no value."""
-    return np.logical_and.reduce([np.isnan(values) for values in reading.channels.values()])
-
-
-def _without_empty_twins(reading: Reading) -> Reading:
-    """The rows without those that hold no value and have the stamp of a row that does: a summary beside a report."""
-    empty = _empty(reading)
-    if not reading.stamped or not empty.any():
-        return reading
-    twins = empty & np.isin(reading.time, reading.time[~empty])
-    if not twins.any():
-        return reading
-    which = "hold no value that is read, beside a row of the same stamp that does"
-    return _without(reading, twins, which, Severity.NOTE)
-
-
-def _without_empty_rows(reading: Reading) -> Reading:
-    """The rows without those that hold no value, where these run back and the others do so less."""
-    back = int((np.diff(reading.time) < 0).sum())
-    empty = _empty(reading)
-    if not back or not empty.any() or empty.all() or int((np.diff(reading.time[~empty]) < 0).sum()) >= back:
-        return reading
-    return _without(reading, empty, "hold no value, some of them with stamps that run back", Severity.WARNING)
-
-
-def _without(reading: Reading, empty: NDArray[np.bool_], which: str, severity: Severity) -> Reading:
-    """The rows without these empty ones, and what is said of them."""
-    finding = Finding(
-        kind="empty-rows", severity=severity, count=int(empty.sum()), where=f"line {reading.line[empty][0]}",
-        what=f"{int(empty.sum())} rows {which}; left out",
-    )  # fmt: skip
-    return reading.take(~empty).with_findings((finding,))
-
-
-def _put_in_order(reading: Reading, choice: ClockChoice | None) -> Reading:
-    found = disorder.sorting(reading.time, choice)
-    if found is not None:
-        return reading.with_findings((found.finding(reading.line),)).take(found.order)
-    if choice == "sort" and disorder.KIND not in {finding.kind for finding in reading.findings}:
-        text = "the rows are in the order of their stamps: --clock sort is not used"
-        return reading.with_findings((Finding(kind="clock-not-set", severity=Severity.NOTE, what=text),))
-    return reading
-
-
-def _sorted(reading: Reading, where: str, choice: ClockChoice | None) -> Reading:
-    lag = np.maximum.accumulate(reading.time) - reading.time
-    if len(lag) == 0 or int(lag.max()) <= JITTER:
-        return _late_rows_sorted(_steady(reading, choice))
-    few = max(min(FEW, len(reading.time) // SHARE), len(reading.time) // 1000)
-    jumps = clock.set_back(reading.time)
-    wild = clock.excursions(reading.time, most=few) if len(jumps) <= few else np.zeros(len(lag), dtype=bool)
-    settled = reading.take(~wild)
-    jumps = clock.set_back(settled.time)
-    many = int(wild.sum()) > max(few, len(wild) // SHARE)
-    if many or len(jumps) > clock.MOST or not all(_believable(settled, jump, choice) for jump in jumps):
-        settable = choice is None and len(jumps) <= clock.MOST
-        return _late_rows_sorted(_one_clock(_risen(reading, lag, few, where, settable=settable), (), choice))
-    if wild.any():
-        settled = settled.with_findings((_left_out(reading, wild, lag),))
-    return _late_rows_sorted(_one_clock(settled, jumps, choice))
-
-
-def _steady(reading: Reading, choice: ClockChoice | None) -> Reading:
-    """Rows that run back by no more than buffers explain, on one clock where it was set back by so little."""
-    differs = _differs(reading)
-    stood = tuple(jump for jump in clock.stood(reading.time) if differs[jump.row - 1])
-    if choice is None:
-        reading = reading.with_findings(clock.doubt_where_it_stood(reading.time, stood, reading.line))
-        stood = ()
-    jumps = (*clock.stepped_back(reading.time), *stood)
-    return _one_clock(reading, jumps, choice)
-
-
-def _believable(reading: Reading, jump: Jump, choice: ClockChoice | None) -> bool:
+def _believable(time: NDArray[np.int64], jump: Jump) -> bool:
     """Whether a step back is a clock that was set; else it may be files joined in another order."""
-    if choice is not None:
-        return True
-    if jump.size < -DAY:
-        return False
-    passed_again = int(reading.time[jump.row :].max()) > int(reading.time[jump.row - 1])
-    return jump.whole or jump.size >= -SMALL or passed_again
+    passed_again = int(time[jump.row :].max()) > int(time[jump.row - 1])
+    return jump.size >= -DAY and (jump.whole or jump.size >= -_SMALL or passed_again)
 
 
-def _one_clock(reading: Reading, jumps: tuple[Jump, ...], choice: ClockChoice | None) -> Reading:
+def _runs_back(reading: Reading, where: str, *, settable: bool) -> TimeError:
+    """That time runs back, and the ways out; `settable` whether one is to say whose stamps are right."""
+    time = reading.time
+    reached = np.maximum.accumulate(time)
+    falls = np.flatnonzero(np.diff(time) < 0) + 1
+    at = int(falls[np.argmax((reached - time)[falls])])
+    out = len(time) - len(clock.longest_rise(time))
+    places = f"in {len(falls)} places, the farthest " if len(falls) > 1 else ""
+    ways = [clock.SORT, f"if one log's clock was set anew, {clock.CHOICES}"] if settable else [clock.SORT]
+    ways += ["if files were joined, split the file there and ingest the parts by themselves", _STATIONS]
+    return TimeError(
+        f"time runs backwards {places}by {(reached - time)[at] / NANOSECONDS:.1f} s, from {iso(int(reached[at]))} to "
+        f"{iso(int(time[at]))}, and {out} rows would have to go",
+        where=f"{where}, line {reading.line[at]}", fix="; ".join(ways),
+    )  # fmt: skip
+
+
+def _continued(reading: Reading, jumps: tuple[Jump, ...], choice: ClockChoice | None) -> Reading:
     """The rows on one clock: set back by `jumps`, or set on as `clock.set_on` finds."""
     on = clock.set_on(reading.time, returns=jumps)
     if choice is None:
         undone = {-jump.size for jump in jumps}
         doubtful = tuple(jump for jump in on if jump.size not in undone)
-        reading = reading.with_findings(clock.doubt(reading.time, doubtful, reading.line))
+        reading = reading.with_findings(clock.report(reading.time, doubtful, reading.line, choice, kept=True))
         on = tuple(jump for jump in on if jump.size in undone)
     every = tuple(sorted((*jumps, *on), key=lambda jump: jump.row))
     if not every:
-        if choice is None:
-            return reading
-        text = f"no place is left where the clock was set back or on: --clock {choice} is not used"
-        return reading.with_findings((Finding(kind="clock-not-set", severity=Severity.NOTE, what=text),))
+        return reading
     time, shifted = clock.continued(reading.time, every, choice)
     flags = np.where(shifted, reading.flags | SampleFlag.TIME_UNSURE, reading.flags)
     found = clock.report(reading.time, every, reading.line, choice)
-    if choice is None and jumps and _may_be_sorted(reading):
-        found = tuple(replace(one, fix=f"{one.fix}; {disorder.SORT}") for one in found)
     return replace(reading, time=time).with_findings(found, flags=flags)
 
 
-def _late_rows_sorted(reading: Reading) -> Reading:
-    time = reading.time
-    backwards = np.flatnonzero(np.diff(time) < 0) + 1
-    if len(backwards) == 0:
-        return reading
-    lag = np.maximum.accumulate(time) - time
-    late = lag > 0
-    worst = float(lag.max()) / NANOSECONDS
-    flags = np.where(late, reading.flags | SampleFlag.TIME_UNSURE, reading.flags).astype(np.uint16)
-    finding = Finding(
-        kind="time-backwards", severity=Severity.WARNING, count=int(late.sum()), value=worst,
-        where=f"line {reading.line[backwards[0]]}",
-        what=f"{int(late.sum())} rows come up to {worst:.3f} s after later ones; sorted and flagged",
-    )  # fmt: skip
-    return reading.with_findings((finding,), flags=flags).take(np.argsort(time, kind="stable"))
+@dataclass(frozen=True, kw_only=True)
+class _Runs:
+    """Runs of rows of one stamp: rows, time from each stamp to the next [ns], each row's place in its run."""
+
+    rows: NDArray[np.int64]
+    room: NDArray[np.int64]
+    place: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, time: NDArray[np.int64]) -> _Runs:
+        start = np.flatnonzero(np.concatenate(([True], np.diff(time) != 0)))
+        rows = np.diff(np.append(start, len(time)))
+        return cls(rows=rows, room=np.diff(time[start]), place=np.arange(len(time)) - np.repeat(start, rows))
 
 
-def _risen(reading: Reading, lag: NDArray[np.int64], few: int, where: str, *, settable: bool) -> Reading:
-    """The rows without the fewest whose removal leaves time in order.
-
-    Args:
-        lag: (n,) how far each row lies before the latest above it [ns].
-        few: rows that may go.
-        settable: whether a word on whose stamps are right would have them read.
+def _distinct(reading: Reading, where: str) -> Reading:
+    """Rows in non-decreasing time as rows in strictly increasing time.
 
     Raises:
-        TimeError: they are many.
+        TimeError: most rows share a stamp, for more than a second, and do not come at one rate.
     """
-    time = reading.time
-    keep = disorder.longest_rise(time)
-    wild = np.ones(len(time), dtype=bool)
-    wild[keep] = False
-    count = int(wild.sum())
-    if count > few:
-        backwards = np.flatnonzero(np.diff(time) < 0) + 1
-        at = int(backwards[np.argmax(lag[backwards])])
-        sort = "if all stamps are right and only the rows are out of order: --clock sort"
-        whose = "--clock first (before it) or --clock last (after it)"
-        ways = [f"or, if one log's clock was set anew, say whose stamps are right: {whose}"] if settable else []
-        why = "the logger's clock was set back, or files were joined"
-        if disorder.turned_about(int(time[at] + lag[at]), int(time[at])):
-            why = "day and month change places there, as where a spreadsheet read a part of the dates"
-            ways = ["split the file there and ingest each part by itself, with its own --date-order"]
-        elif len(backwards) > _JOINED:
-            ways = [sort, *ways, "if rows of several stations are mixed, read one by a recipe with [rows]"]
-            why = f"so it does in {len(backwards)} places, where rows are in no order or of several stations"
-        else:
-            ways = ["split the file there and ingest the parts by themselves", *ways, f"or, {sort}"]
-        raise TimeError(
-            f"time runs backwards by {lag[at] / NANOSECONDS:.1f} s, from {iso(int(time[at] + lag[at]))} to "
-            f"{iso(int(time[at]))}, and {count} rows would have to go: {why}",
-            where=f"{where}, line {reading.line[at]}",
-            fix="; ".join(ways),
-        )  # fmt: skip
-    return reading.take(keep).with_findings((_left_out(reading, wild, lag),))
-
-
-def _left_out(reading: Reading, wild: NDArray[np.bool_], lag: NDArray[np.int64]) -> Finding:
-    first = int(np.flatnonzero(wild)[0])
-    return Finding(
-        kind="time-backwards", severity=Severity.ERROR, count=int(wild.sum()), where=f"line {reading.line[first]}",
-        value=float(lag.max()) / NANOSECONDS,
-        what=f"{int(wild.sum())} rows with stamps far from their neighbours' ({iso(int(reading.time[first]))}); "
-        "left out",
-        fix=disorder.SORT if _may_be_sorted(reading) else None,
-    )  # fmt: skip
-
-
-def _may_be_sorted(reading: Reading) -> bool:
-    """Whether the user may say that the rows are out of order: they have stamps of their own, and fit where sorted."""
-    return reading.stamped and disorder.in_blocks(reading.time)
-
-
-def _without_repeated_stretches(reading: Reading) -> Reading:
-    """The rows without stretches that go back to earlier stamps and bring the earlier values again."""
-    time = reading.time
-    backwards = np.flatnonzero(np.diff(time) < -JITTER) + 1
-    if not 0 < len(backwards) <= 1000:
-        return reading
-    drop = np.zeros(len(time), dtype=bool)
-    for at in backwards.tolist():
-        reached = int(time[:at].max())
-        beyond = np.flatnonzero(time[at:] > reached)
-        stop = at + int(beyond[0]) if len(beyond) else len(time)
-        earlier = np.argsort(time[:at], kind="stable")
-        place = np.minimum(np.searchsorted(time[:at], time[at:stop], sorter=earlier), at - 1)
-        source = earlier[place]
-        again = time[source] == time[at:stop]
-        varies = False
-        for values in reading.channels.values():
-            new, old = values[at:stop], values[source]
-            again &= (new == old) | (np.isnan(new) & np.isnan(old))
-            varies |= len(np.unique(new[np.isfinite(new)])) > 1
-        if varies and float(again.mean()) >= AGAIN:
-            drop[at:stop] |= again
-    if not drop.any():
-        return reading
-    count, first = int(drop.sum()), int(np.flatnonzero(drop)[0])
-    finding = Finding(
-        kind="repeated-stretch", severity=Severity.WARNING, count=count, where=f"line {reading.line[first]}",
-        what=f"{count} rows bring earlier stamps and values again, as when downloads of a logger overlap; left out",
-    )  # fmt: skip
-    return reading.take(~drop).with_findings((finding,))
-
-
-def _without_repeats(reading: Reading, source: TextFile | None) -> Reading:
-    """The rows without those that repeat the row before them in stamp and in all cells."""
-    if len(reading.time) < 2:
-        return reading
-    differs = _differs(reading)
-    same = _repeats(reading, differs)
-    finely = False
-    if same.any() and source is not None:
-        otherwise = written_otherwise(source, reading.line[:-1][same], reading.line[1:][same])
-        finely = 0 < int(otherwise.sum()) < PAIRS and _stamped_finely(reading)  # many are distinguished by `distinct`
-        if not finely:
-            differs[same] = otherwise
-            same = _repeats(reading, differs)
-    if not same.any():
-        return reading
-    twice = np.concatenate(([False], same))
-    count, rows = int(twice.sum()), np.diff(np.flatnonzero(np.append(~twice, True)))
-    most = int(rows.max())
-    cells = "all values that are read" if finely else "all cells"
-    what = f"{count} {'row repeats' if count == 1 else 'rows repeat'} the row before in stamp and in {cells}"
-    what += f", up to {most} rows alike" if most > 2 else ""
-    finding = Finding(
-        kind="duplicate-rows", severity=Severity.WARNING, count=count, where=f"line {reading.line[twice][0]}",
-        what=f"{what}; left out as copies",
-    )  # fmt: skip
-    return reading.take(~twice).with_findings((finding,))
-
-
-def _stamped_finely(reading: Reading) -> bool:
-    """Whether a log's stamps are far finer than its steps, so that two readings share none."""
-    period = clock.usual(reading.time)
-    return period >= SMALL and reading.step * _FINE <= period
-
-
-def _repeats(reading: Reading, differs: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(n - 1,) whether a row repeats the one before it; `differs` whether it differs in something beside the stamp."""
     again = np.diff(reading.time) == 0
-    same = again & ~differs
-    if not _copied(again, differs):
-        # Coarse stamps make equal rows too: isolated pairs alone are the same row written twice.
-        same &= ~_with_room(reading)
-        same &= int(again.sum()) <= max(1.0, ISOLATED * len(again))
-    return same
+    if not again.any():
+        return reading
+    shared = np.concatenate(([False], again)) | np.concatenate((again, [False]))
+    runs = _Runs.of(reading.time)
+    if float(shared.mean()) < 0.5:
+        time, kind = _in_room(reading.time, runs), "equal-stamps"
+        moved, value = time != reading.time, float(np.abs(time - reading.time).max()) / NANOSECONDS
+        what = "{n} rows share a stamp with a neighbour, as rows do that waited in a buffer or whose clock stopped for "
+        what += f"a moment: spread between their neighbours by up to {value:.4g} s, and unsure by as much"
+    else:
+        time, period, hold = _evenly(reading, runs)
+        counted = any(one.kind == RATE_GIVEN for one in reading.findings)
+        if hold > _COARSE and not counted and (
+            hold > 1.5 * reading.step or reading.step >= DAY or not _even(runs, period)
+        ):  # fmt: skip
+            raise _shared(reading, runs, hold, f"{where}, line {reading.line[shared][0]}")
+        held, moved, value = hold > 1.5 * reading.step or hold > _COARSE, np.ones(len(time), dtype=bool), hold
+        kind = "counted-together" if counted else "held-stamps" if held else "coarse-stamps"
+        value = (period if held and not counted else reading.step) / NANOSECONDS
+        what = f"stamps {hold / NANOSECONDS:g} s apart for about {int(np.median(runs.rows))} rows each: spread evenly, "
+        what += f"one every {period / NANOSECONDS:.4g} s, so each time is unsure by up to {hold / NANOSECONDS:g} s"
+    flags = np.where(moved, reading.flags | SampleFlag.TIME_UNSURE, reading.flags)
+    reading = replace(reading.marked(moved, kind, what, value=value), time=time).with_findings((), flags=flags)
+    stuck = np.concatenate(([False], np.diff(time) <= 0))
+    what = "{n} rows carry the stamp of the row before them and other values"
+    return reading.without(stuck, "duplicate-stamps", what, severity=Severity.ERROR, fix=_STATIONS)
 
 
-def _differs(reading: Reading) -> NDArray[np.bool_]:
-    """(n - 1,) whether a row has other values than the one before it."""
-    differs = np.zeros(max(0, len(reading.time) - 1), dtype=bool)
-    for values in reading.channels.values():
-        differs |= ~((values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1])))
-    if reading.host_time is not None:
-        differs |= np.diff(reading.host_time) != 0
-    return differs
+def _in_room(time: NDArray[np.int64], runs: _Runs) -> NDArray[np.int64]:
+    """Runs here and there, spread over the room that the neighbours leave: behind the stamp, else before it; of a fast
+    logger that leaves none, within half a period."""
+    period, rows = int(np.median(runs.room)) if len(runs.room) else 0, runs.rows
+    free = (rows - 1) * period
+    # What lies beyond the log's ends leaves a slow one no room.
+    end = period if period < _FAST else 0
+    after = np.append(runs.room, end * rows[-1])
+    forward = after >= free + period // 2
+    half = np.minimum(after, period) // (2 * rows) if period < _FAST else np.zeros(len(rows), dtype=np.int64)
+    step = np.where(forward, np.minimum(period, after // rows), half)
+    before = np.concatenate(([end * rows[0]], runs.room - ((rows - 1) * step)[:-1]))
+    backward = ~forward & (before >= free + period // 2)
+    step = np.where(backward, np.minimum(period, before // rows), step)
+    start = np.where(backward, -(rows - 1) * step, 0)
+    return time + np.repeat(start, rows) + runs.place * np.repeat(step, rows)
 
 
-def _copied(again: NDArray[np.bool_], differs: NDArray[np.bool_]) -> bool:
-    """Whether rows that share a stamp are copies, and not readings below a coarse stamp.
+def _evenly(reading: Reading, runs: _Runs) -> tuple[NDArray[np.int64], float, int]:
+    """Runs all over, spread from stamp to stamp; the period of the rows and the usual time between stamps [ns].
 
-    Readings change from row to row as often within a stamp as from stamp to stamp; copies change with the stamp alone.
-    Of a log of one stamp nothing is known but that its rows are alike.
-
-    Args:
-        again: (n - 1,) whether a row has the stamp of the one before.
-        differs: (n - 1,) whether it has other values.
+    The period is the median over the stamps of the time to the next one, divided by the rows between. Where the next is
+    farther than that explains, rows are missing and the period alone counts.
     """
-    if again.all():
-        return not differs.any()
-    expected = float(differs[~again].mean()) * int(again.sum())
-    return expected >= COPIES and int((differs & again).sum()) <= COPIED * expected
+    rows, room = runs.rows, runs.room
+    inner = slice(1, -1) if len(rows) > 3 else slice(0, -1)
+    period = float(np.median(room[inner] / rows[:-1][inner])) if len(room) else float(reading.step / max(1, rows.max()))
+    hold = round(float(np.median(room))) if len(room) else reading.step
+    hold = min(hold, reading.step) if len(room) < 2 else hold  # how long a stamp stands is not known
+    length = np.round(period * rows).astype(np.int64)
+    near = room <= 1.5 * np.maximum(length[:-1], hold)
+    length[:-1] = np.where(near, room, np.minimum(length[:-1], room))
+    time = reading.time + np.repeat(length, rows) * runs.place // np.repeat(rows, rows)
+    # The log may begin and end within a stamp: those rows keep the period, the first ones before the next stamp.
+    first, last = int(rows[0]), len(time) - int(rows[-1])
+    if len(room) and near[0]:
+        pace = min(period, int(room[0]) / first)  # no row comes before its stamp
+        time[:first] = reading.time[first] - np.round(pace * np.arange(first, 0, -1)).astype(np.int64)
+    time[last:] = reading.time[-1] + np.round(period * runs.place[last:]).astype(np.int64)
+    return time, period, hold
 
 
-def _with_room(reading: Reading) -> NDArray[np.bool_]:
-    """Pairs of neighbours, (n - 1,), beside which a fast logger left out a step: the second is a sample, come late."""
-    steps = np.diff(reading.time)
-    period = clock.usual(reading.time)
-    if period >= FAST:
-        return np.zeros(len(steps), dtype=bool)
-    wide = steps > 1.5 * period
-    return np.concatenate(([False], wide[:-1])) | np.concatenate((wide[1:], [False]))
+def _even(runs: _Runs, period: float) -> bool:
+    """Whether nearly every stamp stands for as many rows as a period [ns] puts between it and the next, but for one."""
+    off = np.abs(runs.room - runs.rows[:-1] * period) <= period
+    return bool(off[1 if len(off) > 2 else 0 :].mean() >= _EVEN) if len(off) else True
+
+
+def _shared(reading: Reading, runs: _Runs, hold: int, where: str) -> TimeError:
+    low, high = int(runs.rows.min()), int(runs.rows.max())
+    number, dates = f"{low}" if low == high else f"{low} to {high}", reading.step >= DAY
+    what = "the stamps are dates without a time of day, and stand" if dates else (
+        f"the stamps are {hold / NANOSECONDS:g} s apart, and stand"
+    )  # fmt: skip
+    fix = "name the column of the time of day beside that of the date; " if dates else "log a stamp with every row; "
+    fix += "if the rows came at a steady rate, read the wind alone (--columns) with --start TIME --rate HZ; "
+    return TimeError(
+        f"{what} for {number} rows each: the file does not say when each was read", where=where, fix=fix + _STATIONS
+    )

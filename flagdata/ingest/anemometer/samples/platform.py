@@ -50,12 +50,8 @@ class Motion:
 
 def position_columns(header: Sequence[str]) -> tuple[str, str] | None:
     """The columns of latitude and longitude that a header names, each once; `None` where it does not."""
-    found = [
-        [name for name in header if pattern.fullmatch(name.strip()[:40])] for pattern in (_LATITUDE, _LONGITUDE)
-    ]  # fmt: skip
-    if any(len(names) != 1 or list(header).count(names[0]) != 1 for names in found):
-        return None
-    return found[0][0], found[1][0]
+    found = [[name for name in header if one.fullmatch(name.strip()[:40])] for one in (_LATITUDE, _LONGITUDE)]
+    return (found[0][0], found[1][0]) if all(len(names) == 1 for names in found) else None
 
 
 def extent(latitude: NDArray[np.float64], longitude: NDArray[np.float64]) -> float:
@@ -104,40 +100,47 @@ def settle(
         InputError: a platform said to be fixed that moves.
     """
     shown = motion(reading, positions or {})
+    if given == "fixed" and shown is not None:
+        raise InputError(
+            f"the platform was said to be fixed, but {shown.text}", where=where,
+            fix="say --platform moving: its wind is then apparent wind; where the log's wind is over ground, "
+            "computed from a moving platform: --platform corrected",
+        )  # fmt: skip
+    has = set(reading.channels)
     if given == "fixed":
-        if shown is not None:
-            raise InputError(
-                f"the platform was said to be fixed, but {shown.text}", where=where,
-                fix="say --platform moving: its wind is then apparent wind; where the log's wind is over ground, "
-                "computed from a moving platform: --platform corrected",
-            )  # fmt: skip
-        return _fixed(reading)
+        text, names = "fixed platform, as given", {}
+        if "wind_speed" not in has and "apparent_wind_speed" in has:
+            text += ": apparent wind is wind over ground, its direction still from the sensor's own mark"
+            names = {"apparent_wind_speed": "wind_speed"}
+        return _renamed(reading, names, "fixed-platform", text, severity=Severity.NOTE)
     if given == "corrected":
-        text = "wind over ground was computed from a moving platform's motion before it was logged, as given"
-        if "wind_speed" not in reading.channels and "theoretical_wind_speed" in reading.channels:
+        text, names = "wind over ground was computed from a moving platform's motion before it was logged, as given", {}
+        if "wind_speed" not in has and "theoretical_wind_speed" in has:
             text += "; what the file calls true wind is kept as wind_speed"
             names = {"theoretical_wind_speed": "wind_speed"}
-            reading = replace(reading, channels={names.get(n, n): v for n, v in reading.channels.items()})
-        return reading.with_findings((Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text),))
+        return _renamed(reading, names, "computed-true-wind", text)
     if given is None and shown is None:
         return _of_unknown(reading)
-    if {"wind_speed", "apparent_wind_speed"} <= set(reading.channels):
+    if {"wind_speed", "apparent_wind_speed"} <= has:
         text = "wind over ground was computed by the instrument from a moving platform's heading and speed"
-        finding = Finding(kind="computed-true-wind", severity=Severity.WARNING, what=text)
-        return reading.with_findings((finding,))
-    names = [name for name in _RENAMED if name in reading.channels and _RENAMED[name] not in reading.channels]
+        return _renamed(reading, {}, "computed-true-wind", text)
+    names = {name: other for name, other in _RENAMED.items() if name in has and other not in has}
     known = "a moving platform, as given" if shown is None else f"a platform that {shown.text}"
     text = f"wind relative to {known}: no ground truth"
-    if "wind_speed" in names:
-        text += "; what the file calls wind speed is kept as apparent_wind_speed"
-    if "wind_direction" in names:
-        text += ", its direction as one from the bow"
-    finding = Finding(
-        kind="apparent-wind-only", severity=Severity.WARNING, value=shown.speed if shown else None, what=text,
-        fix=None if given else "if the log's wind is over ground all the same, say so: --platform corrected",
-    )  # fmt: skip
-    channels = {_RENAMED[name] if name in names else name: values for name, values in reading.channels.items()}
-    return replace(reading, channels=channels).with_findings((finding,))
+    text += "; what the file calls wind speed is kept as apparent_wind_speed" if "wind_speed" in names else ""
+    text += ", its direction as one from the bow" if "wind_direction" in names else ""
+    fix = None if given else "if the log's wind is over ground all the same, say so: --platform corrected"
+    return _renamed(reading, names, "apparent-wind-only", text, value=shown.speed if shown else None, fix=fix)
+
+
+def _renamed(
+    reading: Reading, names: Mapping[str, str], kind: str, what: str, *, severity: Severity = Severity.WARNING,
+    value: float | None = None, fix: str | None = None,
+) -> Reading:  # fmt: skip
+    """The reading with channels under other names, and what is said of it."""
+    found = Finding(kind=kind, severity=severity, what=what, value=value, fix=fix)
+    channels = {names.get(name, name): values for name, values in reading.channels.items()}
+    return replace(reading, channels=channels).with_findings((found,))
 
 
 def check_corrected(reading: Reading, given: Platform | None, *, where: str) -> None:
@@ -150,33 +153,13 @@ def check_corrected(reading: Reading, given: Platform | None, *, where: str) -> 
     )  # fmt: skip
 
 
-def _fixed(reading: Reading) -> Reading:
-    """Apparent wind of a sensor that stands still as the wind, where the log has none over ground."""
-    channels = dict(reading.channels)
-    text = "fixed platform, as given"
-    if "wind_speed" not in channels and "apparent_wind_speed" in channels:
-        channels["wind_speed"] = channels.pop("apparent_wind_speed")
-        text += ": apparent wind is wind over ground, its direction still from the sensor's own mark"
-    finding = Finding(kind="fixed-platform", severity=Severity.NOTE, what=text)
-    return replace(reading, channels=channels).with_findings((finding,))
-
-
 def _of_unknown(reading: Reading) -> Reading:
-    if "wind_speed" in reading.channels:
+    has = set(reading.channels)
+    if "wind_speed" in has or has.isdisjoint({"theoretical_wind_speed", "apparent_wind_speed"}):
         return reading
-    if "theoretical_wind_speed" in reading.channels:
-        finding = Finding(
-            kind="apparent-wind-only", severity=Severity.WARNING,
-            what="wind that is computed as if its platform did not move (true wind, TWS): no ground truth",
-            fix="if it is wind over ground, computed with the platform's speed and heading, say so: "
-            "--platform corrected",
-        )  # fmt: skip
-        return reading.with_findings((finding,))
-    if "apparent_wind_speed" not in reading.channels:
-        return reading
-    finding = Finding(
-        kind="apparent-wind-only", severity=Severity.WARNING,
-        what="wind relative to a platform of unknown motion: no ground truth",
-        fix="if the sensor stands on a mast, say so: --platform fixed",
-    )  # fmt: skip
-    return reading.with_findings((finding,))
+    text = "wind relative to a platform of unknown motion"
+    fix = "if the sensor stands on a mast, say so: --platform fixed"
+    if "theoretical_wind_speed" in has:
+        text = "wind that is computed as if its platform did not move (true wind, TWS)"
+        fix = "if it is wind over ground, computed with the platform's speed and heading, say so: --platform corrected"
+    return _renamed(reading, {}, "apparent-wind-only", f"{text}: no ground truth", fix=fix)

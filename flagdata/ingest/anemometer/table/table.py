@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from flagdata import compass
 from flagdata.errors import InputError, NothingMeasuredError, UnknownNameError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.instants import counted, zones
-from flagdata.ingest.anemometer.instants.stamps import DAY, YEARS
+from flagdata.ingest.anemometer.instants import dates, zones
+from flagdata.ingest.anemometer.instants.stamps import YEARS
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
-from flagdata.ingest.anemometer.samples import possible
+from flagdata.ingest.anemometer.samples import rules
 from flagdata.ingest.anemometer.table import below, calm, codes, cumulated, unitcheck
 from flagdata.ingest.anemometer.table.rowclock import Block, Given, Order, RowClock, cells_of
 from flagdata.ingest.anemometer.text.cells import Cell, numbers
@@ -27,7 +27,6 @@ from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.timebase import NANOSECONDS
 from flagdata.units import unit
 
-_MINUTE = 60 * NANOSECONDS
 TURNS = ("deg", "10 deg")
 """Units of directions that services write codes in."""
 DOUBTED = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
@@ -246,7 +245,7 @@ def read_table(
     line = gathered.line()[order]
     findings.extend(found)
     if zone_name is not None and gathered.host is None and gathered.clock.stated():
-        counts = counted.is_elapsed(gathered.clock.form)
+        counts = dates.is_elapsed(gathered.clock.form)
         why = (
             "the stamps count from a start, which has a zone of its own"
             if counts
@@ -258,7 +257,6 @@ def read_table(
     named, zone_name = zone_name, zone_name or recipe.time.zone
     time, found = gathered.clock.instants(order, line=line, zone_name=zone_name, where=where, given=given)
     findings.extend(found)
-    findings.extend(_rounded(gathered.clock))
     if named is not None and recipe.time.zone is not None:
         findings.extend(zones.contradiction("the heading, or the recipe, says", recipe.time.zone, named, time))
     host_time = None
@@ -301,7 +299,7 @@ def read_table(
         channel_flags, found = cell_flags(name, layout, value, state, line)
         findings.extend(found)
         if away:
-            value, found = possible.direction(name, value, line, offset=unit(layout.unit).scale * layout.offset)
+            value, found = rules.direction(name, value, line, offset=unit(layout.unit).scale * layout.offset)
             findings.extend(found)
             value = turned(value, layout)
         channels[name] = value
@@ -319,21 +317,6 @@ def read_table(
         rules=recipe.quality, host_time=host_time, findings=tuple(findings),
     )  # fmt: skip
     return Table(reading=reading, extra={name: column.value(order) for name, column in gathered.extra.items()})
-
-
-def _rounded(clock: RowClock) -> tuple[Finding, ...]:
-    """What is said of times that are fractions of a day or an hour, where a digit is more than two minutes."""
-    if (
-        clock.form is None
-        or not any(part in clock.form for part in ("%J", "%Q"))
-        or not 2 * _MINUTE < clock.step < DAY // 2
-    ):
-        return ()
-    unsure = clock.step / 2 / _MINUTE
-    step = clock.step / _MINUTE
-    what = f"the times are fractions, whose last digit is {step:.2g} min: each is unsure by {unsure:.2g} min"
-    fix = "if another column holds the hour, name it beside the day: --columns with year, day_of_year and hour"
-    return (Finding(kind="times-rounded", severity=Severity.WARNING, value=unsure * 60, what=what, fix=fix),)
 
 
 def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str) -> tuple[Finding, ...]:

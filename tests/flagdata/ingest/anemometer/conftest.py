@@ -7,15 +7,41 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from flagdata.errors import FlagdataError
 from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.ingest.anemometer.draft.questions import OpenFactsError
-from flagdata.schema import SampleFlag
-from flagdata.signals import WindLog
+from flagdata.ingest.anemometer.reading import Reading
+from flagdata.schema import CHANNELS, SampleFlag
+from flagdata.signals import Sensor, WindLog
 
 Reader = Callable[..., WindLog]
+
+
+Made = Callable[..., Reading]
+SECOND = 1_000_000_000
+START = 1_777_636_800 * SECOND
+"""2026-05-01T12:00:00Z."""
+
+
+@pytest.fixture
+def made() -> Made:
+    """Makes rows at so many seconds after `START`, each with the wind speed given, or one of its own."""
+
+    def rows(seconds: object, speed: object = None, *, step: float = 1e-9, **more: object) -> Reading:
+        time = START + np.round(np.asarray(seconds, dtype=np.float64) * SECOND).astype(np.int64)
+        own = {name: more.pop(name) for name in [*more] if name in CHANNELS}
+        speeds = 2 + np.modf(np.arange(len(time)) * 0.618034)[0] * 7 if speed is None else speed
+        channels = {"wind_speed": speeds, **own} if speed is not False else own
+        return Reading(
+            time=time, channels={name: np.asarray(values, dtype=np.float64) for name, values in channels.items()},
+            flags=np.zeros(len(time), dtype=np.uint16), line=np.arange(2, len(time) + 2), step=round(step * SECOND),
+            **{"sensor": Sensor(name="test"), **more},  # type: ignore[arg-type]
+        )  # fmt: skip
+
+    return rows
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Callable
 from zoneinfo import ZoneInfo
 
 import numpy as np
@@ -11,9 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flagdata.errors import TimeError, UsageError
-from flagdata.ingest.anemometer.instants.dates import decide
+from flagdata.ingest.anemometer import WindOptions
+from flagdata.ingest.anemometer.draft.drafting import draft
+from flagdata.ingest.anemometer.instants import dates
+from flagdata.ingest.anemometer.instants.dates import date_form
 from flagdata.ingest.anemometer.instants.stamps import parse
-from flagdata.ingest.anemometer.instants.wall import to_utc
+from flagdata.ingest.anemometer.instants.zones import to_utc
+from flagdata.signals import WindLog
 from flagdata.timebase import wall_status
 
 S = 1_000_000_000
@@ -37,14 +42,15 @@ def ns(text: str) -> int:
         ("%m/%d/%y %I:%M:%S %p", "12/31/25 12:05:09 AM", "2025-12-31T00:05:09"),
         ("%m/%d/%y %I:%M:%S %p", "12/31/25 12:05:09 pm", "2025-12-31T12:05:09"),
         ("%d.%m.%Y %H:%M:%S", "05.11.2026 23:59:59", "2026-11-05T23:59:59"),
-        ("%Y %J %H", "2001 58.83 20", "2001-02-27T20:00:00"),
-        ("%Y %J %Q", "2001 58.83 20.0", "2001-02-27T20:00:00"),
-        ("%Y %J %Q", "2001 59.00 23.95", "2001-02-27T23:57:00"),
-        ("%Y %J %G", "2001 58.84 1215", "2001-02-27T20:15:00"),
         ("%Y %j %H:%M", "2024 366 01:02", "2024-12-31T01:02:00"),
         ("%d-%b-%Y %H:%M", "07-Jun-2012 13:00", "2012-06-07T13:00:00"),
         ("epoch-s", "1765296945", "2025-12-09T16:15:45"),
         ("epoch-ms", "1765296945000", "2025-12-09T16:15:45"),
+        ("epoch-us", "1765296945000000", "2025-12-09T16:15:45"),
+        ("epoch-ns", "1765296945000000000", "2025-12-09T16:15:45"),
+        # 46143 is 2026-05-01 (1900-01-01 is 1, and 1900-02-29, which never was, is counted); 730486 is 2000-01-01
+        ("excel-days", "46143.520833", "2026-05-01T12:30:00"),
+        ("datenum", "730486.75", "2000-01-01T18:00:00"),
     ],
 )
 def test_a_stamp_is_the_instant_it_says(form: str, text: str, expected: str) -> None:
@@ -161,30 +167,44 @@ def test_a_log_that_runs_through_the_skipped_hour_was_not_set_forward() -> None:
     assert caught.value.where == "log, line 31"
 
 
-@pytest.mark.parametrize(
-    ("texts", "order"),
-    [
-        (["13/6/2026 10:00"], "dmy"),
-        (["6/13/2026 10:00"], "mdy"),
-        (["2026-06-01 10:00"], "ymd"),
-        (["1/6/2026 0:00", "2/6/2026 0:00", "3/6/2026 0:00"], "dmy"),
-        (["6/1/2026 0:00", "6/2/2026 0:00", "6/3/2026 0:00"], "mdy"),
-        (["30.11.26 0:00"], "dmy"),
-    ],
-)
-def test_the_order_of_a_date_is_decided_by_evidence(texts: list[str], order: str) -> None:
-    assert decide(texts, given=None, where="x").order == order
+ORDERS: dict[str, tuple[list[str], str | None, str]] = {
+    "a number above 12": (["13/6/2026 10:00", "1/6/2026 10:00"], None, "%d/%m/%Y"),
+    "a second number above 12": (["6/13/2026 10:00"], None, "%m/%d/%Y"),
+    "a year in front": (["2026-06-01 10:00"], None, "%Y-%m-%d"),
+    "points": (["1.6.2026 0:00"], None, "%d.%m.%Y"),
+    "points and a year of two digits": (["30.11.26 0:00"], None, "%d.%m.%y"),
+    "years of two digits above 31": (["96-03-14 10:00"], None, "%y-%m-%d"),
+    "given": (["5/6/2026 10:00"], "mdy", "%m/%d/%Y"),
+    "given beside points": (["5.6.2026 10:00"], "mdy", "%m.%d.%Y"),
+    "given with a year of two digits in front": (["09/08/06 15:50"], "ymd", "%y/%m/%d"),
+}
+"""Stamps, the order that the user gives, and the date's form."""
 
 
-def test_a_told_order_for_dates_that_begin_with_the_year_is_refused() -> None:
-    with pytest.raises(TimeError, match="2026-06-01"):
-        decide(["2026-06-01 10:00"], given="dmy", where="x")
+@pytest.mark.parametrize("name", ORDERS)
+def test_the_order_of_a_date_is_decided_by_its_numbers_or_given(name: str) -> None:
+    texts, given_order, form = ORDERS[name]
+    assert date_form(texts, given=given_order, where="x")[0] == form  # type: ignore[arg-type]
 
 
-def test_an_order_without_evidence_is_refused_unless_told() -> None:
-    with pytest.raises(TimeError):
-        decide(["5/6/2026 10:00"], given=None, where="x")
-    assert decide(["5/6/2026 10:00"], given="mdy", where="x").order == "mdy"
+UNDECIDED: dict[str, tuple[list[str], str | None, str]] = {
+    "no number above 12": (["5/6/2026 10:00"], None, "give --date-order dmy or mdy"),
+    "dates that go on in one order alone": (["1/6/2026 0:00", "2/6/2026 0:00", "3/6/2026 0:00"], None, "dmy or mdy"),
+    "points beside a clock of twelve hours": (["5.6.2026 10:00 PM"], None, "dmy or mdy"),
+    "two digits that may be a year or a day": (["26-03-14 10:00"], None, "dmy or ymd"),
+    "another order than the given one": (["2026-06-01 10:00"], "dmy", "--date-order"),
+    "an order that a number contradicts": (["13/6/2026 10:00"], "mdy", "--date-order"),
+    "two orders": (["13/6/2026 10:00", "6/13/2026 10:00"], None, "split the file"),
+    "no date": (["10:00", "10:01"], None, "recipe"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", UNDECIDED)
+def test_what_nothing_decides_is_refused_with_the_option(name: str) -> None:
+    texts, given_order, fix = UNDECIDED[name]
+    with pytest.raises(TimeError) as caught:
+        date_form(texts, given=given_order, where="x")  # type: ignore[arg-type]
+    assert fix in (caught.value.fix or "")
 
 
 @pytest.mark.parametrize("year", [1900, 1969, 2201, 3000])
@@ -195,7 +215,151 @@ def test_a_year_outside_the_accepted_ones_is_told_from_what_is_no_date(year: int
 
 
 def test_a_fraction_may_stand_behind_a_sign_that_is_no_point() -> None:
-    for form in ("%Y%m%d_%H%M%S_%f", "%Y%m%d_%H%M%S_%U"):
-        found = parse(["20150101_001000_000000", "20150101_001000_250000"], form)
-        assert found.valid.all()
-        assert (found.ns - ns("2015-01-01T00:10:00")).tolist() == [0, S // 4]
+    found = parse(["20150101_001000_000000", "20150101_001000_250000"], "%Y%m%d_%H%M%S_%f")
+    assert found.valid.all()
+    assert (found.ns - ns("2015-01-01T00:10:00")).tolist() == [0, S // 4]
+
+
+MONTHS = ("Jan", "feb", "March", "APR", "may", "June", "Jul", "aug", "Sept", "October", "Nov", "December")
+
+
+def test_months_are_read_by_their_english_names_whole_or_cut_short_and_by_no_others() -> None:
+    found = parse([f"7 {name} 2026 1:00" for name in MONTHS], "%d %b %Y %H:%M")
+    assert found.ns.tolist() == [ns(f"2026-{month:02d}-07T01:00:00") for month in range(1, 13)]
+    others = ("Mai", "marraskuu", "Mars", "Maerz", "Juin", "Okt", "septembre", "ma")
+    assert not parse([f"7 {name} 2026 1:00" for name in others], "%d %b %Y %H:%M").valid.any()
+
+
+MIXED: dict[str, tuple[str, list[str], list[str], int]] = {
+    "dates alone are midnight": (
+        "iso", ["2026-05-01 23:50:00", "2026-05-02", "2026-05-02 00:10:00"],
+        ["2026-05-01T23:50:00", "2026-05-02T00:00:00", "2026-05-02T00:10:00"], 1),
+    "and in a form of their own": (
+        "%d.%m.%Y %I:%M %p", ["01.05.2026 11:50 PM", "02.05.2026", "02.05.2026 12:10 AM"],
+        ["2026-05-01T23:50:00", "2026-05-02T00:00:00", "2026-05-02T00:10:00"], 1),
+    "the end of a day with seconds": (
+        "%Y-%m-%d %H:%M", ["2026-05-01 23:00", "2026-05-01 24:00:00", "2026-05-02 01:00"],
+        ["2026-05-01T23:00:00", "2026-05-02T00:00:00", "2026-05-02T01:00:00"], 0),
+    "and without": (
+        "%Y-%m-%d %H:%M:%S", ["2026-05-01 23:00:00", "2026-05-01 24:00", "2026-05-02 01:00:00"],
+        ["2026-05-01T23:00:00", "2026-05-02T00:00:00", "2026-05-02T01:00:00"], 0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MIXED)
+def test_stamps_among_others_that_leave_out_or_add_what_is_zero(name: str) -> None:
+    form, texts, expected, dates_alone = MIXED[name]
+    found, bare = dates.parse(texts, form)
+    assert found.valid.all()
+    assert (found.ns.tolist(), bare) == ([ns(text) for text in expected], dates_alone)
+
+
+def test_an_empty_time_of_day_is_no_midnight() -> None:
+    found, _ = dates.parse(["23:59:58", "23:59:59", ""], "%H:%M:%S")
+    assert found.valid.tolist() == [True, True, False]
+
+
+TWELVE = ("%Y-%m-%d %H:%M", "%H:%M")
+
+
+@pytest.mark.parametrize("form", TWELVE)
+def test_a_clock_of_twelve_hours_without_am_or_pm_is_refused_and_no_other(form: str) -> None:
+    day, lines = ns("2026-05-01T00:00:00"), np.arange(1000)
+
+    def refused(hours: np.ndarray) -> bool:
+        wall = (hours * 3600).astype(np.int64) * S + (day if "%d" in form else 0)
+        try:
+            dates.refuse_twelve(wall, line=lines, where="x")
+        except TimeError as error:
+            return "AM and PM" in (error.fix or "")
+        return False
+
+    sixth = np.arange(500) / 6
+    days, clock = sixth // 24 * 24 * ("%d" in form), sixth % 24
+    twelve = np.where(clock % 12 < 1, clock % 12 + 12, clock % 12)
+    assert refused(days + twelve)
+    assert refused((days + twelve)[30:144])
+    assert not refused(days + clock)
+    mornings = np.concatenate([24 * at * ("%d" in form) + np.arange(8, 12.8, 1 / 6) for at in range(4)])
+    assert not refused(mornings)
+    with pytest.raises(UsageError, match="hours of 12"):
+        dates.check(form.replace("%H", "%I"))
+
+
+EVE = dt.datetime(2023, 12, 31, 22)  # noqa: DTZ001
+YEARLESS = ("%b %d %H:%M:%S", "%d-%b %H:%M", "%d/%m %H:%M", "%d %B %H:%M", "%b %d %I:%M %p", "%m %d %H %M", "%j %H:%M")
+
+
+def completed(form: str, stamps: list[dt.datetime], date: dt.date | None) -> np.ndarray:
+    found, _ = dates.parse([stamp.strftime(form) for stamp in stamps], form)
+    assert found.valid.all()
+    time, (said,) = dates.completed(found.ns, form, date=date, line=np.arange(2, 2 + len(stamps)), where="x")
+    assert "as given" in said.what
+    return time
+
+
+def every(minutes: int, count: int, start: dt.datetime = EVE) -> list[dt.datetime]:
+    return [start + dt.timedelta(minutes=minutes * at) for at in range(count)]
+
+
+@pytest.mark.parametrize("form", [*YEARLESS, "%H:%M:%S"])
+def test_the_first_rows_date_completes_all_over_a_new_year(form: str) -> None:
+    time = completed(form, every(10, 60), EVE.date())
+    assert time[0] == ns("2023-12-31T22:00:00")
+    assert set(np.diff(time)) == {600 * S}
+
+
+@pytest.mark.parametrize("given_date", [dt.date(2023, 12, 30), dt.date(2024, 1, 1), None])
+def test_another_day_than_the_first_rows_is_refused_with_the_right_one(given_date: dt.date | None) -> None:
+    for form in YEARLESS[:6]:
+        with pytest.raises(TimeError) as caught:
+            completed(form, every(10, 60), given_date)
+        assert f"--date {given_date.year if given_date else 'YYYY'}-12-31" in (caught.value.fix or "")
+
+
+@pytest.mark.parametrize("form", ["%b %d %H:%M", "%j %H:%M"])
+def test_a_leap_day_is_of_a_leap_year_alone(form: str) -> None:
+    start = dt.datetime(2024, 2, 28) if "b" in form else dt.datetime(2024, 12, 30)  # noqa: DTZ001
+    assert set(np.diff(completed(form, every(60, 48, start), start.date()))) == {3600 * S}
+    with pytest.raises(TimeError, match=r"2023 has no such day|not of 2023"):
+        completed(form, every(60, 48, start), start.date().replace(year=2023))
+
+
+def test_lines_of_an_instrument_after_dates_without_a_year(read: Callable[..., WindLog]) -> None:
+    text = "".join(f"{at:%b %d %H:%M:%S} $WIMWV,{k}.0,R,{3 + k % 2}.5,M,A\n" for k, at in enumerate(every(10, 20)))
+    with pytest.raises(TimeError, match="--date YYYY-12-31"):
+        read(text, zone="UTC")
+    found = read(text, zone="UTC", date=EVE.date())
+    assert found.series.time[0] == ns("2023-12-31T22:00:00")
+    assert set(np.diff(found.series.time)) == {600 * S}
+    with pytest.raises(TimeError, match="--date 2023-12-31"):
+        read(text, zone="UTC", date=dt.date(2023, 12, 30))
+
+
+def test_a_time_of_day_beside_a_date_that_does_not_read_is_not_the_time() -> None:
+    rows = [f"{at:%b %d,%I:%M %p},3.5" for at in every(10, 60)]
+    found = draft(["date,time,wind speed (m/s)", *rows], WindOptions(zone="UTC"))
+    assert found is not None
+    assert [question.key for question in found.open] == ["columns"]
+
+
+COUNTS: dict[str, tuple[str, list[str], list[float]]] = {
+    "milliseconds that run over 32 bits": (
+        "elapsed-ms", [str((2**32 - 3000 + at * 1000) % 2**32) for at in range(12)], list(range(12))),
+    "hours to the fourth digit": ("elapsed-h", ["0.1667", "0.3333", "0.5"], [0, 600, 1200]),
+    "seconds": ("elapsed-s", ["7.25", "7.5", "1e1"], [0, 0.25, 2.75]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", COUNTS)
+def test_counts_go_on_from_the_start_that_the_user_gives(name: str) -> None:
+    form, texts, expected = COUNTS[name]
+    found, _ = dates.parse(texts, form)
+    lines = np.arange(len(texts))
+    time, said = dates.since_start(found.ns, form, start=ns("2026-05-01T12:00:00"), line=lines, where="x")
+    assert ((time - ns("2026-05-01T12:00:00")) / S).tolist() == expected
+    assert ("counter-overflow" in [one.kind for one in said]) == ("run over" in name)
+    with pytest.raises(TimeError, match="count from a start"):
+        dates.since_start(found.ns, form, start=None, line=lines, where="x")
+    with pytest.raises(TimeError, match="starts again once, first at line 5"):
+        dates.since_start(np.array([0, 1, 2, 3, 4, 0, 1]) * S, form, start=0, line=np.arange(7), where="x")

@@ -10,7 +10,7 @@ import pytest
 
 from flagdata.errors import InputError
 from flagdata.ingest.anemometer.reading import Reading, streams
-from flagdata.ingest.anemometer.samples import quality
+from flagdata.ingest.anemometer.samples import rules
 from flagdata.ingest.store import ingest_wind
 from flagdata.lake import Lake
 from flagdata.rng import stream
@@ -62,7 +62,7 @@ def test_a_gap_of_one_kind_of_wind_is_named_with_it() -> None:
         time=T0 + time[keep], channels={"apparent_wind_speed": relative[keep], "wind_speed": over_ground[keep]},
         flags=np.zeros(len(keep), dtype=np.uint16), line=np.arange(len(keep)) + 1, sensor=Sensor(name="x"), step=1,
     )  # fmt: skip
-    (gap,) = quality.gaps(reading)
+    (gap,) = rules.gaps(reading).findings
     assert gap.value == pytest.approx(31.0)
     assert " of wind_speed " in gap.what
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import pytest
 
-from flagdata.ingest.anemometer.instants.abbreviations import advice
 from flagdata.ingest.anemometer.instants.zones import stated
 from flagdata.signals import WindLog
 
@@ -32,12 +31,10 @@ def kinds(log: WindLog) -> list[str]:
         ("Timezone=UTC", "UTC"),
         ("GMT Offset:,+01:00", "+01:00"),
         ("#DEBUG: Time Zone     -> America/New_York", "America/New_York"),
-        ("utc_offset_seconds,3600", "+01:00"),
         ("GMT Offset=+0530", "+05:30"),
         ("TimeZone=Etc/GMT-1", "Etc/GMT-1"),
         ("Timezone (UTC+)=1", "+01:00"),
         ("Timezone (UTC+)=0", "+00:00"),
-        ("latitude,utc_offset_seconds,timezone\n52.1,-18000,America/New_York", "-05:00"),
     ],
 )
 def test_a_zone_that_lines_above_the_rows_state_is_found(text: str, name: str) -> None:
@@ -60,8 +57,3 @@ def test_a_zone_off_the_preambles_is_told_whatever_reader_is_chosen(read: Read) 
         found = [finding for finding in log.findings if finding.kind == "zone-contradicts"]
         assert [finding.value for finding in found] == [6.0]
         assert "zone-contradicts" not in kinds(read(_NRG, format=name, zone="-05:00"))
-
-
-@pytest.mark.parametrize("heading", ["CST,Max wind mph,Wind SpeedMPH,Dew", "no,Year,DOY,MST,Direct,Wind speed [m/s]"])
-def test_the_letters_of_a_zone_as_a_heading_are_told_with_what_they_mean(heading: str) -> None:
-    assert "has several meanings" in advice([heading])
