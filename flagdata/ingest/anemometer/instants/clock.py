@@ -112,7 +112,9 @@ def set_back_a_little(time: Instants, choice: ClockChoice | None) -> tuple[Jump,
         undone = behind < len(steps) and abs(int(steps[behind]) - step + shift) <= _APART * abs(shift)
         if shift < 0 and not undone and float(np.abs(clock - sides @ solved).max()) <= _APART * abs(shift):
             found.append(Jump(row=int(rows[at + 1]), size=shift, whole=False))
-    return tuple(found) if len(found) <= MOST else ()
+        if len(found) > MOST:
+            return ()
+    return tuple(found)
 
 
 def _length(steady: NDArray[np.bool_]) -> int:

@@ -24,6 +24,7 @@ from flagdata.timebase import NANOSECONDS, iso
 
 Order = Literal["ymd", "dmy", "mdy"]
 _DATE = re.compile(r"^\s*(\d{4}|\d{1,2})([-/.])(\d{1,2})\2(\d{4}|\d{1,2})(?!\d)")
+_WORDS = {"dmy": "day/month", "mdy": "month/day", "ymd": "year/month"}
 _TWELVE = re.compile(r"\d\s*[AaPp]\.?[Mm]\b")
 """A clock of twelve hours, which no locale has beside points."""
 _LEAP = "2000"
@@ -105,12 +106,12 @@ def date_form(texts: Sequence[str], *, given: Order | None, where: str) -> tuple
     chosen = [one for one in (fit if given is None else [given]) if one in fit]
     points = len(chosen) > 1 and sign == "." and not any(map(_TWELVE.search, filled))
     if not fit:
-        raise TimeError("the dates mix several orders", where=where, fix="split the file")
+        raise TimeError("the dates are in no one order", where=where, fix="the file mixes several orders: split it")
     if not chosen:
-        what = f"dates are not {given}: {first} and the others are {' or '.join(fit)}"
-        raise TimeError(what, where=where, fix="correct --date-order, or leave it out")
+        fix = f"leave out --date-order, it is {' or '.join(fit)}"
+        raise TimeError(f"dates are not {given}, as {first} and the others show", where=where, fix=fix)
     if len(chosen) > 1 and not points:
-        what = f"{first} may be {' or '.join(chosen)}, and nothing in the log decides it"
+        what = f"{first} may be {' or '.join(_WORDS[one] for one in chosen)}, and nothing in the log decides it"
         raise TimeError(what, where=where, fix=f"give --date-order {' or '.join(chosen)}")
     reason = f"no other order fits the first {len(dated)} dates"
     if given is not None or points:

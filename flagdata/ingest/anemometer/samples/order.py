@@ -143,15 +143,16 @@ def _on_one_clock(reading: Reading, where: str, choice: ClockChoice | None) -> R
     if not np.any(lag > JITTER):
         return _continued(reading, clock.set_back_a_little(time, choice), choice)
     few = max(min(_FEW, n // _SHARE), n // 1000)
-    scattered = len(clock.set_back(time)) > few
+    scattered = int((np.diff(time) < -JITTER).sum()) > max(few, clock.MOST)
     wild = np.zeros(n, dtype=bool) if scattered else clock.excursions(time, most=few)
-    jumps = clock.set_back(time[~wild])
+    jumps = () if scattered else clock.set_back(time[~wild])
+    scattered |= len(jumps) > clock.MOST
     was_set = choice is not None or all(_believable(time[~wild], jump) for jump in jumps)
-    if int(wild.sum()) > max(few, n // _SHARE) or len(jumps) > clock.MOST or not was_set:
+    if scattered or not was_set or int(wild.sum()) > max(few, n // _SHARE):
         wild = np.ones(n, dtype=bool)
         wild[clock.longest_rise(time)] = False
         if int(wild.sum()) > few:
-            raise _runs_back(reading, where, settable=choice is None and len(jumps) <= clock.MOST)
+            raise _runs_back(reading, where, settable=choice is None and not scattered)
         jumps = ()
     elif jumps and choice is None and clock.disordered(time[~wild]):
         raise _runs_back(reading, where, settable=True)
@@ -242,13 +243,14 @@ def _distinct(reading: Reading, where: str) -> Reading:
             hold > 1.5 * reading.step or reading.step >= DAY or not _even(runs, period)
         ):  # fmt: skip
             raise _shared(reading, runs, hold, f"{where}, line {reading.line[shared][0]}")
-        held, moved, value = hold > 1.5 * reading.step or hold > _COARSE, np.ones(len(time), dtype=bool), hold
+        held, moved = hold > 1.5 * reading.step or hold > _COARSE, np.ones(len(time), dtype=bool)
         kind = "counted-together" if counted else "held-stamps" if held else "coarse-stamps"
         value = (period if held and not counted else reading.step) / NANOSECONDS
         what = f"stamps {hold / NANOSECONDS:g} s apart for about {int(np.median(runs.rows))} rows each: spread evenly, "
         what += f"one every {period / NANOSECONDS:.4g} s, so each time is unsure by up to {hold / NANOSECONDS:g} s"
     flags = np.where(moved, reading.flags | SampleFlag.TIME_UNSURE, reading.flags)
-    reading = replace(reading.marked(moved, kind, what, value=value), time=time).with_findings((), flags=flags)
+    rows = np.concatenate(([False], again)) if kind == "counted-together" else moved
+    reading = replace(reading.marked(rows, kind, what, value=value), time=time).with_findings((), flags=flags)
     stuck = np.concatenate(([False], np.diff(time) <= 0))
     what = "{n} rows carry the stamp of the row before them and other values"
     return reading.without(stuck, "duplicate-stamps", what, severity=Severity.ERROR, fix=_STATIONS)

@@ -192,9 +192,9 @@ UNDECIDED: dict[str, tuple[list[str], str | None, str]] = {
     "dates that go on in one order alone": (["1/6/2026 0:00", "2/6/2026 0:00", "3/6/2026 0:00"], None, "dmy or mdy"),
     "points beside a clock of twelve hours": (["5.6.2026 10:00 PM"], None, "dmy or mdy"),
     "two digits that may be a year or a day": (["26-03-14 10:00"], None, "dmy or ymd"),
-    "another order than the given one": (["2026-06-01 10:00"], "dmy", "--date-order"),
-    "an order that a number contradicts": (["13/6/2026 10:00"], "mdy", "--date-order"),
-    "two orders": (["13/6/2026 10:00", "6/13/2026 10:00"], None, "split the file"),
+    "another order than the given one": (["2026-06-01 10:00"], "dmy", "leave out --date-order, it is ymd"),
+    "an order that a number contradicts": (["13/6/2026 10:00"], "mdy", "leave out --date-order, it is dmy"),
+    "two orders": (["13/6/2026 10:00", "6/13/2026 10:00"], None, "split it"),
     "no date": (["10:00", "10:01"], None, "recipe"),
 }  # fmt: skip
 
