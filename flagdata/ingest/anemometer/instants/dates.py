@@ -99,11 +99,12 @@ def date_form(texts: Sequence[str], *, given: Order | None, where: str) -> tuple
     first, sign = dated[0][0].strip(), dated[0][2]
     widths = [len(dated[0][group]) for group in (1, 3, 4)]
     numbers = np.array([[int(match[group]) for group in (1, 3, 4)] for match in dated])
-    orders: list[Order] = ["ymd"] if widths[0] == 4 else ["dmy", "mdy"]
-    orders += ["ymd"] if 4 not in widths and (sign == "-" or given == "ymd") else []
+    orders: tuple[Order, ...] = ("ymd",) if widths[0] == 4 else ("dmy", "mdy")
+    if 4 not in widths and (sign == "-" or given == "ymd"):
+        orders = (*orders, "ymd")
     highest = {"d": 31, "m": 12, "y": 9999}
     fit = [one for one in orders if bool((numbers <= [highest[letter] for letter in one]).all())]
-    chosen = [one for one in (fit if given is None else [given]) if one in fit]
+    chosen = fit if given is None else [one for one in fit if one == given]
     points = len(chosen) > 1 and sign == "." and not any(map(_TWELVE.search, filled))
     if not fit:
         raise TimeError("the dates are in no one order", where=where, fix="the file mixes several orders: split it")

@@ -114,7 +114,7 @@ def test_light_wind_of_the_night_is_not_stale_beside_the_gusts_of_the_day(
     n = 20_000
     rho = np.exp(-interval / 5)
     noise = stream(11, "night", round(interval * 100)).normal(0, np.sqrt(1 - rho**2), n)
-    gust = lfilter([1.0], [1.0, -rho], noise)
+    gust = np.asarray(lfilter([1.0], [1.0, -rho], noise))
     mean = 1.2 + 4 * np.clip(np.sin(2 * np.pi * np.arange(n) / n), 0, None)
     speed = np.round(mean * (1 + 0.2 * gust) / resolution) * resolution
     # runs of a light wind are correlated, which the bound leaves out: a few rows of 20,000 may be taken for stale
