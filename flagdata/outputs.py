@@ -115,6 +115,9 @@ def write_file(path: Path, content: str | bytes, *, command: str | None = None) 
 def write_files(folder: Path, contents: Mapping[str, str | bytes | None], *, command: str | None = None) -> None:
     """Write files into a folder, which is made; all of them are on the disk before the first takes its name.
 
+    They take their names one after the other: a process that is killed in this moment leaves files of two runs, each
+    whole, which the same command replaces when it is given again.
+
     Args:
         contents: by name; None removes the command's own file of that name from an earlier run.
 
