@@ -28,8 +28,8 @@ from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
 from flagdata.align.motion import MotionSeries
 from flagdata.align.whitened import long_run_variance
 from flagdata.align.windbins import SHORTEST, lead, wind_bins
+from flagdata.averaging import average
 from flagdata.errors import InputError, RefusedError
-from flagdata.ingest.anemometer.samples.averaging import average
 from flagdata.schema import UNUSABLE
 from flagdata.signals import Instants, Series, WindAverage, WindSeries
 from flagdata.timebase import NANOSECONDS

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flagdata.averaging import average
 from flagdata.errors import InputError
-from flagdata.ingest.anemometer.samples.averaging import average
 from flagdata.schema import UNUSABLE
 from flagdata.signals import Sensor, WindAverage, WindSeries
 from flagdata.timebase import NANOSECONDS

@@ -16,8 +16,8 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 from numpy.typing import NDArray
 
 from flagdata.align.clock import ClockModel
+from flagdata.averaging import average
 from flagdata.errors import ConflictError, InputError, LimitError, TimeError, UsageError
-from flagdata.ingest.anemometer.samples.averaging import average
 from flagdata.record import messages, wind_messages
 from flagdata.record.checksums import CHECKSUMS, ChecksummedFile
 from flagdata.record.key_frames import is_key

@@ -48,6 +48,16 @@ def test_help_loads_neither_torch_nor_arrow_nor_a_decoder() -> None:
     assert done.stdout.splitlines()[-1] == "LOADED []"
 
 
+def test_a_record_and_the_lake_know_nothing_of_the_readers_of_logs() -> None:
+    offenders = [
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in modules("flagdata/record", "flagdata/lake")
+        for name in imported_from(path)
+        if name.startswith("flagdata.ingest")
+    ]
+    assert not offenders
+
+
 def test_the_package_runs_as_a_module() -> None:
     run = (sys.executable, "-m", "flagdata", "ingest", "--no-such-option")
     done = subprocess.run(run, capture_output=True, text=True, check=False)

@@ -13,9 +13,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.averaging import average
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.instants.clock import span
-from flagdata.ingest.anemometer.samples.averaging import average
 from flagdata.signals import WindSeries
 from flagdata.timebase import NANOSECONDS
 

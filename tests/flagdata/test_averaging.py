@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flagdata.averaging import average, correlation, instrument_sigma
 from flagdata.errors import InputError, UsageError
-from flagdata.ingest.anemometer.samples.averaging import average, correlation, instrument_sigma
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
 from flagdata.signals import Sensor, WindSeries
