@@ -65,9 +65,10 @@ class NothingMeasuredError(InputError):
 
 
 class ZoneMissingError(TimeError):
-    """Stamps of a wall clock whose zone nobody named."""
+    """Stamps of a wall clock whose zone nobody named: a question to the user, as a gate that is not met."""
 
     kind = "zone-missing"
+    exit_code = 3
 
 
 class NotFoundError(FlagdataError):

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from flagdata.ingest.anemometer.confirm import Drafted
+from flagdata.ingest.anemometer.confirm import Accepting, Drafted
 
 
-class Confirming:
+class Confirming(Accepting):
     """See `flagdata.ingest.anemometer.confirm.Confirm`."""
-
-    accept = None
 
     def __call__(self, drafted: Drafted) -> str:
         return "in a test"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
@@ -13,12 +13,10 @@ from flagdata.console import say
 from flagdata.errors import FlagdataError, RefusedError, ZoneMissingError
 
 if TYPE_CHECKING:
-    from flagdata.ingest.anemometer.confirm import Drafted
+    from flagdata.ingest.anemometer.confirm import Answers, Drafted
     from flagdata.ingest.anemometer.draft.questions import Open
 
 T = TypeVar("T")
-Answers = Mapping[str, object]
-"""Fields of `WindOptions` that were typed, by name."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +32,10 @@ class OnCommandLine:
     accept: str | None
     asks: bool
     quiet: bool = False
+
+    def answered(self, read: Callable[[Answers], T]) -> T:
+        """See `Confirm.answered`: questions are asked at a terminal."""
+        return with_answers(read, asks=self.asks)
 
     def __call__(self, drafted: Drafted) -> str:
         from flagdata.ingest.anemometer.confirm import Accepting, UnconfirmedError

@@ -123,8 +123,6 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
             click.echo(f"    {len(guess['winds'])} anemometers, each becomes an artifact{how}: {winds}")
         for doubt in guess["doubts"]:
             click.echo(f"    to say: {doubt}")
-        for need in guess["needs"]:
-            click.echo(f"    to say when it is ingested: {need}")
         if guess["draft"]:
             unfinished = guess["doubts"] or guess["kind"] == "other"
             state = "complete it where it says ?" if unfinished else "nothing is missing"

@@ -9,7 +9,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
-from flagdata.commands.confirm import Answers, with_answers
 from flagdata.commands.ingest_options import Given, check_applies
 from flagdata.commands.ingest_report import print_results, print_sniffed
 from flagdata.console import document, fail, progress, say
@@ -18,6 +17,7 @@ from flagdata.findings import Finding, Severity
 
 if TYPE_CHECKING:
     from flagdata.ingest.anemometer import Guess
+    from flagdata.ingest.anemometer.confirm import Answers
     from flagdata.ingest.store import IngestResult
     from flagdata.lake import Lake
 
@@ -129,7 +129,6 @@ def _guess(guess: Guess) -> dict[str, Any]:
         "draft": guess.draft,
         "notes": list(guess.notes),
         "doubts": list(guess.doubts),
-        "needs": list(guess.needs),
         "winds": list(guess.winds),
     }
 
@@ -199,7 +198,7 @@ def _one(lake: Lake, source: Path, kind: Guess, options: Given) -> tuple[IngestR
     if kind.kind == "meshes":
         return (_meshes(lake, source, kind, options),)
     if kind.kind != "camera":
-        return with_answers(lambda answers: _winds(lake, source, _with(options, answers)), asks=options.confirm.asks)
+        return options.confirm.answered(lambda answers: _winds(lake, source, _with(options, answers)))
     with progress(None, label=source.name, unit="frame") as advance, _CropPicture(options.crop_picture) as picture:
         result = ingest_camera(
             lake, source, options.camera, labels=options.labels, branch=options.branch, reasons=kind.reasons,

@@ -7,7 +7,7 @@ lies in the recording's axes, or the axis along which the air goes, must be give
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.confirm import UNASKED, Confirm, confirmed
+from flagdata.ingest.anemometer.confirm import UNASKED, Answers, Confirm, confirmed
 from flagdata.lake import Artifact, Lake
 from flagdata.provenance import file_hash
 from flagdata.record.parent import open_parent
@@ -103,17 +103,30 @@ def from_log(
     """The wind of an anemometer's file, of any format that can be ingested.
 
     Args:
-        confirm: asks whether a drafted reading is right; without it a draft is refused.
+        confirm: asks what the file leaves open, and whether a drafted reading is right; without it a draft is refused.
 
     Raises:
+        OpenFactsError, ZoneMissingError: nobody answered what the file leaves open.
         UnconfirmedError: nobody confirmed what the program drafted.
         FlagdataError: as `read_log` and `track`.
     """
-    options = options or WindOptions()
-    log = read_log(path, options)
-    confirmed(path, file_hash(path), [(log, options)], confirm)
-    wind, found = track(log.series, placement, where=f"wind log {path.name}")
-    return wind, (*log.findings, *found)
+
+    def read(answers: Answers) -> tuple[WindTrack, tuple[Finding, ...]]:
+        completed = replace(options or WindOptions(), **dict(answers))  # type: ignore[arg-type]
+        log = read_log(path, completed)
+        confirmed(path, file_hash(path), [(log, completed)], confirm)
+        wind, found = track(log.series, placement, where=f"wind log {path.name}")
+        return wind, (*_typed(answers), *log.findings, *found)
+
+    return confirm.answered(read)
+
+
+def _typed(answers: Answers) -> tuple[Finding, ...]:
+    """What was answered at a terminal about a file, so that the result states it."""
+    if not answers:
+        return ()
+    texts = (f"{name} {', '.join(given) if isinstance(given, tuple) else given}" for name, given in answers.items())
+    return (Finding(kind="answers-given", severity=Severity.NOTE, what=f"given at the terminal: {'; '.join(texts)}"),)
 
 
 def from_artifact(lake: Lake, artifact: Artifact, placement: LogPlacement) -> tuple[WindTrack, tuple[Finding, ...]]:

@@ -7,18 +7,20 @@ or replaced by a recipe.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from flagdata.errors import RefusedError
-from flagdata.findings import Severity
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.provenance import canonical, digest
 from flagdata.signals import WindLog
 from flagdata.timebase import iso
 
+T = TypeVar("T")
+Answers = Mapping[str, object]
+"""Fields of `WindOptions` that were typed, by name."""
 _HASH = 16
 _WIDE = 60
 """Characters of a raw line that a preview shows."""
@@ -64,8 +66,7 @@ class Drafted:
             series = log.series
             lines.append(f"  {len(series)} rows from {iso(int(series.time[0]))} to {iso(int(series.time[-1]))}")
             for found in log.findings:
-                if found.severity is not Severity.ERROR:
-                    lines.append(f"  {found.severity}: {found.what}{f'; {found.fix}' if found.fix else ''}")
+                lines.append(f"  {found.severity}: {found.what}{f'; {found.fix}' if found.fix else ''}")
         return "\n".join(lines)
 
 
@@ -95,11 +96,19 @@ class UnconfirmedError(RefusedError):
 
 
 class Confirm(Protocol):
-    """Asks, by whichever means, whether drafted readings are right."""
+    """Asks, by whichever means, what a file leaves open, and whether drafted readings are right."""
 
     @property
     def accept(self) -> str | None:
         """The hash that was given, if one was."""
+        ...
+
+    def answered(self, read: Callable[[Answers], T]) -> T:
+        """What `read` gives, called with the answers to all that the file leaves open; at first with none.
+
+        Raises:
+            ZoneMissingError, OpenFactsError: there is nobody to ask.
+        """
         ...
 
     def __call__(self, drafted: Drafted) -> str:
@@ -116,6 +125,10 @@ class Accepting:
     """
 
     accept: str | None = None
+
+    def answered(self, read: Callable[[Answers], T]) -> T:
+        """See `Confirm.answered`; nobody is asked."""
+        return read({})
 
     def __call__(self, drafted: Drafted) -> str:
         if self.accept == drafted.accept:

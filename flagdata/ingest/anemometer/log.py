@@ -13,6 +13,7 @@ from flagdata.errors import InputError, NothingMeasuredError, TimeError, UsageEr
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer import untimed
+from flagdata.ingest.anemometer.draft import doubts
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
 from flagdata.ingest.anemometer.identify import opened, recognised, unknown
 from flagdata.ingest.anemometer.instants import zones
@@ -26,9 +27,6 @@ from flagdata.ingest.anemometer.table.delimited import Delimited, drafted
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import CHANNELS, UNUSABLE
 from flagdata.signals import WindLog, WindSeries
-
-_DOUBTS = frozenset({"heading-doubtful", "unit-doubtful"})
-"""Findings that speak against what a file states."""
 
 
 def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
@@ -69,9 +67,8 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     try:
         reading = reader.read(source, options)
     except ZoneMissingError as error:
-        if statement is None:
-            raise
-        fix = f"{error.fix}; {statement.advice()}"
+        hint = f"; {statement.advice()}" if statement is not None else ""
+        fix = f"{error.fix}{hint}; or state it in a recipe, as [time] zone: --sensor FILE.toml"
         raise ZoneMissingError(error.what, where=error.where, fix=fix) from None
     reported = {finding.kind for finding in reading.findings}
     if (
@@ -94,18 +91,18 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     for rule in rules.RULES:
         reading = rule(reading)
     reading = rules.future(reading, now=time.time_ns())
-    findings = (*reading.findings, *_nothing_measured(reading, where=str(path)))
+    findings = (*reading.findings, *(() if reading.drafted else doubts.reported(reading)))
+    findings = (*findings, *_nothing_measured(reading, where=str(path)))
     series = WindSeries(
         time=reading.time, channels=reading.channels, flags=reading.flags, sensor=reading.sensor,
         host_time=reading.host_time,
     )  # fmt: skip
     reasons = reading.understood or reasons
     text = reading.drafted or reading.described or (_text(options.recipe) if options.recipe is not None else None)
-    stated = reading.stated and _DOUBTS.isdisjoint(finding.kind for finding in findings)
     rows = shown_rows(source, reading) if reading.drafted else ()
     return WindLog(
         series=series, format=name, findings=findings, reasons=reasons, plan=understood(name, text),
-        drafted=reading.drafted, stated=stated, rows=rows,
+        drafted=reading.drafted, stated=reading.stated, rows=rows,
     )  # fmt: skip
 
 
@@ -136,9 +133,6 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
         fix = "check the sensor, and which columns are read"
         below = any((values < 0).any() for name, values in reading.channels.items() if name in rules.SPEEDS)
         fix += "; if calm air reads below zero, give --zero-offset" if below else ""
-        doubt = next((finding for finding in reading.findings if finding.kind == "unit-doubtful"), None)
-        if doubt is not None:
-            what, fix = f"{what}; {doubt.what}", doubt.fix or fix
         raise NothingMeasuredError(f"nothing to measure: {what}", where=f"{where}, line {reading.line[0]}", fix=fix)
     text = f"{what}; kept for {', '.join(others)}: no ground truth comes of it"
     return (

@@ -22,7 +22,6 @@ class Guess:
         draft: a recipe (TOML) for a table that no recipe describes; "?" stands where it is to be completed.
         notes: what was left out, and what is odd.
         doubts: what must be said before it can be read, each with how to say it.
-        needs: what `ingest` will ask for beside, each with how to say it.
         winds: labels of the anemometers, where a draft names several.
     """
 
@@ -35,7 +34,6 @@ class Guess:
     draft: str | None = None
     notes: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
-    needs: tuple[str, ...] = ()
     winds: tuple[str, ...] = ()
 
 

@@ -69,7 +69,7 @@ def test_a_unit_that_is_missing_is_asked_for_and_taken(run: Run, lake: Lake, tmp
     assert 'unit = "km/h"' in best["draft"]
 
 
-STORM = [f"--expect={key}" for key in ("fast", "strong", "constant", "unit-doubtful")]
+STORM = [f"--expect={key}" for key in ("fast", "strong", "constant")]
 """Answers to the doubts about a column that holds 400 m/s in every row."""
 
 

@@ -1,6 +1,7 @@
-"""Numbers of a drafted reading that are impossible or doubtful: each opens a question that only the user answers.
+"""Numbers of a log that are impossible or doubtful: of a draft each opens a question that only the user answers.
 
-A doubt is answered for good by its key in a recipe: `[expect] confirmed = ["fast", …]`.
+A doubt is answered for good by its key in a recipe: `[expect] confirmed = ["fast", …]`. Of a log that an exact format
+or a recipe reads, those that speak against the column or its unit are reported.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.instants.stamps import DAY
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import Recipe
@@ -30,6 +32,18 @@ _CALM = 0.2
 _FAR = 0.1
 """Share of a log by which its time goes back no clock that was set goes."""
 _NORTH = 30.0
+_WINDY = 12.0
+"""m/s; Cape Denison, the windiest station known, has an annual mean of 19.4 m/s (Mawson 1915)."""
+_CODE, _MOST = 2.0, 1e5
+"""Times all others that a code for no value is, and a number that is a code in any unit."""
+_CHANGES, _RISES, _ANEW = 20, 0.7, 6.0
+"""Changes from which on a count is recognised, share of them that rise, and median rises at which it begins anew."""
+_CHANCE, _DISTINCT = -4.0, 4
+"""Logarithm of the probability by chance below which a grid is evidence, and distinct values that can be."""
+_GRIDS = {"mph": (1.0, 0.5, 0.1), "kn": (1.0, 0.5, 0.1), "km/h": (1.0, 0.1), "m/s": (1.0, 0.5, 0.1)}
+"""Steps in which instruments measure, and the units that are written."""
+_FACTOR = 6e-4
+"""Relative error of the factors that loggers convert with (0.447, 0.514, 1.609)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,13 +84,8 @@ def doubts(reading: Reading, recipe: Recipe, *, assumed: frozenset[str], left_ou
         left_out: lines that could not be read.
         now: UTC nanoseconds.
     """
-    speed, direction = (_written(reading, recipe, name) for name in ("wind_speed", "wind_direction"))
-    known = np.isfinite(speed) & np.isfinite(direction)
-    seen = _Seen(
-        reading=reading, speed=speed[np.isfinite(speed)], direction=direction[np.isfinite(direction)],
-        both=(speed[known], direction[known]), unit=_unit(recipe, "wind_speed"), assumed="wind_direction" in assumed,
-        left_out=left_out, now=now,
-    )  # fmt: skip
+    written = {name: _written(reading, recipe, name) for name in ("wind_speed", "wind_direction")}
+    seen = _seen(reading, written, _unit(recipe, "wind_speed"), "wind_direction" in assumed, left_out=left_out, now=now)
     found = ((key, check(seen), question) for key, (check, question) in CHECKS.items() if key not in recipe.expect)
     of_values = tuple(Doubt(key=key, text=text, question=question) for key, text, question in found if text)
     of_reader = (
@@ -84,6 +93,30 @@ def doubts(reading: Reading, recipe: Recipe, *, assumed: frozenset[str], left_ou
         for one in reading.findings if one.kind in REPORTED and one.kind not in recipe.expect
     )  # fmt: skip
     return (*of_values, *of_reader)
+
+
+def reported(reading: Reading) -> tuple[Finding, ...]:
+    """What speaks against the column or the unit of the wind that an exact format or a recipe has read."""
+    speed = next((one for one in ("wind_speed", "apparent_wind_speed") if one in reading.channels), None)
+    if speed is None or not len(reading.time):
+        return ()
+    written = {"wind_speed": reading.channels[speed], "wind_direction": np.full(len(reading.time), np.nan)}
+    seen = _seen(reading, written, "m/s", assumed=False, left_out=0, now=0)
+    return tuple(
+        Finding(kind="doubtful-numbers", severity=Severity.WARNING, what=f"{speed}: {text}", fix=CHECKS[key][1])
+        for key in _OF_THE_COLUMN if (text := CHECKS[key][0](seen))
+    )  # fmt: skip
+
+
+def _seen(
+    reading: Reading, written: Mapping[str, Series], unit_name: str, assumed: bool, *, left_out: int, now: int
+) -> _Seen:
+    speed, direction = written["wind_speed"], written["wind_direction"]
+    known = np.isfinite(speed) & np.isfinite(direction)
+    return _Seen(
+        reading=reading, speed=speed[np.isfinite(speed)], direction=direction[np.isfinite(direction)],
+        both=(speed[known], direction[known]), unit=unit_name, assumed=assumed, left_out=left_out, now=now,
+    )  # fmt: skip
 
 
 def _unit(recipe: Recipe, name: str) -> str:
@@ -112,7 +145,80 @@ def _fast(seen: _Seen) -> str:
 
 def _strong(seen: _Seen) -> str:
     median = float(np.median(_si(seen))) if len(seen.speed) else 0.0
+    days = int(np.ptp(seen.reading.time)) / DAY
+    if median > _WINDY and days >= 1:
+        return f"the median speed of {days:.3g} days is {median:.3g} m/s, more than of the windiest stations"
     return f"the median speed is {median:.3g} m/s" if median > _STRONG else ""
+
+
+def _code(seen: _Seen) -> str:
+    """One number, again and again, far above all others or below all directions: what loggers write for no value."""
+    found: list[str] = []
+    high, counts = np.unique(seen.speed, return_counts=True)
+    if len(high) > 1 and counts[-1] > 1 and (high[-1] > _CODE * high[-2] or high[-1] > _MOST):
+        found.append(f"{high[-1]:g} {seen.unit} occurs {counts[-1]} times, and all other speeds are up to {high[-2]:g}")
+    low, counts = np.unique(seen.direction[seen.direction < 0], return_counts=True)
+    if len(low) == 1 and counts[0] > 1 and seen.direction.max() > 180:
+        found.append(f"the direction {low[0]:g} occurs {counts[0]} times, and no other is below 0")
+    return "; ".join(found)
+
+
+def _grows(seen: _Seen) -> str:
+    """Whether most changes are rises, and what falls begins anew near the size of one: a count, a distance, a sum.
+
+    A speed falls about as often as it rises: that m changes in a row are rises has a probability of about 2⁻ᵐ.
+    """
+    steps = np.diff(seen.speed)
+    rises, falls = steps[steps > 0], np.flatnonzero(steps < 0)
+    if len(rises) < _RISES * max(_CHANGES, len(rises) + len(falls)) or bool((seen.speed < 0).any()):
+        return ""
+    usual = float(np.median(rises))
+    anew = len(falls) == 0 or float((seen.speed[falls + 1] <= _ANEW * usual).mean()) >= 0.9
+    high = (seen.speed[falls] > _ANEW * usual).any() if len(falls) else seen.speed.max() > 2 * _CHANGES * usual
+    if not (anew and high):
+        return ""
+    return f"the speed rises in {len(rises)} of {len(rises) + len(falls)} changes, as a sum does"
+
+
+def _steps(seen: _Seen) -> str:
+    """Whether the speeds are multiples of a step of one unit written in another unit than the one that is stated.
+
+    That n distinct values all are multiples of a step g by chance, within t, has the probability (4 t / g)ⁿ:
+    2 t for the product as it is, and as much for one whose factor was rounded first.
+    """
+    known = np.unique(seen.speed[seen.speed > 0])
+    if len(known) < _DISTINCT:
+        return ""
+    rounding = _rounding(known)
+    found: list[tuple[float, str, str]] = []
+    for native, steps in _GRIDS.items():
+        for shown in {*_GRIDS, seen.unit} - {native}:
+            for step in steps:
+                chance = _on(known, step * unit(native).scale / unit(shown).scale, rounding)
+                found.append((chance, shown, f"the speeds are multiples of {step:g} {native} written in {shown}"))
+    chance, shown, text = min(found)
+    stated = min(chance for chance, shown, _ in found if shown == seen.unit)
+    return f"{text}, and {seen.unit} is stated" if chance < _CHANCE and shown != seen.unit and stated > _CHANCE else ""
+
+
+def _rounding(known: Series) -> float:
+    """The last digit that is used."""
+    digits = (one for one in range(6) if np.all(np.abs(known * 10**one - np.round(known * 10**one)) < 1e-4))
+    return 10.0 ** -next(digits, 6)
+
+
+def _on(known: Series, grid: float, rounding: float) -> float:
+    """Logarithm of the probability that distinct values are multiples of `grid` by chance; 0 where they are not.
+
+    A logger may round the factor first, as 0.45 m/s for a mile an hour, and write 0.9 for two.
+    """
+    tolerance = rounding / 2 * 1.02 + _FACTOR * known
+    usable = tolerance < grid / 8
+    whole = np.round(known / grid)
+    off = np.minimum(np.abs(known - whole * grid), np.abs(known - whole * np.round(grid / rounding) * rounding))
+    if usable.sum() < _DISTINCT or float((off[usable] <= tolerance[usable]).mean()) < 0.98:
+        return 0.0
+    return float(np.log10(4 * tolerance[usable] / grid).sum())
 
 
 def _negative(seen: _Seen) -> str:
@@ -164,6 +270,12 @@ def _calm(seen: _Seen) -> str:
     if bool((si[zero] <= _CALM).all()) and bool((si[~zero] > _CALM).any()):
         return f"{rows}, all of them at speeds up to {_CALM:g} m/s"
     near = (np.minimum(direction % 360, -direction % 360) < _NORTH) & ~zero
+    if (
+        bool((np.abs(direction - np.round(direction, -1)) < 1e-6).all())
+        and (~zero).sum() > 10
+        and direction.max() > 180
+    ):
+        return f"{rows}, and all others are whole tens of degrees, none of them 360"
     return "" if near.any() else f"{rows}, and no other is within {_NORTH:g}° of north"
 
 
@@ -206,6 +318,9 @@ CHECKS: Mapping[str, tuple[Callable[[_Seen], str], str]] = {
     "negative": (_negative, "Do negative speeds occur, as of a calibration's zero?"),
     "still": (_still, "Did the wind rest all the time?"),
     "constant": (_constant, "Did the wind never change?"),
+    "code": (_code, "Is this a measured value?"),
+    "steps": (_steps, "Is the unit right?"),
+    "grows": (_grows, "Is this a speed, and no distance, count or sum?"),
     "angles": (_angles, "Are these speeds, and no directions?"),
     "tens": (_tens, "Are these degrees, and no tens of degrees or sectors?"),
     "fixed": (_fixed, "Did the vane never turn?"),
@@ -217,10 +332,8 @@ CHECKS: Mapping[str, tuple[Callable[[_Seen], str], str]] = {
     "lines": (_lines, "May these lines be left out?"),
 }
 """Key of [expect] → the check, and what is asked; "yes" confirms the reading as it is."""
-REPORTED = frozenset(
-    {
-        "code-for-missing", "out-of-range", "north-or-calm", "speed-only-grows", "speed-may-be-sum", "unit-doubtful",
-        "below-threshold", "calm-in-words",
-    }
-)  # fmt: skip
+_OF_THE_COLUMN = ("strong", "code", "steps", "grows", "angles")
+REPORTED = frozenset({"out-of-range", "below-threshold", "calm-in-words", "zero-beside-360"})
 """Kinds of findings of the reader that are doubts of a draft, each by its kind."""
+KEYS = frozenset({*CHECKS, *REPORTED, "components", "gust", "order"})
+"""All that [expect] and --expect can hold; "components" and "gust" are doubts of the draft itself (see `beside`)."""

@@ -11,11 +11,13 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from flagdata import compass
+from flagdata.ingest.anemometer.draft.beside import components as contradicted
+from flagdata.ingest.anemometer.draft.beside import gust_factor
 from flagdata.ingest.anemometer.draft.given import GivenColumns, given_columns
 from flagdata.ingest.anemometer.draft.questions import ZONE, Open
 from flagdata.ingest.anemometer.draft.shape import Shape, is_missing, is_number, shape_of
 from flagdata.ingest.anemometer.draft.times import TimeFields, find_time, of_columns
-from flagdata.ingest.anemometer.draft.toml import ChannelText, recipe_text
+from flagdata.ingest.anemometer.draft.toml import ChannelText, quoted, recipe_text, reference
 from flagdata.ingest.anemometer.draft.words import MOVING, Meaning, fits, meaning
 from flagdata.ingest.anemometer.instants import dates
 from flagdata.ingest.anemometer.options import WindOptions
@@ -148,8 +150,8 @@ def _mixed(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
         if (one.kind == "site" or of_units) and index not in parts.used and 1 < len(values) < len(shape.rows):
             several = f"{len(values)} {'units' if of_units else 'sites'}"
             question = f"rows are of {several} by {shape.shown(index)}: {', '.join(values[:_LISTED])}; which one?"
-            example = f"FILE.toml, with [rows] column = {shape.reference(index)!r}, value = {values[0]!r}"
-            parts.open.append(Open(key="sensor", question=question, example=example))
+            lines = f"[rows]\ncolumn = {reference(shape.reference(index))}\nvalue = {quoted(values[0])}"
+            parts.open.append(Open(key="sensor", question=question, example="FILE.toml", lines=lines))
 
 
 def _cutting(shape: Shape, lines: Sequence[str]) -> Fact:
@@ -266,7 +268,12 @@ def _of_wind(
         )
         parts.open.append(Open(key="platform", question=question, example="PLATFORM"))
     _measured(parts, shape, meanings, "wind_speed", chosen, options, given=given)
-    _direction(parts, shape, meanings, chosen)
+    direction = _direction(parts, shape, meanings, chosen)
+    doubts = [gust_factor(shape, meanings, chosen)]
+    if direction is not None and {"wind_x", "wind_y"} <= set(components):
+        beside = (components["wind_x"], components["wind_y"])
+        doubts.append(contradicted(shape, beside, direction, parts.channels["wind_direction"].unit))
+    parts.open += [one for one in doubts if one is not None and one.example not in options.expect]
     _beside(parts, shape, meanings)
     return tuple(labels), False
 
@@ -298,15 +305,15 @@ _STATED: Origin = "stated"
 _GIVEN: Origin = "given"
 
 
-def _direction(parts: _Parts, shape: Shape, meanings: Sequence[Meaning], speed: int) -> None:
-    """The direction that belongs to a speed: of the same height, the only one of the table."""
+def _direction(parts: _Parts, shape: Shape, meanings: Sequence[Meaning], speed: int) -> int | None:
+    """The direction that belongs to a speed: of the same height, the only one of the table; its column, if numeric."""
     near = [
         i for i, one in enumerate(meanings)
         if one.kind == "direction" and not set(one.against) - {"to", "toward", "towards", "going"}
         and meanings[speed].height in (None, one.height)
     ]  # fmt: skip
     if len(near) != 1:
-        return
+        return None
     index = near[0]
     own = meanings[index]
     unit, origin, evidence = own.unit, _STATED, "the heading; from true north, clockwise, is the convention"
@@ -315,15 +322,15 @@ def _direction(parts: _Parts, shape: Shape, meanings: Sequence[Meaning], speed: 
         question = f"{shape.shown(index)} has points of the compass whose O may be east or west: of which language?"
         example = f"'{shape.reference(index)}=wind_direction[points-de] (or points-es, …), and all other columns'"
         parts.open.append(Open(key="columns", question=question, example=example))
-        return
+        return None
     if points is not None:
         unit, origin, evidence = points, "inferred", "its cells are points of the compass"
     elif not _numeric(shape.column(index)):
-        return
+        return None
     elif unit is None:
         unit, origin, evidence = "deg", "assumed", "no unit is stated"
     elif not fits("wind_direction", unit):
-        return
+        return None
     elif own.plain not in _PLAIN["wind_direction"]:
         origin = "inferred"
     if own.against:
@@ -334,6 +341,7 @@ def _direction(parts: _Parts, shape: Shape, meanings: Sequence[Meaning], speed: 
     parts.channels["wind_direction"] = ChannelText(column=shape.reference(index), unit=unit)
     value = f"{shape.shown(index)} in {unit}"
     parts.facts.append(Fact(what="wind_direction", value=value, origin=origin, evidence=evidence))
+    return index if points is None else None
 
 
 def _beside(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:

@@ -16,14 +16,21 @@ class Open:
         key: the option that answers it.
         question: in words.
         example: what stands behind the option; never an answer, but for the key of a doubt.
+        lines: to be added to a recipe, where only a recipe answers it.
     """
 
     key: str
     question: str
     example: str
+    lines: str = ""
 
     def fix(self) -> str:
         """The option that answers it."""
+        if self.lines:
+            return (
+                "save the recipe that flagdata ingest --sniff prints as FILE.toml, replace each ? in it, and add"
+                f"\n{self.lines}\nfor the one to be read; then name it: --sensor FILE.toml"
+            )
         return f"--{self.key.replace('_', '-')} {self.example}{' (if yes)' if self.key == 'expect' else ''}"
 
 
@@ -44,9 +51,10 @@ class OpenFactsError(RefusedError):
     @classmethod
     def of(cls, questions: Sequence[Open], *, where: str) -> OpenFactsError:
         """The error for some questions, which names what answers each."""
+        recipes = [one.fix() for one in questions if one.lines]
+        options = f"answer by {' '.join(one.fix() for one in questions)}; or describe the file by a recipe: "
         return cls(
             f"the file leaves this open: {'; '.join(one.question for one in questions)}",
             where=where, questions=tuple(questions),
-            fix=f"answer by {' '.join(one.fix() for one in questions)}; or describe the file by a recipe: "
-            "--sensor FILE.toml",
+            fix="; ".join(recipes) or f"{options}--sensor FILE.toml",
         )  # fmt: skip

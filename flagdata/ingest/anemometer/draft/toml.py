@@ -37,10 +37,10 @@ def recipe_text(
         "", "[time]",
     ]  # fmt: skip
     columns = ["?"] if time is None else [shape.reference(i) for i in time]
-    lines += [f"columns = [{', '.join(map(_reference, columns))}]", f"format = {quoted(form or '?')}"]
+    lines += [f"columns = [{', '.join(map(reference, columns))}]", f"format = {quoted(form or '?')}"]
     lines += [f"zone = {quoted(zone)}"] if zone is not None else []
     for name, channel in channels.items():
-        lines += ["", f"[channels.{name}]", f"column = {_reference(channel.column)}", f"unit = {quoted(channel.unit)}"]
+        lines += ["", f"[channels.{name}]", f"column = {reference(channel.column)}", f"unit = {quoted(channel.unit)}"]
         lines += ['convention = "to"'] if channel.towards else []
     return "\n".join([*lines, "", "[sensor]", f"name = {quoted(label)}", ""])
 
@@ -50,5 +50,6 @@ def quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t") + '"'
 
 
-def _reference(column: str | int) -> str:
+def reference(column: str | int) -> str:
+    """A column as TOML writes it: its heading, or its number."""
     return str(column) if isinstance(column, int) else quoted(column)

@@ -48,6 +48,7 @@ _EXTREME = _words(
     "gust gusts gustspeed max maximum min minimum peak high hi low lo highest lowest extreme boe böe bö rafale "
     "racha raffica windgust maxi mini"
 )
+GUSTS = _EXTREME - _words("min minimum low lo lowest mini")
 _SPREAD = _words("std stdev sd stddev sigma deviation dev variance var rms ti turbulence count quality qc flag")
 MOVING = _words(
     "apparent aws awa awd relative bow vessel boat ship drone uav sog cog heading hdg ground gps vehicle truewind "
@@ -105,6 +106,12 @@ def meaning(name: str, below: str = "") -> Meaning:
 def fits(channel: str, unit: str) -> bool:
     """Whether a unit is one of a channel's."""
     return unit in UNITS and UNITS[unit].si == CHANNELS[channel].unit
+
+
+def named_alike(one: Meaning, other: Meaning) -> bool:
+    """Whether a gust has the name of a speed: its words, but those of gusts and speeds, are among the other's."""
+    left, right = (set(a.plain.split()) - _EXTREME - _SPEED - {"mean", "avg", "average"} for a in (one, other))
+    return left <= right
 
 
 def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import recipe as recipes
-from flagdata.ingest.anemometer.draft.doubts import doubts
+from flagdata.ingest.anemometer.draft.doubts import KEYS, doubts
 from flagdata.ingest.anemometer.draft.drafting import Draft, draft
 from flagdata.ingest.anemometer.draft.questions import Open, OpenFactsError
 from flagdata.ingest.anemometer.draft.words import meaning
@@ -18,8 +18,12 @@ from flagdata.ingest.anemometer.formats.described import column_findings, comple
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import OpenRecipe, Recipe
+from flagdata.ingest.anemometer.samples import platform
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
-from flagdata.ingest.anemometer.table.by_recipe import read_by_recipe
+from flagdata.ingest.anemometer.table.rowclock import Given
+from flagdata.ingest.anemometer.table.sonic import with_horizontal
+from flagdata.ingest.anemometer.table.table import read_table
+from flagdata.ingest.anemometer.text.rows import RowReader
 from flagdata.ingest.anemometer.text.source import TextFile
 
 _ASKED = frozenset({"unit", "date_order", "wind", "columns", "missing", "expect"})
@@ -59,17 +63,35 @@ class Delimited:
         recipe = recipes.load(options.recipe)
         if isinstance(recipe, OpenRecipe):
             done = complete(recipe, source.head(HEAD_LINES), options, where=where)
-            reading = read_by_recipe(source, done.recipe, options, azimuth=options.azimuth)
+            reading = _by_recipe(source, done.recipe, options, options.azimuth)
             return reading.with_findings((*done.findings, *column_findings(done)))
         if recipe.file.host:
             raise UsageError(
                 f"the recipe {recipe.name} is for host-stamped lines", where=where, fix="use --as host-stamped"
             )
-        return read_by_recipe(source, recipe, options, azimuth=options.azimuth)
+        return _by_recipe(source, recipe, options, options.azimuth)
+
+
+def _by_recipe(source: TextFile, recipe: Recipe, options: WindOptions, azimuth: float | None) -> Reading:
+    """All rows of a table, in the order of the file; `azimuth` of components' axes [rad, clockwise from true north]."""
+    where, rows = str(source.path), RowReader(source, recipe.file)
+    columns = platform.position_columns(rows.header or ()) or ()
+    given = Given(start=options.start, date=options.date, clock=options.clock)
+    table = read_table(rows, recipe, where=where, zone_name=options.zone, extra=columns, given=given)
+    reading = with_horizontal(table.reading, azimuth, where=where)
+    positions = {name: table.extra[column] for name, column in zip(platform.POSITION, columns, strict=False)}
+    return platform.settle(reading, options.platform, positions=positions, where=where)
 
 
 def drafted(source: TextFile, options: WindOptions) -> Draft | None:
-    """The draft of a file; `None` where it holds no table."""
+    """The draft of a file; `None` where it holds no table.
+
+    Raises:
+        UnknownNameError: an answer to a doubt that there is not.
+    """
+    for key in options.expect:
+        if key not in KEYS:
+            raise UnknownNameError.of("doubt", key, KEYS, where="--expect")
     return draft(source.head(HEAD_LINES), options)
 
 
@@ -86,7 +108,7 @@ def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:
     recipe = recipes.parse(found.recipe, where=f"the draft for {where}")
     recipe = replace(recipe, expect=frozenset((*options.expect, *(("order",) if options.clock is not None else ()))))
     azimuth = _WEST if found.of_earth and options.azimuth is None else options.azimuth
-    reading = read_by_recipe(source, recipe, options, azimuth=azimuth)
+    reading = _by_recipe(source, recipe, options, azimuth)
     if _LEFT_OUT & {finding.kind for finding in reading.findings}:
         _refuse_new_names(source, recipe, where)
     odd = doubts(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -18,19 +18,17 @@ from flagdata.ingest.anemometer.instants.stamps import YEARS
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
 from flagdata.ingest.anemometer.samples import rules
-from flagdata.ingest.anemometer.table import below, calm, codes, cumulated, unitcheck
 from flagdata.ingest.anemometer.table.rowclock import Block, Given, Order, RowClock, cells_of
 from flagdata.ingest.anemometer.text.cells import Cell, numbers
 from flagdata.ingest.anemometer.text.columns import Columns
 from flagdata.ingest.anemometer.text.growing import Growing
 from flagdata.schema import CHANNELS, SampleFlag
-from flagdata.timebase import NANOSECONDS
 from flagdata.units import unit
 
-TURNS = ("deg", "10 deg")
-"""Units of directions that services write codes in."""
-DOUBTED = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
-"""Channels whose unit is held against their values."""
+_ROUND = 1e-6
+"""rad, by which an angle is off after its conversion."""
+_SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
+"""Channels in which a word for calm air, or "<0.3", is a speed."""
 _DIRECTIONS = frozenset(name for name in CHANNELS if name.endswith(("wind_direction", "wind_direction_magnetic")))
 
 
@@ -115,7 +113,6 @@ class _Gathered:
     bad_stamps: list[int] = field(default_factory=list)
     distant: int = 0
     blank: list[int] = field(default_factory=list)
-    turns: dict[str, list[NDArray[np.float64]]] = field(default_factory=dict)
 
     def columns(self) -> list[_Column]:
         return [*self.channels.values(), *self.extra.values()]
@@ -127,7 +124,6 @@ class _Gathered:
 
     def add(self, line: NDArray[np.int64], block: Block, recipe: Recipe) -> None:
         if self.rows is not None and recipe.rows is not None:
-            self._directions(block, recipe)
             wanted = _among(block, self.rows, (recipe.rows.value,))
             line, block = line[wanted], _where(block, wanted)
             if not len(line):
@@ -158,25 +154,31 @@ class _Gathered:
             right = _among(block, check.index, check.layout.values)
             check.right.append(right[keep])
 
-    def _directions(self, block: Block, recipe: Recipe) -> None:
-        """Keep the directions of all sites, since what stands for calm air is a rule of the whole file."""
-        for name, column in self.channels.items():
-            if _blows_from(name) and column.points is None and recipe.channels[name].unit in TURNS:
-                cells = cells_of(block, column.index)
-                read = numbers(cells, decimal=recipe.file.decimal, missing=recipe.file.missing, suffix=column.suffix)
-                self.turns.setdefault(name, []).append(read.value)
-
-    def beside(self, name: str) -> NDArray[np.float64] | None:
-        """(m,) a direction of all sites' rows as written; `None` where the file has one site."""
-        return np.concatenate(self.turns[name]) if name in self.turns else None
-
     def line(self) -> NDArray[np.int64]:
         return self.lines.view()
 
 
-def _blows_from(name: str) -> bool:
-    """Whether a channel is an angle that the wind blows from."""
-    return CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from")
+def _still(states: Mapping[str, NDArray[np.uint8]]) -> dict[str, NDArray[np.bool_]]:
+    """Where a word for calm air stands in a speed: the speed's name and those of its directions → (n,) rows.
+
+    WMO-No. 8 (part I, chapter 5) and WMO-No. 306 (FM 15, 00000KT): calm air has speed 0 and no direction.
+    """
+    calm = {name: state == Cell.CALM for name, state in states.items() if (state == Cell.CALM).any()}
+    return {
+        one: here for name, here in calm.items()
+        for one in (name, *(other for other in states if other.startswith(name.replace("speed", "direction"))))
+    }  # fmt: skip
+
+
+def _of_cells(
+    kind: str, severity: Severity, name: str, here: NDArray[np.bool_], line: NDArray[np.int64], what: str
+) -> Finding:
+    """The finding about the cells of a channel in the rows `here` (n,)."""
+    count = int(here.sum())
+    return Finding(
+        kind=kind, severity=severity, count=count, where=f"line {line[here][0]}",
+        what=f"{count} {what.format(name=name)}",
+    )  # fmt: skip
 
 
 def _in_degrees(cells: Sequence[str] | pa.StringArray, decimal: str, points: Mapping[str, float]) -> list[str]:
@@ -263,51 +265,42 @@ def read_table(
     if gathered.host is not None:
         host_time, _ = gathered.host.instants(order, line=line, zone_name=zone_name, where=where, given=Given())
     channels: dict[str, NDArray[np.float64]] = {}
-    unsure: dict[str, NDArray[np.bool_]] = {}
     flags = np.zeros(len(line), dtype=np.uint16)
     states = {name: column.state(order) for name, column in gathered.channels.items()}
-    still = calm.rows(states)
-    sensor = recipe.sensor
+    sensor, still = recipe.sensor, _still(states)
     for name, column in gathered.channels.items():
         layout, state = recipe.channels[name], states.pop(name)
         unreadable = int((state == Cell.UNREADABLE).sum())
         refuse_if_most(unreadable, len(line) - unreadable, f"unreadable values of {name}", where)
         cells = column.value(order)  # NaN where a cell is no number
-        if name in DOUBTED and name in still:
-            findings.append(calm.report(name, still[name], line))
+        if name in still and name in _SPEEDS:
+            what = "cells of {name} are words for calm air: read as 0 m/s, without a direction"
+            findings.append(_of_cells("calm-in-words", Severity.NOTE, name, still[name], line, what))
         elif name in still:
             state, cells = np.where(still[name], np.uint8(Cell.CALM), state), np.where(still[name], np.nan, cells)
-        away = _blows_from(name)
-        if name in DOUBTED or (away and layout.unit in TURNS):
-            beside = gathered.beside(name)
-            coded = codes.within_a_turn(cells, beside=beside) if away else codes.speeds(cells)
-            if away:
-                unsure[name] = codes.north_or_calm(cells, beside=beside)
-            findings.extend(codes.report(name, cells, coded, line))
-            state = np.where(coded, np.uint8(Cell.MISSING), state)
-            cells = np.where(coded, np.nan, cells)
         value = in_si(cells, layout)
         if column.limit:
             limit = float(in_si(np.array([column.limit]), layout)[0])
-            findings.append(below.report(name, state == Cell.BELOW, limit, line))
-            sensor = below.known(sensor, limit)
-        if name in DOUBTED:
-            span = float(time.max() - time.min()) / NANOSECONDS
-            doubt = unitcheck.contradiction(cells * layout.gain, layout.unit, span=span, channel=name)
-            findings.extend([doubt] if doubt is not None else [])
-            findings.extend(cumulated.report(name, cells, line))
+            what = f"cells of {{name}} say no more than that it was below {limit:.3g} m/s: read as 0"
+            below = _of_cells("below-threshold", Severity.WARNING, name, state == Cell.BELOW, line, what)
+            findings.append(replace(below, value=limit))
+            # averages over the ground truth's window know by the threshold what a 0 may hide
+            sensor = sensor if sensor.threshold is not None else replace(sensor, threshold=limit)
         channel_flags, found = cell_flags(name, layout, value, state, line)
         findings.extend(found)
-        if away:
+        if CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from"):
             value, found = rules.direction(name, value, line, offset=unit(layout.unit).scale * layout.offset)
             findings.extend(found)
+            zero, north = value == 0, np.abs(value - 2 * np.pi) < _ROUND
+            if zero.any() and north.any():
+                what = (
+                    f"values of {{name}} are 0, and {int(north.sum())} are 360: where 360 is north, 0 may be calm air"
+                )
+                findings.append(_of_cells("zero-beside-360", Severity.WARNING, name, zero, line, what))
             value = turned(value, layout)
         channels[name] = value
         if name in WIND_CHANNELS:
             flags |= channel_flags
-    for name, zero in unsure.items():
-        speed = channels.get(name.replace("direction", "speed"))
-        findings.extend(codes.may_be_calm(name, zero if speed is None else zero & (speed > 0), line))
     for check in gathered.checks:
         fault, found = check.faults(order, line)
         flags[fault] |= SampleFlag.SENSOR_FAULT
@@ -371,7 +364,7 @@ def _channel_columns(recipe: Recipe, rows: Rows, where: str) -> dict[str, int]:
 def _channel_column(name: str, index: int, layout: ChannelLayout) -> _Column:
     return _Column(
         index=index, suffix=layout.suffix, points=compass.BY_UNIT.get(layout.unit),
-        calm=compass.STILL if name in DOUBTED else (), absent=tuple(compass.CALM) if name in _DIRECTIONS else (),
+        calm=compass.STILL if name in _SPEEDS else (), absent=tuple(compass.CALM) if name in _DIRECTIONS else (),
     )  # fmt: skip
 
 
@@ -416,13 +409,7 @@ def cell_flags(
     def note(mask: NDArray[np.bool_], flag: SampleFlag, kind: str, severity: Severity, what: str) -> None:
         if mask.any():
             flags[mask] |= flag
-            count = int(mask.sum())
-            found.append(
-                Finding(
-                    kind=kind, severity=severity, count=count, where=f"line {line[mask][0]}",
-                    what=f"{count} {what} of {name}",
-                )
-            )  # fmt: skip
+            found.append(_of_cells(kind, severity, name, mask, line, f"{what} of {{name}}"))
 
     note(state == Cell.MISSING, SampleFlag.MISSING, "missing-values", Severity.WARNING, "missing values")
     note(state == Cell.UNREADABLE, SampleFlag.MISSING, "unreadable-values", Severity.ERROR, "unreadable values")

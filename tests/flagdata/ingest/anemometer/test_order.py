@@ -15,7 +15,6 @@ from flagdata.ingest.anemometer.instants.clock import ClockChoice, longest_rise
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.samples.order import in_order
 from flagdata.ingest.anemometer.samples.rules import gaps
-from flagdata.ingest.anemometer.table import cumulated
 from flagdata.rng import stream
 from flagdata.schema import SampleFlag
 from flagdata.signals import WindLog
@@ -250,16 +249,3 @@ def test_a_date_a_row_is_its_midnight(read: Read, tmp_path: Path) -> None:
     rows = "".join(f"2026-05-{at:02d},{3 + at / 10:.1f}\n" for at in range(1, 31))
     log = read("time,v\n" + rows, zone="UTC", recipe=str(recipe))
     assert set(np.diff(log.series.time)) == {86_400 * 10**9}
-
-
-def test_winds_that_wander_and_steps_of_a_tunnel_are_no_sums() -> None:
-    draws = stream(1, "wandering winds")
-    wandering = (np.round(np.abs(3 + np.cumsum(draws.normal(0, 0.3, 400))), 1) for _ in range(50))
-    assert not [at for at, speeds in enumerate(wandering) if cumulated.grows(np.asarray(speeds, dtype=np.float64))]
-    assert not cumulated.grows(np.repeat(np.arange(0, 21, 1.0), 30))
-
-
-def test_a_sum_that_begins_anew_is_a_doubt(read: Read) -> None:
-    sums = [2.5, 4, 8.5, 11, 15.5, 17, 21.5, 24, 1.5, 3, 1.5, 4, 2.5, 5, 9.5, 11, 13.5, 1.5, 4, 5.5] * 2
-    rows = "".join(f"2026-05-01T12:00:{at:02d}Z,{value}\n" for at, value in enumerate(sums))
-    assert "speed-may-be-sum" in kinds(read("time,wind speed (m/s)\n" + rows))

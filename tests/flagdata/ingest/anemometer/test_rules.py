@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -409,11 +408,3 @@ def test_sonic_components_give_speed_and_direction(read: Read) -> None:
     log = read(head + rows, zone="UTC", azimuth=np.pi / 2)
     assert log.series.channels["wind_speed"] == pytest.approx([5.0, 5.0])
     assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([90 - 53.130102, 90.0])
-
-
-@pytest.mark.parametrize(("mean", "doubted"), [(60.0, 0), (327.0, 1)])
-def test_a_median_in_kilometres_an_hour_that_no_wind_has_is_doubted(read: Read, mean: float, doubted: int) -> None:
-    start = dt.datetime(2026, 5, 13, 12)  # noqa: DTZ001
-    stamps = (start + dt.timedelta(minutes=at) for at in range(60))
-    rows = "".join(f"{at.isoformat()}Z,{value:.3f}\n" for at, value in zip(stamps, intense(mean, 0.1), strict=True))
-    assert kinds(read(f"time,wind speed (km/h)\n{rows}")).count("unit-doubtful") == doubted
