@@ -16,7 +16,8 @@ from flagdata.commands import confirm as commands
 from flagdata.errors import ConflictError
 from flagdata.ingest import store
 from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.confirm import Accepting, UnconfirmedError
+from flagdata.ingest.anemometer.confirm import Accepting, Drafted, UnconfirmedError
+from flagdata.ingest.anemometer.draft.questions import OpenFactsError
 from flagdata.ingest.store import WindIngest, ingest_wind
 from flagdata.lake import Lake
 from flagdata.record import Record
@@ -155,6 +156,61 @@ def test_close_loop_reads_no_draft_that_nobody_confirmed(table: Path) -> None:
         from_log(table, placement, options)
     wind, _ = from_log(table, placement, options, confirm=Accepting(refused.value.accept))
     np.testing.assert_allclose(wind.velocity[0], [18.4 / 3.6, 0, 0])
+
+
+def test_close_loop_asks_at_a_terminal_what_a_log_leaves_open_as_ingest_does(
+    table: Path, types, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    placement = LogPlacement(axis=(1.0, 0.0, 0.0))
+    with pytest.raises(OpenFactsError, match="zone"):
+        from_log(table, placement, confirm=commands.on_command_line(None, as_json=False))
+    types("+02:00\nyes\n")
+    wind, found = from_log(table, placement, confirm=commands.on_command_line(None, as_json=False))
+    np.testing.assert_allclose(wind.velocity[0], [18.4 / 3.6, 0, 0])
+    assert [one.what for one in found if one.kind == "answers-given"] == ["given at the terminal: zone +02:00"]
+
+
+def test_an_exact_format_that_lacks_its_zone_alone_asks_for_it_with_both_ways_out(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "kestrel.csv"
+    rows = "".join(f"2026-05-14 11:30:{k:02d},21.3,48.2,{5 + k % 3}.2,{220 + k}\n" for k in range(30))
+    path.write_text(
+        "Device Name,KESTREL - 2412345\nDevice Model,5500\nSerial Number,2412345\n"
+        "FORMATTED DATE_TIME,Temperature,Relative Humidity,Wind Speed,Direction - True\n"
+        f"YYYY-MM-DD HH:MM:SS,°C,%,m/s,Deg\n{rows}"
+    )
+    code, _, err = run("ingest", path)
+    assert code == 3
+    assert "--zone Europe/Amsterdam" in err
+    assert "[time] zone: --sensor FILE.toml" in err
+
+
+def test_a_table_of_several_sites_is_refused_with_the_lines_of_the_recipe_that_reads_one(
+    run: Run, lake: Lake, tmp_path: Path
+) -> None:
+    path = tmp_path / "masts.csv"
+    rows = [f"2026-05-01T12:00:{k:02d}Z,{mast},{v + k % 3}.5" for k in range(30) for mast, v in (("A", 4), ("B", 9))]
+    path.write_text("\n".join(["time,site,wind_speed (m/s)", *rows]) + "\n")
+    code, _, err = run("ingest", path)
+    assert code == 3
+    lines = '[rows]\ncolumn = "site"\nvalue = "A"\n'
+    assert lines in err
+    recipe = tmp_path / "mast-a.toml"
+    drafted = json.loads(run("ingest", "--sniff", path, "--json")[1])["sources"][0]["guesses"][0]["draft"]
+    recipe.write_text(f"{drafted}\n{lines}")
+    assert run("ingest", path, "--sensor", recipe)[0] == 0
+    (row,) = lake.rows().to_pylist()
+    assert json.loads(row["report"])["samples"] == 30
+    assert json.loads(row["report"])["mean_speed"] == pytest.approx(5.5)  # of mast A; of mast B it is 10.5
+
+
+def test_the_preview_shows_what_was_lost(tmp_path: Path) -> None:
+    path = tmp_path / "mast.csv"
+    path.write_text(TABLE.replace("20,4;202", "?!;202", 1) + "14.05.2026;nonsense;18,4;200\n")
+    options = WindOptions(zone="+02:00", expect=("lines",))
+    log = read_log(path, options)
+    preview = Drafted(path=path, source_hash="", readings=((log, options),)).preview()
+    assert "error: 1 rows whose stamp is not" in preview
+    assert "error: 1 unreadable values of wind_speed" in preview
 
 
 def _understood(log: WindLog, **changes: object) -> WindLog:

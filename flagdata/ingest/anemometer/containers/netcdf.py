@@ -17,7 +17,8 @@ from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.text.source import TableText
 from flagdata.units import UNITS, spelled
 
-_MAGIC = (b"CDF\x01", b"CDF\x02", b"CDF\x05", b"\x89HDF")
+_HDF = b"\x89HDF"
+_MAGIC = (b"CDF\x01", b"CDF\x02", b"CDF\x05", _HDF)
 _STANDARD = {
     "wind_speed": "wind_speed", "wind_from_direction": "wind_direction", "wind_to_direction": "wind_direction",
     "eastward_wind": "eastward wind",
@@ -41,11 +42,16 @@ def open_dataset(path: Path, *, limits: Limits) -> TableText:
     where = str(path)
     xarray: Any = importlib.import_module("xarray")
     with path.open("rb") as stream:  # opened here: scipy leaves a damaged file open
+        if stream.read(4) == _HDF and not {"h5netcdf", "netcdf4"} & set(xarray.backends.list_engines()):
+            what = "this is netCDF-4 or another HDF5 file, and no library that reads it is installed"
+            fix = "pip install h5netcdf; or convert it, nccopy -k classic FILE OTHER.nc; or export it as CSV"
+            raise InputError(what, where=where, fix=fix)
+        stream.seek(0)
         try:
             data = xarray.open_dataset(stream, decode_times=True).squeeze()
         except Exception as error:  # noqa: BLE001 - a damaged file makes its libraries raise anything
             what = f"this netCDF or HDF5 file cannot be read: {type(error).__name__}"
-            raise InputError(what, where=where, fix="pip install h5netcdf for netCDF-4, or export it as CSV") from None
+            raise InputError(what, where=where, fix="copy it again, or export it as CSV") from None
         with data:
             return _table(data, path, limits)
 

@@ -188,7 +188,9 @@ def seen(speed: NDArray[np.float64], unit_name: str, days: float = 0.01) -> str:
         time=time, channels=channels, flags=np.zeros(len(speed), np.uint16), line=np.arange(len(speed)),
         sensor=Sensor(name="made"), step=1,
     )  # fmt: skip
-    recipe = replace(recipes.load("generic-csv"), expect=frozenset(KEYS - {"steps", "strong", "grows"}))
+    known = recipes.load("generic-csv")
+    assert isinstance(known, recipes.Recipe)
+    recipe = replace(known, expect=frozenset(KEYS - {"steps", "strong", "grows"}))
     layout = replace(recipe.channels["wind_speed"], unit=unit_name)
     recipe = replace(recipe, channels={"wind_speed": layout})
     return "; ".join(one.text for one in doubts(reading, recipe, assumed=frozenset(), left_out=0, now=0))
@@ -228,6 +230,6 @@ def test_winds_that_wander_and_steps_of_a_tunnel_are_no_sums() -> None:
     draws = stream(1, "wandering winds")
     wandering = (np.round(np.abs(3 + np.cumsum(draws.normal(0, 0.3, 400))), 1) for _ in range(50))
     assert not [speeds for speeds in wandering if "as a sum" in seen(speeds, "m/s")]
-    assert "as a sum" not in seen(np.repeat(np.arange(0, 21, 1.0), 30), "m/s")
+    assert "as a sum" not in seen(np.repeat(np.arange(21, dtype=np.float64), 30), "m/s")
     sums = [2.5, 4, 8.5, 11, 15.5, 17, 21.5, 24, 1.5, 3, 1.5, 4, 2.5, 5, 9.5, 11, 13.5, 1.5, 4, 5.5] * 2
     assert "as a sum" in seen(np.array(sums), "m/s")

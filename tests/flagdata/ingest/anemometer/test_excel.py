@@ -22,7 +22,8 @@ Book = Callable[..., Path]
 @pytest.fixture
 def book(tmp_path: Path) -> Book:
     """Writes sheets of rows to a workbook and returns its path."""
-    openpyxl: Any = pytest.importorskip("openpyxl", reason="openpyxl absent: pip install 'flagdata[excel]'")
+    pytest.importorskip("python_calamine", reason="python-calamine absent: pip install 'flagdata[excel]'")
+    openpyxl: Any = pytest.importorskip("openpyxl", reason="openpyxl absent: pip install 'flagdata[dev]'")
 
     def write(**sheets: Sequence[Sequence[object]]) -> Path:
         made = openpyxl.Workbook()
@@ -106,9 +107,9 @@ def test_without_the_library_the_extra_is_named(tmp_path: Path, monkeypatch: pyt
     path = tmp_path / "wind.xlsx"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("xl/workbook.xml", "<workbook/>")
-    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    monkeypatch.setitem(sys.modules, "python_calamine", None)
     with pytest.raises(ImportError):
-        importlib.import_module("openpyxl")
+        importlib.import_module("python_calamine")
     with pytest.raises(InputError, match="library that reads it is not installed") as caught:
         read_log(path)
     assert "flagdata[excel]" in (caught.value.fix or "")

@@ -85,3 +85,14 @@ def test_a_file_that_is_cut_off_is_refused(tmp_path: Path, size: int) -> None:
     path = written(tmp_path, SPEED, FROM)
     path.write_bytes(path.read_bytes()[:size])
     assert "cannot be read" in refusal(path, WindOptions()).what
+
+
+def test_netcdf_4_without_a_library_that_reads_it_is_refused_with_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("xarray.backends.list_engines", lambda: {"scipy": None})
+    path = tmp_path / "wind.nc"
+    path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(200))
+    error = refusal(path, WindOptions())
+    assert "netCDF-4" in error.what
+    assert "pip install h5netcdf" in error.fix
