@@ -229,7 +229,7 @@ def test_days_of_gales_are_odd_and_an_hour_is_not() -> None:
 def test_winds_that_wander_and_steps_of_a_tunnel_are_no_sums() -> None:
     draws = stream(1, "wandering winds")
     wandering = (np.round(np.abs(3 + np.cumsum(draws.normal(0, 0.3, 400))), 1) for _ in range(50))
-    assert not [speeds for speeds in wandering if "as a sum" in seen(speeds, "m/s")]
+    assert not [speeds for speeds in wandering if "as a sum" in seen(np.asarray(speeds, dtype=np.float64), "m/s")]
     assert "as a sum" not in seen(np.repeat(np.arange(21, dtype=np.float64), 30), "m/s")
     sums = [2.5, 4, 8.5, 11, 15.5, 17, 21.5, 24, 1.5, 3, 1.5, 4, 2.5, 5, 9.5, 11, 13.5, 1.5, 4, 5.5] * 2
     assert "as a sum" in seen(np.array(sums), "m/s")
