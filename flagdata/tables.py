@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import MISSING, dataclass, fields
 from enum import StrEnum
-from typing import Any, TypeAlias, TypeVar
+from types import NoneType
+from typing import Any, Literal, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
 
 from flagdata.errors import InputError, LimitError, UnknownNameError
 
 E = TypeVar("E", bound=StrEnum)
+R = TypeVar("R")
 WHOLE_LIMIT = 1_000_000
 """Most of anything that a recipe counts, where no other limit is named."""
 SEED_LIMIT = 2**63 - 1
@@ -55,6 +57,16 @@ class Range:
         return {"low": self.low, "high": self.high, "scale": self.scale.value}
 
 
+@dataclass(frozen=True, kw_only=True)
+class Bounds:
+    """Where a number may lie: at least `least`, above `above`, at most `most`."""
+
+    least: float = -math.inf
+    above: float = -math.inf
+    most: float = math.inf
+
+
+POSITIVE, NOT_NEGATIVE, COUNT = Bounds(above=0.0), Bounds(least=0.0), Bounds(least=1)
 Quantity: TypeAlias = float | Range
 """One value for all members, or a range that each draws its own from."""
 
@@ -104,10 +116,77 @@ class Table:
             if key not in self._asked:
                 raise UnknownNameError.of("key", key, self._asked, where=self.where)
 
+    def only(self, *keys: str) -> None:
+        """Refuse other keys before any value is looked at; raises as `done`."""
+        self._asked |= set(keys)
+        self.done()
+
     def table(self, key: str) -> Table:
         """A table inside; an empty one if it is not there."""
         self._asked.add(key)
         return Table(self._content.get(key, {}), where=f"{self.where} [{key}]")
+
+    def record(self, kind: type[R], read: Mapping[str, Callable[[], Any]] | None = None, /, **bounds: Bounds) -> R:
+        """A dataclass whose fields are the keys of this table in kebab-case; other keys are refused before all else.
+
+        A field is read by its type: float, int, bool, str, a Literal, a StrEnum, `Quantity`, `Range`,
+        tuple[float, ...] or tuple[str, ...], each also with None. The class states what a key that is not there
+        stands for; a text without that may not be blank.
+
+        Args:
+            read: field → what gives its value by rules of its own, whether its key is there or not.
+            bounds: of numbers, by the field's name; whole numbers are from 0 to `WHOLE_LIMIT` in any case.
+
+        Raises:
+            UnknownNameError: a key or a choice that is not known; the nearest is suggested.
+            InputError: a value that does not fit, or none for a field without a default.
+            LimitError: a whole number above its bound.
+        """
+        hints, values = get_type_hints(kind), {}
+        entries = {entry.name.replace("_", "-"): entry for entry in fields(kind)}  # pyright: ignore[reportArgumentType]
+        self.only(*entries)
+        for key, entry in entries.items():
+            needed = entry.default is MISSING and entry.default_factory is MISSING
+            if entry.name in (read or {}):
+                values[entry.name] = (read or {})[entry.name]()
+            elif key in self._content:
+                values[entry.name] = self._of_type(key, hints[entry.name], bounds.get(entry.name))
+            if needed and str(values.get(entry.name, "")).strip() == "":
+                raise InputError(f"no {key}", where=self.where, fix=f"add {key} = …")
+        return kind(**values)
+
+    def _of_type(self, key: str, hint: Any, bounds: Bounds | None) -> Any:
+        """The value of a key as a field of that type."""
+        kinds = {hint} if get_origin(hint) in (None, tuple, Literal) else set(get_args(hint)) - {NoneType}
+        within = vars(bounds or Bounds())
+        if kinds == {float, Range}:
+            return self.quantity(key, math.nan, **within)
+        (kind,) = kinds
+        readers: dict[Any, Callable[[], Any]] = {
+            Range: lambda: self.range(key, math.nan, **within),
+            float: lambda: self.number(key, math.nan, **within),
+            int: lambda: self.whole(
+                key, 0, least=int(max(within["least"], 0)), most=int(min(within["most"], WHOLE_LIMIT))
+            ),
+            bool: lambda: self.flag(key),
+            str: lambda: self.text(key, None),
+            tuple[str, ...]: lambda: self.texts(key),
+            tuple[float, ...]: lambda: self.numbers(key),
+        }
+        if kind in readers:
+            return readers[kind]()
+        return self.text(key, None) if get_origin(kind) is Literal else self.choice(key, next(iter(kind)))
+
+    def named(self, key: str, default: str, known: Collection[str], *, noun: str) -> str:
+        """One of the known names.
+
+        Raises:
+            UnknownNameError: another; the nearest is suggested.
+        """
+        name = self.text(key, default)
+        if name not in known:
+            raise UnknownNameError.of(noun, str(name), known, where=self.where)
+        return str(name)
 
     def says(self, key: str, word: str) -> bool:
         """Whether the value is this text."""
@@ -223,6 +302,13 @@ class Table:
                 self._bound(key, end, least=least, above=above, most=most)
             return value
         return self.number(key, default, least=least, above=above, most=most)
+
+    def range(
+        self, key: str, default: float, *, least: float = -math.inf, above: float = -math.inf, most: float = math.inf
+    ) -> Range:
+        """As `quantity`; one number is a range of no width."""
+        value = self.quantity(key, default, least=least, above=above, most=most)
+        return value if isinstance(value, Range) else Range(low=value, high=value)
 
     def angle(self, key: str, default: float) -> Quantity:
         """An angle [rad]: a quantity in radians under `key`, or in degrees under `key-deg`.

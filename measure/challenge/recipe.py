@@ -16,15 +16,15 @@ All values are SI. A *range* is `{ low = …, high = …, scale = "linear" | "lo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from math import lcm
 from typing import Any
 
-from flagdata.errors import InputError, LimitError, UnknownNameError
+from flagdata.errors import InputError, LimitError
 from flagdata.recipes import Shelf, parsed
 from flagdata.registry import Registry
-from flagdata.tables import Range, Table
+from flagdata.tables import NOT_NEGATIVE, POSITIVE, Bounds, Range, Table
 from sim import material
 
 CHALLENGES = Shelf(folder="challenges", noun="challenge")
@@ -69,13 +69,13 @@ class Numerics:
         damping: of the cloths it takes [s].
     """
 
-    columns: int
-    rows: int
-    diagonals: Diagonals
-    integrator: Method
-    step: float
-    thickness: float
-    damping: Range
+    columns: int = 20
+    rows: int = 14
+    diagonals: Diagonals = Diagonals.ALTERNATE
+    integrator: Method = Method.SYMPLECTIC
+    step: float = 0.0
+    thickness: float = 0.0
+    damping: Range = field(default_factory=lambda: Range(low=1e-3, high=1e-3))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -202,13 +202,13 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
         composition={kind: shares.number(kind.value, 0.0, least=0) for kind in Kind},
         width=flag.number("width", 1.5, above=0), height=flag.number("height", 1.0, above=0),
         materials=materials,
-        density=_range(flag, "density", 1.0), bending=_range(flag, "bending", 1.0),
+        density=flag.range("density", 1.0, above=0), bending=flag.range("bending", 1.0, above=0),
         count=run.whole("count", 3, least=1), duration=run.number("duration", 10.0, above=0),
         settle=run.number("settle", 4.0, above=0),
         rates=tuple(_whole(run, "rates", rate) for rate in run.numbers("rates")), noises=run.numbers("noises"),
-        speed=_range(run, "speed", 5.0), apart=run.number("apart", 0.0, least=0),
+        speed=run.range("speed", 5.0, above=0), apart=run.number("apart", 0.0, least=0),
         varying=log.number("share", 0.0, least=0), log_rate=log.whole("rate", 10, least=1),
-        intensity=_range(log, "intensity", 0.1), length=log.number("length", 40.0, above=0),
+        intensity=log.range("intensity", 0.1, above=0), length=log.number("length", 40.0, above=0),
         marker_columns=markers.whole("columns", 17, least=4), marker_rows=markers.whole("rows", 11, least=4),
         jitter=markers.number("jitter", 0.0, least=0),
         numerics={name: _numerics(numerics.table(name)) for name in numerics.names()},
@@ -219,11 +219,6 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
     return recipe
 
 
-def _range(table: Table, key: str, default: float) -> Range:
-    value = table.quantity(key, default, above=0)
-    return value if isinstance(value, Range) else Range(low=value, high=value)
-
-
 def _whole(table: Table, key: str, value: float) -> int:
     if value < 1 or value != int(value):
         raise InputError(f"{key} has {value!r}", where=table.where, fix="give whole numbers of at least 1")
@@ -231,14 +226,8 @@ def _whole(table: Table, key: str, value: float) -> int:
 
 
 def _numerics(table: Table) -> Numerics:
-    found = Numerics(
-        columns=table.whole("columns", 20, least=3), rows=table.whole("rows", 14, least=3),
-        diagonals=table.choice("diagonals", Diagonals.ALTERNATE),
-        integrator=table.choice("integrator", Method.SYMPLECTIC),
-        step=table.number("step", 0.0, least=0), thickness=table.number("thickness", 0.0, least=0),
-        damping=_range(table, "damping", 1e-3),
-    )  # fmt: skip
-    table.done()
+    mesh = Bounds(least=3)
+    found = table.record(Numerics, columns=mesh, rows=mesh, step=NOT_NEGATIVE, thickness=NOT_NEGATIVE, damping=POSITIVE)
     if found.integrator is Method.IMPLICIT and not found.step:
         raise InputError("the implicit integrator without a step", where=table.where, fix="give step in seconds")
     if found.integrator is Method.SYMPLECTIC and found.step:
@@ -253,10 +242,8 @@ def _strengths(table: Table, known: Registry) -> dict[str, Strengths]:
     for name in table.names():
         inner = table.table(name)
         strengths: tuple[str, ...] = known[name].strengths()
-        parameter = inner.text("parameter", strengths[0]) or strengths[0]
-        if parameter not in strengths:
-            raise UnknownNameError.of("strength", parameter, strengths, where=inner.where)
-        values, drawn = inner.numbers("values"), _range(inner, "range", 1.0)
+        parameter = inner.named("parameter", strengths[0], strengths, noun="strength")
+        values, drawn = inner.numbers("values"), inner.range("range", 1.0, above=0)
         if any(value <= 0 for value in values):
             raise InputError(
                 "values has magnitudes that are not above 0", where=inner.where, fix="say by negative which sets differ"

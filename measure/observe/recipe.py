@@ -25,7 +25,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from flagdata import timebase
 from flagdata.addresses import local_path
@@ -38,7 +37,7 @@ from flagdata.ingest.meshes import read_obj
 from flagdata.lake import Lake
 from flagdata.recipes import parsed, read_recipe
 from flagdata.schema import Kind
-from flagdata.tables import DEGREES, Table
+from flagdata.tables import DEGREES, NOT_NEGATIVE, POSITIVE, Table
 from measure.observe import markers, meshes, wind
 from measure.observe.cloth import VERTICES, outline
 from measure.observe.experiment import Observed, observe
@@ -47,8 +46,8 @@ from measure.observe.setup import Hold, Setup, sheet
 from measure.observe.trajectory import DENSITY_UNCERTAINTY, WindTrack
 from measure.observe.wind import LogPlacement
 from sim.air import QuadraticNormal
-from sim.arcsim import read_material
 from sim.material import MATERIALS, Material, named
+from sim.run.reading import material_file
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +143,7 @@ def parse(path: Path) -> ExperimentRecipe:
         InputError: a value that does not fit.
         UsageError: values that do not fit together.
     """
-    top = Table(_parsed_file(path), where=str(path))
+    top = Table(parsed(read_recipe(path).text, where=str(path)), where=str(path))
     folder = path.parent
     test = top.table("test")
     recipe = ExperimentRecipe(
@@ -245,7 +244,7 @@ def _material(table: Table, folder: Path) -> Material | None:
         raise UsageError("both name and file are given", where=table.where, fix="keep one of them")
     if name is not None and name not in MATERIALS.names():
         raise UnknownNameError.of("material", name, MATERIALS.names(), where=table.where)
-    base = named(name) if name is not None else _material_file(folder / local_path(file or ""))
+    base = named(name) if name is not None else material_file(folder / local_path(file or ""))
     thicken = table.number("thicken", 1.0, above=0.0)
     made = base.scaled(
         density=thicken,
@@ -260,29 +259,13 @@ def _material(table: Table, folder: Path) -> Material | None:
     return made
 
 
-def _material_file(path: Path) -> Material:
-    if path.suffix == ".json":
-        return read_material(path)
-    return Material.from_mapping(_parsed_file(path), name=path.stem)
-
-
-def _parsed_file(path: Path) -> dict[str, Any]:
-    return parsed(read_recipe(path).text, where=str(path))
-
-
 def _recording(table: Table, folder: Path) -> RecordingSource:
-    source = table.text("source", None)
-    if not source:
+    if not table.text("source", None):
         raise InputError("no source is named", where=table.where, fix="add source, an artifact's id or a path")
-    recording = RecordingSource(
-        source=source, take=table.text("take", "") or "", name=table.text("name", "") or "",
-        rate=table.number("rate", 0.0, above=0.0) if "rate" in table else None,
-        unit=table.text("unit", "m") or "m", rest_unit=table.text("rest-unit", None),
-        noise=table.number("noise", 0.0, least=0.0) if "noise" in table else None,
-        wind=_wind(table.table("wind"), folder) if "wind" in table else None,
+    return table.record(
+        RecordingSource, {"wind": lambda: _wind(table.table("wind"), folder) if "wind" in table else None},
+        rate=POSITIVE, noise=NOT_NEGATIVE,
     )  # fmt: skip
-    table.done()
-    return recording
 
 
 def _wind(table: Table, folder: Path) -> WindSource:

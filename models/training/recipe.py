@@ -18,7 +18,7 @@ from dataclasses import asdict, dataclass
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import torch
 
@@ -29,7 +29,7 @@ from flagdata.lake.matching import Values
 from flagdata.provenance import recipe_hash
 from flagdata.recipes import Shelf, is_name, parsed
 from flagdata.schema import Kind
-from flagdata.tables import Table
+from flagdata.tables import COUNT, Bounds, Table
 from models.crops import Cropping
 from models.frontend import RATE_LIMIT, FrontEnd, Maps
 from models.learner import NUMBER_LIMIT, Learner, Loss, build
@@ -261,9 +261,7 @@ def _data(table: Table) -> DataSpec:
 
 
 def _input(table: Table) -> tuple[FrontEnd, Cropping, int]:
-    maps = table.text("maps", "spectral-maps")
-    if maps not in _MAPS:
-        raise UnknownNameError.of("kind of maps", str(maps), _MAPS, where=table.where)
+    maps = cast("Maps", table.named("maps", "spectral-maps", _MAPS, noun="kind of maps"))
     size, frames = table.whole("size", 224, least=4), table.whole("frames", 30, least=4)
     front_end = FrontEnd(
         maps=maps, size=size, frames=frames, rate=table.number("rate", 25.0, above=0.0, most=RATE_LIMIT)
@@ -312,25 +310,18 @@ def _loss(table: Table) -> LossSpec:
         raise UsageError(f"components say nothing of {name.value}", where=table.where, fix="leave them out")
     if name is not Loss.CONTRASTIVE and "margin" in table:
         raise UsageError(f"a margin says nothing of {name.value}", where=table.where, fix="leave it out")
-    spec = LossSpec(
-        name=name, targets=targets, components=table.whole("components", 6, least=1),
-        margin=table.number("margin", 1.0, above=0.0, most=NUMBER_LIMIT),
+    return table.record(
+        LossSpec, {"name": lambda: name, "targets": lambda: targets}, components=COUNT,
+        margin=Bounds(above=0.0, most=NUMBER_LIMIT),
     )  # fmt: skip
-    table.done()
-    return spec
 
 
 def _optimiser(table: Table) -> OptimiserSpec:
     schedule = table.choice("schedule", Schedule.STEPS)
     if schedule is not Schedule.STEPS and "drop-after" in table:
         raise UsageError(f"drop-after says nothing of {schedule.value}", where=table.where, fix="leave it out")
-    spec = OptimiserSpec(
-        rate=table.number("rate", 1e-2, above=0.0, most=_LARGEST_STEP),
-        decay=table.number("decay", 2e-3, least=0.0, most=_LARGEST_STEP),
-        batch=table.whole("batch", 32, least=2), epochs=table.whole("epochs", 40, least=1), schedule=schedule,
-        drop_after=table.whole("drop-after", 20, least=1),
-        clip_norm=table.number("clip-norm", 10.0, above=0.0, most=NUMBER_LIMIT) if "clip-norm" in table else None,
-        precision=table.choice("precision", Precision.FLOAT32), patience=table.whole("patience", 10, least=1),
+    return table.record(
+        OptimiserSpec, rate=Bounds(above=0.0, most=_LARGEST_STEP), decay=Bounds(least=0.0, most=_LARGEST_STEP),
+        batch=Bounds(least=2), epochs=COUNT, drop_after=COUNT, patience=COUNT,
+        clip_norm=Bounds(above=0.0, most=NUMBER_LIMIT),
     )  # fmt: skip
-    table.done()
-    return spec

@@ -25,7 +25,7 @@ from flagdata.errors import InputError, LimitError, UnknownNameError, UsageError
 from flagdata.recipes import Shelf, parsed
 from flagdata.record.writer import Coding
 from flagdata.schema import TRUTH_WINDOW
-from flagdata.tables import SEED_LIMIT, Quantity, Table
+from flagdata.tables import COUNT, NOT_NEGATIVE, POSITIVE, SEED_LIMIT, Bounds, Quantity, Table
 from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, SessionSpec, Side, Truth
 from sim.effects import EFFECTS, SENSOR_EFFECTS
 from sim.effects.effect import FlowEffect, WindEffect
@@ -68,11 +68,9 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
     """
     top = Table(parsed(text, where=where), where=where)
     render = top.table("render")
-    renderer = render.text("renderer", "raster") or ""
-    if renderer not in RENDERERS:
-        raise UnknownNameError.of("renderer", renderer, RENDERERS, where=render.where)
+    renderer = render.named("renderer", "raster", RENDERERS, noun="renderer")
     photos = render.text("photos", None)
-    sessions = _sessions(top.table("sessions")) if "sessions" in top else None
+    sessions = top.table("sessions").record(SessionSpec, spread=NOT_NEGATIVE) if "sessions" in top else None
     recipe = DatasetRecipe(
         name=name, title=top.text("title", name) or name, licence=top.text("licence", None) or "",
         seed=top.whole("seed", 0, least=0, most=SEED_LIMIT), renderer=renderer,
@@ -144,26 +142,16 @@ def _sides(table: Table, sessions: SessionSpec | None) -> tuple[Side, ...]:
     return tuple(found)
 
 
-def _sessions(table: Table) -> SessionSpec:
-    spec = SessionSpec(spread=table.number("spread", 0.25, least=0.0))
-    table.done()
-    return spec
-
-
 def _camera(table: Table) -> CameraSpec:
     coding = table.choice("coding", Coding.JPEG)
     idle = "jpeg-quality" if coding is Coding.H264 else "rate-factor"
     if idle in table:
         raise InputError(f"{idle} says nothing of {coding.value}", where=table.where, fix="leave it out")
-    spec = CameraSpec(
-        coding=coding, jpeg_quality=table.quantity("jpeg-quality", 90.0, least=1.0, most=100.0),
-        rate_factor=table.quantity("rate-factor", 20.0, least=0.0, most=51.0),
-        read_noise=table.quantity("read-noise", 0.0, least=0.0, most=128.0),
-        shot_noise=table.quantity("shot-noise", 0.0, least=0.0, most=128.0),
-        frame_slot=table.whole("frame-slot", 32768, least=1),
+    noise = Bounds(least=0.0, most=128.0)
+    return table.record(
+        CameraSpec, jpeg_quality=Bounds(least=1.0, most=100.0), rate_factor=Bounds(least=0.0, most=51.0),
+        read_noise=noise, shot_noise=noise, frame_slot=COUNT,
     )  # fmt: skip
-    table.done()
-    return spec
 
 
 def _anemometer(table: Table) -> AnemometerSpec:
@@ -180,14 +168,10 @@ def _anemometer(table: Table) -> AnemometerSpec:
         }
         inner.done()
     chosen.done()
-    spec = AnemometerSpec(
-        truth=table.choice("truth", Truth.STATED), rate=table.number("rate", 1.0, above=0.0),
-        before=table.number("before", 75.0, least=0.0), noise=table.quantity("noise", 0.0, least=0.0),
-        resolution=table.number("resolution", 0.1, above=0.0), accuracy=table.number("accuracy", 0.2, least=0.0),
-        effects=effects,
+    return table.record(
+        AnemometerSpec, {"effects": lambda: effects}, rate=POSITIVE, before=NOT_NEGATIVE, noise=NOT_NEGATIVE,
+        resolution=POSITIVE, accuracy=NOT_NEGATIVE,
     )  # fmt: skip
-    table.done()
-    return spec
 
 
 def _check(recipe: DatasetRecipe, *, where: str) -> None:

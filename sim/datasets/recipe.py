@@ -60,12 +60,12 @@ class CameraSpec:
             are a whole multiple of it long, those of H.264 too [B].
     """
 
-    coding: Coding
-    jpeg_quality: Quantity
-    rate_factor: Quantity
-    read_noise: Quantity
-    shot_noise: Quantity
-    frame_slot: int
+    coding: Coding = Coding.JPEG
+    jpeg_quality: Quantity = 90.0
+    rate_factor: Quantity = 20.0
+    read_noise: Quantity = 0.0
+    shot_noise: Quantity = 0.0
+    frame_slot: int = 32768
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,12 +82,12 @@ class AnemometerSpec:
         effects: names of `sim.effects.SENSOR_EFFECTS` → parameter → value, drawn for each recording.
     """
 
-    truth: Truth
-    rate: float
-    before: float
-    noise: Quantity
-    resolution: float
-    accuracy: float
+    truth: Truth = Truth.STATED
+    rate: float = 1.0
+    before: float = 75.0
+    noise: Quantity = 0.0
+    resolution: float = 0.1
+    accuracy: float = 0.2
     effects: Mapping[str, Mapping[str, Quantity]]
 
 
@@ -99,7 +99,7 @@ class SessionSpec:
         spread: the sequences' winds lie within this share of the session's mean, either way.
     """
 
-    spread: float
+    spread: float = 0.25
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -35,7 +35,7 @@ from flagdata.addresses import local_path
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.provenance import canonical, digest
 from flagdata.recipes import Shelf, parsed, read_recipe
-from flagdata.tables import SEED_LIMIT, Quantity, Range, Table
+from flagdata.tables import COUNT, NOT_NEGATIVE, POSITIVE, SEED_LIMIT, Quantity, Range, Table
 from sim import material
 from sim.air import AIR_FORCES, AirForce, QuadraticNormal, Stokes
 from sim.arcsim import SWEEPS, ArcsimScene, read_material, read_scene
@@ -102,20 +102,20 @@ def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: st
     """
     top = Table(content, where=where)
     scene = _scene(top.table("scene"), folder)
-    precision = top.text("precision", "float32") or ""
-    if precision not in DTYPES:
-        raise UnknownNameError.of("precision", precision, DTYPES, where=where)
     integrator = _integrator(top.table("integrator"))
     given = None if scene.arcsim is None else scene.arcsim.scene
-    contact = _contact(top.table("contact")) if "contact" in top else given and given.contact
+    contact = given and given.contact
+    if "contact" in top:
+        contact = top.table("contact").record(Contact, thickness=POSITIVE, stiffness=POSITIVE, friction=NOT_NEGATIVE)
     bounds = given and given.limits
     limits = _limits(top.table("limits"), bounds, integrator) if bounds is not None or "limits" in top else None
+    time = top.table("time").record(TimeSpec, settle=NOT_NEGATIVE, frames=COUNT, rate=POSITIVE)
     recipe = Recipe(
         name=name, title=top.text("title", name) or name, seed=top.whole("seed", 0, least=0, most=SEED_LIMIT),
         count=top.whole("count", 1, least=1), batch=top.whole("batch", 16, least=1),
-        precision=precision,
+        precision=top.named("precision", "float32", DTYPES, noun="precision"),
         scene=scene, material=_material(top.table("material"), folder, scene), wind=_wind(top.table("wind"), scene),
-        contact=contact, limits=limits, integrator=integrator, time=_time(top.table("time")),
+        contact=contact, limits=limits, integrator=integrator, time=time,
         effects=_effects(top.table("effects")),
     )  # fmt: skip
     top.done()
@@ -232,13 +232,19 @@ def _bases(table: Table, folder: Path, scene: SceneSpec) -> tuple[Material, ...]
     if chosen:
         return tuple(material.named(each, where=table.where) for each in chosen)
     if file is not None:
-        return (_material_file(folder / local_path(file)),)
+        return (material_file(folder / local_path(file)),)
     if scene.arcsim is not None:
         return (scene.arcsim.scene.material,)
     raise InputError("no material is named", where=table.where, fix='add name = "camel-ponte-roma", or a file')
 
 
-def _material_file(path: Path) -> Material:
+def material_file(path: Path) -> Material:
+    """The material of a file, TOML or ArcSim's JSON.
+
+    Raises:
+        NotFoundError: no such file.
+        InputError: one that is no material.
+    """
     if path.suffix == ".json":
         return read_material(path)
     return Material.from_mapping(parsed(read_recipe(path).text, where=str(path)), name=path.stem)
@@ -248,9 +254,7 @@ def _wind(table: Table, scene: SceneSpec) -> WindSpec:
     if scene.arcsim is not None and not table.names():
         x, y, z = scene.arcsim.scene.wind
         return WindSpec(speed=math.hypot(x, y), toward=math.atan2(y, x), vertical=z, force=scene.arcsim.scene.air)
-    name = table.text("force", "quadratic-normal") or ""
-    if name not in AIR_FORCES:
-        raise UnknownNameError.of("wind force", name, AIR_FORCES, where=table.where)
+    name = table.named("force", "quadratic-normal", AIR_FORCES, noun="wind force")
     force: AirForce
     if name == "stokes":
         force = Stokes(viscosity=table.number("viscosity", Stokes().viscosity, least=0.0))
@@ -269,17 +273,6 @@ def _wind(table: Table, scene: SceneSpec) -> WindSpec:
     return spec
 
 
-def _contact(table: Table) -> Contact:
-    base = Contact()
-    contact = Contact(
-        thickness=table.number("thickness", base.thickness, above=0.0),
-        stiffness=table.number("stiffness", base.stiffness, above=0.0),
-        friction=table.number("friction", base.friction, least=0.0),
-    )
-    table.done()
-    return contact
-
-
 def _limits(table: Table, given: StrainLimits | None, integrator: IntegratorSpec) -> StrainLimits:
     """Those of the table, in what it leaves out those of an ArcSim scene; small steps need one sweep."""
     base = replace(given or StrainLimits(), sweeps=SWEEPS if integrator.name == "implicit" else 1)
@@ -292,9 +285,7 @@ def _limits(table: Table, given: StrainLimits | None, integrator: IntegratorSpec
 
 
 def _integrator(table: Table) -> IntegratorSpec:
-    name = table.text("name", "symplectic") or ""
-    if name not in INTEGRATORS:
-        raise UnknownNameError.of("integrator", name, INTEGRATORS, where=table.where)
+    name = table.named("name", "symplectic", INTEGRATORS, noun="integrator")
     step = table.number("step", 0.0, above=0.0) if "step" in table else None
     air_shape = AirShape.CURRENT
     if name == "implicit":
@@ -302,15 +293,6 @@ def _integrator(table: Table) -> IntegratorSpec:
         air_shape = table.choice("air-shape", AirShape.CURRENT)
     table.done()
     return IntegratorSpec(name=name, step=step, air_shape=air_shape)
-
-
-def _time(table: Table) -> TimeSpec:
-    spec = TimeSpec(
-        settle=table.number("settle", 4.0, least=0.0), frames=table.whole("frames", 60, least=1),
-        rate=table.number("rate", 25.0, above=0.0),
-    )  # fmt: skip
-    table.done()
-    return spec
 
 
 def _effects(table: Table) -> dict[str, EffectSpec]:

@@ -167,9 +167,9 @@ class IntegratorSpec:
 class TimeSpec:
     """What is kept: `frames` at `rate` [Hz] after `settle` [s] that are not."""
 
-    settle: float
-    frames: int
-    rate: float
+    settle: float = 4.0
+    frames: int = 60
+    rate: float = 25.0
 
     @property
     def settling(self) -> int:

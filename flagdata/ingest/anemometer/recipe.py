@@ -20,7 +20,8 @@ A recipe may leave open what the heading of the file states: see `OpenRecipe`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from functools import partial
 from typing import Any, Literal
 
 from flagdata.errors import FlagdataError, InputError, UnknownNameError, UsageError
@@ -30,7 +31,7 @@ from flagdata.ingest.anemometer.options import ZeroOffset, check_zero_offset
 from flagdata.recipes import Shelf, parsed
 from flagdata.schema import CHANNELS
 from flagdata.signals import Sensor
-from flagdata.tables import Table
+from flagdata.tables import NOT_NEGATIVE, Table
 from flagdata.timebase import zone
 from flagdata.units import unit
 
@@ -41,6 +42,7 @@ COLUMNS_LIMIT = 10_000
 """Highest number of a column."""
 MISSING = ("", "nan", "na", "n/a", "n.a.", "#n/a", "#value!", "null", "none", "m", "mm", "missing", "no data")
 """Spellings of "no value" that every recipe knows, lower-case."""
+_SENSOR = [entry.name for entry in fields(Sensor) if entry.name != "name"]
 MISSING_SIGNS = r"^[-–—_./*#]+$"
 """Cells of signs alone ("----", "--.-", "/////", "***") are no value either."""
 
@@ -318,7 +320,7 @@ def _opened(data: Mapping[str, Any], *, where: str) -> OpenRecipe:
     table = Table(data, where=where)
     match = table.table("match")
     match.texts("header")
-    _known(match, MATCH)
+    match.only(*MATCH.split())
     channels: dict[str, Any] = {}
     for name, layout in table.mapping("channels").items():
         own = dict(layout) if isinstance(layout, Mapping) else {}
@@ -327,7 +329,7 @@ def _opened(data: Mapping[str, Any], *, where: str) -> OpenRecipe:
             own["column"] = names[0]
         if isinstance(stated, Mapping):
             inside = Table(stated, where=f"{where} [channels.{name}] unit")
-            _known(inside, "in else whole")
+            inside.only("in", "else", "whole")
             if stated.get("in") != "heading":
                 raise InputError("the unit is in no heading", where=inside.where, fix='write { in = "heading" }')
             own["unit"] = CHANNELS[name].unit if name in CHANNELS else "m/s"
@@ -351,101 +353,67 @@ def _inside(file: str, place: str | None) -> str:
 
 
 def _recipe(table: Table) -> Recipe:
-    _known(table, "name about source file time rows channels sensor quality check expect")
+    table.only("name", "about", "source", "file", "time", "rows", "channels", "sensor", "quality", "check", "expect")
     text = {key: _text(table, key) for key in ("name", "about", "source")}
     channels, rows, expect = table.table("channels"), table.table("rows"), table.table("expect")
-    _known(rows, "column value")
-    _known(expect, "confirmed")
+    confirmed = expect.texts("confirmed")
+    expect.done()
     return Recipe(
         name=text["name"], about=text["about"], source=text["source"],
         file=_file(table.table("file")),
         time=_time(table.table("time")),
         channels={name: _channel(channels.table(name)) for name in channels.names()},
-        sensor=_sensor(table.table("sensor")),
+        sensor=table.table("sensor").record(Sensor, None, **dict.fromkeys(_SENSOR, NOT_NEGATIVE)),
         quality=_quality(table.table("quality")),
-        rows=RowsLayout(column=_column(rows), value=_text(rows, "value")) if rows.names() else None,
-        expect=frozenset(expect.texts("confirmed")),
+        rows=rows.record(RowsLayout, {"column": partial(_column, rows)}) if rows.names() else None,
+        expect=frozenset(confirmed),
         checks=tuple(map(_check, table.tables("check"))),
     )  # fmt: skip
 
 
 def _file(table: Table) -> FileLayout:
-    _known(table, "delimiter decimal encoding preamble header comment missing host")
-    delimiter = table.text("delimiter", ",") or ","
-    return FileLayout(
-        delimiter=DELIMITERS.get(delimiter, delimiter),
-        decimal=table.text("decimal", "."),  # type: ignore[arg-type]
-        encoding=table.text("encoding", None),
-        preamble=table.whole("preamble", 0, least=0),
-        header=table.whole("header", 1, least=0),
-        comment=table.text("comment", "") or "",
-        missing=tuple(str(code).strip().lower() for code in _list(table, "missing")),
-        host=table.text("host", "") or "",
-    )
+    def delimiter() -> str:
+        given = table.text("delimiter", None) or ","
+        return DELIMITERS.get(given, given)
+
+    def missing() -> tuple[str, ...]:
+        return tuple(str(code).strip().lower() for code in _list(table, "missing"))
+
+    return table.record(FileLayout, {"delimiter": delimiter, "missing": missing})
 
 
 def _time(table: Table) -> TimeLayout:
-    _known(table, "columns format zone")
-    return TimeLayout(
-        columns=tuple(_column_of(one, table.where) for one in _list(table, "columns")),
-        format=_text(table, "format"),
-        zone=table.text("zone", None),
-    )
+    columns = partial(_list, table, "columns")
+    return table.record(TimeLayout, {"columns": lambda: tuple(_column_of(one, table.where) for one in columns())})
 
 
 def _channel(table: Table) -> ChannelLayout:
-    _known(table, "column unit gain offset range convention rotation optional suffix")
-    bounds = table.numbers("range")
-    if "range" in table and len(bounds) != 2:
-        raise InputError("range is not two numbers", where=table.where, fix="give [lowest, highest]")
-    return ChannelLayout(
-        column=_column(table),
-        unit=_text(table, "unit"),
-        gain=table.number("gain", 1.0),
-        offset=table.number("offset", 0.0),
-        range=(bounds[0], bounds[1]) if bounds else None,
-        convention=table.text("convention", "from"),  # type: ignore[arg-type]
-        rotation=table.number("rotation", 0.0),
-        optional=table.flag("optional"),
-        suffix=table.text("suffix", "") or "",
-    )
+    def bounds() -> tuple[float, float] | None:
+        given = table.numbers("range")
+        if "range" in table and len(given) != 2:
+            raise InputError("range is not two numbers", where=table.where, fix="give [lowest, highest]")
+        return (given[0], given[1]) if given else None
 
-
-def _sensor(table: Table) -> Sensor:
-    numbers = (
-        "height", "distance-constant", "averaging", "threshold", "resolution", "accuracy", "accuracy-relative",
-    )  # fmt: skip
-    _known(table, " ".join(("name", *numbers)))
-    given = {key.replace("-", "_"): table.number(key, 0.0, least=0.0) for key in numbers if key in table}
-    return Sensor(name=_text(table, "name"), **given)
+    return table.record(ChannelLayout, {"column": partial(_column, table), "range": bounds})
 
 
 def _quality(table: Table) -> QualityRules:
-    _known(table, "zero-offset stale-after frame-rate-of fault-where-zero")
-    lists = {key: table.texts(key) for key in ("frame-rate-of", "fault-where-zero")}
-    for key, channels in lists.items():
+    def offset() -> Any:
+        return table.value("zero-offset") if "zero-offset" in table else "report"
+
+    rules = table.record(QualityRules, {"zero_offset": offset})
+    for key, channels in (("frame-rate-of", rules.frame_rate_of), ("fault-where-zero", rules.fault_where_zero)):
         for name in channels:
             if name not in CHANNELS:
                 raise UnknownNameError.of("channel", name, CHANNELS, where=f"[quality] {key}")
-    return QualityRules(
-        zero_offset=table.value("zero-offset") if "zero-offset" in table else "report",
-        stale_after=table.number("stale-after", 0.0) if "stale-after" in table else None,
-        frame_rate_of=lists["frame-rate-of"],
-        fault_where_zero=lists["fault-where-zero"],
-    )
+    return rules
 
 
 def _check(table: Table) -> CheckLayout:
-    _known(table, "column values about")
-    values = tuple(str(value).strip() for value in _list(table, "values"))
-    return CheckLayout(column=_column(table), values=values, about=_text(table, "about"))
+    def values() -> tuple[str, ...]:
+        return tuple(str(value).strip() for value in _list(table, "values"))
 
-
-def _known(table: Table, keys: str) -> None:
-    """Refuse other keys before any value is looked at."""
-    for key in keys.split():
-        _ = key in table
-    table.done()
+    return table.record(CheckLayout, {"column": partial(_column, table), "values": values})
 
 
 def _list(table: Table, key: str) -> list[Any]:
