@@ -70,7 +70,9 @@ class Lineage:
         self._entries: dict[str, list[Entry]] = {}
         for entry in sorted(history, key=lambda entry: entry["version"]):
             if "branch" in entry:
-                self._entries.setdefault(entry["branch"], []).append(entry)
+                with _reading(entry):
+                    own = Slice(branch=entry["branch"], version=entry["version"])
+                self._entries.setdefault(own.branch, []).append(entry)
         self._forks = {**forks, MAIN: ()}
 
     def fork(self, part: Slice) -> View | None:

@@ -29,10 +29,20 @@ _COMMIT = re.compile(r"c[0-9a-f]{16}")
 
 @dataclass(frozen=True, kw_only=True)
 class Slice:
-    """The rows of one branch at one version."""
+    """The rows of one branch at one version.
+
+    Raises:
+        ValueError: what is no branch's name or no version, as a damaged ref may state.
+    """
 
     branch: str
     version: int
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.branch, str) or not _NAME.fullmatch(self.branch):
+            raise ValueError(f"{self.branch!r} names no branch")
+        if type(self.version) is not int or self.version < 0:
+            raise ValueError(f"{self.version!r} is no version")
 
 
 View = tuple[Slice, ...]
@@ -44,8 +54,15 @@ def as_json(view: View) -> list[dict[str, Any]]:
 
 
 def view_from(stored: Iterable[Mapping[str, Any]]) -> View:
-    """The view that `as_json` stored."""
-    return tuple(Slice(branch=part["branch"], version=int(part["version"])) for part in stored)
+    """The view that `as_json` stored.
+
+    Raises:
+        ValueError, KeyError, TypeError: it is no view.
+    """
+    view = tuple(Slice(branch=part["branch"], version=part["version"]) for part in stored)
+    if not view:
+        raise ValueError("a view of nothing")
+    return view
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +72,10 @@ class Ref:
     name: str
     created: str
     view: View
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.name, str) and isinstance(self.created, str)):
+            raise TypeError("name and time of creation are texts")
 
 
 def check_name(name: str, *, noun: str) -> str:

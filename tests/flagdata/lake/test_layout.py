@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import os
 import shutil
 from collections.abc import Callable
@@ -238,6 +239,32 @@ def test_doctor_reports_a_log_entry_that_cannot_be_opened_as_its_finding(
         assert ended.value.code == code
         assert captured.out.count("error: log-damaged: ") == (verb != "ls")
         assert f"where: {entry}" in (captured.err if verb == "ls" else captured.out)
+
+
+@pytest.mark.parametrize(
+    "stated",
+    [
+        {"view": [{"branch": ["main"], "version": 1}]},
+        {"view": [{"branch": "../main", "version": 1}]},
+        {"view": [{"branch": "main", "version": "1"}]},
+        {"view": [{"branch": "main", "version": 1.5}]},
+        {"view": [{"branch": "main", "version": -1}]},
+        {"view": []},
+        {"name": ["v1"]},
+        {"created": 3},
+    ],
+)
+def test_a_ref_whose_values_are_of_another_type_is_a_finding_and_a_clear_error(
+    stated: dict[str, object], lake: Lake, put_text: Put
+) -> None:
+    put_text(lake, "a")
+    lake.tag("v1")
+    path = lake.path / "refs" / "tags" / "v1.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), **stated}))
+    with pytest.raises(CorruptError, match="the ref cannot be read") as caught:
+        lake.rows(at="v1")
+    assert caught.value.where == str(path)
+    assert str(path) in [finding.where for finding in doctor(lake)]
 
 
 def test_a_marker_that_is_a_pipe_is_refused_at_once(lake: Lake) -> None:
