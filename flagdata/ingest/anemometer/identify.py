@@ -12,7 +12,7 @@ from flagdata.ingest.anemometer.containers import json_lines, spreadsheet
 from flagdata.ingest.anemometer.draft.drafting import Draft
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
 from flagdata.ingest.anemometer.options import Limits, WindOptions
-from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Guess, GuessKind, Head
+from flagdata.ingest.anemometer.sniffing import HEAD_LINES, NAMED, SURE, Guess, GuessKind, Head
 from flagdata.ingest.anemometer.table.delimited import Delimited, drafted
 from flagdata.ingest.anemometer.text.opening import first_bytes, open_text, signature
 from flagdata.ingest.anemometer.text.source import TextFile
@@ -48,6 +48,8 @@ def _guesses(source: TextFile) -> tuple[Guess, ...]:
     for name in FORMATS:
         reader: Format = FORMATS[name]()
         guess = reader.recognise(head)
+        if guess is not None and guess.score >= NAMED:
+            return (guess,)
         if guess is not None:
             found.append(guess)
     return tuple(sorted(found, key=lambda guess: -guess.score))

@@ -39,38 +39,24 @@ class HostStamped:
     uses = frozenset({"zone", "azimuth"})
 
     def recognise(self, head: Head) -> Guess | None:
-        """The recipe whose fields most lines after the stamp have, within its ranges.
-
-        Sure only below a header that speaks of raw lines: any table may have two columns, and its unit is not known.
-        """
+        """Below a header that speaks of raw lines, the recipe whose fields most lines have, within its ranges."""
         lines = [line for line in head.lines if _STAMP.match(line)]
-        if len(lines) < max(1, len(head.lines) // 2):
+        first = head.lines[0] if head.lines else ""
+        if len(lines) < max(1, len(head.lines) // 2) or lines[0] == first or not _RAW.search(first.partition(",")[2]):
             return None
-        headed = not _STAMP.match(head.lines[0])
-        if headed and not _RAW.search(head.lines[0].partition(",")[2]):
+        shares = {
+            name: sum(_in_range(recipe, line) for line in lines) / len(lines) for name in recipes.SENSORS.names()
+            if isinstance(recipe := recipes.load(name), Recipe) and recipe.file.host
+        }  # fmt: skip
+        name, share = max(shares.items(), key=lambda item: item[1])
+        if share <= LEAST:
             return None
-        best: Guess | None = None
-        most = 0.0
-        for name in recipes.SENSORS.names():
-            recipe = recipes.load(name)
-            if not isinstance(recipe, Recipe) or not recipe.file.host:
-                continue
-            share = sum(_in_range(recipe, line) for line in lines) / len(lines)
-            if share > max(LEAST, most):
-                most = share
-                best = Guess(
-                    format="host-stamped",
-                    recipe=name,
-                    score=max(0.55, min(0.9, share)) if headed else 0.4,
-                    reasons=(
-                        f"line 1 names a raw line: {head.lines[0]!r}"
-                        if headed
-                        else "no header says what the lines are",
-                        f"{len(lines)} of the first {len(head.lines)} lines begin with a computer's stamp",
-                        f"{share:.0%} of them go on with the fields of recipe {name}: {recipe.about}",
-                    ),
-                )
-        return best
+        reasons = (
+            f"line 1 names a raw line: {first!r}",
+            f"{len(lines)} of the first {len(head.lines)} lines begin with a computer's stamp",
+            f"{share:.0%} of them go on with the fields of the recipe {name}",
+        )
+        return Guess(format=self.name, recipe=name, score=max(0.55, min(0.9, share)), reasons=reasons)
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read a file by the recipe in `options`."""

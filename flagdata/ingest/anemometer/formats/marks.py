@@ -42,7 +42,7 @@ class Placed:
         time: (n,) UTC nanoseconds.
         spacing: median distance of the marks [s].
         marks: number of marks used.
-        kind: sentence they come from, or "TAG".
+        kind: sentence they come from.
         findings: about midnight and marks that run backwards.
         bursts: whether each line has the time of its burst's mark, and none is interpolated.
     """
@@ -75,11 +75,6 @@ class TimeLine:
             except ValueError:
                 return
 
-    def add_instant(self, line: int, instant: int) -> None:
-        """A whole instant, of a TAG block [UTC ns]."""
-        self.line.setdefault("TAG", []).append(line)
-        self.clock.setdefault("TAG", []).append(instant)
-
     def place(
         self,
         lines: NDArray[np.int64],
@@ -87,7 +82,6 @@ class TimeLine:
         date: dt.date | None,
         where: str,
         choice: ClockChoice | None = None,
-        once: bool = False,
         winds: Sequence[Hashable] = (),
     ) -> Placed:
         """Instants of `lines`, by interpolation between the marks and at their usual pace outside them.
@@ -97,17 +91,12 @@ class TimeLine:
         Args:
             date: day (UTC) of the first mark, for a stream that states none.
             choice: whose marks are right where the stream's clock was set back and stays so; `None` where nobody said.
-            once: whether the lines are one reading, which may have one instant.
             winds: which wind each line holds, where bursts are to be looked for.
 
         Raises:
             TimeError: fewer than two marks, unless all lines are close to the one, or no date.
-            UsageError: a date given that the stream contradicts, or does not need.
+            UsageError: a date given that the stream contradicts.
         """
-        instants = set(self.clock.get("TAG", ()))
-        if once and len(instants) == 1:
-            time = np.full(len(lines), instants.pop(), dtype=np.int64)
-            return Placed(time=time, spacing=1.0, marks=1, kind="TAG", findings=())
         single = self._single()
         if single is not None and _reach(lines, self.line[single][0]) <= BURST:
             return self._of_one(single, lines, date=date, where=where)
@@ -115,34 +104,20 @@ class TimeLine:
         at = np.array(self.line[kind], dtype=np.int64)
         clock = np.array(self.clock[kind], dtype=np.int64)
         found: list[Finding] = []
-        if kind == "TAG":
-            if date is not None:
-                raise UsageError(
-                    "a date was given, but TAG blocks carry their own", where=where, fix="leave out --date"
-                )
-            day = np.zeros(len(clock), dtype=np.int64)
-            start = 0
-        else:
-            # More than half a day back is midnight; less is disorder.
-            day = np.cumsum(np.concatenate(([0], np.diff(clock) < -DAY // 2)).astype(np.int64))
-            start = self._start(at, clock, day, date, where) * DAY
-            if day[-1]:
-                text = f"{day[-1]} times the clock passes midnight: the day is counted on"
-                found.append(Finding(kind="midnight", severity=Severity.NOTE, count=int(day[-1]), what=text))
-        marks = start + day * DAY + clock
+        # More than half a day back is midnight; less is disorder.
+        day = np.cumsum(np.concatenate(([0], np.diff(clock) < -DAY // 2)).astype(np.int64))
+        if day[-1]:
+            text = f"{day[-1]} times the clock passes midnight: the day is counted on"
+            found.append(Finding(kind="midnight", severity=Severity.NOTE, count=int(day[-1]), what=text))
+        marks = (self._start(at, clock, day, date, where) + day) * DAY + clock
         marks, reported = _one_clock(marks, at, choice)
         found.extend(reported)
         rising = marks > np.concatenate(([np.iinfo(np.int64).min], np.maximum.accumulate(marks)[:-1]))
         behind = np.concatenate(([False], np.diff(marks) < -DISORDER))
         if behind.any():
-            found.append(
-                Finding(
-                    kind="time-backwards", severity=Severity.WARNING, count=int(behind.sum()),
-                    where=f"line {at[behind][0]}",
-                    what=f"{int(behind.sum())} times the stream's clock runs backwards; marks behind earlier ones are "
-                    "not used",
-                )
-            )  # fmt: skip
+            count = int(behind.sum())
+            what = f"{count} times the stream's clock runs backwards; marks behind earlier ones are not used"
+            found.append(_backwards(count, f"line {at[behind][0]}", what))
         at, marks = at[rising], marks[rising]
         if len(marks) < 2:
             raise TimeError(
@@ -152,14 +127,14 @@ class TimeLine:
                 "what tells the time and give --start TIME --rate HZ",
             )
         spacing = float(np.median(np.diff(marks))) / NANOSECONDS
-        time = self.bursts.placed(lines, winds, at, marks) if winds and kind != "TAG" else None
+        time = self.bursts.placed(lines, winds, at, marks) if winds else None
         return Placed(
             time=_interpolate(lines, at, marks) if time is None else time, spacing=spacing, marks=len(marks), kind=kind,
             findings=tuple(found), bursts=time is not None,
         )  # fmt: skip
 
     def _single(self) -> str | None:
-        """The kind of the one mark of the stream; `None` where there are more, or none but a TAG block."""
+        """The kind of the one mark of the stream; `None` where there are more or none."""
         if any(len(lines) > 1 for lines in self.line.values()):
             return None
         return next((kind for kind in _TRUST if kind in self.line), None)
@@ -180,12 +155,10 @@ class TimeLine:
 
     def _kind(self, where: str) -> str:
         counts = {kind: len(lines) for kind, lines in self.line.items()}
-        if max(counts.values(), default=0) < 2:
+        most = max(counts.values(), default=0)
+        if most < 2:
             raise TimeError(NO_TIME if not counts else "the stream carries only one time", where=where, fix=NO_TIME_FIX)
-        if counts.get("TAG", 0) >= 2:
-            return "TAG"
-        enough = max(counts.values()) / 2
-        return next(kind for kind in _TRUST if counts.get(kind, 0) >= enough)
+        return next(kind for kind in _TRUST if 2 * counts.get(kind, 0) >= most)
 
     def _start(
         self, at: NDArray[np.int64], clock: NDArray[np.int64], day: NDArray[np.int64], date: dt.date | None, where: str
@@ -231,12 +204,13 @@ def _one_clock(
     found = clocks.report(marks[settled], jumps, at[settled], choice)
     if stray.any():
         out[stray] = out[settled[np.maximum(np.searchsorted(settled, np.flatnonzero(stray)) - 1, 0)]]
-        finding = Finding(
-            kind="time-backwards", severity=Severity.WARNING, count=int(stray.sum()), where=f"line {at[stray][0]}",
-            what=f"{int(stray.sum())} times of the stream leave its course and come back to it; not used",
-        )  # fmt: skip
-        found = (*found, finding)
+        what = f"{int(stray.sum())} times of the stream leave its course and come back to it; not used"
+        found = (*found, _backwards(int(stray.sum()), f"line {at[stray][0]}", what))
     return out, found
+
+
+def _backwards(count: int, where: str, what: str) -> Finding:
+    return Finding(kind="time-backwards", severity=Severity.WARNING, count=count, where=where, what=what)
 
 
 def _interpolate(lines: NDArray[np.int64], at: NDArray[np.int64], marks: NDArray[np.int64]) -> Instants:

@@ -1,7 +1,7 @@
 """NMEA 0183 streams: wind from MWV and MWD, else VWR, VWT and MDA, time from the sentences around them.
 
 Wind sentences carry no time. Each gets one by interpolating, over line numbers, between the time sentences (ZDA, RMC,
-GGA, GLL, or the time of a TAG block), or that of its burst (`bursts`), and the flag TIME_UNSURE. MWV,R is wind past the
+GGA, GLL), or that of its burst (`bursts`), and the flag TIME_UNSURE. MWV,R is wind past the
 platform; MWV,T is "theoretical": what the instrument computed as if the platform did not move; both are relative to the
 bow. They stay in channels of their own, and neither is ground truth unless the user says the platform is fixed. VWR,
 VWT and MDA are what older instruments and weather stations send for MWV,R, MWV,T and MWD; beside these they are the
@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,7 +29,6 @@ from flagdata.ingest.anemometer.formats.sentences import (
     number,
     speed_over_ground,
     split,
-    tag_time,
     time_mark,
 )
 from flagdata.ingest.anemometer.formats.serial_lines import is_comment, most_stamped
@@ -39,7 +38,7 @@ from flagdata.ingest.anemometer.samples import rules
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import SampleFlag
-from flagdata.signals import Instants, Sensor
+from flagdata.signals import Instants, Sensor, Series
 from flagdata.timebase import NANOSECONDS
 from flagdata.units import UNITS
 
@@ -48,6 +47,9 @@ _OTHERS = {"VWR": "apparent_wind", "VWT": "theoretical_wind", "MDA": "wind"}
 _NEWER = {"apparent_wind": "MWV,R", "theoretical_wind": "MWV,T", "wind": "MWD"}
 """The sentences of the same winds that are read before them."""
 WINDS = ("MWV", "MWD", *_OTHERS)
+_FIELDS = {"MWV": 4, "MWD": 8, "VWR": 4, "VWT": 4, "MDA": 20}
+"""Fields that a sentence has at least."""
+_SIDES = {"MWV": ("R", "T"), "VWR": ("L", "R", ""), "VWT": ("L", "R", "")}
 _BEFORE = re.compile(r"(?=[^$!]*\d[^$!]*\d)(?!\\)[^$!]*(?=[$!])")
 """What stands before a sentence and holds numbers, as a stamp would."""
 _CHANNELS = (
@@ -57,7 +59,7 @@ _CHANNELS = (
 
 
 @dataclass
-class _Stream:
+class Stream:
     """What one pass over the lines gathers."""
 
     line: list[int] = field(default_factory=list)
@@ -116,61 +118,86 @@ class Nmea:
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read all wind sentences."""
-        stream = _Stream()
-        for first, lines in source.blocks():
-            for at, line in enumerate(lines, start=first):
-                if line.strip(" \t\x00") and not is_comment(line):
-                    _take(stream, line, at, options.talker)
-        _take_others(stream)
-        _leave_silent(stream)
         where = str(source.path)
-        if not stream.line:
-            by = f" of the talker {options.talker}" if options.talker is not None else ""
-            raise InputError(
-                f"no valid sentence of wind ({', '.join(WINDS)}){by}{_others_seen(stream.kinds)}",
-                where=where, fix="have the instrument send MWV, or check its baud rate if sentences are broken",
-            )  # fmt: skip
-        talkers = Counter(stream.talkers)
-        if len(talkers) > 1:
-            what = f"several talkers send wind: {', '.join(sorted(talkers))}; they are different instruments"
-            fix = f"choose one, e.g. --talker {talkers.most_common(1)[0][0]}"
-            if not stream.times.line:
-                raise InputError(f"{what}, and {NO_TIME}", where=where, fix=f"{NO_TIME_FIX}; then {fix}")
-            raise InputError(what, where=where, fix=fix)
+        stream = gathered(source, options, lambda number, line: line)
         line = np.array(stream.line, dtype=np.int64)
-        if options.clock == "sort":
-            fix = "give --clock first or --clock last, or leave it out"
-            raise UsageError("the lines of a stream are in the order in which they came", where=where, fix=fix)
         winds = [frozenset(row) for row in stream.values]
-        once = len(set(winds)) == len(winds)
-        placed = stream.times.place(line, date=options.date, where=where, choice=options.clock, once=once, winds=winds)
-        channels = {
-            name: np.array([row.get(name, np.nan) for row in stream.values], dtype=np.float64) for name in _CHANNELS
-        }
-        found: list[Finding] = []
-        for name in channels:
-            if name.endswith(("direction", "magnetic")):
-                angle, impossible = rules.direction(name, channels[name], line)
-                channels[name] = np.mod(angle, 2 * np.pi)
-                found.extend(impossible)
-        channels = {name: values for name, values in channels.items() if np.isfinite(values).any()}
-        if not channels:
-            raise InputError(
-                "every wind sentence is empty or invalid", where=f"{where}, line {line[0]}", fix="check the sensor"
-            )
-        channels, about = over_ground.settled(
-            channels, options, speeds=stream.speeds, source=_sources(stream, "wind"), where=where
-        )
-        flags = np.array(stream.flags, dtype=np.uint16) | np.uint16(SampleFlag.TIME_UNSURE)
-        return Reading(
-            time=placed.time, channels=channels, flags=flags, line=line,
-            sensor=Sensor(name=f"NMEA 0183 talker {next(iter(talkers))}"), step=NANOSECONDS,
-            stamped=False, findings=(*_kinds(stream, placed.time), *_findings(stream, placed), *found, about),
-        )  # fmt: skip
+        placed = stream.times.place(line, date=options.date, where=where, choice=options.clock, winds=winds)
+        reading = reading_of(stream, placed.time, options, where=where)
+        flags = reading.flags | np.uint16(SampleFlag.TIME_UNSURE)
+        found = _placed(len(line), placed)
+        return replace(reading, flags=flags, findings=(*found, *reading.findings))
 
 
-def _take(stream: _Stream, line: str, at: int, talker: str | None) -> None:
-    tagged = tag_time(line) if line.startswith("\\") else None
+def gathered(
+    source: TextFile, options: WindOptions, divide: Callable[[int, str], str], *, timed: bool = False
+) -> Stream:
+    """The wind sentences of one talker.
+
+    Args:
+        divide: number and text of a line → the sentence in it.
+        timed: whether each line has a stamp.
+
+    Raises:
+        InputError: no wind, or that of several talkers.
+        UsageError: an order that a stream cannot have.
+    """
+    stream, where = Stream(), str(source.path)
+    for first, lines in source.blocks():
+        for at, line in enumerate(lines, start=first):
+            if line.strip(" \t\x00") and not is_comment(line):
+                _take(stream, divide(at, line), at, options.talker)
+    _take_others(stream)
+    _leave_silent(stream)
+    if not stream.line:
+        by = f" of the talker {options.talker}" if options.talker is not None else ""
+        what = f"no valid sentence of wind ({', '.join(WINDS)}){by}{_others_seen(stream.kinds)}"
+        fix = "have the instrument send MWV, or check its baud rate if sentences are broken"
+        raise InputError(what, where=where, fix=fix)
+    talkers = Counter(stream.talkers)
+    if len(talkers) > 1:
+        what = f"several talkers send wind: {', '.join(sorted(talkers))}; they are different instruments"
+        fix = f"choose one, e.g. --talker {talkers.most_common(1)[0][0]}"
+        if not timed and not stream.times.line:
+            raise InputError(f"{what}, and {NO_TIME}", where=where, fix=f"{NO_TIME_FIX}; then {fix}")
+        raise InputError(what, where=where, fix=fix)
+    if options.clock == "sort":
+        fix = "give --clock first or --clock last, or leave it out"
+        raise UsageError("the lines of a stream are in the order in which they came", where=where, fix=fix)
+    return stream
+
+
+def reading_of(stream: Stream, time: Instants, options: WindOptions, *, where: str) -> Reading:
+    """The sentences of a stream at these instants (n,).
+
+    Raises:
+        InputError: all are empty, or a platform that was said to be fixed moves.
+        UsageError: an azimuth that nothing can be turned by.
+    """
+    line = np.array(stream.line, dtype=np.int64)
+    channels: dict[str, Series] = {}
+    found: list[Finding] = []
+    for name in _CHANNELS:
+        values = np.array([row.get(name, np.nan) for row in stream.values], dtype=np.float64)
+        if name.endswith(("direction", "magnetic")):
+            angle, impossible = rules.direction(name, values, line)
+            values = np.mod(angle, 2 * np.pi)
+            found.extend(impossible)
+        if np.isfinite(values).any():
+            channels[name] = values
+    if not channels:
+        fix = "check the sensor"
+        raise InputError("every wind sentence is empty or invalid", where=f"{where}, line {line[0]}", fix=fix)
+    source = _sources(stream, "wind")
+    channels, about = over_ground.settled(channels, options, speeds=stream.speeds, source=source, where=where)
+    return Reading(
+        time=time, channels=channels, flags=np.array(stream.flags, dtype=np.uint16), line=line,
+        sensor=Sensor(name=f"NMEA 0183 talker {stream.talkers[0]}"), step=NANOSECONDS, stamped=False,
+        findings=(*_kinds(stream, time), *_findings(stream), *found, about),
+    )  # fmt: skip
+
+
+def _take(stream: Stream, line: str, at: int, talker: str | None) -> None:
     try:
         sentence = split(line)
     except ChecksumError:
@@ -179,14 +206,12 @@ def _take(stream: _Stream, line: str, at: int, talker: str | None) -> None:
     if sentence is None:
         stream.not_sentences.append(at)
         return
-    if tagged is None and (before := _BEFORE.match(line)) is not None:
+    if (before := _BEFORE.match(line)) is not None:
         stream.before.append(at)
         stream.first_before = stream.first_before or before[0].strip()
     stream.kinds[sentence.kind] += 1
     stream.times.bursts.sentence(f"{sentence.talker}{sentence.kind}", at)
     stream.unchecked += not sentence.checked
-    if tagged is not None:
-        stream.times.add_instant(at, tagged * 1_000_000)
     mark = time_mark(sentence)
     if mark is not None:
         stream.times.add(sentence.kind, at, mark)
@@ -195,15 +220,13 @@ def _take(stream: _Stream, line: str, at: int, talker: str | None) -> None:
         stream.speeds.append(over_ground)
     if talker is not None and sentence.talker != talker:
         return
-    if sentence.kind == "MWV":
-        _mwv(stream, sentence, at)
-    elif sentence.kind == "MWD":
-        _mwd(stream, sentence, at)
-    elif sentence.kind in _OTHERS:
+    if sentence.kind in _OTHERS:
         stream.others.append((sentence, at))
+    elif sentence.kind in WINDS:
+        _wind(stream, sentence, at)
 
 
-def _take_others(stream: _Stream) -> None:
+def _take_others(stream: Stream) -> None:
     """Sentences of older kinds, of each wind that the stream holds in no other."""
     known = {name for row in stream.values for name in row}
     added = False
@@ -213,59 +236,61 @@ def _take_others(stream: _Stream) -> None:
             stream.beside[sentence.kind] += 1
             continue
         added = True
-        stream.sources[kind].add(sentence.kind)
-        (_mda if kind == "wind" else _vwr)(stream, sentence, at)
+        _wind(stream, sentence, at)
     if added:
-        _keep(stream, np.argsort(np.array(stream.line, dtype=np.int64), kind="stable").tolist())
+        keep(stream, np.argsort(np.array(stream.line, dtype=np.int64), kind="stable").tolist())
 
 
-def _leave_silent(stream: _Stream) -> None:
+def _leave_silent(stream: Stream) -> None:
     """Leave out the sentences of talkers whose wind is empty in all of them, where another talker has one."""
     speaking = {talker for talker, row in zip(stream.talkers, stream.values, strict=True) if row}
     if speaking:
         stream.silent = Counter(talker for talker in stream.talkers if talker not in speaking)
-        _keep(stream, [index for index, talker in enumerate(stream.talkers) if talker in speaking])
+        keep(stream, [index for index, talker in enumerate(stream.talkers) if talker in speaking])
 
 
-def _keep(stream: _Stream, order: Sequence[int]) -> None:
+def keep(stream: Stream, order: Sequence[int]) -> None:
     stream.line = [stream.line[index] for index in order]
     stream.values = [stream.values[index] for index in order]
     stream.flags = [stream.flags[index] for index in order]
     stream.talkers = [stream.talkers[index] for index in order]
 
 
-def _vwr(stream: _Stream, sentence: Sentence, at: int) -> None:
-    """VWR and VWT: the angle to the left or right of the bow, then the speed in knots, m/s and km/h."""
-    fields = sentence.fields
-    if len(fields) < 4 or fields[1] not in ("L", "R", ""):
+def _wind(stream: Stream, sentence: Sentence, at: int) -> None:
+    """The wind of one sentence.
+
+    MWV: the angle from the bow, R or T, the speed, its unit, a status. MWD: the direction true and magnetic, the speed
+    in knots and m/s. VWR and VWT: the angle to the left or right of the bow, the speed in knots, m/s and km/h. MDA: of
+    the composite of a weather station the direction true and magnetic, the speed in knots and m/s.
+    """
+    fields, kind = sentence.fields, sentence.kind
+    if len(fields) < _FIELDS[kind] or (kind not in ("MWD", "MDA") and fields[1] not in _SIDES[kind]):
         stream.invalid.append(at)
         return
-    kind = _OTHERS[sentence.kind]
-    angle = number(fields[0])
-    row: dict[str, float] = {}
-    if angle is not None and fields[1]:
-        row[f"{kind}_direction"] = float(np.radians(angle if fields[1] == "R" else -angle))
-    speed = _speed(fields[2:])
-    if speed is not None:
-        row[f"{kind}_speed"] = speed
-    _add(stream, sentence, at, row, SampleFlag.OK if speed is not None else SampleFlag.MISSING)
-
-
-def _mda(stream: _Stream, sentence: Sentence, at: int) -> None:
-    """MDA: of the composite of a weather station the direction (true, magnetic) and the speed (knots, m/s)."""
-    fields = sentence.fields
-    if len(fields) < 20:
-        stream.invalid.append(at)
-        return
-    true, magnetic, speed = number(fields[12]), number(fields[14]), _speed(fields[16:20])
-    row: dict[str, float] = {}
-    if true is not None:
-        row["wind_direction"] = float(np.radians(true))
-    if magnetic is not None:
-        row["wind_direction_magnetic"] = float(np.radians(magnetic))
-    if speed is not None:
-        row["wind_speed"] = speed
-    _add(stream, sentence, at, row, SampleFlag.OK if speed is not None else SampleFlag.MISSING)
+    source, flag, magnetic = kind, SampleFlag.OK, None
+    if kind in ("MWD", "MDA"):
+        first = 0 if kind == "MWD" else 12
+        wind, angle, magnetic = "wind", number(fields[first]), number(fields[first + 2])
+        speed = _speed((fields[6], "M", fields[4], "N") if kind == "MWD" else fields[16:20])
+        if kind == "MWD" and angle is None and magnetic is None:
+            stream.undirected += 1
+            return
+    elif kind == "MWV":
+        wind, source = ("apparent_wind" if fields[1] == "R" else "theoretical_wind"), f"MWV,{fields[1]}"
+        angle, speed = number(fields[0]), _speed(fields[2:4])
+        stream.unstated += len(fields) == 4  # canboat's n2kd leaves the status out
+        flag = SampleFlag.OK if len(fields) == 4 or fields[4] == "A" else SampleFlag.SENSOR_FAULT
+    else:
+        wind, angle, speed = _OTHERS[kind], number(fields[0]) if fields[1] else None, _speed(fields[2:])
+        angle = -angle if angle is not None and fields[1] == "L" else angle
+    angles = {f"{wind}_direction": angle, f"{wind}_direction_magnetic": magnetic}
+    row = {name: float(np.radians(value)) for name, value in angles.items() if value is not None}
+    row |= {} if speed is None else {f"{wind}_speed": speed}
+    stream.sources[wind].add(source)
+    stream.talkers.append(sentence.talker)
+    stream.line.append(at)
+    stream.values.append(row)
+    stream.flags.append(int(flag if speed is not None else flag | SampleFlag.MISSING))
 
 
 def _speed(fields: Sequence[str]) -> float | None:
@@ -279,59 +304,7 @@ def _speed(fields: Sequence[str]) -> float | None:
     return min(known)[1] if known else None
 
 
-def _mwv(stream: _Stream, sentence: Sentence, at: int) -> None:
-    fields = sentence.fields
-    if len(fields) < 4 or fields[1] not in ("R", "T"):
-        stream.invalid.append(at)
-        return
-    kind = "apparent" if fields[1] == "R" else "theoretical"
-    stream.sources[f"{kind}_wind"].add(f"MWV,{fields[1]}")
-    angle, speed, unit = number(fields[0]), number(fields[2]), SPEED_UNITS.get(fields[3])
-    row: dict[str, float] = {}
-    unstated = len(fields) == 4  # canboat's n2kd leaves the status out
-    stream.unstated += unstated
-    flag = SampleFlag.OK if unstated or fields[4] == "A" else SampleFlag.SENSOR_FAULT
-    if angle is not None:
-        row[f"{kind}_wind_direction"] = float(np.radians(angle))
-    if speed is not None and unit is not None:
-        row[f"{kind}_wind_speed"] = speed * UNITS[unit].scale
-    else:
-        flag |= SampleFlag.MISSING
-    _add(stream, sentence, at, row, flag)
-
-
-def _mwd(stream: _Stream, sentence: Sentence, at: int) -> None:
-    fields = sentence.fields
-    if len(fields) < 8:
-        stream.invalid.append(at)
-        return
-    true, magnetic = number(fields[0]), number(fields[2])
-    speed = _speed((fields[6], "M", fields[4], "N"))
-    if true is None and magnetic is None:
-        stream.undirected += 1
-        return
-    stream.sources["wind"].add("MWD")
-    row: dict[str, float] = {}
-    if true is not None:
-        row["wind_direction"] = float(np.radians(true))
-    if magnetic is not None:
-        row["wind_direction_magnetic"] = float(np.radians(magnetic))
-    flag = SampleFlag.OK
-    if speed is None:
-        flag = SampleFlag.MISSING
-    else:
-        row["wind_speed"] = speed
-    _add(stream, sentence, at, row, flag)
-
-
-def _add(stream: _Stream, sentence: Sentence, at: int, row: dict[str, float], flag: SampleFlag) -> None:
-    stream.talkers.append(sentence.talker)
-    stream.line.append(at)
-    stream.values.append(row)
-    stream.flags.append(int(flag))
-
-
-def _kinds(stream: _Stream, time: Instants) -> tuple[Finding, ...]:
+def _kinds(stream: Stream, time: Instants) -> tuple[Finding, ...]:
     """How many sentences of each kind of wind there are, and how far apart, where a stream holds several kinds."""
     parts: list[str] = []
     for prefix, kind in (("apparent_wind", "relative"), ("theoretical_wind", "theoretical"), ("wind", "over ground")):
@@ -347,7 +320,7 @@ def _kinds(stream: _Stream, time: Instants) -> tuple[Finding, ...]:
     return (Finding(kind="wind-kinds", severity=Severity.NOTE, count=len(stream.line), what=text),)
 
 
-def _sources(stream: _Stream, wind: str) -> str:
+def _sources(stream: Stream, wind: str) -> str:
     """The sentences that a wind was read from."""
     return " and ".join(sorted(stream.sources[wind]))
 
@@ -370,53 +343,48 @@ def _others_seen(kinds: Counter[str]) -> str:
     return f"; there are {counted}" if counted else ""
 
 
-def _findings(stream: _Stream, placed: Placed) -> tuple[Finding, ...]:
-    count = len(stream.line)
-    found = list(placed.findings)
-    if placed.marks > 1:
-        what = f"{count} wind sentences carry no time: interpolated between {placed.marks} {placed.kind} marks "
-        what += f"{placed.spacing:g} s apart"
-        kind = "time-interpolated"
-        if placed.bursts:
-            what = f"{count} wind sentences carry no time: sentences come in bursts {placed.spacing:g} s apart, with "
-            what += f"one {placed.kind} in each, and each has the time of the {placed.kind} of its burst"
-            kind = "time-of-burst"
-        found.insert(0, Finding(kind=kind, severity=Severity.WARNING, count=count, value=placed.spacing, what=what))
+def _placed(count: int, placed: Placed) -> tuple[Finding, ...]:
+    """What is said of sentences that have their time from others."""
+    if placed.marks < 2:
+        return placed.findings
+    kind, what = (
+        "time-interpolated",
+        f"interpolated between {placed.marks} {placed.kind} marks {placed.spacing:g} s apart",
+    )
+    if placed.bursts:
+        kind, what = "time-of-burst", f"sentences come in bursts {placed.spacing:g} s apart, with one {placed.kind} in "
+        what += f"each, and each has the time of the {placed.kind} of its burst"
+    what = f"{count} wind sentences carry no time: {what}"
+    found = Finding(kind=kind, severity=Severity.WARNING, count=count, value=placed.spacing, what=what)
+    return (found, *placed.findings)
 
-    def note(places: list[int], kind: str, severity: Severity, what: str) -> None:
-        if places:
-            text = f"{len(places)} {what}"
-            found.append(Finding(kind=kind, severity=severity, count=len(places), where=f"line {places[0]}", what=text))
 
-    if stream.before:
-        text = stream.first_before[:60]
-        what = f"before {len(stream.before)} sentences stands no stamp that is known, as {text!r}; not read"
-        found.append(Finding(kind="text-before-sentences", severity=Severity.WARNING, count=len(stream.before),
-                             where=f"line {stream.before[0]}", what=what))  # fmt: skip
+def _findings(stream: Stream) -> tuple[Finding, ...]:
+    found: list[Finding] = []
+
+    def note(rows: Sequence[int] | int, kind: str, severity: Severity, what: str) -> None:
+        count, at = (rows, None) if isinstance(rows, int) else (len(rows), rows[0] if rows else None)
+        if count:
+            where = None if at is None else f"line {at}"
+            found.append(Finding(kind=kind, severity=severity, count=count, where=where, what=f"{count} {what}"))
+
+    before = f"sentences stand behind text that is no stamp, as {stream.first_before[:60]!r}; the text is not read"
+    note(stream.before, "text-before-sentences", Severity.WARNING, before)
     for talker, silent in stream.silent.items():
-        what = f"the {silent} wind sentences of talker {talker} are empty; left out"
-        found.append(Finding(kind="sentences-not-read", severity=Severity.NOTE, count=silent, what=what))
+        note(silent, "sentences-not-read", Severity.NOTE, f"wind sentences of talker {talker} are empty; left out")
     note(stream.bad_checksums, "checksum-errors", Severity.ERROR, "sentences with a wrong checksum; left out")
     note(stream.not_sentences, "malformed-lines", Severity.WARNING, "lines that are no sentence; left out")
     note(stream.invalid, "malformed-sentences", Severity.ERROR, "wind sentences with fields missing; left out")
-    faults = sum(1 for flag in stream.flags if flag & SampleFlag.SENSOR_FAULT)
-    if faults:
-        text = f"{faults} wind sentences that the instrument itself marks invalid; left out of averages"
-        found.append(Finding(kind="sensor-fault", severity=Severity.WARNING, count=faults, what=text))
-    if stream.unchecked:
-        text = f"{stream.unchecked} sentences without a checksum; taken as they are"
-        found.append(Finding(kind="no-checksum", severity=Severity.WARNING, count=stream.unchecked, what=text))
-    if stream.unstated:
-        text = f"{stream.unstated} MWV sentences without a status; taken as valid"
-        found.append(Finding(kind="no-status", severity=Severity.WARNING, count=stream.unstated, what=text))
+    faults = sum(bool(flag & SampleFlag.SENSOR_FAULT) for flag in stream.flags)
+    what = "wind sentences that the instrument itself marks invalid; left out of averages"
+    note(faults, "sensor-fault", Severity.WARNING, what)
+    note(stream.unchecked, "no-checksum", Severity.WARNING, "sentences without a checksum; taken as they are")
+    note(stream.unstated, "no-status", Severity.WARNING, "MWV sentences without a status; taken as valid")
     for kind, number_of in stream.beside.items():
-        text = f"{number_of} {kind} sentences are not read: {_NEWER[_OTHERS[kind]]} is read for that wind"
-        found.append(Finding(kind="sentences-not-read", severity=Severity.NOTE, count=number_of, what=text))
-    if stream.undirected:
-        text = f"{stream.undirected} MWD sentences without a direction: no wind over ground, not read"
-        found.append(Finding(kind="mwd-without-direction", severity=Severity.NOTE, count=stream.undirected, what=text))
-    missing = sum(1 for flag in stream.flags if flag & SampleFlag.MISSING)
-    if missing:
-        text = f"{missing} wind sentences without a speed"
-        found.append(Finding(kind="missing-values", severity=Severity.WARNING, count=missing, what=text))
+        what = f"{kind} sentences are not read: {_NEWER[_OTHERS[kind]]} is read for that wind"
+        note(number_of, "sentences-not-read", Severity.NOTE, what)
+    what = "MWD sentences without a direction: no wind over ground, not read"
+    note(stream.undirected, "mwd-without-direction", Severity.NOTE, what)
+    missing = sum(bool(flag & SampleFlag.MISSING) for flag in stream.flags)
+    note(missing, "missing-values", Severity.WARNING, "wind sentences without a speed")
     return tuple(found)

@@ -40,10 +40,10 @@ class Format(Protocol):
 FORMATS = Registry(
     "anemometer format",
     {
+        "toa5": "flagdata.ingest.anemometer.formats.toa5:Toa5",
         "delimited": "flagdata.ingest.anemometer.table.delimited:Delimited",
         "nmea": "flagdata.ingest.anemometer.formats.nmea:Nmea",
         "kestrel": "flagdata.ingest.anemometer.formats.described:Kestrel",
-        "toa5": "flagdata.ingest.anemometer.formats.toa5:Toa5",
         "nmea-stamped": "flagdata.ingest.anemometer.formats.stamped_nmea:StampedNmea",
         "canboat": "flagdata.ingest.anemometer.formats.canboat:Canboat",
         "davis": "flagdata.ingest.anemometer.formats.described:Davis",

@@ -1,32 +1,35 @@
 """NMEA 0183 sentences, each after the stamp of the computer that logged it: "2026-05-01T12:00:00.123Z,$WIMWV,…".
 
-So log LCJ CV7, Calypso, Gill, Vaisala and other instruments whose sentences carry no time themselves. The stamps are
-handed to the reader of NMEA streams as TAG blocks (IEC 61162-450, parameter "c", Unix milliseconds); what the sentences
-mean is said in nmea.py. Sources for the instruments: LCJ Capteurs, CV7 user manual (MWV relative, and XDR); Calypso
-Instruments, ULP STD user manual, 3.1 (data format NMEA 0183).
+So log LCJ CV7, Calypso, Gill, Vaisala and other instruments whose sentences carry no time themselves; a TAG block (IEC
+61162-450, parameter "c") is such a stamp too. What the sentences mean is said in nmea.py. Sources for the instruments:
+LCJ Capteurs, CV7 user manual (MWV relative, and XDR); Calypso Instruments, ULP STD user manual, 3.1 (data format NMEA
+0183).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.formats import receiver_clock
-from flagdata.ingest.anemometer.formats.nmea import WINDS, Nmea, no_wind
-from flagdata.ingest.anemometer.formats.sentences import ChecksumError, checksum, split
+from flagdata.ingest.anemometer.formats.nmea import WINDS, gathered, keep, no_wind, reading_of
+from flagdata.ingest.anemometer.formats.sentences import ChecksumError, split, time_mark
 from flagdata.ingest.anemometer.formats.serial_lines import GIVEN_CLOCK, split_stamp, stamps_of, without_comments
 from flagdata.ingest.anemometer.instants.zones import instants
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.text.source import TextFile
-from flagdata.schema import SampleFlag
+from flagdata.timebase import NANOSECONDS
 
-_MILLISECOND = 1_000_000
+_OFF = 60.0
+"""Median difference of a receiver's time from the stamps that no delay of a serial line explains [s]."""
+_REPORTED = 2.0
+"""Median difference that is worth a word [s]: clips are paired with winds by the second."""
 
 
 class StampedNmea:
@@ -38,100 +41,85 @@ class StampedNmea:
 
     def recognise(self, head: Head) -> Guess | None:
         """Lines of a stamp and a sentence, some of them of wind."""
-        stamped, wind = count(head)
-        lines = without_comments(head.lines)
-        if stamped < max(1, len(lines) // 2):
+        lines = [split_stamp(line) for line in without_comments(head.lines)]
+        kinds: list[str] = []
+        for stamp, raw in lines:
+            with suppress(ChecksumError):
+                sentence = split(raw) if stamp and raw.startswith(("$", "!")) else None
+                kinds += [] if sentence is None else [sentence.kind]
+        if len(kinds) < max(1, len(lines) // 2):
             return None
-        what = "a computer's stamp and an NMEA 0183 sentence"
-        if head.counted:
-            what = f"NMEA 0183 sentences; {GIVEN_CLOCK}"
+        wind = sum(kind in WINDS for kind in kinds)
+        what = f"NMEA 0183 sentences; {GIVEN_CLOCK}" if head.counted else "a computer's stamp and an NMEA 0183 sentence"
         reasons = (
-            f"{stamped} of the first {len(lines)} lines are {what}",
+            f"{len(kinds)} of the first {len(lines)} lines are {what}",
             f"{wind} of them are wind ({', '.join(WINDS)})",
         )
-        fix = None if wind else no_wind([split_stamp(line)[1] for line in lines], self.name)
+        fix = None if wind else no_wind([raw for _, raw in lines], self.name)
         return Guess(format=self.name, score=0.96 if wind else 0.3, reasons=reasons, fix=fix)
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read all wind sentences, each at its own stamp."""
         where = str(source.path)
-        line: list[int] = []
-        texts: list[str] = []
-        marks: list[tuple[int, int]] = []
-        for first, lines in source.blocks():
-            for number, text in enumerate(lines, start=first):
-                stamp, raw = split_stamp(text)
-                if stamp and raw.startswith(("$", "!")):
-                    line.append(number)
-                    texts.append(stamp)
-                    said = receiver_clock.mark(raw)
-                    marks += [] if said is None else [(number, said)]
-        if not line:
+        texts: dict[int, str] = {}
+        marks: dict[int, int] = {}
+
+        def divide(number: int, line: str) -> str:
+            stamp, raw = split_stamp(line)
+            if stamp and raw.startswith(("$", "!")):
+                texts[number] = stamp
+                said = _mark(raw)
+                marks.update({} if said is None else {number: said})
+            return raw
+
+        stream = gathered(source, options, divide, timed=True)
+        if not texts:
             raise InputError("no NMEA 0183 sentence after a stamp", where=where, fix="name another format by --as")
-        stamps = stamps_of(texts)
-        lines = np.array(line, dtype=np.int64)[stamps.valid]
+        stamps = stamps_of(list(texts.values()))
+        line = np.array(list(texts), dtype=np.int64)[stamps.valid]
         time, found = instants(
-            stamps.ns[stamps.valid], stamps.utc[stamps.valid], line=lines, zone_name=options.zone, where=where
+            stamps.ns[stamps.valid], stamps.utc[stamps.valid], line=line, zone_name=options.zone, where=where
         )
-        at = dict(zip(lines.tolist(), time.tolist(), strict=True))
-        tagged = _Tagged(
-            path=source.path, encoding=source.encoding, lines=source.lines, findings=source.findings, instants=at,
-            source=source,
-        )  # fmt: skip
-        reading = Nmea().read(tagged, options)
-        keep = np.array([number in at for number in reading.line.tolist()], dtype=bool)
-        reading = reading.take(keep)
-        kept = tuple(finding for finding in reading.findings if finding.kind != "time-interpolated")
-        dropped = int((~keep).sum())
+        at = dict(zip(line.tolist(), time.tolist(), strict=True))
+        timed = [index for index, number in enumerate(stream.line) if number in at]
+        dropped = len(stream.line) - len(timed)
+        keep(stream, timed)
         if dropped:
-            text = f"{dropped} wind sentences without a stamp; left out"
-            kept = (*kept, Finding(kind="no-stamp", severity=Severity.ERROR, count=dropped, what=text))
-        return replace(
-            reading,
-            time=np.array([at[number] for number in reading.line.tolist()], dtype=np.int64),
-            flags=reading.flags & ~np.uint16(SampleFlag.TIME_UNSURE),
-            step=stamps.step,
-            findings=(*found, *kept, *receiver_clock.report(at, marks)),
-        )
+            what = f"{dropped} wind sentences without a stamp; left out"
+            found = (*found, Finding(kind="no-stamp", severity=Severity.ERROR, count=dropped, what=what))
+        reading = reading_of(stream, np.array([at[number] for number in stream.line], np.int64), options, where=where)
+        found = (*found, *reading.findings, *_receiver(at, marks))
+        return replace(reading, step=stamps.step, findings=found)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Tagged(TextFile):
-    """The same lines with a TAG block in the place of the stamp.
-
-    Attributes:
-        instants: line → its stamp [UTC ns].
-        source: whose lines they are, which may be other than the file's.
-    """
-
-    instants: Mapping[int, int]
-    source: TextFile
-
-    def blocks(self, size: int = 200_000) -> Iterator[tuple[int, list[str]]]:
-        """See `TextFile.blocks`."""
-        for first, lines in self.source.blocks(size):
-            yield first, [self._tagged(number, text) for number, text in enumerate(lines, start=first)]
-
-    def _tagged(self, number: int, text: str) -> str:
-        instant = self.instants.get(number)
-        if instant is None:
-            return split_stamp(text)[1]
-        block = f"c:{instant // _MILLISECOND:013d}"
-        return f"\\{block}*{checksum(block):02X}\\{split_stamp(text)[1]}"
+def _mark(text: str) -> int | None:
+    """The instant [UTC ns] that a sentence states; `None` for one without a date, and for a damaged one."""
+    if not text[3:7].startswith(("ZDA,", "RMC,")):
+        return None
+    try:
+        sentence = split(text)
+    except ChecksumError:
+        return None
+    said = None if sentence is None else time_mark(sentence)
+    if said is None or said.date is None:
+        return None
+    day = np.datetime64("-".join(f"{part:02d}" for part in said.date), "D").astype(np.int64)
+    return int(day) * 86_400 * NANOSECONDS + said.clock
 
 
-def count(head: Head) -> tuple[int, int]:
-    """Numbers of lines that are a stamp and a sentence, and of those that are wind."""
-    stamped = wind = 0
-    for text in head.lines:
-        stamp, raw = split_stamp(text)
-        if not stamp or not raw.startswith(("$", "!")):
-            continue
-        try:
-            sentence = split(raw)
-        except ChecksumError:
-            continue
-        if sentence is not None:
-            stamped += 1
-            wind += sentence.kind in WINDS
-    return stamped, wind
+def _receiver(stamps: Mapping[int, int], marks: Mapping[int, int]) -> tuple[Finding, ...]:
+    """The finding about a satellite receiver whose time is another than that of the stamps; none where they agree."""
+    off = [(at, (said - stamps[at]) / NANOSECONDS) for at, said in marks.items() if at in stamps]
+    median = float(np.median([seconds for _, seconds in off])) if off else 0.0
+    if abs(median) < _REPORTED:
+        return ()
+    size = f"{abs(median) / 3600:.3g} h" if abs(median) >= 3600 else f"{abs(median):.1f} s"
+    side = "behind" if median < 0 else "before"
+    return (
+        Finding(
+            kind="receiver-clock-off", severity=Severity.WARNING if abs(median) >= _OFF else Severity.NOTE,
+            count=len(off), value=median, where=f"line {off[0][0]}",
+            what=f"the satellite receiver's time (RMC, ZDA) is {size} {side} the stamps of the lines, which are taken",
+            fix="check the zone of the stamps and the computer's clock; for the receiver's time, take the stamps out",
+        ),
+    )  # fmt: skip

@@ -21,6 +21,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.formats.described import Described
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.sniffing import NAMED, Guess, Head
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import SampleFlag
 from flagdata.signals import Instants
@@ -36,6 +37,11 @@ class Toa5(Described):
     def __init__(self) -> None:
         super().__init__("toa5")
         self.uses = self.uses | {"azimuth"}
+
+    def recognise(self, head: Head) -> Guess | None:
+        """The first line begins with the format's name."""
+        found = super().recognise(head)
+        return None if found is None else replace(found, score=NAMED)
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read a table whose header names wind speed or wind components."""
