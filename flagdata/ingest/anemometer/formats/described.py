@@ -20,7 +20,6 @@ A name is the heading's, or a regular expression that fits the whole of it, case
 
 from __future__ import annotations
 
-import csv
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -32,14 +31,14 @@ from typing import Any
 import numpy as np
 
 from flagdata.documents import to_toml
-from flagdata.errors import InputError, TimeError
+from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer import recipe as recipes
-from flagdata.ingest.anemometer.instants.dates import date_form
+from flagdata.ingest.anemometer.formats.headings import Column, Heading, find, fits, stamp_format
 from flagdata.ingest.anemometer.instants.stamps import parse
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading, described
-from flagdata.ingest.anemometer.recipe import DELIMITERS, OpenRecipe, Recipe
+from flagdata.ingest.anemometer.recipe import OpenRecipe, Recipe
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.table.rowclock import Given
 from flagdata.ingest.anemometer.table.sonic import with_horizontal
@@ -52,38 +51,14 @@ from flagdata.timebase import NANOSECONDS
 from flagdata.units import UNITS, spelled, unit
 
 _SHELF = Shelf(folder="sensors/formats", noun="table format")
-_LINES, _LONGEST = 5000, 20_000
-"""Lines by which order of dates and decimal mark are decided, and letters of a heading."""
+_LINES = 5000
+"""Lines by which order of dates and decimal mark are decided."""
 _FIX = "export again in m/s, km/h, mph or knots (Beaufort is a scale of classes), or describe the file by a recipe"
-_REST = re.compile(
-    r"\s+\d{1,2}:\d{2}(?P<s>:\d{2})?(?P<f>[.,]\d+)?(?P<b>\s*)(?P<p>[AaPp](?:\.?[Mm]\.?)?)?\s*(?P<z>Z|[+-]\d{2}:?\d{2})?$"
-)
 _NAMED, _WIDE = 60, 120
 """Columns that are not read which a note names, and letters of each."""
 _WINDS = ("mph", "km/h", "m/s", "kn")
 _ENOUGH = 5
 """Different speeds above 0 that show the unit which an instrument counts whole."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Column:
-    """A column of a heading: its number from 1, its name, and its unit as written ("" where there is none)."""
-
-    number: int
-    name: str
-    unit: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Heading:
-    """The line of names, from 0; the lines above the rows; the names' cells and columns, and the units below them."""
-
-    at: int
-    rows: int
-    delimiter: str
-    cells: Sequence[str] = ()
-    columns: Sequence[Column] = ()
-    below: Sequence[str] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +97,7 @@ class Described:
 
     def recognise(self, head: Head) -> Guess | None:
         """The heading and the mark that the maker writes."""
-        found = _heading(self.open.data, head.lines)
+        found = find(self.open.data, head.lines)
         if found is None:
             return None
         reason = f"line {found.at + 1} is as in every {self.about}: {head.lines[found.at].strip()[:100]}"
@@ -184,7 +159,7 @@ def complete(
         TimeError: no stamps, or nothing that decides between day and month.
     """
     data = open_recipe.data
-    heading = _heading(data, lines)
+    heading = find(data, lines)
     if heading is None:
         fix = "export it again, or name another --as or --sensor"
         raise InputError(f"no heading of a {data['about']}", where=f"{where}, line 1", fix=fix)
@@ -228,83 +203,6 @@ def opened(name: str) -> tuple[str, OpenRecipe]:
     return text, recipes.parse_open(text, where=f"table format {name!r}")
 
 
-def _fits(name: str, cell: str) -> re.Match[str] | None:
-    cell = cell[:300]  # a heading of any length must not cost more
-    return re.fullmatch(name, cell, re.IGNORECASE) or re.fullmatch(re.escape(name), cell, re.IGNORECASE)
-
-
-def cut(line: str, delimiter: str) -> list[str]:
-    """The cells of one line of a heading, without blanks and quotes around them."""
-    if delimiter == " ":
-        return line.split()
-    return [cell.strip() for cell in next(csv.reader([line.lstrip("\ufeff")], delimiter=delimiter), [])]
-
-
-def _heading(data: Mapping[str, Any], lines: Sequence[str]) -> Heading | None:
-    match, file = data.get("match", {}), data.get("file", {})
-    mark, preamble = match.get("mark", ""), file.get("preamble", 0)
-    delimiter = DELIMITERS.get(file.get("delimiter", ""), file.get("delimiter"))
-    if not lines or not re.match(match.get("first-line", ""), lines[0].lstrip("\ufeff")):
-        return None
-    if file.get("header", 1) == 0:
-        known = len(lines) > preamble and re.search(mark, "\n".join(lines[:preamble]))
-        return Heading(at=max(preamble - 1, 0), rows=preamble, delimiter=delimiter or ",") if known else None
-    first = 0 if "header" in match else preamble
-    above = [line[:_LONGEST] for line in lines[: match.get("within", first + 1)]]
-    if not re.search(mark, "\n".join(above)):
-        return None
-    for at, line in enumerate(above[first:], start=first):
-        line = line.lstrip("\ufeff# ")
-        used = delimiter or ("\t" if "\t" in line else ";" if line.count(";") > 1 or "," not in line else ",")
-        cells = cut(line, used)
-        if match.get("groups") and at:
-            cells = _grouped(cut(above[at - 1], used), cells)
-        if match.get("stacked") and at:
-            used = "\t" if "\t" in line else " "
-            cells = _stacked(above[at - 1].lstrip("\ufeff"), above[at], used)
-        held = all(any(_fits(one, cell) for cell in cells) for one in match.get("header", ()))
-        if held and re.search(mark, "\n".join(above[: at + 1])):
-            found = _named(match, lines, at, used, cells, file.get("header", 1 + bool(match.get("units"))))
-            row = lines[found.rows] if found.rows < len(lines) else ""
-            return found if re.match(match.get("row", ""), row) else None
-    return None
-
-
-def _named(
-    match: Mapping[str, Any], lines: Sequence[str], at: int, delimiter: str, cells: list[str], header: int
-) -> Heading:
-    below = cut(lines[at + 1], delimiter) if match.get("units") and at + 1 < len(lines) else []
-    rows = at + header
-    while rows < len(lines) and not lines[rows].strip(f'{delimiter} "-'):
-        rows += 1
-    parts = [_fits(match["cell"], cell) if "cell" in match else None for cell in cells]
-    stated = [*below, *[""] * len(cells)] if below else [part["unit"] or "" if part else "" for part in parts]
-    names = [part["name"] or "" if part else cell for part, cell in zip(parts, cells, strict=True)]
-    columns = [Column(number=i + 1, name=name, unit=stated[i]) for i, name in enumerate(names)]
-    return Heading(at=at, rows=rows, delimiter=delimiter, cells=cells, columns=columns, below=below)
-
-
-def _grouped(above: Sequence[str], cells: Sequence[str]) -> list[str]:
-    """Names behind the name of their group, which stands above the first of it."""
-    joined, group = [], ""
-    for at, cell in enumerate(cells):
-        group = above[at] if at < len(above) and above[at] else group
-        joined.append(f"{group} {cell}".strip())
-    return joined
-
-
-def _stacked(upper: str, lower: str, delimiter: str) -> list[str]:
-    """Names whose first word stands in the line above: in the same cell, or over one of the letters."""
-    if delimiter != " ":
-        first, second = cut(upper, delimiter), cut(lower, delimiter)
-        return [f"{first[at] if at < len(first) else ''} {cell}".strip() for at, cell in enumerate(second)]
-    words = [(match.start(), match.end(), match[0]) for match in re.finditer(r"\S+", upper)]
-    return [
-        " ".join([*(word for start, end, word in words if start < one.end() and end > one.start()), one[0]])
-        for one in re.finditer(r"\S+", lower)
-    ]
-
-
 def _facts(data: Mapping[str, Any], lines: Sequence[str]) -> defaultdict[str, str]:
     text = "\n".join(lines).lstrip("\ufeff")
     found = ((name, re.search(pattern, text, re.MULTILINE)) for name, pattern in data.get("facts", {}).items())
@@ -333,12 +231,12 @@ def _stamped(
         if isinstance(wanted, int):
             columns.append(wanted)
             continue
-        fits = ((at, match) for at, cell in enumerate(heading.cells, start=1) if (match := _fits(wanted, cell)))
-        for at, match in islice(fits, 1):
+        named = ((at, match) for at, cell in enumerate(heading.cells, start=1) if (match := fits(wanted, cell)))
+        for at, match in islice(named, 1):
             columns.append(at)
             zone = match.groupdict().get("zone") or zone
     if not columns:
-        fix = f"its columns are {', '.join(heading.cells)[:_LONGEST]}"
+        fix = f"its columns are {', '.join(heading.cells)[:1000]}"
         raise InputError(f"no column is called {' or '.join(time['columns'])}", where=where, fix=fix)
     return columns, zone
 
@@ -357,36 +255,6 @@ def _format(
             if 2 * int(parse(texts, form).valid.sum()) >= max(1, len(texts)):
                 return form, ()
     return stamp_format(texts, options, where, claim=heading.below[columns[0] - 1] if heading.below else "")
-
-
-def stamp_format(
-    texts: Sequence[str], options: WindOptions, where: str, *, claim: str = ""
-) -> tuple[str, tuple[Finding, ...]]:
-    """The format of stamps (see stamps.py) by the stamps themselves, and what was found about the order of dates.
-
-    Args:
-        texts: stamps of the first rows, date before time.
-        claim: what the heading says of them.
-
-    Raises:
-        TimeError: no date and time in them, or nothing that decides between day and month.
-    """
-    filled = [text.strip() for text in texts if text.strip()]
-    date, order, reason = date_form(filled, given=options.date_order, where=where)
-    found = [match for text in filled if (match := _REST.search(text))]
-    rest = next(iter(found), None)
-    if rest is None:
-        first = filled[0] if filled else ""
-        raise TimeError(f"no time of day in {first!r}", where=where, fix="export date and time")
-    clock = ("%I" if rest["p"] else "%H") + ":%M" + (":%S" if rest["s"] else "")
-    clock += "%f" if any(match["f"] for match in found) else ""  # some loggers drop zeros at the end
-    half = f"{' ' if rest['b'] else ''}%p" if rest["p"] else ""
-    form = f"{date} {clock}{half}{'%z' if rest['z'] else ''}"
-    if order == "ymd":
-        return form, ()
-    other = claim.upper().startswith("YYYY")
-    text = f"dates are read as {order}: {reason}" + (f"; the heading says {claim!r}" if other else "")
-    return form, (Finding(kind="date-order", severity=Severity.WARNING if other else Severity.NOTE, what=text),)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -408,7 +276,7 @@ def _channel(channels: Mapping[str, Mapping[str, Any]], column: Column) -> str |
     for name, layout in channels.items():
         wanted = layout["column"]
         names = wanted if isinstance(wanted, list) else [wanted]
-        if column.number in names or any(isinstance(one, str) and _fits(one, column.name) for one in names):
+        if column.number in names or any(isinstance(one, str) and fits(one, column.name) for one in names):
             return name
     return None
 

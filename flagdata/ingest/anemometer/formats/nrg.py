@@ -9,7 +9,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from flagdata.ingest.anemometer.formats.described import Column, Described, Heading
+from flagdata.ingest.anemometer.formats.described import Described
+from flagdata.ingest.anemometer.formats.headings import Column, Heading
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.text.source import TextFile
