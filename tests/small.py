@@ -47,11 +47,11 @@ width = 32
 height = 32
 raster-samples = 2
 [sides.train]
-sequences = 4
-renders = 11
+sequences = 3
+renders = 7
 [sides.test]
 sequences = 2
-renders = 4
+renders = 3
 [camera]
 jpeg-quality = { low = 70, high = 90 }
 read-noise = 1.0
@@ -64,7 +64,7 @@ distance = { low = 1.0, high = 3.0 }
 [anemometer.effects.anemometer-gain]
 gain = { low = 0.95, high = 1.05 }
 """
-"""Six sequences of a coarse flag, fifteen films of 32 × 32 pixels."""
+"""Five sequences of a coarse flag, ten films of 32 × 32 pixels."""
 TRAINING = """
 title = "small"
 seed = 1

@@ -202,6 +202,8 @@ def results(client: Client, jobs: Iterable[Job], *, say: Callable[[str], None]) 
                     f"workers kept dying over the same job: {error}", where="dask",
                     fix="look at the workers' logs; they may lack memory",
                 ) from None  # fmt: skip
+            if isinstance(result, CancelledError):  # what Dask gives for the result of a job that was lost with it
+                raise _lost()
             future.release()
             yield result
             fill()

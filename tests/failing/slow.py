@@ -62,7 +62,7 @@ noise = {noise}
 [recording.wind]
 velocity = [{speed}, 0.0, 0.0]
 """
-FEW = DATA_SET.replace("4\nrenders = 11", "2\nrenders = 2").replace("2\nrenders = 4", "1\nrenders = 1")
+FEW = DATA_SET.replace("3\nrenders = 7", "2\nrenders = 2").replace("2\nrenders = 3", "1\nrenders = 1")
 _LAKE = ("--lake", "{folder}/lake")
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from flagdata.commands.confirm import OnCommandLine
+from flagdata.lake import Lake
 from tests.confirming import CONFIRMED
 
 VIDEO_START = "2026-05-01T10:00:00Z"
@@ -58,6 +59,11 @@ def wind_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("wind") / "mast.csv"
     path.write_text("\n".join(rows) + "\n")
     return path
+
+
+@pytest.fixture
+def lake(tmp_path: Path) -> Lake:
+    return Lake.create(tmp_path / "lake")
 
 
 @pytest.fixture

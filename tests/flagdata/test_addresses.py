@@ -10,78 +10,65 @@ import pytest
 
 import flagdata
 from flagdata.addresses import local_path
-from flagdata.cli import VERBS, main
+from flagdata.cli import VERBS
 from flagdata.console import LocalPath
 from flagdata.dataset.cache import DecodedCache
 from flagdata.errors import UsageError
 from flagdata.ingest.anemometer import read_log, sniff
 from flagdata.ingest.camera import open_camera
 from flagdata.lake import Lake
+from tests.program import invoke
+
+ADDRESSES = [
+    ("s3://bucket/lake", "object storage", "copy it to a local disk"),
+    ("gs://bucket/lake", "object storage", "copy it to a local disk"),
+    ("abfss://box@account/lake", "object storage", "copy it to a local disk"),
+    ("rtsp://127.0.0.1:9/x", "a live stream", "record it to a file"),
+    ("HTTPS://example.org/film.mp4", "a file on the web", "download it"),
+    ("file:///data/lake", "a file: address", "give the path: /data/lake"),
+    ("ssh://host/data", "another machine", "mount it"),
+    ("me@host:/data/lake", "another machine", "mount it"),
+    ("new-thing+v2://x", "another machine or service", "give the local path"),
+]
+PATHS = ["lake", "./s3/lake", "/data/s3:/lake", "log 12:30.csv", "C:/films/a.mp4", "wind:a.csv", "a=b/c", ".", "s3:"]
 
 
-@pytest.mark.parametrize(
-    ("address", "what", "fix"),
-    [
-        ("s3://bucket/lake", "object storage", "copy it to a local disk"),
-        ("gs://bucket/lake", "object storage", "copy it to a local disk"),
-        ("abfss://box@account/lake", "object storage", "copy it to a local disk"),
-        ("rtsp://127.0.0.1:9/x", "a live stream", "record it to a file"),
-        ("HTTPS://example.org/film.mp4", "a file on the web", "download it"),
-        ("file:///data/lake", "a file: address", "give the path: /data/lake"),
-        ("ssh://host/data", "another machine", "mount it"),
-        ("me@host:/data/lake", "another machine", "mount it"),
-        ("new-thing+v2://x", "another machine or service", "give the local path"),
-    ],
-)
-def test_an_address_is_refused_as_what_it_is_as_text_and_as_a_path(address: str, what: str, fix: str) -> None:
-    for given in (address, Path(address)):  # which makes one slash of two
-        with pytest.raises(UsageError) as refused:
-            local_path(given)
-        assert what in refused.value.what
-        assert fix in refused.value.fix
-        assert refused.value.where == str(given)
+def test_an_address_is_refused_as_what_it_is_as_text_and_as_a_path() -> None:
+    for address, what, fix in ADDRESSES:
+        for given in (address, Path(address)):  # which makes one slash of two
+            with pytest.raises(UsageError) as refused:
+                local_path(given)
+            error = refused.value
+            assert (what in error.what, fix in error.fix, error.where) == (True, True, str(given)), address
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["lake", "./s3/lake", "/data/s3:/lake", "log 12:30.csv", "C:/films/a.mp4", "wind:a.csv", "a=b/c", ".", "s3:"],
-)
-def test_what_is_no_address_stays_the_path_it_is(text: str) -> None:
-    assert local_path(text) == Path(text)
+def test_what_is_no_address_stays_the_path_it_is() -> None:
+    assert [local_path(text) for text in PATHS] == [Path(text) for text in PATHS]
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["init", "s3://bucket/lake"],
-        ["init", "--lake", "gs://bucket/lake"],
-        ["ls", "--lake", "s3://bucket/lake"],
-        ["ingest", "rtsp://127.0.0.1:9/x", "--lake", "lake"],
-        ["ingest", "a.csv", "--sensor", "https://example.org/a.toml", "--lake", "lake"],
-        ["export", "csv", "--to", "s3://bucket/out", "--lake", "lake"],
-        ["recover", "http://example.org/a.mcap", "b.mcap", "--lake", "lake"],
-        ["simulate", "https://example.org/flag", "--lake", "lake"],
-        ["build", "flagsim-small", "--lake", "s3://bucket/lake"],
-        ["build", "s3://bucket/recipe.toml", "--lake", "lake"],
-        ["train", "sdn", "--lake", "s3://bucket/lake"],
-        ["measure", "rtsp://127.0.0.1:9/x"],
-        ["measure", "film.mp4", "--report", "s3://bucket/page.html"],
-        ["close-loop", "s3://bucket/tracks.csv"],
-    ],
-)
+ADDRESSED = [
+    "init s3://bucket/lake", "init --lake gs://bucket/lake", "ls --lake s3://bucket/lake",
+    "ingest rtsp://127.0.0.1:9/x --lake lake", "ingest a.csv --sensor https://example.org/a.toml --lake lake",
+    "export csv --to s3://bucket/out --lake lake", "recover http://example.org/a.mcap b.mcap --lake lake",
+    "simulate https://example.org/flag --lake lake", "build flagsim-small --lake s3://bucket/lake",
+    "build s3://bucket/recipe.toml --lake lake", "train sdn --lake s3://bucket/lake", "measure rtsp://127.0.0.1:9/x",
+    "measure film.mp4 --report s3://bucket/page.html", "close-loop s3://bucket/tracks.csv",
+]  # fmt: skip
+
+
 def test_commands_refuse_addresses_of_lakes_sources_and_outputs_and_make_nothing(
-    arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Lake.create("lake")
     Path("a.csv").write_text("time,wind_speed (m/s)\n2026-05-01T12:00:00Z,5\n")
     before = sorted(tmp_path.rglob("*"))
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    said = capsys.readouterr().err
-    assert ended.value.code == 2, said
-    assert "address" in said
-    assert sorted(tmp_path.rglob("*")) == before
+    offenders = []
+    for command in ADDRESSED:
+        code, _, err = invoke(capsys, *command.split())
+        if code != 2 or "address" not in err or sorted(tmp_path.rglob("*")) != before:
+            offenders.append((command, code, err))
+    assert offenders == []
 
 
 def test_the_library_refuses_them_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

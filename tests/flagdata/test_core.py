@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import pickle
 import subprocess
@@ -14,10 +13,10 @@ import pyarrow as pa
 import pytest
 
 from flagdata import provenance, rng, schema, units
-from flagdata.cli import main
 from flagdata.errors import FlagdataError, RefusedError, UnknownNameError
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.registry import Registry
+from tests.program import invoke
 
 
 def subclasses(cls: type[FlagdataError]) -> list[type[FlagdataError]]:
@@ -46,9 +45,8 @@ def test_an_unknown_name_suggests_the_nearest() -> None:
         raise UnknownNameError.of("effect", "drga", ["drag", "lift"])
 
 
-@pytest.mark.parametrize(
-    ("text", "value", "si"),
-    [
+def test_units_agree_with_their_definitions() -> None:
+    cases = [
         ("km/h", 36.0, 10.0),
         ("KTS", 1.0, 0.514444),  # BIPM: 1852/3600 m/s
         ("mph", 1.0, 0.44704),
@@ -58,11 +56,10 @@ def test_an_unknown_name_suggests_the_nearest() -> None:
         ("inHg", 29.92126, 101325.0),
         ("deg", 180.0, math.pi),
         ("%", 50.0, 0.5),
-    ],
-)
-def test_units_agree_with_their_definitions(text: str, value: float, si: float) -> None:
-    # 7 digits: the literals above are given to that many.
-    assert float(units.unit(text).to_si(value)) == pytest.approx(si, rel=2e-6)
+    ]
+    assert [float(units.unit(text).to_si(value)) for text, value, _ in cases] == [
+        pytest.approx(si, rel=2e-6) for _, _, si in cases
+    ]
 
 
 def test_units_convert_back_exactly_enough() -> None:
@@ -130,12 +127,8 @@ def test_quality_flags_are_warnings_and_errors_once() -> None:
 def test_errors_on_the_command_line_say_what_and_how_to_mend_it(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main(["ls", "--lake", str(tmp_path), "--json"])
-    printed = capsys.readouterr()
-    assert stop.value.code == 1
-    assert json.loads(printed.out)["kind"] == "not-found"
-    assert "fix:" in printed.err
+    ended = invoke(capsys, "ls", "--lake", tmp_path, "--json")
+    assert (ended.code, ended.document["kind"], "fix:" in ended.err) == (1, "not-found", True)
 
 
 def test_a_misspelt_verb_exits_2() -> None:
@@ -145,7 +138,5 @@ def test_a_misspelt_verb_exits_2() -> None:
 
 
 def test_usage_errors_are_one_json_document_too(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main(["ls", "--bogus", "--json"])
-    assert stop.value.code == 2
-    assert json.loads(capsys.readouterr().out)["kind"] == "usage"
+    ended = invoke(capsys, "ls", "--bogus", "--json")
+    assert (ended.code, ended.document["kind"]) == (2, "usage")

@@ -7,6 +7,7 @@ import io
 import json
 import os
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -91,35 +92,23 @@ def test_a_format_without_a_place_for_the_seal_is_never_replaced(tmp_path: Path)
         check_file(tmp_path / "plot.jpg", command="align")
 
 
-@pytest.mark.parametrize("size", [0, 1, 40, 150])
-def test_short_files_are_not_taken_for_sealed_ones(size: int, tmp_path: Path) -> None:
-    (tmp_path / "a.html").write_bytes((b"written by flagdata " * 20)[:size])
-    assert not is_signed(tmp_path / "a.html", command="x")
+def test_short_files_are_not_taken_for_sealed_ones(tmp_path: Path) -> None:
+    for size in (0, 1, 40, 150):
+        (tmp_path / "a.html").write_bytes((b"written by flagdata " * 20)[:size])
+        assert not is_signed(tmp_path / "a.html", command="x")
     assert signed(b"", name="a.html", command="x") != b""
 
 
-def occupied_by_a_folder(path: Path) -> None:
-    path.mkdir()
-
-
-def occupied_by_a_link(path: Path) -> None:
-    path.symlink_to(path.with_name("elsewhere"))
-
-
-def occupied_by_a_pipe(path: Path) -> None:
-    os.mkfifo(path)
-
-
-@pytest.mark.parametrize("occupied", [occupied_by_a_folder, occupied_by_a_link, occupied_by_a_pipe])
-def test_nothing_but_a_file_is_replaced(occupied: Callable[[Path], None], tmp_path: Path) -> None:
-    path = tmp_path / "page.html"
-    occupied(path)
-    kind = path.lstat().st_mode
-    for write in (lambda: write_file(path, "a", command="measure"), lambda: rewrite(path, "a")):
-        with pytest.raises(ConflictError):
-            write()
-    assert path.lstat().st_mode == kind
-    assert [entry.name for entry in tmp_path.iterdir()] == ["page.html"]
+def test_nothing_but_a_file_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / "folder.html").mkdir()
+    (tmp_path / "link.html").symlink_to(tmp_path / "elsewhere")
+    os.mkfifo(tmp_path / "pipe.html")
+    before = {path: path.lstat().st_mode for path in tmp_path.iterdir()}
+    for path in before:
+        for write in (partial(write_file, command="measure"), rewrite):
+            with pytest.raises(ConflictError):
+                write(path, "a")
+    assert {path: path.lstat().st_mode for path in tmp_path.iterdir()} == before
 
 
 def test_a_new_file_never_takes_a_name_that_was_taken_meanwhile(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import torch
 
 from flagdata.errors import InputError
 from models.crops import Crop, Cropping
+from tests.refusals import unrefused
 
 FILM = np.arange(20 * 30 * 40, dtype=np.uint32).reshape(20, 30, 40).astype(np.uint8)
 
@@ -49,10 +50,9 @@ def test_the_plain_view_is_the_largest_square_about_the_middle() -> None:
     assert crop == Crop(first=4, top=0, left=5, side=30, mirrored=False)
 
 
-@pytest.mark.parametrize("scales", [(), (0.0,), (1.2,)])
-def test_scales_that_cannot_be_are_refused(scales: tuple[float, ...]) -> None:
-    with pytest.raises(InputError):
-        Cropping(scales=scales)
+def test_scales_that_cannot_be_are_refused() -> None:
+    cases = [(), (0.0,), (1.2,)]
+    assert not unrefused(lambda scales: Cropping(scales=scales), zip(cases), InputError)
 
 
 def test_a_film_that_is_too_short_is_refused() -> None:

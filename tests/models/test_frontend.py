@@ -14,6 +14,7 @@ from flagdata.errors import InputError
 from models.filters import gaussian, pooled_derivatives, smoothing_matrix
 from models.frontend import WAVE_CHANNELS, FrontEnd, standardised
 from models.spectral import SpectralDecomposition, periodogram
+from tests.refusals import unrefused
 
 SIZE, FRAMES, RATE = 48, 30, 25.0
 
@@ -62,10 +63,15 @@ def test_gradients_of_the_filters_are_right() -> None:
     assert torch.autograd.gradcheck(lambda x: pooled_derivatives(x, sigma=1.0), (frames,))
 
 
-@pytest.mark.parametrize("shape", [(30, 33, 48), (30, 48, 33), (1, 30, 48, 48)])
-def test_frames_that_cannot_be_pooled_are_refused(shape: tuple[int, ...]) -> None:
-    with pytest.raises(InputError, match="even height and width"):
-        pooled_derivatives(torch.zeros(shape), sigma=2.0)
+def test_frames_that_cannot_be_pooled_are_refused() -> None:
+    cases = [(30, 33, 48), (30, 48, 33), (1, 30, 48, 48)]
+    assert (
+        unrefused(
+            lambda shape: pooled_derivatives(torch.zeros(shape), sigma=2.0), zip(cases), InputError,
+            "even height and width",
+        )
+        == []
+    )  # fmt: skip
 
 
 def test_smoothing_in_time_is_scipys() -> None:

@@ -15,7 +15,7 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from flagdata.errors import ConflictError, FlagdataError, InputError, NotFoundError, UnknownNameError
+from flagdata.errors import ConflictError, InputError, NotFoundError, UnknownNameError
 from flagdata.ingest.meshes import read_folder
 from flagdata.lake.meshes import Mesh as MeshFrame
 from sim.air import QuadraticNormal, Stokes
@@ -28,19 +28,15 @@ from sim.material import named
 from sim.mesh import Mesh
 from sim.scene import Scene, assemble, flag
 from sim.tables import Evaluation
+from tests.refusals import unrefused
 
 MATERIAL = {"density": 0.284, "stretching": [[50, 1, 60, 40]] * 6, "bending": [[1e-5] * 5] * 3}
 SQUARE = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
 SCENE: dict[str, Any] = {
-    "frame_time": 0.04,
-    "frame_steps": 8,
-    "duration": 2,
-    "cloths": [{"mesh": "square.obj", "materials": [{"data": "m.json"}]}],
-    "handles": [{"nodes": [0, 3]}],
-    "gravity": [0, 0, -9.8],
-    "wind": {"velocity": [4, 1, 0]},
-    "disable": list(STAGES),
-}
+    "frame_time": 0.04, "frame_steps": 8, "duration": 2,
+    "cloths": [{"mesh": "square.obj", "materials": [{"data": "m.json"}]}], "handles": [{"nodes": [0, 3]}],
+    "gravity": [0, 0, -9.8], "wind": {"velocity": [4, 1, 0]}, "disable": list(STAGES),
+}  # fmt: skip
 Write = Callable[[dict[str, Any]], Path]
 
 
@@ -97,11 +93,9 @@ def test_thickening_scales_density_and_both_tables(write: Write) -> None:
     assert material.damping == 1e-3
 
 
-@pytest.mark.parametrize(
-    ("end", "frames"), [({"duration": 1}, 25), ({"end_time": 0.1}, 2), ({"end_frame": 7}, 7), ({"duration": 0.12}, 3)]
-)
-def test_the_end_may_be_given_in_three_ways(write: Write, end: dict[str, Any], frames: int) -> None:
-    assert read_scene(write({"duration": None, **end})).frames == frames
+def test_the_end_may_be_given_in_three_ways(write: Write) -> None:
+    cases = [({"duration": 1}, 25), ({"end_time": 0.1}, 2), ({"end_frame": 7}, 7), ({"duration": 0.12}, 3)]
+    assert [read_scene(write({"duration": None, **end})).frames for end, _ in cases] == [frames for _, frames in cases]
 
 
 def test_all_that_is_not_supported_is_told_at_once(write: Write) -> None:
@@ -213,9 +207,8 @@ def test_a_scene_and_its_material_do_not_take_each_others_place(tmp_path: Path) 
         replace(file, frames=0)
 
 
-@pytest.mark.parametrize(
-    ("changes", "error", "word"),
-    [
+def test_impossible_scenes_are_refused(write: Write) -> None:
+    cases = [
         ({"disable": ["remshing"]}, UnknownNameError, "did you mean 'remeshing'"),
         ({"cloths": []}, InputError, "0 cloths"),
         ({"cloths": [*SCENE["cloths"], *SCENE["cloths"]]}, InputError, "2 cloths"),
@@ -252,13 +245,8 @@ def test_a_scene_and_its_material_do_not_take_each_others_place(tmp_path: Path) 
         ),
         ({"disable": ["remeshing", "collision"], "magic": {"repulsion_thickness": 0}}, InputError, "thickness"),
         ({"magic": {"friction": 0.6}}, InputError, "magic.friction"),
-    ],
-)
-def test_impossible_scenes_are_refused(
-    write: Write, changes: dict[str, Any], error: type[FlagdataError], word: str
-) -> None:
-    with pytest.raises(error, match=word):
-        read_scene(write(changes))
+    ]
+    assert not unrefused(lambda changes: read_scene(write(changes)), cases)
 
 
 def test_a_material_file_is_complete_and_says_no_more(tmp_path: Path) -> None:

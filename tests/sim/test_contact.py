@@ -20,6 +20,7 @@ from sim.material import isotropic, named
 from sim.mesh import Mesh, grid
 from sim.scene import assemble, flag
 from sim.state import State
+from tests.refusals import unrefused
 
 G = 9.81
 
@@ -186,9 +187,6 @@ def test_the_automatic_step_stays_stable_over_ten_seconds_of_layers_on_one_anoth
     assert bool((kinetic[-50:].mean(0) < kinetic.amax(0) / 10).all())
 
 
-@pytest.mark.parametrize(
-    "fields", [{"thickness": 0.0}, {"stiffness": -1.0}, {"friction": -0.1}, {"friction": math.nan}]
-)
-def test_impossible_contacts_are_refused(fields: dict[str, float]) -> None:
-    with pytest.raises(InputError, match="contact"):
-        Contact(**fields)
+def test_impossible_contacts_are_refused() -> None:
+    cases = [{"thickness": 0.0}, {"stiffness": -1.0}, {"friction": -0.1}, {"friction": math.nan}]
+    assert not unrefused(lambda fields: Contact(**fields), zip(cases), InputError, "contact")

@@ -19,6 +19,7 @@ from sim.integrate.symplectic import Symplectic
 from sim.material import isotropic, named
 from sim.mesh import grid
 from sim.state import State
+from tests.refusals import unrefused
 
 
 def matrix(seed: int) -> torch.Tensor:
@@ -100,10 +101,9 @@ def test_backward_euler_damps_a_slow_mode_as_declared_damping_of_one_step_does(m
     assert numerical < 0.3
 
 
-@pytest.mark.parametrize("fields", [{"step": 0.0}, {"step": math.nan}, {"tolerance": 0.0}, {"tolerance": 2.0}])
-def test_impossible_settings_are_refused(fields: dict[str, float]) -> None:
-    with pytest.raises(UsageError, match="integrator implicit"):
-        BackwardEuler(**fields)
+def test_impossible_settings_are_refused() -> None:
+    cases = [{"step": 0.0}, {"step": math.nan}, {"tolerance": 0.0}, {"tolerance": 2.0}]
+    assert not unrefused(lambda fields: BackwardEuler(**fields), zip(cases), UsageError, "integrator implicit")
 
 
 @pytest.mark.parametrize("stiffness", [1e3, math.inf])

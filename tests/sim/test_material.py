@@ -13,6 +13,7 @@ import pytest
 from flagdata.errors import InputError, UnknownNameError
 from sim import material
 from sim.material import Material
+from tests.refusals import unrefused
 
 
 def test_catalog_has_ten_cloths_paper_and_aluminium() -> None:
@@ -66,22 +67,14 @@ def test_thicker_cloth_is_heavier_and_stiffer_by_the_same_factor() -> None:
     assert thick.damping == thin.damping
 
 
-@pytest.mark.parametrize(
-    ("change", "word"),
-    [
-        ({"density": -0.1}, "density"),
-        ({"density": float("nan")}, "density"),
-        ({"damping": -1.0}, "damping"),
-        ({"stretching": np.zeros((5, 4))}, "stretching"),
-        ({"bending": -np.ones((3, 5))}, "bending"),
-        ({"bending": np.full((3, 5), np.inf)}, "bending"),
-        ({"stretching": -np.ones((6, 4))}, "stiffness"),
+def test_impossible_materials_are_refused_with_the_reason() -> None:
+    cases = [
+        ({"density": -0.1}, "density"), ({"density": float("nan")}, "density"), ({"damping": -1.0}, "damping"),
+        ({"stretching": np.zeros((5, 4))}, "stretching"), ({"bending": -np.ones((3, 5))}, "bending"),
+        ({"bending": np.full((3, 5), np.inf)}, "bending"), ({"stretching": -np.ones((6, 4))}, "stiffness"),
         ({"stretching": [["a"] * 4] * 6}, "numbers"),
-    ],
-)
-def test_impossible_materials_are_refused_with_the_reason(change: dict[str, object], word: str) -> None:
-    with pytest.raises(InputError, match=word):
-        replace(material.named("paper"), **change)
+    ]  # fmt: skip
+    assert not unrefused(lambda change: replace(material.named("paper"), **change), cases, InputError)
 
 
 def test_unknown_and_missing_keys_are_named() -> None:

@@ -17,6 +17,7 @@ from sim.mesh import Mesh, grid
 from sim.scene import Scene, assemble, flag, hanging_cloth, upright
 from sim.tables import Evaluation
 from sim.wind.uniform import UniformWind
+from tests.refusals import unrefused
 
 CAMEL = named("camel-ponte-roma")
 
@@ -42,20 +43,16 @@ def test_members_differ_in_material_and_wind_but_not_in_mesh() -> None:
         assemble([])
 
 
-@pytest.mark.parametrize(
-    ("change", "word"),
-    [
-        ({"wind": (float("nan"), 0, 0)}, "wind"),
-        ({"gravity": (0, 0)}, "gravity"),
-        ({"position": np.zeros((3, 3))}, "positions have shape"),
-        ({"position": np.full((35, 3), np.inf)}, "finite"),
-        ({"handles": Handles(vertices=())}, "not held"),
-        ({"handles": Handles(vertices=(35,))}, "held vertex 35"),
-    ],
-)
-def test_impossible_scenes_are_refused_with_the_reason(change: dict[str, object], word: str) -> None:
-    with pytest.raises(InputError, match=word):
-        replace(flag(material=CAMEL, wind_speed=4, columns=6), **change)
+def test_impossible_scenes_are_refused_with_the_reason() -> None:
+    cases = [
+        ({"wind": (float("nan"), 0, 0)}, "wind"), ({"gravity": (0, 0)}, "gravity"),
+        ({"position": np.zeros((3, 3))}, "positions have shape"), ({"position": np.full((35, 3), np.inf)}, "finite"),
+        ({"handles": Handles(vertices=())}, "not held"), ({"handles": Handles(vertices=(35,))}, "held vertex 35"),
+    ]  # fmt: skip
+    assert (
+        unrefused(lambda change: replace(flag(material=CAMEL, wind_speed=4, columns=6), **change), cases, InputError)
+        == []
+    )
 
 
 def test_a_second_piece_that_nothing_holds_is_refused() -> None:

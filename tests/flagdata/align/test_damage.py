@@ -24,7 +24,7 @@ from flagdata.signals import Sensor, WindSeries
 SECOND = 1_000_000_000
 START = 1_780_000_000 * SECOND
 FRAMES = 31
-FLIPS = 60
+FLIPS = 20
 COMPAT = Path(__file__).parents[2] / "compat"
 
 

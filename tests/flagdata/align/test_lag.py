@@ -20,6 +20,7 @@ from flagdata.signals import WindAverage
 
 Scenes = Callable[..., tuple[MotionSeries, WindAverage]]
 SECOND = 1_000_000_000
+FIELDS = 60
 
 
 def estimate(pair: tuple[MotionSeries, WindAverage], **changes: float) -> LagEstimate:
@@ -38,14 +39,14 @@ def test_offset_of_a_gusty_ten_minutes_is_recovered_within_half_a_second(scene: 
     assert found.interval[0] <= offset <= found.interval[1]
 
 
-def test_intervals_of_two_hundred_field_recordings_cover_the_offset_at_their_level(scene: Scenes) -> None:
+def test_intervals_of_field_recordings_cover_the_offset_at_their_level(scene: Scenes) -> None:
     """Fields drawn at random: turbulence 10 to 25 %, length scales 50 to 100 m, flag 1 to 3 m from the sensor.
 
     The flag's response is drawn with the mean and spread that the search assumes. Coverage is that of accepted
     estimates, which is what a user gets.
     """
     errors, sigmas, covered = [], [], 0
-    for seed in range(200):
+    for seed in range(FIELDS):
         rng = stream(seed, "field")
         response = max(0.05, rng.normal(0.3, 0.15))
         offset = rng.uniform(-110, 110)
@@ -62,11 +63,11 @@ def test_intervals_of_two_hundred_field_recordings_cover_the_offset_at_their_lev
             sigmas.append(found.sigma)
             covered += bool(found.interval[0] <= offset <= found.interval[1])
     accepted = len(errors)
-    assert accepted >= 140  # two thirds: the rest is too noisy to tell and says so
+    assert accepted >= 2 * FIELDS / 3  # the rest is too noisy to tell and says so
     # 90 % of n by the binomial distribution, at the 1 % and 99.9 % points: chance alone fails this once in a hundred.
     assert binom.ppf(0.01, accepted, 0.9) <= covered
     scores = np.array(errors) / np.array(sigmas)
-    # The σ are neither boasts nor excuses: their scores' standard deviation is 1 ± 0.06 by theory, heavy tails apart.
+    # The σ are neither boasts nor excuses: their scores' standard deviation is 1 ± 0.1 by theory, heavy tails apart.
     assert 0.75 < np.std(scores) < 1.2
     assert np.median(np.abs(errors)) < 0.3
     assert np.mean(np.abs(errors) < 0.5) > 0.85
@@ -131,12 +132,12 @@ def test_periodic_wind_is_refused_as_ambiguous(scene: Scenes, period: float) -> 
 def test_unrelated_wind_is_accepted_no_more_often_than_stated(
     scene: Scenes, gusts_alone: Callable[..., np.ndarray]
 ) -> None:
-    """150 films of one gusty day against the wind of another; the stated chance is 1 %."""
+    """Films of one gusty day against the wind of another; the stated chance is 1 %."""
     accepted = 0
-    for seed in range(150):
+    for seed in range(FIELDS):
         found = estimate(scene(seed=seed, other=gusts_alone(seed + 10_000, 900.0)), surrogates=60, sigma=10.0)
         accepted += found.accepted
-    assert accepted <= binom.ppf(0.999, 150, 0.01)
+    assert accepted <= binom.ppf(0.999, FIELDS, 0.01)
 
 
 def test_too_short_an_overlap_is_refused(scene: Scenes) -> None:
@@ -194,14 +195,10 @@ def test_bins_off_their_grid_say_so(scene: Scenes) -> None:
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"window": 0.0},
-        {"window": 1e5},
-        {"centre": np.nan},
-        {"response_sigma": -1.0},
-        {"chance": 1.0},
+        {"window": 0.0}, {"window": 1e5}, {"centre": np.nan}, {"response_sigma": -1.0}, {"chance": 1.0},
         {"surrogates": 3},
     ],
-)
+)  # fmt: skip
 def test_searches_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError):
         LagSearch(**wrong)  # type: ignore[arg-type]

@@ -11,6 +11,7 @@ from flagdata.align.paired import host_clock, nominal_times, pair_clocks
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.signals import Sensor, WindSeries
+from tests.refusals import unrefused
 
 SECOND = 1_000_000_000
 START = 1_780_000_000 * SECOND
@@ -121,17 +122,18 @@ def test_a_counted_clock_shows_lost_samples_as_steps() -> None:
     assert np.searchsorted(device, second.start) == pytest.approx(2500, abs=5)
 
 
-@pytest.mark.parametrize(
-    ("device", "host", "what"),
-    [
-        ([0], [0], "one sample"),
-        ([0, 1], [0], "two stamps"),
-        ([1, 1], [0, 1], "do not increase"),
-    ],
-)
-def test_stamps_that_make_no_clock_are_refused(device: list[int], host: list[int], what: str) -> None:
-    with pytest.raises(InputError, match=what):
-        pair_clocks(np.array(device, dtype=np.int64), np.array(host, dtype=np.int64))
+def test_stamps_that_make_no_clock_are_refused() -> None:
+    cases = [
+        ([0], [0], "one sample"), ([0, 1], [0], "two stamps"), ([1, 1], [0, 1], "do not increase"),
+    ]  # fmt: skip
+    assert (
+        unrefused(
+            lambda device, host: pair_clocks(np.array(device, dtype=np.int64), np.array(host, dtype=np.int64)),
+            cases,
+            InputError,
+        )
+        == []
+    )
 
 
 def test_a_log_with_one_kind_of_stamp_has_no_host_clock() -> None:

@@ -196,17 +196,15 @@ def test_a_steady_wind_is_refused_and_nothing_is_committed(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("options", "what"),
     [
-        (["--by", "given"], "without an offset"),
-        (["--offset", "3"], "together with an offset"),
+        (["--by", "given"], "without an offset"), (["--offset", "3"], "together with an offset"),
         (["--by", "given", "--offset", "3"], "without an uncertainty"),
-        (["--by", "stamps"], "without an uncertainty"),
-        (["--offset-sigma", "1"], "is estimated"),
+        (["--by", "stamps"], "without an uncertainty"), (["--offset-sigma", "1"], "is estimated"),
         (["--by", "given", "--offset", "3", "--offset-sigma", "1", "--search", "5"], "searches nothing"),
         (["--by", "given", "--offset", "nan", "--offset-sigma", "1"], "offset of nan"),
         (["--by", "given", "--offset", "1", "--offset-sigma", "0"], "uncertainty 0"),
         (["--by", "stamps", "--offset-sigma", "1", "--plot", "x.png"], "no search to draw"),
     ],
-)
+)  # fmt: skip
 def test_options_that_a_method_cannot_use_are_refused(
     gusty: tuple[Path, str, str], options: list[str], what: str
 ) -> None:

@@ -11,26 +11,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flagdata.cli import main
+from flagdata.commands.ingest_options import marker_options
+from flagdata.errors import UsageError
 from flagdata.lake import Lake
+from tests.program import Run, invoke
 
 
 @pytest.fixture
-def lake(tmp_path: Path) -> Lake:
-    return Lake.create(tmp_path / "lake")
-
-
-@pytest.fixture
-def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    """Runs `flagdata ingest` on the lake: exit code, stdout, stderr."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as exit_:
-            main(["ingest", *map(str, arguments), "--lake", str(lake.path)])
-        printed = capsys.readouterr()
-        return int(exit_.value.code or 0), printed.out, printed.err
-
-    return run
+def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
+    return lambda *arguments: invoke(capsys, "ingest", *arguments, "--lake", lake.path)
 
 
 def test_kind_is_told_by_content_not_by_name(run, lake: Lake, video: Path, wind_log: Path, tmp_path: Path) -> None:
@@ -151,42 +140,42 @@ def test_a_disk_that_refuses_the_record_is_one_clear_error_and_the_lake_is_uncha
     assert not [p for p in lake.path.rglob("*.mcap") if p.is_file()]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["{log}", "--crop", "auto"], "--crop means nothing for an anemometer log"),
-        (["{log}", "--true-fps", "1000"], "--true-fps means nothing"),
-        (["{log}", "--archive", "h264"], "--archive means nothing"),
-        (["{log}", "--start", "2026-05-01T10:00:00Z"], "--start is not used"),
-        (["{video}", "--date-order", "dmy"], "--date-order means nothing for a camera file"),
-        (["{video}", "--azimuth", "12"], "--azimuth means nothing"),
-        (["{video}", "{log}", "--unit", "mm"], "'mm' is no unit of speed"),
-        (["{video}", "--sensor", "generic-csv"], "--sensor means nothing for a camera file"),
-        (["{video}", "--start", "2026-05-01T10:00:00Z", "--zone", "UTC"], "--zone means nothing for a camera file wh"),
-        (["{video}", "--start", "2026-02-30T10:00:00Z"], "day is out of range"),
-        (["{video}", "--start", "x"], "not an ISO 8601 time"),
-        (["{video}", "--zone", "+99:00"], "beyond"),
-        (["{log}", "--zone", "Qwxzy"], "give a name such as Europe/Amsterdam"),
-        (["{video}", "{video}", "--start", "2026-05-01T10:00:00Z"], "--start with 2 sources"),
-        (["{video}", "{log}", "--name", "a"], "--name with 2 sources"),
-        (["{video}", "--crop-picture", "{video}.png"], "--crop-picture without --crop auto"),
-        (["{video}", "--crop", "1,2,3"], "not a crop"),
-        (["{video}", "--rate", "fast"], "not a number"),
-        (["{video}", "--exposure", "5"], "an exposure of 5 s is longer than the 0.02 s from frame to frame"),
-        (["{video}", "--exposure", "0.0021", "--true-fps", "500"], "longer than the 0.002 s"),
-        (["{video}", "--as", "vidoe"], "unknown format"),
-        (["{log}", "--sensor", "generic-cvs"], "did you mean 'generic-csv'"),
-        (["{log}", "--date", "1/5/2026"], "not a date"),
-        (["{video}", "--zone", "Europe/Amsterdm"], "did you mean 'Europe/Amsterdam'"),
-        (["{video}", "--sniff", "--session", "a"], "--session means nothing to --sniff"),
-    ],
-)
+MISUSED = [
+    (["{log}", "--crop", "auto"], "--crop means nothing for an anemometer log"),
+    (["{log}", "--true-fps", "1000"], "--true-fps means nothing"),
+    (["{log}", "--archive", "h264"], "--archive means nothing"),
+    (["{log}", "--start", "2026-05-01T10:00:00Z"], "--start is not used"),
+    (["{video}", "--date-order", "dmy"], "--date-order means nothing for a camera file"),
+    (["{video}", "--azimuth", "12"], "--azimuth means nothing"),
+    (["{video}", "{log}", "--unit", "mm"], "'mm' is no unit of speed"),
+    (["{video}", "--sensor", "generic-csv"], "--sensor means nothing for a camera file"),
+    (["{video}", "--start", "2026-05-01T10:00:00Z", "--zone", "UTC"], "--zone means nothing for a camera file wh"),
+    (["{video}", "--start", "2026-02-30T10:00:00Z"], "day is out of range"),
+    (["{video}", "--start", "x"], "not an ISO 8601 time"), (["{video}", "--zone", "+99:00"], "beyond"),
+    (["{log}", "--zone", "Qwxzy"], "give a name such as Europe/Amsterdam"),
+    (["{video}", "{video}", "--start", "2026-05-01T10:00:00Z"], "--start with 2 sources"),
+    (["{video}", "{log}", "--name", "a"], "--name with 2 sources"),
+    (["{video}", "--crop-picture", "{video}.png"], "--crop-picture without --crop auto"),
+    (["{video}", "--crop", "1,2,3"], "not a crop"), (["{video}", "--rate", "fast"], "not a number"),
+    (["{video}", "--exposure", "5"], "an exposure of 5 s is longer than the 0.02 s from frame to frame"),
+    (["{video}", "--exposure", "0.0021", "--true-fps", "500"], "longer than the 0.002 s"),
+    (["{video}", "--as", "vidoe"], "unknown format"),
+    (["{log}", "--sensor", "generic-cvs"], "did you mean 'generic-csv'"),
+    (["{log}", "--date", "1/5/2026"], "not a date"),
+    (["{video}", "--zone", "Europe/Amsterdm"], "did you mean 'Europe/Amsterdam'"),
+    (["{video}", "--sniff", "--session", "a"], "--session means nothing to --sniff"),
+]  # fmt: skip
+
+
 def test_options_that_do_not_apply_are_usage_errors_and_change_nothing(
-    run, lake: Lake, video: Path, wind_log: Path, arguments: list[str], said: str
+    run: Run, lake: Lake, video: Path, wind_log: Path
 ) -> None:
-    code, _, err = run(*(a.format(video=video, log=wind_log) for a in arguments))
-    assert code == 2
-    assert said in err
+    offenders = []
+    for arguments, said in MISUSED:
+        ended = run(*(a.format(video=video, log=wind_log) for a in arguments))
+        if ended.code != 2 or said not in ended.err:
+            offenders.append((arguments, ended))
+    assert offenders == []
     assert lake.rows().num_rows == 0
 
 
@@ -295,3 +284,18 @@ def test_what_is_neither_camera_nor_wind_says_what_to_do(run, tmp_path: Path) ->
         assert code == 1
         assert "no video, wind log, folder of meshes or table of markers" in err
         assert "fix:" in err
+
+
+def test_a_rate_is_hertz_or_the_time_between_two() -> None:
+    cases = [
+        ("20", 20.0), ("20Hz", 20.0), ("12.5 hz", 12.5), ("40ms", 25.0), ("10min", 1 / 600), ("1 h", 1 / 3600),
+        (".5s", 2.0),
+    ]  # fmt: skip
+    assert [marker_options(rate=written, length="m").rate for written, _ in cases] == [rate for _, rate in cases]
+
+
+@pytest.mark.parametrize("written", ["often", "0s", "10 minutes", "Hz", ""])
+def test_what_is_no_rate_says_how_to_write_one(written: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        marker_options(rate=written, length="m")
+    assert "40ms" in str(caught.value.fix)

@@ -116,7 +116,7 @@ def test_damaged_bytes_of_a_video_never_end_in_anything_else(tmp_path: Path, vid
     whole = video.read_bytes()
     rng = np.random.default_rng(21)
     taken = 0
-    for number in range(40):
+    for number in range(12):
         data = bytearray(whole)
         for place in rng.integers(0, len(data), rng.integers(1, 40)):
             data[place] = rng.integers(0, 256)
@@ -130,27 +130,13 @@ def _mutations(text: str, rng: np.random.Generator) -> Iterator[str]:
     lines = text.splitlines()
     body = lines[1:]
     snippets = [
-        "",
-        "NaN",
-        "-5.0",
-        "1e999",
-        "--",
-        ",",
-        ",,,,",
-        '"',
-        "\0",
-        "é",
-        "12:61:00",
-        "2026-05-01",
-        "∞",
-        "0x1F",
-        "1,5",
-    ]
+        "", "NaN", "-5.0", "1e999", "--", ",", ",,,,", '"', "\0", "é", "12:61:00", "2026-05-01", "∞", "0x1F", "1,5",
+    ]  # fmt: skip
 
     def joined(rows: list[str]) -> str:
         return "\n".join([lines[0], *rows, ""])
 
-    for _ in range(30):
+    for _ in range(8):
         rows = list(body)
         for place in rng.integers(0, len(rows), 5):
             rows[place] = rows[place][: rng.integers(0, len(rows[place]))]
@@ -173,7 +159,7 @@ def _mutations(text: str, rng: np.random.Generator) -> Iterator[str]:
     yield text.replace("+02:00", "+25:00")
     yield text.replace("+02:00", " Mars/Olympus")
     yield text.replace("2026", "0001")
-    for _ in range(40):
+    for _ in range(10):
         characters = list(text)
         for place in rng.integers(0, len(characters), 20):
             characters[place] = chr(rng.integers(0, 256))
@@ -188,7 +174,7 @@ def test_damaged_logs_never_end_in_anything_else(tmp_path: Path, wind_log: Path)
         path.write_bytes(text.encode("latin-1" if number % 2 else "utf-8", errors="replace"))
         _ingest(lake, path)
         count += 1
-    assert count >= 100
+    assert count >= 50
 
 
 def test_pipes_and_devices_are_refused_at_once(tmp_path: Path) -> None:

@@ -3,35 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from flagdata.cli import main
 from flagdata.lake import Lake
+from tests.program import Run, invoke
 
-Run = Callable[..., tuple[int, str, str]]
 pytestmark = pytest.mark.usefixtures("confirmed_drafts")
 ROWS = [f"2026-05-13T12:00:{k:02d}Z,{4 + k % 7 / 10:.1f},{3 + k % 5 / 10:.1f}" for k in range(30)]
 
 
 @pytest.fixture
-def lake(tmp_path: Path) -> Lake:
-    return Lake.create(tmp_path / "lake")
-
-
-@pytest.fixture
 def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
-    """Runs `flagdata ingest` on the lake: exit code, stdout, stderr."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as exit_:
-            main(["ingest", *map(str, arguments), "--lake", str(lake.path)])
-        printed = capsys.readouterr()
-        return int(exit_.value.code or 0), printed.out, printed.err
-
-    return run
+    return lambda *arguments: invoke(capsys, "ingest", *arguments, "--lake", lake.path)
 
 
 def test_each_anemometer_of_a_table_becomes_an_artifact(run: Run, lake: Lake, tmp_path: Path) -> None:
@@ -113,7 +98,5 @@ def test_ls_shows_the_mean_wind_of_a_log(
     rows = [f"2026-05-13T12:00:{k:02d}Z,{4 + k % 3}" for k in range(30)]
     path.write_text("\n".join(["time,wind speed (m/s)", *rows]) + "\n")
     assert run(path)[0] == 0
-    with pytest.raises(SystemExit):
-        main(["ls", "--lake", str(lake.path)])
-    (row,) = capsys.readouterr().out.splitlines()[1:]
+    (row,) = invoke(capsys, "ls", "--lake", lake.path).out.splitlines()[1:]
     assert row.split()[2:5] == ["mast", "2026-05-13T12:00:00Z", "5.00"]

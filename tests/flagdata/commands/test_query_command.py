@@ -5,20 +5,17 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import pyarrow as pa
 import pytest
 
-from flagdata.cli import main
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import CATALOG, Kind
+from tests.program import Run, invoke
 
 NOON = 1_777_636_800_000_000_000  # 2026-05-01T12:00:00Z
 SECOND = 1_000_000_000
-
-Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module")
@@ -46,13 +43,7 @@ def clip(recording: str, number: int, *, wind: float | None) -> Artifact:
 
 @pytest.fixture
 def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
-    def call(*arguments: str) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as stopped:
-            main(["query", "--lake", str(lake.path), *arguments])
-        out, err = capsys.readouterr()
-        return int(stopped.value.code or 0), out, err
-
-    return call
+    return lambda *arguments: invoke(capsys, "query", "--lake", lake.path, *arguments)
 
 
 def test_people_see_a_table_with_units_and_the_columns_of_that_kind(run: Run) -> None:

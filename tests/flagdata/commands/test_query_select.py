@@ -15,6 +15,7 @@ from flagdata.errors import UnknownNameError, UsageError
 from flagdata.lake.refs import Slice, View
 from flagdata.query import COLUMNS, Request, Selection, select
 from flagdata.schema import CATALOG, catalog_schema
+from tests.refusals import unrefused
 
 NOON = 1_777_636_800_000_000_000  # 2026-05-01T12:00:00Z: date -u -d @1777636800
 SECOND = 1_000_000_000
@@ -109,9 +110,9 @@ def test_nanoseconds_stay_exact_and_times_are_cut_to_microseconds() -> None:
     assert duration == pytest.approx(0.876_543_211, abs=1e-12)  # 1 s - 123,456,789 ns; float64 of a second
 
 
-@pytest.mark.parametrize("moment", ["2026-05-01 12:01:30", "2026-05-01 14:01:30+02:00", "2026-05-01T12:01:30Z"])
-def test_times_in_text_are_utc_unless_they_name_a_zone(moment: str) -> None:
-    assert numbers(select(HandWritten(), f"start_time > '{moment}'")) == [4]
+def test_times_in_text_are_utc_unless_they_name_a_zone() -> None:
+    cases = ["2026-05-01 12:01:30", "2026-05-01 14:01:30+02:00", "2026-05-01T12:01:30Z"]
+    assert [numbers(select(HandWritten(), f"start_time > '{moment}'")) for moment in cases] == [[4] for moment in cases]
 
 
 def test_columns_of_the_catalog_carry_their_unit_and_free_sql_does_not() -> None:
@@ -142,37 +143,21 @@ def test_the_limit_cuts_rows_and_the_total_does_not_count_it() -> None:
     assert selection.total() == 4
 
 
-@pytest.mark.parametrize(
-    "sql",
-    [
-        "create table x (a int)",
-        "drop view catalog",
-        "insert into stored select * from stored",
-        "select 1; select 2",
-        "set threads = 1",
-        "copy catalog to 'out.csv'",
-        "attach 'other.db'",
-        "install httpfs",
-        "select * from read_csv('/etc/passwd')",
-        "select * from read_text('pyproject.toml')",
-        "select * from glob('*')",
-        "select * from 'pyproject.toml'",
-        "export database 'out'",
-        "",
-    ],
-)
-def test_sql_that_is_not_one_read_of_the_catalog_is_refused(sql: str) -> None:
-    with pytest.raises(UsageError):
-        select(HandWritten(), sql=sql)
+def test_sql_that_is_not_one_read_of_the_catalog_is_refused() -> None:
+    cases = [
+        "create table x (a int)", "drop view catalog", "insert into stored select * from stored",
+        "select 1; select 2", "set threads = 1", "copy catalog to 'out.csv'", "attach 'other.db'", "install httpfs",
+        "select * from read_csv('/etc/passwd')", "select * from read_text('pyproject.toml')",
+        "select * from glob('*')", "select * from 'pyproject.toml'", "export database 'out'", "",
+    ]  # fmt: skip
+    assert not unrefused(lambda sql: select(HandWritten(), sql=sql), zip(cases), UsageError)
 
 
-@pytest.mark.parametrize(
-    "where",
-    ["1 = 1; drop view catalog", "1 = 1) or (1 = 1", "(select count(*) from read_csv('/etc/passwd')) > 0", "", ";"],
-)
-def test_a_filter_cannot_be_more_than_a_condition(where: str) -> None:
-    with pytest.raises(UsageError):
-        select(HandWritten(), where)
+def test_a_filter_cannot_be_more_than_a_condition() -> None:
+    cases = [
+        "1 = 1; drop view catalog", "1 = 1) or (1 = 1", "(select count(*) from read_csv('/etc/passwd')) > 0", "", ";",
+    ]  # fmt: skip
+    assert not unrefused(lambda where: select(HandWritten(), where), zip(cases), UsageError)
 
 
 def test_python_variables_are_not_tables() -> None:
@@ -185,14 +170,11 @@ def test_python_variables_are_not_tables() -> None:
 @pytest.mark.parametrize(
     ("where", "fix"),
     [
-        ("winds > 3", "did you mean 'wind'?"),
-        ("catalog.wnd > 3", "did you mean 'wind'?"),
-        ("kind = clip", "'clip' in single quotes"),
-        ("end > 3", '"end"'),
-        ("start > '2026-05-01 12:00'", "start_time or end_time"),
-        ("wind > 'much'", "--describe"),
+        ("winds > 3", "did you mean 'wind'?"), ("catalog.wnd > 3", "did you mean 'wind'?"),
+        ("kind = clip", "'clip' in single quotes"), ("end > 3", '"end"'),
+        ("start > '2026-05-01 12:00'", "start_time or end_time"), ("wind > 'much'", "--describe"),
     ],
-)
+)  # fmt: skip
 def test_mistakes_are_answered_with_what_to_write(where: str, fix: str) -> None:
     with pytest.raises(UsageError) as caught:
         select(HandWritten(), where)

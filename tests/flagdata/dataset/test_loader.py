@@ -7,6 +7,7 @@ import multiprocessing
 import threading
 import time
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,9 @@ import flagdata
 from flagdata.dataset import DecodedCache, collate
 from flagdata.errors import CorruptError, RefusedError, UsageError
 from flagdata.lake import Lake
+from flagdata.record.container import open_file, read_messages, read_summary
+from flagdata.rng import stream
+from flagdata.schema import TOPIC_IMAGE
 
 
 @pytest.fixture(scope="module")
@@ -56,9 +60,7 @@ def expected(pairs):
     return [epoch(loader), epoch(loader)]
 
 
-@pytest.mark.parametrize(
-    ("workers", "run_in"), [(1, "threads"), (2, "threads"), (5, "threads"), (1, "fork"), (2, "fork")]
-)
+@pytest.mark.parametrize(("workers", "run_in"), [(1, "threads"), (5, "threads"), (2, "fork")])
 def test_batches_are_identical_with_any_number_of_workers(pairs, expected, workers, run_in):
     loader = pairs.loader(7, workers=workers, run_in=run_in)
     assert epoch(loader) == expected[0]
@@ -69,7 +71,7 @@ def test_batches_are_identical_with_any_number_of_workers(pairs, expected, worke
 def test_worker_processes_need_nothing_of_the_catalog(field_lake, expected, run_in):
     # The catalog was used in this process just now: what the workers inherit must not need it.
     fresh = flagdata.open(field_lake.path).pairs(at="v1", seed=11)
-    assert epoch(fresh.loader(7, workers=2, run_in=run_in)) == expected[0]
+    assert epoch(fresh.loader(7, workers=1, run_in=run_in)) == expected[0]
 
 
 def test_an_epoch_holds_every_pair_once_in_another_order_than_the_last(pairs, expected):
@@ -237,23 +239,14 @@ def test_worker_processes_end_with_their_loader(pairs):
     assert not any(child.is_alive() for child in children)
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"batch_size": 0},
-        {"batch_size": 1, "workers": -1},
-        {"batch_size": 1, "order": "random"},
-        {"batch_size": 1, "last": "pad"},
-        {"batch_size": 1, "memory": "fast"},
-        {"batch_size": 1, "run_in": "fibres"},
-        {"batch_size": 49, "last": "drop"},
-        {"batch_size": 30, "share": (0, 3)},
-        {"batch_size": 1, "share": (2, 2)},
-    ],
-)
-def test_options_that_cannot_be_are_usage_errors(pairs, options):
-    with pytest.raises(UsageError):
-        pairs.loader(**options)
+def test_options_that_cannot_be_are_usage_errors(pairs):
+    for options in (
+        {"batch_size": 0}, {"batch_size": 1, "workers": -1}, {"batch_size": 1, "order": "random"},
+        {"batch_size": 1, "last": "pad"}, {"batch_size": 1, "memory": "fast"}, {"batch_size": 1, "run_in": "fibres"},
+        {"batch_size": 49, "last": "drop"}, {"batch_size": 30, "share": (0, 3)}, {"batch_size": 1, "share": (2, 2)},
+    ):  # fmt: skip
+        with pytest.raises(UsageError):
+            pairs.loader(**options)
 
 
 def read_in_child(pairs, connection):
@@ -276,3 +269,33 @@ def test_a_record_that_is_open_may_be_read_after_a_fork(pairs):
 def test_torchs_own_loader_works_too(pairs, workers):
     loader = torch.utils.data.DataLoader(pairs, batch_size=16, num_workers=workers, collate_fn=collate)
     assert [a for batch in loader for a in batch.artifact] == pairs.table.artifact.tolist()
+
+
+FLIPS = 20
+
+
+@pytest.mark.parametrize("cached", [False, True])
+def test_the_loader_refuses_every_flipped_bit_of_a_frame_and_names_object_and_place(
+    tmp_path: Path, made, add_recording, cached: bool
+) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    recording = lake.artifact(add_recording(lake, made(number=1, frames=30)))
+    path = lake.object_path(str(recording.object))
+    file = open_file(path)
+    table = read_messages(file, read_summary(file, where=""), TOPIC_IMAGE, where="")
+    sound = path.read_bytes()
+    path.chmod(0o644)
+    rng = stream(9, "flips")
+    source = flagdata.open(lake.path)
+    cache = DecodedCache(tmp_path / "cache", limit=1 << 24) if cached else None
+    for trial in range(FLIPS):
+        frame = int(rng.integers(0, len(table)))
+        place = int(table.offset[frame]) + int(rng.integers(0, table.length[frame]))
+        damaged = bytearray(sound)
+        damaged[place] ^= 1 << int(rng.integers(0, 8))
+        path.write_bytes(damaged)
+        with pytest.raises(CorruptError) as refused:
+            list(source.pairs(cache=cache).loader(1))
+        assert refused.value.where == f"{path}, byte {table.offset[frame]}", f"trial {trial}, byte {place}"
+    path.write_bytes(sound)
+    assert len(list(source.pairs(cache=cache).loader(1))) == 1

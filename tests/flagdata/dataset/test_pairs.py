@@ -13,6 +13,7 @@ import flagdata
 from flagdata.dataset import ExplicitSplit, HashedSplit, Sample, Tolerance
 from flagdata.errors import NotFoundError, RefusedError, UnknownNameError, UsageError
 from flagdata.lake import Lake
+from tests.refusals import unrefused
 
 NS = 1_000_000_000
 NOON = 1_777_636_800 * NS
@@ -23,11 +24,6 @@ PERIOD = NS // 25
 @pytest.fixture(scope="module")
 def source(field_lake):
     return flagdata.open(field_lake.path)
-
-
-@pytest.fixture
-def lake(tmp_path):
-    return Lake.create(tmp_path / "lake")
 
 
 def test_real_and_simulated_clips_are_samples_of_one_type(source):
@@ -213,10 +209,9 @@ def test_what_is_not_there_is_said(source):
         source.pairs(at="v1")[48]
 
 
-@pytest.mark.parametrize("where", ["wind > 4) or (1=1", "1=1) --", ""])
-def test_a_filter_cannot_reach_beyond_the_clips(source, where):
-    with pytest.raises(UsageError):
-        source.pairs(where)
+def test_a_filter_cannot_reach_beyond_the_clips(source):
+    cases = ["wind > 4) or (1=1", "1=1) --", ""]
+    assert not unrefused(lambda where: source.pairs(where), zip(cases), UsageError)
 
 
 def test_a_seed_is_a_whole_number(source):

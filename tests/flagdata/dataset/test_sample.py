@@ -14,21 +14,10 @@ from flagdata.errors import InputError
 
 def sample(index, **changes):
     base = Sample(
-        clip=torch.full((1, 3, 4, 5), index, dtype=torch.uint8),
-        wind=5.0 + index,
-        wind_sigma=0.25,
-        staleness=0.5,
-        coverage=1.0,
-        clock_sigma=0.125,
-        parameters={},
-        artifact=f"clip{index}",
-        recording="recording",
-        session="field",
-        day="2026-05-01",
-        seed=None,
-        start=10 * index,
-        end=10 * index + 5,
-    )
+        clip=torch.full((1, 3, 4, 5), index, dtype=torch.uint8), wind=5.0 + index, wind_sigma=0.25, staleness=0.5,
+        coverage=1.0, clock_sigma=0.125, parameters={}, artifact=f"clip{index}", recording="recording",
+        session="field", day="2026-05-01", seed=None, start=10 * index, end=10 * index + 5,
+    )  # fmt: skip
     return replace(base, **changes)
 
 
@@ -73,16 +62,13 @@ def test_moving_a_batch_moves_all_tensors_and_keeps_identities():
     assert moved.artifact == batch.artifact
 
 
-@pytest.mark.parametrize("clip", [torch.zeros(3, 4, 5, dtype=torch.uint8), torch.zeros(1, 3, 4, 5)])
-def test_a_clip_of_another_shape_or_type_is_refused(clip):
-    with pytest.raises(InputError, match="channel, time, height, width"):
-        sample(0, clip=clip)
-
-
-@pytest.mark.parametrize("name", ["wind", "wind_sigma", "staleness", "coverage", "clock_sigma"])
-def test_a_ground_truth_that_is_not_a_number_never_becomes_a_sample(name):
-    with pytest.raises(InputError, match="not finite"):
-        sample(0, **{name: math.nan})
+def test_a_clip_of_another_shape_or_type_and_a_ground_truth_that_is_not_a_number_are_refused():
+    for clip in (torch.zeros(3, 4, 5, dtype=torch.uint8), torch.zeros(1, 3, 4, 5)):
+        with pytest.raises(InputError, match="channel, time, height, width"):
+            sample(0, clip=clip)
+    for name in ("wind", "wind_sigma", "staleness", "coverage", "clock_sigma"):
+        with pytest.raises(InputError, match="not finite"):
+            sample(0, **{name: math.nan})
 
 
 def test_clips_of_different_sizes_do_not_stack():

@@ -19,12 +19,9 @@ real = st.builds(
     sources=st.lists(st.integers(0, 40).map(lambda n: f"camera {n}"), max_size=2, unique=True).map(tuple),
 )
 simulated = st.builds(
-    Origin,
-    recording=st.integers(0, 10**6).map(lambda n: f"sim{n}"),
-    session=st.none(),
-    days=st.just(("1970-01-01",)),
-    seed=st.integers(0, 30),
-)
+    Origin, recording=st.integers(0, 10**6).map(lambda n: f"sim{n}"), session=st.none(),
+    days=st.just(("1970-01-01",)), seed=st.integers(0, 30),
+)  # fmt: skip
 origins = st.lists(st.one_of(real, simulated), min_size=1, max_size=40, unique_by=lambda origin: origin.recording)
 
 
@@ -105,22 +102,14 @@ def test_a_side_without_a_share_gets_nothing():
     assert set(split.assign([Origin(recording=f"s{k}", seed=k) for k in range(200)])) == {"train", "test"}
 
 
-@pytest.mark.parametrize(
-    ("shared", "named"),
-    [
-        ({"session": "field"}, "session field is in train and in test"),
-        ({"days": ("2026-05-01",)}, "day 2026-05-01 is in train and in test"),
-        ({"seed": 7}, "seed 7 is in train and in test"),
-        ({"sources": ("camera abc",)}, "camera abc is in train and in test"),
-    ],
-)
-def test_an_explicit_split_that_leaks_is_refused_and_the_leak_is_named(shared, named):
-    with pytest.raises(RefusedError, match=named):
-        refuse_leaks({"train": [Origin(recording="a", **shared)], "test": [Origin(recording="b", **shared)]})
-
-
-def test_the_same_recording_on_two_sides_is_refused_whatever_else_is_unknown():
-    with pytest.raises(RefusedError, match="recording a is in train and in test"):
+def test_an_explicit_split_that_leaks_is_refused_and_the_leak_is_named():
+    for shared, named in (
+        ({"session": "field"}, "session field"), ({"days": ("2026-05-01",)}, "day 2026-05-01"), ({"seed": 7}, "seed 7"),
+        ({"sources": ("camera abc",)}, "camera abc"),
+    ):  # fmt: skip
+        with pytest.raises(RefusedError, match=f"{named} is in train and in test"):
+            refuse_leaks({"train": [Origin(recording="a", **shared)], "test": [Origin(recording="b", **shared)]})
+    with pytest.raises(RefusedError, match="recording a is in train and in test"):  # whatever else is unknown
         refuse_leaks({"train": [Origin(recording="a")], "test": [Origin(recording="a")]})
 
 
@@ -133,13 +122,10 @@ def test_sides_that_share_nothing_are_let_through():
     )
 
 
-@pytest.mark.parametrize("fractions", [{}, {"train": 0.5}, {"train": 1.5, "test": -0.5}, {"train": float("nan")}])
-def test_fractions_that_do_not_add_up_are_a_usage_error(fractions):
-    with pytest.raises(UsageError):
-        HashedSplit(fractions=fractions)
-
-
-def test_an_unknown_side_is_refused_with_the_nearest_name():
+def test_fractions_that_do_not_add_up_and_unknown_sides_are_refused():
+    for fractions in ({}, {"train": 0.5}, {"train": 1.5, "test": -0.5}, {"train": float("nan")}):
+        with pytest.raises(UsageError):
+            HashedSplit(fractions=fractions)
     with pytest.raises(UnknownNameError, match="did you mean 'validation'"):
         check_side("validate", HashedSplit())
     with pytest.raises(UsageError):

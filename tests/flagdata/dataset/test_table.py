@@ -54,11 +54,8 @@ def test_pairs_are_in_the_order_of_recording_and_frame():
     table = PairTable.of(
         rows({"recording": "s", "frame_first": 0}, {"recording": "r", "frame_first": 30}, {"recording": "r"})
     )
-    assert list(zip(table.recording.tolist(), table.frame_first.tolist(), strict=True)) == [
-        ("r", 0),
-        ("r", 30),
-        ("s", 0),
-    ]
+    pairs = list(zip(table.recording.tolist(), table.frame_first.tolist(), strict=True))
+    assert pairs == [("r", 0), ("r", 30), ("s", 0)]
 
 
 def test_taking_pairs_keeps_each_with_its_object_and_parameters():
@@ -71,21 +68,23 @@ def test_taking_pairs_keeps_each_with_its_object_and_parameters():
     assert len(taken.take(np.array([], dtype=np.int64))) == 0
 
 
-@pytest.mark.parametrize("field", [f.name for f in fields(PairTable) if f.name != "names"])
-def test_the_fingerprint_sees_every_value(field):
+def test_the_fingerprint_depends_on_every_value():
     table = PairTable.of(rows({"parameters": '{"p": 1}'}, {"parameters": '{"p": 2}', "object": "mcap/" + "1" * 64}))
-    values = getattr(table, field).copy()
-    at = (0,) * values.ndim
-    if values.dtype.kind == "U":
-        values[at] = "z" + str(values[at])[1:]
-    elif values.dtype.kind == "f":
-        values[at] = np.nextafter(values[at], np.inf)
-    else:
-        values[at] = not values[at]
-    assert replace(table, **{field: values}).fingerprint() != table.fingerprint()
+    overlooked = []
+    for field in (f.name for f in fields(PairTable) if f.name != "names"):
+        values = getattr(table, field).copy()
+        at = (0,) * values.ndim
+        if values.dtype.kind == "U":
+            values[at] = "z" + str(values[at])[1:]
+        elif values.dtype.kind == "f":
+            values[at] = np.nextafter(values[at], np.inf)
+        else:
+            values[at] = not values[at]
+        overlooked += [field] * (replace(table, **{field: values}).fingerprint() == table.fingerprint())
+    assert overlooked == []
 
 
-@pytest.mark.parametrize("column", ["object", "frame_first", "frame_count", "start", "end"])
-def test_a_clip_that_is_nowhere_is_an_error_that_names_it(column):
-    with pytest.raises(CorruptError, match=f"artifact a1: a clip without {column}"):
-        PairTable.of(rows({}, {column: None}))
+def test_a_clip_that_is_nowhere_is_an_error_that_names_it():
+    for column in ("object", "frame_first", "frame_count", "start", "end"):
+        with pytest.raises(CorruptError, match=f"artifact a1: a clip without {column}"):
+            PairTable.of(rows({}, {column: None}))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -262,12 +263,7 @@ def test_standard_error_does_not_depend_on_the_logging_rate(rate):
 
 def test_sonic_components_give_the_horizontal_speed():
     wind = series(np.arange(0, 121), 3.0, channel="wind_x")
-    both = WindSeries(
-        time=wind.time,
-        channels={"wind_x": wind.channels["wind_x"], "wind_y": np.full(121, -4.0), "wind_z": np.full(121, 9.0)},
-        flags=wind.flags,
-        sensor=wind.sensor,
-    )
+    both = replace(wind, channels={**wind.channels, "wind_y": np.full(121, -4.0), "wind_z": np.full(121, 9.0)})
     assert truth(both, 100).wind == pytest.approx(5.0, rel=1e-12)
 
 
@@ -276,12 +272,7 @@ def test_rows_of_other_channels_take_nothing_from_the_coverage():
     seconds = np.sort(np.concatenate([np.arange(0, 121), np.arange(0, 121) + 0.1]))
     ground = np.arange(len(seconds)) % 2 == 0
     wind = series(seconds, np.where(ground, 4.0, np.nan))
-    both = WindSeries(
-        time=wind.time,
-        channels={**wind.channels, "apparent_wind_speed": np.where(ground, np.nan, 9.0)},
-        flags=wind.flags,
-        sensor=wind.sensor,
-    )
+    both = replace(wind, channels={**wind.channels, "apparent_wind_speed": np.where(ground, np.nan, 9.0)})
     result = truth(both, 100)
     assert (result.wind, result.coverage, result.count) == (4.0, 1.0, 60)
 
@@ -291,20 +282,16 @@ def test_apparent_wind_is_refused_as_ground_truth():
         TruthSeries.of(series(np.arange(0, 121), 3.0, channel="apparent_wind_speed"))
 
 
-@pytest.mark.parametrize(
-    "options", [{"window": 0.0}, {"window": math.inf}, {"clock_sigma": -1.0}, {"clock_sigma": math.nan}]
-)
-def test_impossible_window_or_clock_is_a_usage_error(options):
-    with pytest.raises(UsageError):
-        truth(series(np.arange(0, 121), 3.0), 100, **options)
+def test_impossible_window_or_clock_is_a_usage_error():
+    for options in ({"window": 0.0}, {"window": math.inf}, {"clock_sigma": -1.0}, {"clock_sigma": math.nan}):
+        with pytest.raises(UsageError):
+            truth(series(np.arange(0, 121), 3.0), 100, **options)
 
 
 @given(
-    gaps=st.lists(st.floats(0.05, 20.0), min_size=2, max_size=80),
-    end=st.floats(0.0, 200.0),
-    window=st.floats(1.0, 120.0),
-    speed=st.floats(0.0, 60.0),
-)
+    gaps=st.lists(st.floats(0.05, 20.0), min_size=2, max_size=80), end=st.floats(0.0, 200.0),
+    window=st.floats(1.0, 120.0), speed=st.floats(0.0, 60.0),
+)  # fmt: skip
 def test_any_spacing_keeps_the_mean_within_the_samples_and_coverage_within_one(gaps, end, window, speed):
     result = truth(series(np.cumsum(gaps), speed), end, window=window)
     assert 0.0 <= result.coverage <= 1.0

@@ -99,12 +99,10 @@ def write_record(
     with RecordWriter(path, metadata={"provenance": {"source_name": "pier.mp4"}}) as writer:
         writer.wind(
             WindSeries(
-                time=wind_time,
-                channels={"wind_speed": wind_speed},
-                flags=np.zeros(len(wind_time), dtype=np.uint16),
+                time=wind_time, channels={"wind_speed": wind_speed}, flags=np.zeros(len(wind_time), dtype=np.uint16),
                 sensor=Sensor(name="cup", accuracy=0.1),
             )
-        )
+        )  # fmt: skip
         writer.attach("log.csv", b"time,speed\n", media_type="text/csv", log_time=int(wind_time[0]))
         for time, data in zip(times.tolist(), jpegs, strict=True):
             writer.frame(log_time=time, publish_time=time - CAMERA_BEHIND, timestamp=time, image=data)

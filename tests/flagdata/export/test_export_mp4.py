@@ -91,13 +91,6 @@ def test_lossless_video_is_asked_for_by_crf_zero(known: Any, tmp_path: Path) -> 
     assert np.abs(np.stack(frames).astype(int) - known.images[:30]).max() <= 3
 
 
-def test_the_same_clip_gives_the_same_bytes(known: Any, tmp_path: Path) -> None:
-    for name in ("a", "b"):
-        export(known.lake, Export(format="mp4", where="name = 'pier 0'"), tmp_path / name)
-    video = f"{known.clips[0]}.mp4"
-    assert (tmp_path / "a" / video).read_bytes() == (tmp_path / "b" / video).read_bytes()
-
-
 def test_frames_within_a_microsecond_are_refused() -> None:
     with pytest.raises(InputError, match="closer than a microsecond"):
         presentation_times(np.array([0, 400, 800], dtype=np.int64))

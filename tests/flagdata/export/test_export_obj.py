@@ -24,11 +24,6 @@ Put = Callable[..., str]
 
 
 @pytest.fixture
-def lake(tmp_path: Path) -> Lake:
-    return Lake.create(tmp_path / "lake")
-
-
-@pytest.fixture
 def put(lake: Lake) -> Put:
     """Stores a sequence at 50 Hz; its artifact."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -61,14 +60,6 @@ def test_parts_hold_no_more_frame_bytes_than_asked_for(known: Any, tmp_path: Pat
         f"part-0000{i}.parquet" for i in range(3)
     ]
     assert pl.read_parquet(tmp_path / "out" / "rows" / "*.parquet").height == 3
-
-
-def test_exporting_twice_gives_the_same_bytes(known: Any, tmp_path: Path) -> None:
-    hashes = []
-    for name in ("a", "b"):
-        export(known.lake, Export(format="parquet", where=CLIPS, options={"frames": "jpg"}), tmp_path / name)
-        hashes.append(hashlib.sha256((tmp_path / name / "rows" / "part-00000.parquet").read_bytes()).hexdigest())
-    assert hashes[0] == hashes[1]
 
 
 def test_arrays_are_not_a_parquet_column(known: Any, tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.cli import main
 from flagdata.commands import confirm as commands
 from flagdata.errors import ConflictError
 from flagdata.ingest import store
@@ -24,17 +23,12 @@ from flagdata.record import Record
 from flagdata.signals import WindLog
 from measure.observe.wind import LogPlacement, from_log
 from tests.confirming import CONFIRMED
+from tests.program import Run, invoke
 
-Run = Callable[..., tuple[int, str, str]]
 ROWS = [f"14.05.2026;11:30:{k:02d};{18 + k % 7},4;{200 + k}" for k in range(30)]
 TABLE = "\n".join(["Date;Time;Speed [km/h];Dir [deg]", *ROWS]) + "\n"
 STATED = "time,wind_speed (m/s)\n" + "".join(f"2026-05-01T12:00:{k:02d}Z,{5 + k % 3}.5\n" for k in range(30))
 ZONED = WindIngest(wind=WindOptions(zone="+02:00"))
-
-
-@pytest.fixture
-def lake(tmp_path: Path) -> Lake:
-    return Lake.create(tmp_path / "lake")
 
 
 @pytest.fixture
@@ -46,15 +40,7 @@ def table(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
-    """Runs a command on the lake: exit code, stdout, stderr."""
-
-    def run(*arguments: object) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as exit_:
-            main([*map(str, arguments), "--lake", str(lake.path)])
-        printed = capsys.readouterr()
-        return int(exit_.value.code or 0), printed.out, printed.err
-
-    return run
+    return lambda *arguments: invoke(capsys, *arguments, "--lake", lake.path)
 
 
 @pytest.fixture

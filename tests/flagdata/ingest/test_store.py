@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.errors import ConflictError, FlagdataError, InputError, NotFoundError, TimeError
+from flagdata.errors import ConflictError, InputError, NotFoundError, TimeError
 from flagdata.ingest import store
 from flagdata.ingest.anemometer import WindOptions
 from flagdata.ingest.camera import CameraOptions, CropBox, open_camera
@@ -21,11 +21,6 @@ from flagdata.record import Coding, Record
 from flagdata.schema import Kind
 
 START = 1_777_629_600_000_000_000  # 2026-05-01T10:00:00Z
-
-
-@pytest.fixture
-def lake(tmp_path: Path) -> Lake:
-    return Lake.create(tmp_path / "lake")
 
 
 def _everything(lake: Lake) -> list[str]:
@@ -208,31 +203,6 @@ def test_a_source_that_changes_while_it_is_read_is_refused(
     with pytest.raises(ConflictError, match="changed"):
         ingest_camera(lake, growing, progress=grow)
     assert lake.rows().num_rows == 0
-
-
-def _bad_sources(folder: Path, video: Path, write_video: Callable[..., Path]) -> dict[str, Path]:
-    made = {
-        "empty.mp4": b"", "noise.mp4": np.random.default_rng(1).bytes(5000), "head.mp4": video.read_bytes()[:40],
-        "empty.csv": b"", "zeros.csv": b"\0" * 4096, "header.csv": b"time,wind_speed\n",
-        "words.csv": b"time,wind_speed\nnever,fast\nnever,slow\n",
-    }  # fmt: skip
-    for name, data in made.items():
-        (folder / name).write_bytes(data)
-    found = {name: folder / name for name in made}
-    found["no-start.mp4"] = write_video(folder / "no-start.mp4", creation_time=None)
-    found["missing.mp4"] = folder / "missing.mp4"
-    return found
-
-
-def test_bad_sources_end_in_flagdata_errors_and_leave_the_lake_unchanged(
-    lake: Lake, tmp_path: Path, video: Path, write_video: Callable[..., Path]
-) -> None:
-    before = _everything(lake)
-    for name, path in _bad_sources(tmp_path, video, write_video).items():
-        with pytest.raises(FlagdataError) as error:
-            ingest_camera(lake, path) if name.endswith(".mp4") else ingest_wind(lake, path)
-        assert error.value.fix, name
-        assert _everything(lake) == before, name
 
 
 def test_a_missing_start_is_a_time_error_and_a_missing_file_is_named(

@@ -22,11 +22,6 @@ _ENDS = {"done", "failed", "killed"}
 
 
 @pytest.fixture
-def lake(tmp_path: Path) -> Lake:
-    return Lake.create(tmp_path / "lake")
-
-
-@pytest.fixture
 def put_text() -> Callable[..., Artifact]:
     """Commits one row whose object is a small text."""
 

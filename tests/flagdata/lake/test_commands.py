@@ -2,50 +2,24 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from flagdata.cli import main
 from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter
+from tests.program import Run, invoke
 
 Put = Callable[..., Artifact]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Ended:
-    code: int
-    out: str
-    err: str
-
-    @property
-    def document(self) -> dict[str, Any]:
-        return json.loads(self.out)
-
-
 @pytest.fixture
-def run(lake: Lake, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Ended]:
+def run(lake: Lake, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
     """Runs `flagdata ...` on the lake, named by its environment variable."""
     monkeypatch.setenv("FLAGDATA_LAKE", str(lake.path))
-
-    def call(*arguments: object) -> Ended:
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as end:
-            main([str(argument) for argument in arguments])
-        captured = capsys.readouterr()
-        code = end.value.code
-        return Ended(code=code if isinstance(code, int) else 0, out=captured.out, err=captured.err)
-
-    return call
-
-
-Run = Callable[..., Ended]
+    return lambda *arguments: invoke(capsys, *arguments)
 
 
 def test_init_makes_a_lake_that_the_others_open(run: Run, tmp_path: Path) -> None:
@@ -108,16 +82,11 @@ def test_ls_counts_clips_and_lists_them_on_request(run: Run, lake: Lake, put_tex
     recording = put_text(lake, "recording")
     with lake.transaction("clips") as tx:
         for first in (0, 30):
-            tx.add(
-                Artifact(
-                    kind="clip",
-                    name="clip",
-                    object=recording.object,
-                    parents=(recording.id,),
-                    frame_first=first,
-                    frame_count=30,
-                )
-            )
+            clip = Artifact(
+                kind="clip", name="clip", object=recording.object, parents=(recording.id,), frame_first=first,
+                frame_count=30,
+            )  # fmt: skip
+            tx.add(clip)
     listed = run("ls")
     assert [line.split()[2] for line in listed.out.splitlines()[1:]] == ["recording"]
     assert "1 artifact and 2 clips (--kind clip lists them)" in listed.err
@@ -133,10 +102,8 @@ def test_log_tells_each_commit_and_a_commit_names_a_version(run: Run, lake: Lake
     put_text(lake, "b")
     commits = run("log", "--json").document["commits"]
     assert [(c["version"], c["added"], c["message"]) for c in commits] == [
-        (2, 1, "ingest b"),
-        (1, 1, "ingest a"),
-        (0, 0, "create the lake"),
-    ]
+        (2, 1, "ingest b"), (1, 1, "ingest a"), (0, 0, "create the lake"),
+    ]  # fmt: skip
     at_first = run("ls", "--at", commits[1]["commit"], "--json").document["artifacts"]
     assert [artifact["name"] for artifact in at_first] == ["a"]
     assert len(run("log", "--limit", 1).out.splitlines()) == 2
@@ -170,11 +137,9 @@ def test_diff_prints_what_came_and_what_went(run: Run, lake: Lake, put_text: Put
     came = put_text(lake, "came")
     assert run("withdraw", gone.id[:10], "-m", "wrong camera").code == 0
     assert run("diff", "v1").out.splitlines() == [
-        f"+ wind        {came.id[:12]} came",
-        f"+ object      {came.object}",
-        f"- wind        {gone.id[:12]} gone",
+        f"+ wind        {came.id[:12]} came", f"+ object      {came.object}", f"- wind        {gone.id[:12]} gone",
         f"- object      {gone.object}",
-    ]
+    ]  # fmt: skip
     document = run("diff", "v1", "main", "--json").document
     assert document["schema"] == "flagdata.diff/1"
     assert [row["artifact"] for row in document["removed"]] == [gone.id]

@@ -136,11 +136,9 @@ def test_a_damaged_log_entry_is_told_by_its_name(lake: Lake, put_text: Put) -> N
     with pytest.raises(CorruptError) as told:
         fresh.rows()
     assert told.value.as_dict() == {
-        "kind": "corrupt",
-        "what": f"the log entry {entry.name} is damaged",
-        "where": str(entry),
+        "kind": "corrupt", "what": f"the log entry {entry.name} is damaged", "where": str(entry),
         "fix": "restore it from a copy",
-    }
+    }  # fmt: skip
     findings = doctor(fresh)
     assert not any("\n" in f.what for f in findings)
     assert {"ref-unreadable", "log-damaged"} <= {f.kind for f in findings}

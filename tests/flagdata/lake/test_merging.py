@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.cli import main
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
 from flagdata.export import Export, prepare
 from flagdata.findings import Severity
@@ -19,6 +18,7 @@ from flagdata.lake.health import doctor
 from flagdata.lake.lineage import noted_hidden, noted_view
 from flagdata.lake.marking import mark
 from flagdata.schema import Kind
+from tests.program import Ended, invoke
 
 NOW = timedelta(0)
 DAY = timedelta(hours=24)
@@ -254,11 +254,8 @@ def test_a_note_of_the_log_that_cannot_be_read_is_damage(note: dict[str, str]) -
 def test_the_verbs_say_what_a_merge_and_a_deletion_did(
     lake: Lake, put_text: Put, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def run(*arguments: str) -> tuple[object, str, str]:
-        with pytest.raises(SystemExit) as ended:
-            main([*arguments, "--lake", str(lake.path)])
-        captured = capsys.readouterr()
-        return ended.value.code, captured.out, captured.err
+    def run(*arguments: str) -> Ended:
+        return invoke(capsys, *arguments, "--lake", lake.path)
 
     both, base = put_text(lake, "both"), put_text(lake, "base")
     lake.branch("b")

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.cli import main
 from flagdata.errors import UsageError
 from flagdata.lake import Artifact, Lake
+from tests.program import invoke
 
 NOBODY = 65534
 COMMANDS = (["ls"], ["doctor"], ["verify"], ["tag", "v1"], ["log"])
@@ -22,6 +22,7 @@ _AS_NOBODY = """
 import json, os, sys, zoneinfo
 import flagdata.commands.lake, flagdata.commands.upkeep, flagdata.ingest.before, flagdata.lake.health, tqdm, xml
 from flagdata.cli import main
+from tests.program import invoke
 for arguments in json.loads(sys.argv[1]):
     child = os.fork()
     if child == 0:
@@ -87,10 +88,8 @@ def test_a_folder_that_the_catalog_cannot_work_in_is_refused_by_name(
     with pytest.raises(UsageError, match="backslash, or a byte that is not UTF-8"):
         Lake.create(tmp_path / name)
     for more in ([], ["--json"]):
-        with pytest.raises(SystemExit) as ended:
-            main(["init", str(tmp_path / name), *more])
-        assert ended.value.code == 2
-        assert "rename the folder" in capsys.readouterr().err
+        ended = invoke(capsys, "init", tmp_path / name, *more)
+        assert (ended.code, "rename the folder" in ended.err) == (2, True)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -17,17 +17,17 @@ NOW = timedelta(0)
 
 
 def test_four_processes_ingesting_at_once_lose_no_row(lake: Lake, start_worker: Callable[..., Any]) -> None:
-    workers = [start_worker(f"w{i}", count=25, shared=5) for i in range(4)]
+    workers = [start_worker(f"w{i}", count=16, shared=5) for i in range(4)]
     for worker in workers:
         worker.await_line("done")
-    assert [len(worker.acknowledged()) for worker in workers] == [30] * 4
+    assert [len(worker.acknowledged()) for worker in workers] == [21] * 4
     expected = {identity for worker in workers for identity in worker.acknowledged()}
-    assert len(expected) == 4 * 25 + 5
+    assert len(expected) == 4 * 16 + 5
     rows = lake.rows()["artifact"].to_pylist()
     assert len(rows) == len(expected)  # the five shared sources raced, and are there once
     assert set(rows) == expected
     merges = [entry for entry in lake.catalog.history() if entry.get("message", "").startswith("merge ")]
-    assert len(merges) == 3  # of the catalog's files, after each 32 of some 108 versions, overtaken by no commit
+    assert len(merges) == 2  # of the catalog's files, after each 32 of some 72 versions, overtaken by no commit
     assert doctor(lake, grace=NOW) == ()
     assert verify(lake, object_names(lake)) == ()
 
@@ -48,10 +48,10 @@ def test_collection_beside_ingests_deletes_nothing_that_they_publish(
     assert verify(lake, object_names(lake)) == ()
 
 
-def test_fifty_kills_during_ingest_lose_nothing_acknowledged(lake: Lake, start_worker: Callable[..., Any]) -> None:
+def test_kills_during_ingest_lose_nothing_acknowledged(lake: Lake, start_worker: Callable[..., Any]) -> None:
     moments = random.Random(2020)
     acknowledged: set[str] = set()
-    for wave in range(25):
+    for wave in range(10):
         pair = [start_worker(f"wave{wave}-{i}", count=1000, shared=3) for i in range(2)]
         for worker in pair:
             worker.await_line("ready")
@@ -61,7 +61,7 @@ def test_fifty_kills_during_ingest_lose_nothing_acknowledged(lake: Lake, start_w
             worker.kill()
         acknowledged.update(*(worker.acknowledged() for worker in pair))
     rows = lake.rows()["artifact"].to_pylist()
-    assert len(acknowledged) >= 25  # the test has tested something
+    assert acknowledged  # the test has tested something
     assert acknowledged <= set(rows)
     assert len(rows) == len(set(rows))
     before = doctor(lake, grace=NOW)

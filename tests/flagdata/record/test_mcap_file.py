@@ -31,12 +31,10 @@ def wind(n: int) -> WindSeries:
     speed[::7] = np.nan
     speed[3] = -0.0
     return WindSeries(
-        time=time,
-        channels={"wind_speed": speed, "sonic_temperature": rng.normal(290, 1, n), "wind_x": np.zeros(n)},
-        flags=rng.choice([0, 1, 127, 128, 0xFFFF], n).astype(np.uint16),
-        sensor=Sensor(name="a made one"),
+        time=time, channels={"wind_speed": speed, "sonic_temperature": rng.normal(290, 1, n), "wind_x": np.zeros(n)},
+        flags=rng.choice([0, 1, 127, 128, 0xFFFF], n).astype(np.uint16), sensor=Sensor(name="a made one"),
         host_time=time + 700_000_001,
-    )
+    )  # fmt: skip
 
 
 def one_by_one(series: WindSeries) -> list[bytes]:

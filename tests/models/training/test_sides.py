@@ -15,6 +15,7 @@ from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind, catalog_schema
 from models.evaluation.command import refuse_learned
 from models.training.recipe import DataSpec, parse
+from tests.refusals import unrefused
 
 SIDES = ("train", "validation", "test")
 RECIPE = (
@@ -115,7 +116,12 @@ def test_a_recipe_names_any_data_set_that_can_be_built(name: str) -> None:
     assert recipe.data.datasets == (name,)
 
 
-@pytest.mark.parametrize("entry", ['""', '" "', '"a\\nb"', "3", "[]", '["a", 3]', f'"{"a" * 101}"'])
-def test_what_no_data_set_can_be_called_is_refused(entry: str) -> None:
-    with pytest.raises(InputError, match="the data set is"):
-        parse(RECIPE.format(entry), name="r", where="r.toml")
+def test_what_no_data_set_can_be_called_is_refused() -> None:
+    cases = ['""', '" "', '"a\\nb"', "3", "[]", '["a", 3]', f'"{"a" * 101}"']
+    assert (
+        unrefused(
+            lambda entry: parse(RECIPE.format(entry), name="r", where="r.toml"), zip(cases), InputError,
+            "the data set is",
+        )
+        == []
+    )  # fmt: skip

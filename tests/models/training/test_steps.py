@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +34,7 @@ from models.training.recipe import (
     Schedule,
     TrainingRecipe,
 )
-from models.training.steps import DivergedError, Training, learning_rate
+from models.training.steps import DivergedError, Trained, Training, learning_rate
 
 SIZE = 24
 FRONT_END = FrontEnd(maps="wave-maps", size=SIZE)
@@ -101,26 +102,33 @@ def one_thread() -> Iterator[None]:
     torch.set_num_threads(before)
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, one_thread: None) -> Callable[[Loss], Trained]:
+    """Trainings that ran through, one a loss."""
+    return cache(lambda loss: training(tmp_path_factory.mktemp("whole") / "run", recipe(loss)).complete())
+
+
 @pytest.mark.parametrize("loss", list(Loss))
 @pytest.mark.parametrize("clips", [20, 41, 90])
 def test_a_training_that_was_stopped_reaches_the_weights_of_one_that_was_not(
-    tmp_path: Path, loss: Loss, clips: int
+    tmp_path: Path, loss: Loss, clips: int, whole: Callable[[Loss], Trained]
 ) -> None:
-    whole = training(tmp_path / "whole", recipe(loss)).complete()
     with pytest.raises(KeyboardInterrupt):
         training(tmp_path / "broken", recipe(loss), bars=stopped_after(clips)).complete()
     checkpoint.check_folder(tmp_path / "broken")
-    taken_up = training(tmp_path / "broken", recipe(loss)).complete()
-    for name, value in whole.learner.state_dict().items():
+    taken_up, unbroken = training(tmp_path / "broken", recipe(loss)).complete(), whole(loss)
+    for name, value in unbroken.learner.state_dict().items():
         assert torch.equal(value, taken_up.learner.state_dict()[name]), name
-    known = [(epoch.train, epoch.validation) for epoch in whole.course.epochs]
+    known = [(epoch.train, epoch.validation) for epoch in unbroken.course.epochs]
     assert known == [(epoch.train, epoch.validation) for epoch in taken_up.course.epochs]
 
 
-def test_other_seeds_give_other_weights_and_the_same_seed_the_same(tmp_path: Path) -> None:
-    first, second, other = (
-        training(tmp_path / str(place), replace(recipe(), seed=seed)).complete().learner.state_dict()
-        for place, seed in enumerate((3, 3, 4))
+def test_other_seeds_give_other_weights_and_the_same_seed_the_same(
+    tmp_path: Path, whole: Callable[[Loss], Trained]
+) -> None:
+    first = whole(Loss.POSTERIOR).learner.state_dict()
+    second, other = (
+        training(tmp_path / str(seed), replace(recipe(), seed=seed)).complete().learner.state_dict() for seed in (3, 4)
     )
     assert all(torch.equal(first[name], second[name]) for name in first)
     assert not torch.equal(first["network.summary.0.weight"], other["network.summary.0.weight"])
@@ -178,13 +186,12 @@ def test_a_checkpoint_of_other_data_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def stopped(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, torch.Tensor], Path]:
-    """The weights of a training that ran through, and the run folder of one that was stopped in its third epoch."""
-    folder = tmp_path_factory.mktemp("stopped")
-    whole = training(folder / "whole", recipe()).complete()
+def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run folder of a training that was stopped in its third epoch."""
+    folder = tmp_path_factory.mktemp("stopped") / "broken"
     with pytest.raises(KeyboardInterrupt):
-        training(folder / "broken", recipe(), bars=stopped_after(90)).complete()
-    return whole.learner.state_dict(), folder / "broken"
+        training(folder, recipe(), bars=stopped_after(90)).complete()
+    return folder
 
 
 @pytest.mark.parametrize(
@@ -193,18 +200,15 @@ def stopped(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, torch.T
      ("best.safetensors", "changed"), ("SHA256SUMS", "cut")],
 )  # fmt: skip
 def test_a_damaged_checkpoint_is_passed_over_for_the_one_before_and_the_weights_stay_the_same(
-    stopped: tuple[dict[str, torch.Tensor], Path],
-    tmp_path: Path,
-    caplog: pytest.LogCaptureFixture,
-    name: str,
-    damage: str,
-) -> None:
-    whole, folder = stopped
-    run = tmp_path / "run"
-    shutil.copytree(folder, run)
+    stopped: Path, whole: Callable[[Loss], Trained], tmp_path: Path, caplog: pytest.LogCaptureFixture,
+    name: str, damage: str,
+) -> None:  # fmt: skip
+    run = Path(shutil.copytree(stopped, tmp_path / "run"))
     spoil(run / "last" / name, damage)
-    taken_up = training(run, recipe()).complete()
-    assert all(torch.equal(value, taken_up.learner.state_dict()[key]) for key, value in whole.items())
+    taken_up, unbroken = (
+        done.learner.state_dict() for done in (training(run, recipe()).complete(), whole(Loss.POSTERIOR))
+    )
+    assert all(torch.equal(value, taken_up[key]) for key, value in unbroken.items())
     (warning,) = caplog.messages
     assert "the last checkpoint is damaged" in warning
     assert "goes on from the one before it" in warning
@@ -228,14 +232,15 @@ def test_checkpoints_that_are_all_damaged_are_an_error_with_the_file_and_the_fix
     assert "delete all checkpoints" in caught.value.fix
 
 
-def test_a_kill_between_the_two_renames_loses_nothing(tmp_path: Path) -> None:
-    whole = training(tmp_path / "whole", recipe()).complete()
+def test_a_kill_between_the_two_renames_loses_nothing(tmp_path: Path, whole: Callable[[Loss], Trained]) -> None:
     with pytest.raises(KeyboardInterrupt):
         training(tmp_path / "broken", recipe(), bars=stopped_after(50)).complete()
     shutil.rmtree(tmp_path / "broken" / "before")
     (tmp_path / "broken" / "last").rename(tmp_path / "broken" / "before")
     taken_up = training(tmp_path / "broken", recipe()).complete()
-    assert all(torch.equal(v, taken_up.learner.state_dict()[n]) for n, v in whole.learner.state_dict().items())
+    assert all(
+        torch.equal(v, taken_up.learner.state_dict()[n]) for n, v in whole(Loss.POSTERIOR).learner.state_dict().items()
+    )
 
 
 def test_a_target_that_clips_do_not_state_is_an_error(tmp_path: Path) -> None:
@@ -332,19 +337,15 @@ sys.path.insert(0, {here!r})
 from test_steps import Loss, Learner, recipe, training, small_learner
 from models.training.recipe import TrainingRecipe
 torch.set_num_threads(1)
-rank, count = int(sys.argv[1]), int(sys.argv[2])
-if count > 1:
-    ranks.init_process_group("gloo", init_method="file://" + sys.argv[3] + "/meet", rank=rank, world_size=count)
+rank, folder = int(sys.argv[1]), Path(sys.argv[2])
+ranks.init_process_group("gloo", init_method=f"file://{{folder}}/meet", rank=rank, world_size=2)
 TrainingRecipe.learner = small_learner
-own = recipe(Loss.REGRESSION, epochs=2)
-done = training(Path(sys.argv[3]) / f"run-{{count}}", own, checkpoint_seconds=1e9).complete()
-if count > 1:
-    ranks.barrier()  # as `models.training.command` has it: no rank leaves while another still talks to it
+done = training(folder / "run-2", recipe(Loss.REGRESSION, epochs=2), checkpoint_seconds=1e9).complete()
+ranks.barrier()  # as `models.training.command` has it: no rank leaves while another still talks to it
 if rank == 0:
     state = {{name: value.double().tolist() for name, value in done.learner.state_dict().items()}}
-    (Path(sys.argv[3]) / f"weights-{{count}}.json").write_text(json.dumps(state))
-if count > 1:
-    ranks.destroy_process_group()
+    (folder / "weights.json").write_text(json.dumps(state))
+ranks.destroy_process_group()
 """
 
 
@@ -364,21 +365,24 @@ def small_learner(own: TrainingRecipe) -> Learner:
     return Learner(Mean(), loss=own.loss.name, targets=own.loss.targets)
 
 
-def test_two_ranks_take_the_steps_of_one(tmp_path: Path) -> None:
+def test_two_ranks_take_the_steps_of_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Gradients of two halves, averaged by gloo, are those of the whole batch."""
     script = tmp_path / "rank.py"
     script.write_text(_RANK.format(here=str(Path(__file__).parent)))
     root = str(Path(__file__).resolve().parents[3])
 
-    def started(rank: int, count: int) -> subprocess.Popen[bytes]:
-        command = [sys.executable, str(script), str(rank), str(count), str(tmp_path)]
+    def started(rank: int) -> subprocess.Popen[bytes]:
+        command = [sys.executable, str(script), str(rank), str(tmp_path)]
         return subprocess.Popen(command, cwd=root, env={"PYTHONPATH": root, "PATH": "/usr/bin:/bin"})
 
-    for count in (1, 2):
-        assert [process.wait(timeout=240) for process in [started(rank, count) for rank in range(count)]] == [0] * count
-    alone, shared = (json.loads((tmp_path / f"weights-{count}.json").read_text()) for count in (1, 2))
+    with monkeypatch.context() as patch:
+        patch.setattr(TrainingRecipe, "learner", small_learner)
+        own = recipe(Loss.REGRESSION, epochs=2)
+        alone = training(tmp_path / "run-1", own, checkpoint_seconds=1e9).complete().learner.state_dict()
+    assert [process.wait(timeout=240) for process in [started(rank) for rank in range(2)]] == [0, 0]
+    shared = json.loads((tmp_path / "weights.json").read_text())
     for name, values in alone.items():
-        np.testing.assert_allclose(shared[name], values, rtol=1e-5, atol=1e-6, err_msg=name)
+        np.testing.assert_allclose(shared[name], values.numpy(), rtol=1e-5, atol=1e-6, err_msg=name)
 
 
 @pytest.mark.parametrize("theirs", ["notes.txt", "next/thesis.tex", "before/last/a", "last/card.json/b"])

@@ -1,4 +1,4 @@
-"""A tiny data set: six sequences of a coarse flag, fifteen films of 32 × 32 pixels; and where it is built."""
+"""A tiny data set: five sequences of a coarse flag, ten films of 32 × 32 pixels; and where it is built."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner, Result
 
+from flagdata.cli import root
 from flagdata.lake import Lake
 from sim.datasets.reading import parse
 from sim.datasets.recipe import DatasetRecipe
@@ -103,23 +105,27 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 
 
 class Builds:
-    """Builds in processes of their own, through the cluster."""
+    """Builds through the cluster: in this process, or in processes of their own, which may be killed."""
 
-    def __init__(self, cluster: Cluster) -> None:
+    def __init__(self, cluster: Cluster, said: Path) -> None:
         self._cluster = cluster
+        self._said = said
 
     def start(self, recipe: Path, lake: Path) -> subprocess.Popen[bytes]:
         """`flagdata build`, which commits every two films."""
         command = [sys.executable, str(WORKER), "build", str(recipe), "--lake", str(lake)]
-        return subprocess.Popen(
-            [*command, "--scheduler", self._cluster.address], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-        )
+        # What it says goes to a file: nobody reads a pipe while it runs.
+        with self._said.open("wb") as said:
+            command = [*command, "--scheduler", self._cluster.address]
+            return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=said)
 
-    def finish(self, process: subprocess.Popen[bytes]) -> str:
-        """What it printed."""
-        out, err = process.communicate(timeout=300)
-        assert process.returncode == 0, err.decode()
-        return out.decode()
+    def finish(self, process: subprocess.Popen[bytes]) -> None:
+        assert process.wait(timeout=300) == 0
+
+    def build(self, recipe: Path, lake: Path) -> Result:
+        """`flagdata build`, to its end."""
+        command = ["build", str(recipe), "--lake", str(lake), "--scheduler", self._cluster.address]
+        return CliRunner().invoke(root, command)
 
     def wait_for(self, process: subprocess.Popen[bytes], lake: Path, artifacts: int) -> None:
         """Until the lake shows that many artifacts."""
@@ -128,11 +134,16 @@ class Builds:
             with suppress(Exception):
                 if Lake.open(lake).rows(columns=["artifact"]).num_rows >= artifacts:
                     return
-            time.sleep(0.02)
+            time.sleep(0.1)
+
+    def refused(self, process: subprocess.Popen[bytes]) -> str:
+        """What a build says that ends without success."""
+        assert process.wait(timeout=300) == 1
+        return self._said.read_text()
 
     def kill(self, process: subprocess.Popen[bytes]) -> None:
         process.send_signal(signal.SIGKILL)
-        process.communicate()
+        process.wait()
 
     def rows(self, lake: Path) -> Rows:
         """Artifact → all of its row that does not say when it was committed, and by which code."""
@@ -154,13 +165,14 @@ def doomed(tmp_path: Path) -> Iterator[Cluster]:
 
 
 @pytest.fixture(scope="session")
-def builds(cluster: Cluster) -> Builds:
-    return Builds(cluster)
+def builds(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Builds:
+    return Builds(cluster, tmp_path_factory.mktemp("builds") / "said")
 
 
 @pytest.fixture(scope="session")
 def built(recipe_file: Path, builds: Builds, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The tiny data set, built without interruption."""
     lake = tmp_path_factory.mktemp("built") / "lake"
-    builds.finish(builds.start(recipe_file, lake))
+    done = builds.build(recipe_file, lake)
+    assert done.exit_code == 0, done
     return lake

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import signal
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from distributed import CancelledError
 
+from sim.datasets import cluster
 from sim.datasets.cluster import WorkerError, connected, results
 
 
@@ -52,3 +55,14 @@ def test_a_worker_that_dies_over_sending_its_result_keeps_nobody_waiting(
     with connected(doomed.address, workers=1) as client, pytest.raises(WorkerError, match="no workers for 2 s"):
         list(results(client, [(_fatal, [])], say=said.append))
     assert said == ["all workers are gone; waiting 2 s for new ones"]
+
+
+def test_what_dask_gives_for_a_job_that_was_lost_with_the_scheduler_is_no_result(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    client: Any = SimpleNamespace(status="running", nthreads=lambda: {"a": 1}, submit=lambda *_, **__: None, loop=None)
+    running = SimpleNamespace(count=lambda: 0, add=print, is_empty=lambda: False, clear=lambda: None)
+    monkeypatch.setattr(cluster, "as_completed", lambda **_: running)
+    monkeypatch.setattr(cluster, "_next", lambda *_: (SimpleNamespace(release=print), CancelledError("a job")))
+    with pytest.raises(WorkerError, match="the scheduler is gone"):
+        next(results(client, [(sum, [[1]])], say=print))

@@ -10,18 +10,15 @@ from typing import NoReturn
 
 import pytest
 
-from flagdata.cli import main
 from sim.datasets import jobs
 from sim.datasets.build import BuildReport
 from sim.datasets.cast import casts
 from sim.datasets.reading import load
+from tests.program import Ended, invoke
 
 
-def said(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as stop:
-        main(["build", *map(str, arguments)])
-    out, err = capsys.readouterr()
-    return int(stop.value.code or 0), out, err
+def said(capsys: pytest.CaptureFixture[str], *arguments: object) -> Ended:
+    return invoke(capsys, "build", *arguments)
 
 
 def test_a_plan_states_counts_bytes_and_hours_and_makes_nothing(
@@ -33,13 +30,13 @@ def test_a_plan_states_counts_bytes_and_hours_and_makes_nothing(
     assert not lake.exists()
     plan = json.loads(out)
     assert plan["schema"] == "flagdata.build-plan/1"
-    assert plan["sequences"] == {"train": 4, "test": 2}
-    assert plan["films"] == plan["clips"] == {"train": 11, "test": 4}  # 30 frames a film are one clip
-    assert plan["missing"] == {"sequences": 6, "films": 15}
+    assert plan["sequences"] == {"train": 3, "test": 2}
+    assert plan["films"] == plan["clips"] == {"train": 7, "test": 3}  # 30 frames a film are one clip
+    assert plan["missing"] == {"sequences": 5, "films": 10}
     rates = plan["rates"]
-    work = 6 * rates["sequence_seconds"] + 15 * rates["film_seconds"]
+    work = 5 * rates["sequence_seconds"] + 10 * rates["film_seconds"]
     assert plan["hours"] == pytest.approx(work / 2 / 3600)
-    assert plan["bytes"] == pytest.approx(6 * rates["sequence_bytes"] + 15 * rates["film_bytes"], abs=1)
+    assert plan["bytes"] == pytest.approx(5 * rates["sequence_bytes"] + 10 * rates["film_bytes"], abs=1)
     # 30 frames of one slot each; the log, the schemas and the parameters take some 45 kB beside them.
     assert 30 * 2048 <= rates["film_bytes"] < 30 * 2048 + 60_000
 
@@ -64,10 +61,10 @@ def test_a_plan_for_people_has_a_line_a_side(
     code, out, err = said(capsys, recipe_file, "--lake", tmp_path / "lake", "--plan", "--workers", 2)
     assert code == 0
     assert [line.split() for line in out.splitlines()] == [
-        ["side", "sequences", "films", "clips"], ["train", "4", "11", "11"], ["test", "2", "4", "4"],
-        ["all", "6", "15", "15"],
+        ["side", "sequences", "films", "clips"], ["train", "3", "7", "7"], ["test", "2", "3", "3"],
+        ["all", "5", "10", "10"],
     ]  # fmt: skip
-    assert "6 sequences and 15 films" in err
+    assert "5 sequences and 10 films" in err
     assert "2 workers" in err
 
 

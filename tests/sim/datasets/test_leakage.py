@@ -33,7 +33,8 @@ def around(make: Callable[..., DatasetRecipe], tmp_path_factory: pytest.TempPath
 
 
 def films(make: Callable[..., DatasetRecipe], tmp_path_factory: pytest.TempPathFactory) -> Surroundings:
-    recipe = make({"sequences = 4\nrenders = 11": f"sequences = {SEQUENCES}\nrenders = {FILMS}"})
+    sides = {"sequences = 3\nrenders = 7": f"sequences = {SEQUENCES}\nrenders = {FILMS}"}
+    recipe = make(sides, scene={"frames = 30": "frames = 5"})
     cast = next(casts(recipe))
     roll = Roll(cast=cast)
     sequences: dict[int, MeshSequence] = {}

@@ -20,6 +20,7 @@ from sim.datasets.films import Film
 from sim.datasets.reading import load
 from sim.datasets.recipe import DatasetRecipe
 from sim.run.publish import member_artifact
+from tests.refusals import unrefused
 
 Make = Callable[..., DatasetRecipe]
 
@@ -44,7 +45,7 @@ def test_films_are_of_their_data_set_and_side(make: Make, tmp_path: Path) -> Non
     recipe = replace(make(), name="o'brien")
     rows = [film.artifact(frames=30) for film in films(Lake.create(tmp_path / "lake"), recipe)]
     assert {row.dataset for row in rows} == {"o'brien"}
-    assert [sum(row.side == side for row in rows) for side in ("train", "test")] == [11, 4]
+    assert [sum(row.side == side for row in rows) for side in ("train", "test")] == [7, 3]
 
 
 def test_the_card_of_a_data_set_shows_how_its_sides_are_taken(make: Make, tmp_path: Path) -> None:
@@ -64,7 +65,6 @@ def test_a_recipe_whose_films_are_there_under_another_name_is_refused_before_any
         build_of(lake, replace(make(), name="other")).run()
 
 
-@pytest.mark.parametrize("name", ["a\tb", " ", "a" * 101, "a\udcffb"])
-def test_what_no_artifact_can_be_called_is_refused_before_the_recipe_is_read(name: str) -> None:
-    with pytest.raises(InputError, match="a data set cannot be called"):
-        load(f"{name}.toml")
+def test_what_no_artifact_can_be_called_is_refused_before_the_recipe_is_read() -> None:
+    cases = ["a\tb", " ", "a" * 101, "a\udcffb"]
+    assert not unrefused(lambda name: load(f"{name}.toml"), zip(cases), InputError, "a data set cannot be called")

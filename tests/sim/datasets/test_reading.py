@@ -11,6 +11,7 @@ from flagdata.tables import Range, ends
 from sim.datasets.cast import casts
 from sim.datasets.reading import DATASETS, load, parse, with_renderer
 from sim.datasets.recipe import DatasetRecipe, Truth
+from tests.refusals import unrefused
 
 Make = Callable[..., DatasetRecipe]
 
@@ -63,7 +64,7 @@ def test_what_does_not_shape_the_data_leaves_the_hash_alone_and_what_does_change
     assert make({"A tiny data set": "Another title"}).hash == base
     for old, new in (
         ("seed = 1", "seed = 2"),
-        ("renders = 11", "renders = 12"),
+        ("renders = 7", "renders = 8"),
         ("read-noise = 1.0", "read-noise = 2.0"),
     ):
         assert make({old: new}).hash != base
@@ -72,11 +73,10 @@ def test_what_does_not_shape_the_data_leaves_the_hash_alone_and_what_does_change
     assert with_renderer(make(), "cycles").hash != base
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "error", "says"),
-    [
+def test_what_makes_no_data_set_is_refused(make: Make) -> None:
+    cases = [
         ('licence = "CC0-1.0"', "", InputError, "licence"),
-        ("renders = 11", "renders = 3", InputError, "renders"),
+        ("renders = 7", "renders = 2", InputError, "renders"),
         ("[sides.test]", "[sides.tset]", UnknownNameError, "did you mean 'test'"),
         ('prior = "flags"', 'prior = "flag"', UnknownNameError, "did you mean 'flags'"),
         ('prior = "flags"', "", InputError, "prior"),
@@ -87,11 +87,8 @@ def test_what_does_not_shape_the_data_leaves_the_hash_alone_and_what_does_change
         ('scene = "scene.toml"', 'scene = "absent.toml"', NotFoundError, "no such recipe file"),
         ("noise = 0.1", 'noise = 0.1\ntruth = "measured"\nbefore = 30.0', UsageError, "30 s of wind"),
         ("width = 32", 'width = 32\nrenderer = "povray"', UnknownNameError, "renderer"),
-    ],
-)  # fmt: skip
-def test_what_makes_no_data_set_is_refused(make: Make, old: str, new: str, error: type[Exception], says: str) -> None:
-    with pytest.raises(error, match=says):
-        make({old: new})
+    ]  # fmt: skip
+    assert not unrefused(lambda old, new: make({old: new}), cases)
 
 
 def test_gusts_whose_minute_before_is_not_simulated_cannot_be_measured(make: Make) -> None:

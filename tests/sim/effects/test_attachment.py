@@ -16,7 +16,7 @@ from sim.effects.slack import Slack
 from sim.effects.tilted_pole import TiltedPole
 from sim.handles import Handles, corners
 from sim.integrate.implicit import BackwardEuler
-from sim.integrate.symplectic import Backend, advance
+from sim.integrate.symplectic import advance
 from sim.mesh import grid
 
 STILL = QuadraticNormal(density=0.0)
@@ -57,7 +57,7 @@ def test_tight_lacing_keeps_the_hoist_in_place_and_loose_does_not(held, integrat
         if integrator == "implicit":
             final = BackwardEuler(step=2e-3).advance(each, start, 0.06)
         else:
-            final = advance(each, start, 0.06, steps=300, backend=Backend.TORCH)
+            final = advance(each, start, 0.06, steps=300)
         travel.append(float((final.position - state.position)[middle].norm()))
     assert travel[0] > 5e-3
     assert travel[1] < 1.5 * 24e-6
@@ -91,7 +91,7 @@ def test_within_its_slack_the_cloth_falls_freely(held, integrator) -> None:
     if integrator == "implicit":
         final = BackwardEuler(step=5e-3, tolerance=1e-12).advance(system, state, 0.1)
     else:
-        final = advance(system, state, 0.1, steps=500, backend=Backend.TORCH)
+        final = advance(system, state, 0.1, steps=500)
     np.testing.assert_allclose(final.velocity[:, 2, 0], -0.981, rtol=1e-6)
 
 

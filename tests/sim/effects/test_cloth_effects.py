@@ -21,7 +21,7 @@ from sim.effects.rest_curvature import RestCurvature
 from sim.effects.wet_mass import WetMass
 from sim.handles import Handles
 from sim.integrate.stability import stable_step
-from sim.integrate.symplectic import Backend, advance
+from sim.integrate.symplectic import advance
 from sim.material import isotropic
 from sim.mesh import Mesh, grid
 
@@ -99,7 +99,7 @@ def test_damping_lets_a_vibration_decay_as_stated(make_system) -> None:
     state = replace(state, position=pulled)
     stretch = []
     for _ in range(250):
-        state = advance(system, state, 1e-3, steps=3, backend=Backend.TORCH)
+        state = advance(system, state, 1e-3, steps=3)
         stretch.append((state.position[2:, 1] - 0.2).mean(0).numpy() / 2e-7)
     free, damped = np.array(stretch).T
     crossings = np.flatnonzero(np.diff(np.sign(free)) != 0)
@@ -163,4 +163,4 @@ def test_a_state_without_memory_is_refused(hinge) -> None:
     system, state = hinge
     remembering, _ = apply([Hysteresis(couple=1e-4)], system, state)
     with pytest.raises(UsageError, match="memories"):
-        advance(remembering, state, 1e-3, steps=1, backend=Backend.TORCH)
+        advance(remembering, state, 1e-3, steps=1)

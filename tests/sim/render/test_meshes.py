@@ -75,12 +75,10 @@ def test_a_single_frame_has_a_rate_too() -> None:
         ("faces", torch.tensor([[0, 1, -1], [0, 1, 2]]), "outside"),
         ("uv", torch.zeros(3, 2), "3 texture places for 4 vertices"),
         ("vertex_offset", (0, 3), "vertex_offset does not fit"),
-        ("face_offset", (0, 1, 2), "different numbers of frames"),
-        ("face_offset", (0,), "face_offset does not fit"),
-        ("rate", 0.0, "rate"),
-        ("heading", float("nan"), "heading"),
+        ("face_offset", (0, 1, 2), "different numbers of frames"), ("face_offset", (0,), "face_offset does not fit"),
+        ("rate", 0.0, "rate"), ("heading", float("nan"), "heading"),
     ],
-)
+)  # fmt: skip
 def test_what_is_no_mesh_sequence_is_refused(name, value, says) -> None:
     good = meshes(sheet())
     given = {field: getattr(good, field) for field in good.__dataclass_fields__} | {name: value}

@@ -252,12 +252,10 @@ def test_limits_may_be_given_to_any_recipe() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "word"),
     [
-        ("vt 1 1", "vt 0.5 -1", "inverted"),
-        ("vt 1 1", "vt 0.5 0", "degenerate"),
-        ("f 1/1 3/3 4/4", "f 1/1 4/4 3/3", "inverted"),
-        ("f 1/1 3/3 4/4\n", "", "belong to no face"),
+        ("vt 1 1", "vt 0.5 -1", "inverted"), ("vt 1 1", "vt 0.5 0", "degenerate"),
+        ("f 1/1 3/3 4/4", "f 1/1 4/4 3/3", "inverted"), ("f 1/1 3/3 4/4\n", "", "belong to no face"),
     ],
-)
+)  # fmt: skip
 def test_a_mesh_that_cannot_be_simulated_is_refused_with_the_reason(
     scene_folder: Path, old: str, new: str, word: str
 ) -> None:

@@ -10,25 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata import cli
 from flagdata.ingest.meshes import read_folder
 from flagdata.lake import Lake
 from flagdata.lake.meshes import MeshSequence, read_meshes
-
-Run = Callable[..., tuple[int, str, str]]
+from tests.program import Run, invoke
 
 
 @pytest.fixture
 def run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
     Lake.create(tmp_path / "lake")
 
-    def call(*arguments: str | Path) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as done:
-            cli.main(["simulate", *map(str, arguments), "--lake", str(tmp_path / "lake")])
-        out, err = capsys.readouterr()
-        return int(done.value.code or 0), out, err
-
-    return call
+    return lambda *arguments: invoke(capsys, "simulate", *arguments, "--lake", tmp_path / "lake")
 
 
 def test_artifacts_are_printed_one_a_line(run: Run, tmp_path: Path, small: Callable[..., str]) -> None:
@@ -58,13 +50,11 @@ def test_a_failed_member_makes_the_command_fail_and_is_named(run: Run, tmp_path:
 @pytest.mark.parametrize(
     ("arguments", "code", "word"),
     [
-        (["hanging-cloht"], 2, "did you mean 'hanging-cloth'"),
-        (["nowhere.toml"], 1, "no such recipe file"),
-        (["nowhere.json"], 1, "no such file"),
-        (["hanging-cloth", "--device", "cuda:97"], 2, "is not there"),
+        (["hanging-cloht"], 2, "did you mean 'hanging-cloth'"), (["nowhere.toml"], 1, "no such recipe file"),
+        (["nowhere.json"], 1, "no such file"), (["hanging-cloth", "--device", "cuda:97"], 2, "is not there"),
         (["hanging-cloth", "--branch", "trail"], 1, "trail"),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_done_is_told(run: Run, arguments: list[str], code: int, word: str) -> None:
     assert run(*arguments)[0] == code
     assert word in run(*arguments)[2]

@@ -133,13 +133,11 @@ def test_an_automatic_crop_is_used_and_kept_with_its_picture(film: Callable[...,
 @pytest.mark.parametrize(
     ("crop", "edges"),
     [
-        ("150,20,100,160", {"right": 30}),
-        ("230,90,150,100", {"left": 30, "top": 30}),
-        ("190,50,100,100", {}),
+        ("150,20,100,160", {"right": 30}), ("230,90,150,100", {"left": 30, "top": 30}), ("190,50,100,100", {}),
         ("10,10,100,100", {}),
     ],
     ids=["tip", "corner", "whole flag", "elsewhere"],
-)
+)  # fmt: skip
 def test_a_crop_that_cuts_through_what_moves_is_told_with_the_edges(
     crop: str, edges: dict[str, int], film: Callable[..., Path], plain: CameraOptions
 ) -> None:

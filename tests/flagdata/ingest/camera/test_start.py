@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from flagdata.commands.ingest_options import camera_options
 from flagdata.errors import TimeError
+from flagdata.findings import quality_flags
 from flagdata.ingest.camera.avchd import recording_time
 from flagdata.ingest.camera.start import Start, find_start
-from flagdata.timebase import parse
+from flagdata.timebase import iso, parse
 
 TEN = parse("2026-05-01T10:00:00Z")
 
@@ -64,16 +66,11 @@ def test_an_unusable_time_is_passed_over_and_mentioned() -> None:
 @pytest.mark.parametrize(
     "metadata",
     [
-        {},
-        {"creation_time": "1904-01-01T00:00:00.000000Z"},
-        {"creation_time": "1970-01-01T00:00:00.000000Z"},
-        {"creation_time": "1970-01-09T11:00:00.000000Z"},
-        {"creation_time": "yesterday"},
-        {"creation_time": ""},
-        {"com.apple.quicktime.creationdate": "2026-05-01T12:00:00"},
-        {"date": "2026-05-01"},
+        {}, {"creation_time": "1904-01-01T00:00:00.000000Z"}, {"creation_time": "1970-01-01T00:00:00.000000Z"},
+        {"creation_time": "1970-01-09T11:00:00.000000Z"}, {"creation_time": "yesterday"}, {"creation_time": ""},
+        {"com.apple.quicktime.creationdate": "2026-05-01T12:00:00"}, {"date": "2026-05-01"},
     ],
-)
+)  # fmt: skip
 def test_without_a_usable_time_the_way_out_is_named(metadata: dict[str, str]) -> None:
     with pytest.raises(TimeError) as raised:
         find(metadata)
@@ -92,3 +89,16 @@ def test_the_avchd_message_is_read_as_binary_coded_decimals() -> None:
     assert recording_time(head + entries[:-1]) is None
     assert recording_time(head + bytes([2, 0x18, 0, 0x20, 0x23, 0x1F, 0x19, 0x31, 0x23, 0x59, 0x58])) is None
     assert recording_time(b"\x00" * 40) is None
+
+
+def test_an_unknown_start_is_flagged_and_goes_before_the_files_own() -> None:
+    options = camera_options(
+        start="unknown", zone_name=None, true_fps=None, sequence_fps=None, rate="25", crop="whole", exposure=None,
+        archive="jpeg",
+    )  # fmt: skip
+    found = find_start(
+        options.camera.start, {"creation_time": "2024-05-01T12:00:00Z"}, recorded=None, place=None, duration=10.0,
+        where="film.mp4",
+    )  # fmt: skip
+    assert (iso(found.instant), found.source, found.sigma) == ("2000-01-01T00:00:00Z", "unknown", None)
+    assert quality_flags(found.findings) == ["start-unknown"]

@@ -8,6 +8,7 @@ import pytest
 
 from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNameError
 from flagdata.ingest.cloths import read_cloths
+from tests.refusals import unrefused
 
 HEADING = "film,fabric,area_weight,bending_stiffness,wind_level,wind_speed,wind_sigma"
 ROWS = ("a.mp4,Faux Fur,0.39,2.1e-5,W1,,", "b.mp4,Faux Fur,0.39,2.1e-5,W2,,", "c.mp4,silk,0.05,,,2.4,0.3")
@@ -74,10 +75,15 @@ def test_a_misspelt_column_is_named_with_the_nearest(folder: Path) -> None:
         read_cloths(written(folder, "film,fabric,area_wieght", "a.mp4,silk,0.05"))
 
 
-@pytest.mark.parametrize("heading", ["film,fabric", "film,fabric,area_weight,area_weight"])
-def test_missing_and_doubled_columns_are_refused(folder: Path, heading: str) -> None:
-    with pytest.raises(InputError, match=r"area_weight|twice"):
-        read_cloths(written(folder, heading, "a.mp4,silk"))
+def test_missing_and_doubled_columns_are_refused(folder: Path) -> None:
+    cases = ["film,fabric", "film,fabric,area_weight,area_weight"]
+    assert (
+        unrefused(
+            lambda heading: read_cloths(written(folder, heading, "a.mp4,silk")), zip(cases), InputError,
+            r"area_weight|twice",
+        )
+        == []
+    )  # fmt: skip
 
 
 def test_a_table_without_rows_and_one_that_is_not_there_are_errors(folder: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 
 from flagdata.errors import InputError, LimitError, NotFoundError
 from flagdata.ingest.meshes import Obj, obj, read_obj, write_obj
+from tests.refusals import unrefused
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 2 0\nvt 0 3\n"
 
@@ -53,32 +54,23 @@ def test_velocities_belong_to_the_vertex_before_them(tmp_path: Path) -> None:
         (TRIANGLE + "f 1/1 2/2 4/3\n", "what is not there", 7),
         (TRIANGLE + "f 1/1 2/2 3/4\n", "what is not there", 7),
         (TRIANGLE + "f 0/1 2/2 3/3\n", "what is not there", 7),
-        (TRIANGLE + "f -4/1 2/2 3/3\n", "what is not there", 7),
-        (TRIANGLE + "f 1/1 2/2\n", "fewer than three", 7),
+        (TRIANGLE + "f -4/1 2/2 3/3\n", "what is not there", 7), (TRIANGLE + "f 1/1 2/2\n", "fewer than three", 7),
         (TRIANGLE + "f 1/1 2/x 3/3\n", "not a corner", 7),
         (TRIANGLE + "f 1/1 2/2 3/3\nf 1/2 2/2 3/3\n", "two material coordinates", 8),
-        ("v 0 0 nan\n", "not 3 finite", 1),
-        ("v 0 0 inf\n", "not 3 finite", 1),
-        ("v 0 0\n", "not 3 finite", 1),
-        ("v 0 0 0x\n", "not 3 finite", 1),
-        ("vt 0\n", "not 2 finite", 1),
-        ("nv 1 2 3\n", "before any vertex", 1),
+        ("v 0 0 nan\n", "not 3 finite", 1), ("v 0 0 inf\n", "not 3 finite", 1), ("v 0 0\n", "not 3 finite", 1),
+        ("v 0 0 0x\n", "not 3 finite", 1), ("vt 0\n", "not 2 finite", 1), ("nv 1 2 3\n", "before any vertex", 1),
         ("solid cube\n", "unknown keyword 'solid'", 1),
     ],
-)
+)  # fmt: skip
 def test_a_malformed_line_is_refused_by_its_number(tmp_path: Path, text: str, word: str, line: int) -> None:
     with pytest.raises(InputError, match=word) as caught:
         read(tmp_path, text)
     assert (caught.value.where or "").endswith(f"line {line}")
 
 
-@pytest.mark.parametrize(
-    ("text", "word"),
-    [("v 0 0 0\n", "without faces"), ("", "is empty"), (TRIANGLE + "f 1/1 2/2 3\n", "some corners")],
-)
-def test_a_mesh_that_is_none_is_refused(tmp_path: Path, text: str, word: str) -> None:
-    with pytest.raises(InputError, match=word):
-        read(tmp_path, text)
+def test_a_mesh_that_is_none_is_refused(tmp_path: Path) -> None:
+    cases = [("v 0 0 0\n", "without faces"), ("", "is empty"), (TRIANGLE + "f 1/1 2/2 3\n", "some corners")]
+    assert not unrefused(lambda text: read(tmp_path, text), cases, InputError)
 
 
 def test_a_file_too_large_or_missing_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
