@@ -33,8 +33,7 @@ def around(make: Callable[..., DatasetRecipe], tmp_path_factory: pytest.TempPath
 
 
 def films(make: Callable[..., DatasetRecipe], tmp_path_factory: pytest.TempPathFactory) -> Surroundings:
-    sides = {"sequences = 3\nrenders = 7": f"sequences = {SEQUENCES}\nrenders = {FILMS}"}
-    recipe = make(sides, scene={"frames = 30": "frames = 5"})
+    recipe = make({"sequences = 3\nrenders = 7": f"sequences = {SEQUENCES}\nrenders = {FILMS}"})
     cast = next(casts(recipe))
     roll = Roll(cast=cast)
     sequences: dict[int, MeshSequence] = {}
