@@ -172,7 +172,7 @@ class WindLog:
     """What an anemometer reader returns: the series, what it found, and why it thinks the file is of this format.
 
     Attributes:
-        plan: what was understood of the file, see `ingest.anemometer.plan`.
+        plan: what was understood of the file, see `ingest.anemometer.log.understood`.
         drafted: the recipe (TOML) that was drafted from the file's own text, "" where it was read by another.
         stated: whether the file itself states all that a draft says, so that nothing of it is a guess.
         rows: of a draft that is one, some rows to judge it by.

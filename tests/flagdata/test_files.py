@@ -10,7 +10,7 @@ import pytest
 
 from flagdata.errors import InputError, LimitError, NotFoundError
 from flagdata.files import check_input
-from flagdata.ingest.anemometer.text.opening import first_bytes
+from flagdata.ingest.anemometer.text.source import first_bytes
 from flagdata.ingest.camera import open_camera
 from flagdata.ingest.classify import guesses
 from flagdata.ingest.cloths import read_cloths

@@ -8,14 +8,13 @@ from pathlib import Path
 from flagdata.addresses import local_path
 from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.ingest.anemometer import untimed
-from flagdata.ingest.anemometer.containers import json_lines, spreadsheet
+from flagdata.ingest.anemometer.containers import json_lines
 from flagdata.ingest.anemometer.draft.drafting import Draft
-from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
+from flagdata.ingest.anemometer.formats.registry import FORMATS, SIGNATURES, Format
 from flagdata.ingest.anemometer.options import Limits, WindOptions
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, NAMED, SURE, Guess, GuessKind, Head
 from flagdata.ingest.anemometer.table.delimited import Delimited, drafted
-from flagdata.ingest.anemometer.text.opening import first_bytes, open_text, signature
-from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.ingest.anemometer.text.source import TextFile, first_bytes, is_workbook, open_text, signature
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
 _MESHES = {".obj", ".ply", ".stl", ".off"}
@@ -28,13 +27,20 @@ def opened(path: Path, options: WindOptions, encoding: str | None = None) -> Tex
         FlagdataError: it cannot be read as text, or does not fit the options.
     """
     source = open_text(path, limits=options.limits, encoding=options.encoding or encoding)
-    flat = json_lines.matches(source.head())
+    first = next((line.strip() for line in source.head() if line.strip()), "")
+    flat = first.startswith("{") and first.endswith("}")
     if options.rate is not None:
-        table = (json_lines.as_table(source) or source) if flat else source
+        table = json_lines.as_table(source) if flat else source
         return untimed.timed(table, rate=options.rate, start=options.start, columns=options.columns)
     if not flat or options.format is not None or options.recipe is not None or recognised(source):
         return source
-    return json_lines.as_table(source) or source
+    return json_lines.as_table(source)
+
+
+def signed(source: TextFile) -> tuple[str, ...]:
+    """Formats by which a file's first line names itself."""
+    first = "".join(source.head(1)).lstrip("\ufeff")
+    return tuple(name for name, marks in SIGNATURES.items() if first.startswith(marks))
 
 
 def recognised(source: TextFile) -> tuple[Guess, ...]:
@@ -45,7 +51,7 @@ def recognised(source: TextFile) -> tuple[Guess, ...]:
 def _guesses(source: TextFile) -> tuple[Guess, ...]:
     head = Head(lines=tuple(source.head(HEAD_LINES)), counted=source.counted)
     found: list[Guess] = []
-    for name in FORMATS:
+    for name in signed(source) or FORMATS:
         reader: Format = FORMATS[name]()
         guess = reader.recognise(head)
         if guess is not None and guess.score >= NAMED:
@@ -78,7 +84,7 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
     if path.is_dir():
         return (_folder(path),)
     head = first_bytes(path)
-    other = None if spreadsheet.is_workbook(path, head) else signature(head)
+    other = None if is_workbook(path, head) else signature(head)
     if other is not None:
         what, fix = other
         kind: GuessKind = "camera" if "video" in what else "record" if "MCAP" in what else "other"

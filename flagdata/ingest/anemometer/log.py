@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,18 +17,26 @@ from flagdata.ingest.anemometer import recipe as recipes
 from flagdata.ingest.anemometer import untimed
 from flagdata.ingest.anemometer.draft import doubts
 from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
-from flagdata.ingest.anemometer.identify import opened, recognised, unknown
+from flagdata.ingest.anemometer.identify import opened, recognised, signed, unknown
 from flagdata.ingest.anemometer.instants import zones
 from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.plan import understood
 from flagdata.ingest.anemometer.preview import shown_rows
 from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.samples import platform, rules, zero
 from flagdata.ingest.anemometer.samples.order import in_order
 from flagdata.ingest.anemometer.table.delimited import Delimited, drafted
 from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.provenance import digest
 from flagdata.schema import CHANNELS, UNUSABLE
 from flagdata.signals import WindLog, WindSeries
+
+READER = 2
+"""Version of the readers of logs: raised with each change of code after which a file that was read gives other times,
+values or flags, or has other channels. What a TOML file says needs no raise: its digest is in the plan.
+
+    2   formats of tables are TOML files; instruments' lines are read where they are whole and stamped; numbers that may
+        stand for no value, and directions of 0 that may be calm air, are asked about or reported, and stay as written
+"""
 
 
 def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
@@ -47,7 +57,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     source = opened(path, options, recipe.file.encoding if recipe else None)
     if options.rate is not None:
         options = replace(options, start=None, rate=None)
-    if recipe is None and options.columns is None and untimed.clocked(source):
+    if recipe is None and options.columns is None and not signed(source) and untimed.clocked(source):
         if options.date is None:
             day = untimed.year_alone(source)
             lacking = "dates without a year" if day else "times of day without a date"
@@ -163,3 +173,9 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
         return Delimited.name, options, ()
     best = guesses[0]
     return best.format, replace(options, recipe=best.recipe), best.reasons
+
+
+def understood(format_name: str, recipe: str | None) -> Mapping[str, Any]:
+    """The plan by which a log was read: its format, the digest of the recipe (TOML), of the user or of the catalog's
+    format, if one was used, and the reader."""
+    return {"format": format_name, "recipe": None if recipe is None else digest(recipe), "reader": READER}

@@ -25,13 +25,11 @@ class Limits:
         size: of the file [bytes].
         rows: lines in the file.
         line: length of a line [bytes].
-        document: length of a line of JSON, XML, HTML and dumps of databases, which are written in one [bytes].
     """
 
     size: int = 2 * 1024**3
     rows: int = 20_000_000
     line: int = 65_536
-    document: int = 64 * 1024**2
 
     def __post_init__(self) -> None:
         for item in fields(self):

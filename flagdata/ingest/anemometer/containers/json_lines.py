@@ -5,19 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Sequence
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.text.source import TableText, TextFile
 
 _NAMES = 2000
-
-
-def matches(lines: Sequence[str]) -> bool:
-    """Whether the first line that holds something is one object."""
-    first = next((line.strip() for line in lines if line.strip()), "")
-    return first.startswith("{") and first.endswith("}")
 
 
 def as_table(source: TextFile) -> TableText:

@@ -18,18 +18,12 @@ from flagdata.ingest.anemometer.text.source import TableText
 from flagdata.units import UNITS, spelled
 
 _HDF = b"\x89HDF"
-_MAGIC = (b"CDF\x01", b"CDF\x02", b"CDF\x05", _HDF)
 _STANDARD = {
     "wind_speed": "wind_speed", "wind_from_direction": "wind_direction", "wind_to_direction": "wind_direction",
     "eastward_wind": "eastward wind",
     "northward_wind": "northward wind", "upward_air_velocity": "upward wind", "air_temperature": "air_temperature",
     "relative_humidity": "relative_humidity", "air_pressure": "air_pressure",
 }  # fmt: skip
-
-
-def matches(head: bytes) -> bool:
-    """Whether a file is netCDF, or HDF5 as netCDF-4 is."""
-    return head.startswith(_MAGIC)
 
 
 def open_dataset(path: Path, *, limits: Limits) -> TableText:

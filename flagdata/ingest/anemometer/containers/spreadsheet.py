@@ -20,20 +20,8 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.text.source import TableText
 
-ZIP = b"PK\x03\x04"
 _WIDEST = 2000
 """Columns of the widest sheet that is read."""
-
-
-def is_workbook(path: Path, head: bytes) -> bool:
-    """Whether a file is an Excel workbook (Office Open XML), by its content."""
-    if not head.startswith(ZIP):
-        return False
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return "xl/workbook.xml" in archive.namelist()
-    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
-        return False
 
 
 def open_sheet(path: Path, *, limits: Limits) -> TableText:

@@ -41,8 +41,7 @@ from flagdata.ingest.anemometer.reading import Reading, described
 from flagdata.ingest.anemometer.recipe import OpenRecipe, Recipe
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.table.rowclock import Given
-from flagdata.ingest.anemometer.table.sonic import with_horizontal
-from flagdata.ingest.anemometer.table.table import Table, read_table
+from flagdata.ingest.anemometer.table.table import Table, read_table, with_horizontal
 from flagdata.ingest.anemometer.text.rows import RowReader, cells_of_lines
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.recipes import Shelf

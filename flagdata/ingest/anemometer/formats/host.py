@@ -16,8 +16,7 @@ from flagdata.ingest.anemometer.reading import Reading
 from flagdata.ingest.anemometer.recipe import Recipe
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.table.rowclock import Given
-from flagdata.ingest.anemometer.table.sonic import with_horizontal
-from flagdata.ingest.anemometer.table.table import read_table
+from flagdata.ingest.anemometer.table.table import read_table, with_horizontal
 from flagdata.ingest.anemometer.text.source import TextFile
 
 # Possessive quantifiers: a line of 60,000 blanks or digits must not take quadratic time.

@@ -5,6 +5,7 @@ A user's own format is a package with an entry point in the group `flagdata.form
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol
 
 from flagdata.ingest.anemometer.options import WindOptions
@@ -69,3 +70,5 @@ FORMATS = Registry(
     },
     group="flagdata.formats",
 )
+SIGNATURES: Mapping[str, tuple[str, ...]] = {"toa5": ('"TOA5"', "TOA5,")}
+"""Formats whose makers write these at the beginning of every file: no other format is asked about one."""

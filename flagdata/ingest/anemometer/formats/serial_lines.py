@@ -29,7 +29,7 @@ from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.ingest.anemometer.reading import Reading, described
 from flagdata.ingest.anemometer.samples import rules
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.table.sonic import with_horizontal
+from flagdata.ingest.anemometer.table.table import with_horizontal
 from flagdata.ingest.anemometer.text.source import TextFile
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.signals import Sensor

@@ -21,8 +21,7 @@ from flagdata.ingest.anemometer.recipe import OpenRecipe, Recipe
 from flagdata.ingest.anemometer.samples import platform
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
 from flagdata.ingest.anemometer.table.rowclock import Given
-from flagdata.ingest.anemometer.table.sonic import with_horizontal
-from flagdata.ingest.anemometer.table.table import read_table
+from flagdata.ingest.anemometer.table.table import read_table, with_horizontal
 from flagdata.ingest.anemometer.text.rows import RowReader
 from flagdata.ingest.anemometer.text.source import TextFile
 

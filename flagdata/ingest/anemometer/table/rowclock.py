@@ -16,8 +16,8 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.instants import clock, dates, stamps, zones
 from flagdata.ingest.anemometer.instants.clock import ClockChoice
 from flagdata.ingest.anemometer.instants.stamps import Stamps
+from flagdata.ingest.anemometer.text.cells import Growing
 from flagdata.ingest.anemometer.text.columns import Columns
-from flagdata.ingest.anemometer.text.growing import Growing
 from flagdata.signals import Instants
 
 NEWEST_FIRST = 0.9

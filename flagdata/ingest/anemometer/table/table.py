@@ -11,7 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from flagdata import compass
-from flagdata.errors import InputError, NothingMeasuredError, UnknownNameError
+from flagdata.errors import InputError, NothingMeasuredError, UnknownNameError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.instants import dates, zones
 from flagdata.ingest.anemometer.instants.stamps import YEARS
@@ -19,9 +19,8 @@ from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.recipe import ChannelLayout, CheckLayout, Recipe
 from flagdata.ingest.anemometer.samples import rules
 from flagdata.ingest.anemometer.table.rowclock import Block, Given, Order, RowClock, cells_of
-from flagdata.ingest.anemometer.text.cells import Cell, numbers
+from flagdata.ingest.anemometer.text.cells import Cell, Growing, numbers
 from flagdata.ingest.anemometer.text.columns import Columns
-from flagdata.ingest.anemometer.text.growing import Growing
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.units import unit
 
@@ -431,3 +430,39 @@ def refuse_if_most(bad: int, good: int, what: str, where: str) -> None:
         raise InputError(
             f"{bad} of {bad + good} are {what}", where=where, fix="look at it with flagdata ingest --sniff"
         )
+
+
+def with_horizontal(reading: Reading, azimuth: float | None, *, where: str) -> Reading:
+    """Add `wind_speed` = √(x² + y²), and with the azimuth `wind_direction`, where a log has components alone.
+
+    The azimuth is the compass direction the array points to, against +x: wind along +x comes from there. With +z up, +y
+    is 90° to the left of +x, so that the wind comes from azimuth - atan2(y, x) (Campbell Scientific, CSAT3 manual,
+    appendix "Orientation").
+
+    Args:
+        azimuth: [rad, clockwise from true north]; `None` where nobody knows: no direction then.
+
+    Raises:
+        UsageError: an azimuth for a log without components.
+    """
+    channels = reading.channels
+    if not {"wind_x", "wind_y"} <= set(channels) or "wind_speed" in channels:
+        if azimuth is not None:
+            raise UsageError(
+                "an azimuth was given, but the log has no wind components", where=where,
+                fix="leave out --azimuth; a turned vane is a rotation in the recipe",
+            )  # fmt: skip
+        return reading
+    x, y = channels["wind_x"], channels["wind_y"]
+    added = {"wind_speed": np.hypot(x, y)}
+    text = "wind_speed is √(wind_x² + wind_y²)"
+    fix = None
+    if azimuth is None:
+        text += "; no direction, since the sensor's azimuth is not known"
+        fix = "give the sensor's azimuth for a direction: --azimuth DEG (270 for x to the east, y to the north)"
+    else:
+        towards = np.mod(azimuth - np.arctan2(y, x), 2 * np.pi)
+        added["wind_direction"] = np.where(added["wind_speed"] == 0, np.nan, towards)  # calm air comes from nowhere
+        text += f", wind_direction is from the azimuth {np.degrees(azimuth):.1f}° given"
+    finding = Finding(kind="speed-from-components", severity=Severity.NOTE, count=len(x), what=text, fix=fix)
+    return replace(reading, channels={**channels, **added}, findings=(*reading.findings, finding))

@@ -1,10 +1,15 @@
-"""The text under a log, line by line; of a file compressed by gzip what is in it."""
+"""The file under a log: refused when it is no text or too large, its encoding settled; its text, line by line.
+
+Of a file compressed by gzip what is in it; workbooks and netCDF files are opened as the table that they hold.
+"""
 
 from __future__ import annotations
 
 import codecs
 import gzip
 import io
+import zipfile
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,7 +17,12 @@ from itertools import islice
 from pathlib import Path
 from typing import IO
 
-from flagdata.findings import Finding
+import numpy as np
+
+from flagdata.errors import InputError, LimitError
+from flagdata.files import check_input
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.options import Limits
 
 GZIP = b"\x1f\x8b"
 """First bytes of a file compressed by gzip (RFC 1952); a log may be: it is read as what is in it."""
@@ -120,3 +130,245 @@ def opened(path: Path) -> IO[bytes]:
 def _text(path: Path, encoding: str) -> Iterator[IO[str]]:
     with opened(path) as raw, io.TextIOWrapper(raw, encoding=encoding, newline=None) as stream:
         yield stream
+
+
+_CHUNK = 1 << 20
+HEAD = 65_536
+"""Bytes looked at to find what a file is."""
+
+# First bytes → what it is, what to do. Signatures as in the formats' own specifications.
+_SIGNATURES: tuple[tuple[int, bytes, str, str], ...] = (
+    (0, GZIP, "gzip-compressed and damaged", "copy it again, or unpack it: gunzip FILE"),
+    (0, b"PK\x03\x04", "a zip archive or an Excel workbook", "unpack it, or save the sheet as CSV"),
+    (0, b"PK\x05\x06", "an empty zip archive", "give the log itself"),
+    (0, b"\xfd7zXZ\x00", "xz-compressed", "unpack it first: unxz FILE"),
+    (0, b"BZh", "bzip2-compressed", "unpack it first: bunzip2 FILE"),
+    (0, b"7z\xbc\xaf\x27\x1c", "a 7-Zip archive", "unpack it first"),
+    (0, b"\x28\xb5\x2f\xfd", "zstd-compressed", "unpack it first: unzstd FILE"),
+    (0, b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook", "save the sheet as CSV"),
+    (0, b"{\\rtf", "rich text (RTF), whose marks stand among the readings", "save it as plain text, and ingest that"),
+    (0, b"%PDF", "a PDF document", "export the readings as CSV"),
+    (0, b"\x89PNG", "a PNG picture", "give the anemometer's log"),
+    (0, b"\xff\xd8\xff", "a JPEG picture", "give the anemometer's log"),
+    (4, b"ftyp", "a video (MP4 or MOV)", "ingest it as a camera file"),
+    (0, b"RIFF", "a video or sound (AVI or WAV)", "ingest it as a camera file"),
+    (0, b"\x1a\x45\xdf\xa3", "a video (Matroska or WebM)", "ingest it as a camera file"),
+    (0, b"\x00\x00\x01\xba", "a video (MPEG)", "ingest it as a camera file"),
+    (0, b"SQLite format 3", "a SQLite database", "export the table of readings as CSV"),
+    (0, b"PAR1", "a Parquet file", "write it as CSV: duckdb -c \"copy 'FILE' to 'FILE.csv'\""),
+    (0, b"<?xml", "an XML document", "export the readings as CSV, one row a reading"),
+    (0, b"<html", "a page of HTML", "save its table as CSV"),
+    (0, b"<!DOCTYPE", "a page of HTML", "save its table as CSV"),
+    (0, b"<!doctype", "a page of HTML", "save its table as CSV"),
+    (0, b"\x89MCAP", "an MCAP record", "it is a record already"),
+    (0, b"TOB1", "a Campbell TOB1 binary table", "convert it to TOA5 with LoggerNet's CardConvert"),
+    (0, b'"TOB', "a Campbell binary table", "convert it to TOA5 with LoggerNet's CardConvert"),
+)
+_BOMS: tuple[tuple[bytes, str], ...] = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+
+
+NETCDF = (b"CDF\x01", b"CDF\x02", b"CDF\x05", b"\x89HDF")
+"""netCDF, or HDF5 as netCDF-4 is."""
+
+
+def is_workbook(path: Path, head: bytes) -> bool:
+    """Whether a file is an Excel workbook (Office Open XML), by its content."""
+    if not head.startswith(b"PK\x03\x04"):
+        return False
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return "xl/workbook.xml" in archive.namelist()
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
+        return False
+
+
+def signature(head: bytes) -> tuple[str, str] | None:
+    """What a file of another kind is by its first bytes, and what to do with it; `None` when none is recognised."""
+    if len(head) > 188 * 2 and head[0] == head[188] == head[376] == 0x47:
+        return "a video (MPEG transport stream)", "ingest it as a camera file"
+    if len(head) > 4 + 192 and head[4] == head[4 + 192] == 0x47:
+        return "a video (AVCHD, MTS)", "ingest it as a camera file"
+    for at, magic, what, fix in _SIGNATURES:
+        if head[at : at + len(magic)] == magic:
+            return what, fix
+    return None
+
+
+def first_bytes(path: Path) -> bytes:
+    """The first `HEAD` bytes of a file; of one compressed by gzip, of what is in it.
+
+    Raises:
+        NotFoundError: there is none.
+        InputError: it is a folder, cannot be read or is empty.
+    """
+    check_input(path, noun="log")
+    try:
+        with opened(path) as stream:
+            head = stream.read(HEAD)
+    except (gzip.BadGzipFile, zlib.error, EOFError):
+        return GZIP
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check its permissions") from None
+    if not head:
+        raise InputError("the file is empty", where=str(path), fix="copy it from the logger again")
+    return head
+
+
+def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> TextFile:
+    """Check a file against the limits and settle its encoding, in one pass over its bytes.
+
+    Raises:
+        NotFoundError, InputError: see `first_bytes`; not text, or not in the encoding named.
+        LimitError: larger than `limits` allow.
+    """
+    head = first_bytes(path)
+    where = str(path)
+    size = path.stat().st_size
+    if size > limits.size:
+        raise LimitError(
+            f"the file has {size} bytes, more than {limits.size}",
+            where=where,
+            fix="split it",
+        )
+    if is_workbook(path, head):
+        from flagdata.ingest.anemometer.containers import spreadsheet
+
+        return spreadsheet.open_sheet(path, limits=limits)
+    if head.startswith(NETCDF):
+        from flagdata.ingest.anemometer.containers import netcdf
+
+        return netcdf.open_dataset(path, limits=limits)
+    other = signature(head)
+    if other:
+        raise InputError(f"this is {other[0]}, not a text log", where=where, fix=other[1])
+    codec = encoding or next((name for bom, name in _BOMS if head.startswith(bom)), None)
+    if codec is None and _looks_utf16(head):
+        raise InputError(
+            "this looks like UTF-16 without a byte-order mark", where=where, fix="name it: --encoding utf-16-le"
+        )
+    if codec is None or not codec.startswith(("utf-16", "utf-32")):
+        _refuse_binary(head, where)
+    try:
+        codec, problem = _settle(path, codec, limits)
+        lines, findings = _count(path, limits, wide=codec.startswith(("utf-16", "utf-32")))
+    except (gzip.BadGzipFile, zlib.error, EOFError):
+        raise InputError(
+            "the gzip file is damaged or incomplete", where=where, fix="copy it again, or save what is left: gunzip"
+        ) from None
+    return TextFile(path=path, encoding=codec, lines=lines, findings=(*problem, *findings))
+
+
+def _looks_utf16(head: bytes) -> bool:
+    sample = np.frombuffer(head[: len(head) // 2 * 2], dtype=np.uint8)
+    if len(sample) < 8:
+        return False
+    zeros = (float((sample[::2] == 0).mean()), float((sample[1::2] == 0).mean()))
+    return max(zeros) > 0.6 and min(zeros) < 0.1
+
+
+def _refuse_binary(head: bytes, where: str) -> None:
+    text = head.rstrip(b"\x00")
+    if not text:
+        raise InputError("the file holds nothing but NUL bytes", where=where, fix="copy it from the logger again")
+    sample = np.frombuffer(text, dtype=np.uint8)
+    # Tabs, line ends, form feeds, and the STX and ETX that serial instruments frame their lines with.
+    control = (sample < 32) & ~np.isin(sample, (2, 3, 9, 10, 12, 13))
+    if float(control.mean()) > 0.05:
+        raise InputError(
+            "the file is binary, not a text log", where=where, fix="export it as text with the logger's own program"
+        )
+
+
+def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[Finding, ...]]:
+    """The codec that decodes the whole file."""
+    where = str(path)
+    try:
+        info = codecs.lookup(codec or "utf-8")
+        text = getattr(info, "_is_text_encoding", True)  # what open() itself looks at
+    except LookupError:
+        raise InputError(f"no encoding {codec!r}", where=where, fix="give a Python codec name such as cp1252") from None
+    if not text or info.incrementaldecoder is None:
+        raise InputError(f"{codec!r} is not a text encoding", where=where, fix="give one such as cp1252")
+    decoder = info.incrementaldecoder()
+    done = size = 0
+    with opened(path) as stream:
+        try:
+            while chunk := stream.read(_CHUNK):
+                size += len(chunk)
+                if size > limits.size:
+                    fix = "split it"
+                    raise LimitError(f"the file unpacks to more than {limits.size} bytes", where=where, fix=fix)
+                decoder.decode(chunk)
+                done += chunk.count(b"\n")
+            decoder.decode(b"", final=True)
+        except UnicodeError as error:
+            if isinstance(error, UnicodeDecodeError):
+                done += error.object[: error.start].count(b"\n")
+            if codec is not None:
+                raise InputError(
+                    f"not valid {codec}: {error.__class__.__name__}",
+                    where=f"{where}, line {done + 1}", fix="name the encoding it is in, e.g. --encoding cp1252",
+                ) from None  # fmt: skip
+            return "latin-1", (
+                Finding(
+                    kind="encoding-assumed", severity=Severity.WARNING, where=f"line {done + 1}",
+                    what="not valid UTF-8, read as Latin-1: letters beyond ASCII may be wrong, numbers are not",
+                    fix="name the encoding, e.g. --encoding cp1252",
+                ),
+            )  # fmt: skip
+    return codec or "utf-8", ()
+
+
+def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Finding, ...]]:
+    """Line ends of each kind, NUL bytes and the longest line, within the limits.
+
+    In `wide` encodings (2 or 4 bytes a character) the limits hold all the same, but bytes say nothing on line ends.
+    """
+    where = str(path)
+    unix = windows = mac = nul = lines = tail = before = 0
+    last = b""
+    size = 0
+    with opened(path) as stream:
+        while chunk := stream.read(_CHUNK):
+            nul += chunk.count(0)
+            size += len(chunk)
+            pairs = chunk.count(b"\r\n") + (last == b"\r" and chunk[:1] == b"\n")
+            feeds, returns = chunk.count(b"\n"), chunk.count(b"\r")
+            windows, unix, mac = windows + pairs, unix + feeds - pairs, mac + returns - pairs
+            lines = unix + windows + mac
+            data = np.frombuffer(chunk, dtype=np.uint8)
+            ends = np.flatnonzero((data == 10) | (data == 13))
+            spans = np.diff(np.concatenate(([-1 - tail], ends, [len(data)])))
+            tail = int(spans[-1]) - 1
+            if lines > limits.rows:
+                raise LimitError(f"more than {limits.rows} lines", where=where, fix="split the file")
+            if int(spans.max()) > limits.line:
+                at = int(np.append(ends, len(data))[int(np.argmax(spans))])
+                number = before + max(chunk.count(b"\n", 0, at), chunk.count(b"\r", 0, at)) + 1
+                what = f"a line longer than {limits.line} bytes"
+                raise LimitError(what, where=f"{where}, line {number}", fix="check that this is the log")
+            before = lines
+            last = chunk[-1:]
+    found: list[Finding] = []
+    kinds = {"LF": unix, "CR LF": windows, "CR": mac}
+    if wide:
+        return lines, ()
+    if sum(1 for count in kinds.values() if count) > 1:
+        text = ", ".join(f"{count} {name}" for name, count in kinds.items() if count)
+        found.append(
+            Finding(kind="mixed-line-ends", severity=Severity.NOTE, what=f"line ends of several kinds: {text}")
+        )
+    if nul and nul * 3 < size:
+        found.append(
+            Finding(
+                kind="nul-bytes", severity=Severity.WARNING, count=nul,
+                what=f"{nul} NUL bytes, as a logger leaves behind when it loses power; lines holding them are left out",
+            )
+        )  # fmt: skip
+    return lines, tuple(found)

@@ -16,9 +16,8 @@ from flagdata.ingest.anemometer.instants.stamps import PLAIN_FORMS, parse
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.recipe import FileLayout
 from flagdata.ingest.anemometer.text.columns import Columns
-from flagdata.ingest.anemometer.text.opening import open_text
 from flagdata.ingest.anemometer.text.rows import RowReader
-from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.ingest.anemometer.text.source import TextFile, open_text
 
 HEADER = b"a,b,c\n"
 LAWS: dict[str, bytes] = {
