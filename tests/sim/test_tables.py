@@ -88,10 +88,9 @@ def bend(curvature: float, degrees: float, evaluation: Evaluation = Evaluation.A
     return float(bending_stiffness(column, segments, rows, evaluation))
 
 
-@pytest.mark.parametrize("row", [0, 1, 2])
-@pytest.mark.parametrize("column", [0, 1, 2, 3, 4])
-def test_bending_at_the_nodes_is_the_table(row: int, column: int) -> None:
-    assert bend(5.0 * column, 45.0 * row) == pytest.approx(CAMEL.bending[row, column], rel=1e-12)
+def test_bending_at_the_nodes_is_the_table() -> None:
+    found = [[bend(5.0 * column, 45.0 * row) for column in range(5)] for row in range(3)]
+    np.testing.assert_allclose(found, CAMEL.bending, rtol=1e-12)
 
 
 def test_bending_between_nodes_is_linear_in_curvature_and_direction() -> None:
