@@ -110,7 +110,7 @@ def main(arguments: list[str] | None = None) -> None:
             sys.exit(fail(foreseen(error.__cause__), as_json="--json" in given))
         click.echo("flagdata: interrupted", err=True)
         sys.exit(1)
-    except Exception as error:  # noqa: BLE001  whatever it is, a user is told in one form
+    except Exception as error:  # noqa: BLE001  all errors are reported in one form
         sys.exit(fail(foreseen(error), as_json="--json" in given))
     sys.exit(outcome if isinstance(outcome, int) else 0)  # an int is what a command gave to Context.exit
 

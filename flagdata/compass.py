@@ -122,7 +122,7 @@ _HEADINGS = {
     "points-de": ("richtung",), "points-nl": ("richting",),
     "points-es": ("viento", "vento", "vent", "dirección", "direccion", "direzione"), "points-pt": ("vento", "direção"),
 }  # fmt: skip
-"""Words of a heading that tell its language."""
+"""Words of a heading that identify its language."""
 STILL = frozenset(
     {
         "c", "calm", "calm wind", "calm winds", "calm, no wind", "still", "calma", "calmo", "windstille", "calme",
@@ -155,8 +155,8 @@ def table_of(cells: Sequence[str], *, heading: str, share: float) -> str | None:
     kinds = {cell for cell in filled if any(cell in BY_UNIT[unit] for unit in known)}
     if "points" in known or all(len({BY_UNIT[unit].get(cell) for unit in known}) == 1 for cell in kinds):
         return known[0]
-    told = [unit for unit in known if any(word in heading.lower() for word in _HEADINGS.get(unit, ()))]
-    return told[0] if told else None
+    found = [unit for unit in known if any(word in heading.lower() for word in _HEADINGS.get(unit, ()))]
+    return found[0] if found else None
 
 
 def in_letters(cell: str, unit: str) -> str:

@@ -101,7 +101,7 @@ def progress(total: int | None, label: str, unit: str) -> Iterator[Callable[[int
 
 
 def foreseen(error: Exception) -> FlagdataError:
-    """What a user is told of any exception that reached the command line."""
+    """The report of any exception that reached the command line."""
     if isinstance(error, FlagdataError):
         return error
     if isinstance(error, OSError):

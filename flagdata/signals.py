@@ -82,7 +82,7 @@ class WindSeries:
 
 @dataclass(frozen=True, kw_only=True)
 class WindAverage:
-    """Wind speed averaged over equal bins (1 s unless told).
+    """Wind speed averaged over equal bins (by default 1 s).
 
     Attributes:
         time: (n,) the END of each bin, UTC nanoseconds; bins with no usable sample are absent.

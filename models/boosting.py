@@ -55,8 +55,8 @@ class Boosting:
         """Return `count` equally probable values of each target by itself: (n, count, t) float32.
 
         They stand at the levels (i + ½)/count of the quantile function, linear between the fitted levels and constant
-        beyond the outermost: no interval wider than the one between these is told, and nothing of how targets vary
-        together.
+        beyond the outermost: no interval is wider than the one between these, and the samples do not show how targets
+        vary together.
         """
         if count < 1:
             raise InputError(f"{count} samples", fix="ask for at least 1")

@@ -1,7 +1,7 @@
 """A trained model at work: clips in, a distribution of wind and cloth out, and whether the clip is one it can judge.
 
 An estimator has one learner or several of other seeds, whose distributions are mixed with equal weights: they differ
-most where the data told them least. What it says of clips that are unlike all it was trained on means nothing, so each
+most where the data constrain them least. Estimates for clips unlike all training clips mean nothing, so each
 estimate carries a p-value of the distance of its summary to the training clips' (`models.outliers`).
 """
 
@@ -98,7 +98,7 @@ class Estimator:
             InputError: a model without targets, which has no ranges.
         """
         if not self.targets:
-            raise InputError(f"the model {self.name!r} tells nothing", fix="take one that was trained for targets")
+            raise InputError(f"the model {self.name!r} has no targets", fix="take one that was trained for targets")
         return self.targets[0].cloth
 
     @property
@@ -149,10 +149,10 @@ class Estimator:
         else:
             logits, _ = self.logits_within(embeddings, known, seed=seed, draws=draws)
         values = self.learners[0].scaling.values(logits)
-        told = embeddings[0].cpu().numpy().astype(np.float32)
+        summary = embeddings[0].cpu().numpy().astype(np.float32)
         return Estimates(
-            targets=self.targets, draws=values.cpu().numpy().astype(np.float32), summary=told,
-            unlike=None if self.cloud is None else self.cloud.p_value(told),
+            targets=self.targets, draws=values.cpu().numpy().astype(np.float32), summary=summary,
+            unlike=None if self.cloud is None else self.cloud.p_value(summary),
         )  # fmt: skip
 
     @torch.no_grad()

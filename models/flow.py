@@ -44,12 +44,12 @@ CHANNELS = channels(2)
 CHANNELS_OF_THREE = channels(3)
 """Of clips of 224 px, on whose two coarser scales the maps are those of `CHANNELS`."""
 WINDOW = 5
-"""Height and width [px] of the windows whose motion is told; they overlap."""
+"""Height and width [px] of the windows whose motion is estimated; they overlap."""
 RIDGE = 1e-3
 """Square slope [(standard deviations of the clip / px)²] that is added to each direction's: where less is to be seen
 than that, the flow falls to 0 instead of following the camera's noise."""
 FASTEST = 8.0
-"""Largest displacement [px a frame] that is told; a window of 5 px does not follow half of it."""
+"""Largest displacement [px a frame] that is estimated; a window of 5 px does not follow half of it."""
 _FLOOR = 0.02**2  # square flow [px²] up to which the scale of powers is linear
 _SHARE = 1e-4  # that keeps quotients of nothing by nothing finite
 _TINY = 1e-6

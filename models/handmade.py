@@ -26,7 +26,7 @@ FLOOR = 1e-6
 a clip with a standard deviation of 50 gray levels, (1/12) / 50² / 15."""
 
 LEAST_SLOPE = 0.02
-"""Slope [standard deviations/px] added to the divisor of the normal flow: flat pixels have no flow to tell."""
+"""Slope [standard deviations/px] added to the divisor of the normal flow: flat pixels have no flow."""
 
 _SIGNALS = ("change", "slope_x", "slope_y")
 _BANDS = tuple(f"{low:g}_{high:g}hz" for low, high in pairwise(BAND_EDGES))

@@ -105,7 +105,7 @@ class Learner(nn.Module):
             return (self.head(embedding) - wanted).square().mean()
         return -self.head(embedding).log_prob(wanted).mean()
 
-    def told(self, embedding: Tensor) -> Tensor:
+    def point_estimates(self, embedding: Tensor) -> Tensor:
         """(n, target) values of a regression's embeddings, or the means of a posterior's components."""
         found = self.head(embedding)
         if isinstance(found, Mixture):

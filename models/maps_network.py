@@ -15,7 +15,7 @@ class MapsNetwork(nn.Module):
     """Maps (batch, channel, h, w) to a summary (batch, dimension).
 
     The maps are standardised by batch statistics, pass residual blocks, and are pooled by their mean and their maximum
-    over the picture, which tell how much there is and how strong it is at its strongest.
+    over the picture: how much there is, and how strong it is at its strongest.
 
     Attributes:
         known: names of the maps that come in.

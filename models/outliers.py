@@ -107,13 +107,13 @@ class Familiarity:
         exceeded = int(np.floor(false_alarm * (n + 1) + 1e-9))
         if exceeded < 1:
             raise InputError(
-                f"{n} validation clips cannot tell a false-alarm rate of {false_alarm:g}",
+                f"{n} validation clips are too few for a false-alarm rate of {false_alarm:g}",
                 fix=f"give a rate of {1 / (n + 1):.2g} or more, or at least {int(np.ceil(1 / false_alarm)) - 1} clips",
             )
         return float(self.reference[n - exceeded])
 
     def unfamiliar(self, summaries: NDArray[np.floating], *, false_alarm: float) -> NDArray[np.bool_]:
-        """Tell which summaries (n, d) lie outside: beyond `threshold`, which is p ≤ false_alarm: (n,)."""
+        """Which summaries (n, d) lie outside: beyond `threshold`, which is p ≤ false_alarm: (n,)."""
         return self.distance(summaries) > self.threshold(false_alarm)
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:

@@ -62,7 +62,7 @@ def restricted(logits: Tensor, scaling: Scaling, known: Known, *, draws: int) ->
         (n, draws, target) logits, and (n,) the share of draws within the range: what the model gave it.
 
     Raises:
-        InputError: a quantity that the model does not tell, or a range that leaves the model's.
+        InputError: a quantity that the model does not estimate, or a range that leaves the model's.
     """
     column = _column(scaling, known.name)
     target = scaling.targets[column]
@@ -87,6 +87,6 @@ def restricted(logits: Tensor, scaling: Scaling, known: Known, *, draws: int) ->
 def _column(scaling: Scaling, name: str) -> int:
     if name not in scaling.quantities:
         raise InputError(
-            f"the model does not tell the {name}", fix=f"what it tells is {', '.join(scaling.quantities) or 'nothing'}"
+            f"the model does not estimate the {name}", fix=f"it estimates {', '.join(scaling.quantities) or 'nothing'}"
         )
     return scaling.quantities.index(name)

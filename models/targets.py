@@ -1,4 +1,4 @@
-"""What networks are to tell of a clip: physical parameters, their ranges, and how they become numbers to learn.
+"""What networks estimate from a clip: physical parameters, their ranges, and their encoding for training.
 
 Each target lies in a range, for flags that of the search space of Runia et al. 2020 (table 1), or a wider one of flags
 of any fabric. What networks learn is the logit of its place in that range, widened by 1 % so that the ends stay finite:
@@ -38,7 +38,7 @@ class Cloth(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Target:
-    """A quantity to be told.
+    """A quantity that networks estimate.
 
     Attributes:
         name: of the quantity, as in tables.

@@ -71,7 +71,7 @@ class Pairs:
 
 
 def layers(mesh: Mesh, contact: Contact) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What tells layers apart at rest: (face, 2) centres, and (face,) how far from them another layer begins [m]."""
+    """Layers at rest: (face, 2) centres, and (face,) how far from them another layer begins [m]."""
     corners = mesh.rest[mesh.faces]
     centre = corners.mean(axis=1)
     radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)

@@ -62,7 +62,7 @@ def _declared(
 def stamp_step(time: Instants) -> float:
     """The step that stamps are cut or rounded to [s]: the coarsest of 1 h, 1 min, 10 s, … 1 ms that divides all.
 
-    0 where none does. A logger that writes exactly once a second cannot be told from one that cuts to whole seconds.
+    0 where none does. A logger that writes exactly once a second looks like one that truncates to whole seconds.
 
     Raises:
         InputError: no stamps.

@@ -99,7 +99,7 @@ def log_clock(
 
     Raises:
         InputError: a log without wind speed or with too few samples.
-        RefusedError: the logs are not of one wind, or nothing tells where they meet, with the reason.
+        RefusedError: the logs are not of one wind, or no offset can be estimated, with the reason.
     """
     slow_is_sensor = _spacing(sensor) >= _spacing(reference)
     slow, fast = (sensor, reference) if slow_is_sensor else (reference, sensor)
@@ -135,7 +135,8 @@ def gain_of(reference: WindSeries, sensor: WindSeries, model: ClockModel) -> Gai
     n = len(x)
     if n < 10 or not np.std(x) > 0:
         raise InputError(
-            f"{n} minutes that both logs cover tell no gain", fix="give longer logs, or logs of a wind that varies"
+            f"{n} minutes that both logs cover are too few or too even for a gain",
+            fix="give longer logs, or logs of a wind that varies",
         )
     away = x - x.mean()
     square = float(away @ away)
@@ -328,6 +329,6 @@ def _model(
 
 def _refused(names: tuple[str, str], reasons: list[str]) -> RefusedError:
     return RefusedError(
-        f"no offset can be told: {'; '.join(reasons)}", where=f"{names[0]} and {names[1]}",
+        f"no offset can be estimated: {'; '.join(reasons)}", where=f"{names[0]} and {names[1]}",
         fix="check that both logs are of one wind, and their zones; search around another offset: --centre, --search",
     )  # fmt: skip

@@ -187,7 +187,7 @@ def estimated(pair: Pair, found: Evidence, *, recipe: Mapping[str, Any]) -> Outc
     estimate, line = found.estimate, found.line
     if line is None or found.reasons:
         raise RefusedError(
-            f"no offset can be told: {'; '.join(found.reasons)}",
+            f"no offset can be estimated: {'; '.join(found.reasons)}",
             where=f"{pair.camera.name} and {pair.wind.name}",
             fix="look at it with --plot FILE.png; then state the offset: --by given --offset S --offset-sigma S",
         )
@@ -246,9 +246,9 @@ def _too_good(pair: Pair, sigma: float) -> tuple[Finding, ...]:
         Finding(
             kind="sigma-below-frame",
             severity=Severity.WARNING,
-            what=f"the offset's σ of {sigma:.2g} s is below the {period:.2g} s between frames: hardly known that well",
+            what=f"the offset's σ of {sigma:.2g} s is below the {period:.2g} s between frames: implausibly small",
             value=sigma,
-            fix="state what a comparison of the two clocks can really tell",
+            fix="give the σ with which the two clocks were really compared",
         ),
     )
 

@@ -65,7 +65,7 @@ def pair_clocks(
     Args:
         device_time: (n,) the device's stamps, strictly increasing [UTC ns].
         host_time: (n,) the computer's stamps of the same samples [UTC ns].
-        least_delay: of the fastest sample on its way [s]; nothing in the stamps tells it.
+        least_delay: of the fastest sample on its way [s]; the stamps do not show it.
         least_delay_sigma: its standard uncertainty [s]; with `None`, the median delay above the fastest, since what
             cannot be seen is likely of the size of what can.
 
@@ -120,7 +120,7 @@ def nominal_times(host_time: Instants) -> Instants:
         InputError: fewer than two samples, or all at one instant.
     """
     if len(host_time) < 2:
-        raise InputError("a rate cannot be told from one sample", fix="give a longer log")
+        raise InputError("one sample gives no rate", fix="give a longer log")
     count = np.arange(len(host_time), dtype=np.float64)
     seconds = (host_time - host_time[0]) / NANOSECONDS
     # Slopes over a tenth of the log, so that jitter averages out; their median, so that gaps do not count.

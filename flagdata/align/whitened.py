@@ -119,7 +119,7 @@ class Peak:
 
 @dataclass(frozen=True, kw_only=True)
 class Fit:
-    """Two views of one model: `best` for the offset, `whitest` for telling whether there is any relation.
+    """Two views of one model: `best` for the offset, `whitest` for the test whether there is any relation.
 
     Attributes:
         best: filtered by what the wind leaves unexplained of the motion; most certain if the two are related.

@@ -26,7 +26,7 @@ def align_logs(
 
     Raises:
         UsageError: there are such options, or another method than an estimate.
-        RefusedError: the logs do not tell, with the reasons.
+        RefusedError: the logs give no estimate, with the reasons.
     """
     from flagdata.align.apart import by_spans
     from flagdata.align.lag import LagSearch

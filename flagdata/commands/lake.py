@@ -178,7 +178,7 @@ def tag(
     _check_ref_options(name, {"--at": at, "--discard": discard, "--message": message}, delete=delete)
     lake = Lake.open(lake_path)
     if name is not None and delete:
-        _tell_deletion("tag", name, lake.delete_tag(name, message, discard=discard), as_json=as_json)
+        _report_deletion("tag", name, lake.delete_tag(name, message, discard=discard), as_json=as_json)
         return
     refs = lake.refs.tags().values() if name is None else [lake.tag(name, at=at)]
     _print_refs("tags", refs, as_json=as_json)
@@ -202,7 +202,7 @@ def branch(
     _check_ref_options(name, {"--at": at, "--discard": discard, "--message": message}, delete=delete)
     lake = Lake.open(lake_path)
     if name is not None and delete:
-        _tell_deletion("branch", name, lake.delete_branch(name, message, discard=discard), as_json=as_json)
+        _report_deletion("branch", name, lake.delete_branch(name, message, discard=discard), as_json=as_json)
         return
     refs = lake.refs.branches().values() if name is None else [lake.branch(name, at=at)]
     _print_refs("branches", refs, as_json=as_json)
@@ -304,7 +304,7 @@ def withdraw(
     click.echo(f"version {done.version}: {', '.join(parts)}")
 
 
-def _tell_deletion(noun: str, name: str, version: int, *, as_json: bool) -> None:
+def _report_deletion(noun: str, name: str, version: int, *, as_json: bool) -> None:
     if as_json:
         document(f"{noun}-deleted", {"version": version, "name": name})
     else:

@@ -116,7 +116,7 @@ class Prepared:
         return len(self.source)
 
     def write(self, target: Path, *, advance: Callable[[int], None] = lambda count: None) -> ExportResult:
-        """Write it into the new folder `target`; `advance` is told of rows done.
+        """Write it into the new folder `target`; `advance` is called with the number of rows done.
 
         Raises:
             ConflictError: `target` exists.

@@ -1,7 +1,7 @@
 """The catalog: one Delta table, appended to under optimistic concurrency, every version readable for good.
 
 Each append is one Parquet file and one log entry. The file is written and flushed to disk first; the log entry is put
-only if its version number is free, so of two writers at the same version one wins and the other is told (`Moved`) and
+only if its version number is free, so of two writers at the same version one wins and the other gets `Moved` and
 looks again. The log is never expired: a tag must be readable for as long as the lake exists.
 
 After every `_TIDY_EVERY` versions the small files are merged, in a commit of its own that changes no row, and a

@@ -68,7 +68,9 @@ def _find(lake: Lake, grace: timedelta) -> Garbage:
     if damage:
         first = damage[0]
         raise CorruptError(
-            f"what is needed cannot be told: {first.what}", where=first.where, fix=first.fix or "run flagdata doctor"
+            f"which objects are needed is unknown: {first.what}",
+            where=first.where,
+            fix=first.fix or "run flagdata doctor",
         )
     held = {name for state in states if state.alive for name in state.objects}
     limit = (datetime.now(UTC) - grace).timestamp()

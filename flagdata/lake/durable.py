@@ -1,7 +1,7 @@
 """Writing that survives a crash: flush file, then folder; put a file only if its name is free.
 
 Once a name is public nothing takes it back: what the disk refuses after that is a warning (the logger "flagdata"),
-never an error, since who is told of an error believes that nothing was published.
+never an error, since an error means to the caller that nothing was published.
 """
 
 from __future__ import annotations

@@ -90,7 +90,7 @@ def verify_catalog(lake: Lake) -> tuple[Finding, ...]:
 
 
 def object_names(lake: Lake) -> list[str]:
-    """Every object that is stored or that a readable ref needs, sorted; `verify_catalog` tells of other refs."""
+    """Every object that is stored or that a readable ref needs, sorted; `verify_catalog` reports unreadable refs."""
     needed = mark(lake, grace=timedelta(0)).objects
     return sorted(needed | {stored.name for stored in lake.objects})
 
@@ -257,7 +257,7 @@ def _unleased(path: Path, written: float, grace: timedelta) -> Finding:
     return Finding(
         kind="staging-unleased",
         severity=Severity.WARNING if old else Severity.NOTE,
-        what="in staging with no lease, so that nothing tells whose it is",
+        what="in staging without a lease: its owner is unknown",
         where=str(path),
         fix="move it away, or let flagdata gc delete it"
         if old

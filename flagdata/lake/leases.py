@@ -122,7 +122,7 @@ def leases(staging: Path) -> list[LeaseState]:
 
 
 def unleased(staging: Path) -> list[Path]:
-    """What lies in staging with no lease to tell whose it is: folders without one, and files, by name."""
+    """Entries of staging without a lease: folders without one, and files, by name."""
     folders = [state.folder for state in leases(staging) if not state.leased]
     files = [path for path in staging.iterdir() if not _is_folder(path) and path.name not in (_COLLECT, _TURN)]
     return sorted([*folders, *files])

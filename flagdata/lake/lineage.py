@@ -3,7 +3,7 @@
 All branches share one sequence of versions. A commit on a branch notes its name; a merge also notes which branch it
 took in, and at which version. So for a branch at a version it is known which commits of which branches went into it,
 and for two branches what they last had in common. A name that was deleted and used again is another branch: each is
-told by the version that deleted the one before it.
+identified by the version that deleted the one before it.
 """
 
 from __future__ import annotations

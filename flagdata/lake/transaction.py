@@ -58,7 +58,7 @@ class Transaction:
     process that dies during the commit may or may not have published, and finds out by ingesting again.
 
     Idempotence holds in a race too: an append is accepted only at the version whose identities were checked. When two
-    processes add the same identity at once, one publishes it, the other is told, looks again, and reports it as
+    processes add the same identity at once, one publishes it; the other is refused, looks again, and reports it as
     existing. No reader ever sees an identity twice on one branch.
 
     Raises:

@@ -53,10 +53,10 @@ _BEFORE: dict[str, tuple[str, ...]] = {"train": (), "validation": ("train",), "t
     type=click.IntRange(min=4),
     metavar="N",
     multiple=True,
-    help="Tell triplet accuracy of clips of N frames, too, for networks on maps; give it several times.",
+    help="Also report triplet accuracy for clips of N frames (networks on maps only); may be repeated.",
 )
 @click.option("--linear", is_flag=True,
-              help="Tell what a linear model reads of area weight and stiffness from each embedding.")  # fmt: skip
+              help="Also report how well a linear model predicts cloth parameters from each embedding.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
               help="Seed of the draws and of the bootstrap.")  # fmt: skip
 @click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Threads; by default one a core.")
@@ -152,7 +152,7 @@ class _Desk:
         from models.evaluation.evaluation import evaluate as scored
         from models.training.recipe import DataSpec
 
-        told: list[Predictions] = []
+        evaluated: list[Predictions] = []
         learned: list[tuple[int, Predictions]] = []
         curves: set[str] = set()
         chosen = self._models(names)
@@ -163,19 +163,19 @@ class _Desk:
             predictions = self._predictions(estimator, side)
             data = DataSpec.of_identity(_card(estimator)["recipe"]["data"])
             if data.sequences is None or row is None:
-                told.append(predictions)
+                evaluated.append(predictions)
             else:
                 curves.add(predictions.label)
             if row is not None:
                 learned.append((data.sequences or self._sequences(data), predictions))
         if handmade:
-            told += self._handmade(side)
-        told = told or [predictions for _, predictions in learned]
+            evaluated += self._handmade(side)
+        evaluated = evaluated or [predictions for _, predictions in learned]
         data = f"{self._dataset}, {side} side, at {self._at or 'head'}{self._stated}"
         return scored(
-            told, data=data, seed=self._seed, reference=reference, tsne_of=tsne,
+            evaluated, data=data, seed=self._seed, reference=reference, tsne_of=tsne,
             frames=self._triplets([estimator for _, estimator in chosen], frames, side),
-            reads=self._reads(told, side, data) if linear else (),
+            reads=self._reads(evaluated, side, data) if linear else (),
             learning=_points([point for point in learned if point[1].label in curves]),
         )  # fmt: skip
 
@@ -259,10 +259,10 @@ class _Desk:
             )
         return [point for runs in labels.values() for point in triplet_accuracies(runs, frames, films, seed=self._seed)]
 
-    def _reads(self, told: Sequence[Predictions], side: str, data: str) -> list[Read]:
+    def _reads(self, evaluated: Sequence[Predictions], side: str, data: str) -> list[Read]:
         from models.evaluation.embeddings import readouts
 
-        return readouts(told, self._side(side).table.parameter_columns(), data=data, seed=self._seed)
+        return readouts(evaluated, self._side(side).table.parameter_columns(), data=data, seed=self._seed)
 
     @property
     def _stated(self) -> str:

@@ -31,11 +31,11 @@ def triplet_accuracies(
 ) -> list[FramesPoint]:
     """Triplet accuracy of one network's embedding, given so many frames of each film from a random one on.
 
-    A network on maps takes clips of any length, as the maps' size does not depend on it. It is not trained anew: what
-    is told is what its distance is worth on clips that are shorter or longer than those it learned from.
+    A network on maps takes clips of any length, as the maps' size does not depend on it. It is not trained anew: the
+    result shows what its distance is worth on clips shorter or longer than the training clips.
 
     Args:
-        runs: networks of one recipe from several seeds; the mean over them is told.
+        runs: networks of one recipe from several seeds; the mean over them is reported.
         frames: lengths of the clips.
 
     Raises:

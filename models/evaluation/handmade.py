@@ -33,13 +33,13 @@ Bars = Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fitted:
-    """Both models, fitted on the same crops of a data set's films; what they tell is `TARGETS`, in this order."""
+    """Both models, fitted on the same crops of a data set's films; they predict `TARGETS`, in this order."""
 
     ridge: Ridge
     boosting: Boosting
 
     def quantiles(self, film: NDArray[np.uint8]) -> NDArray[np.float64]:
-        """What boosting tells of a clip (frame, height, width), (level, target)."""
+        """Quantiles that boosting predicts for a clip (frame, height, width): (level, target)."""
         return self.boosting.predict_quantiles(_features(film).double().numpy())[0]
 
 

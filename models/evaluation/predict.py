@@ -46,7 +46,7 @@ def predict(
         samples = None
     else:
         targets, names = learner.scaling.quantities, learner.scaling.names
-        samples, mean, embedding = _told(estimator, prepared, seed=seed, known=known)
+        samples, mean, embedding = _predicted(estimator, prepared, seed=seed, known=known)
     truth = prepared.truth(names)
     if learner.objective is not Loss.CONTRASTIVE:
         note = "; ".join([note, *learner.scaling.beyond(truth)])
@@ -58,7 +58,7 @@ def predict(
     )  # fmt: skip
 
 
-def _told(
+def _predicted(
     estimator: Estimator, prepared: Prepared, *, seed: int, known: tuple[str, float, float] | None
 ) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
     learner = estimator.learners[0]
@@ -74,7 +74,7 @@ def _told(
             continue
         with torch.no_grad():
             embedding = learner.network(inputs)
-            means.append(learner.told(embedding).double().cpu().numpy())
+            means.append(learner.point_estimates(embedding).double().cpu().numpy())
             embeddings.append(embedding.float().cpu().numpy())
     return np.concatenate(draws) if draws else None, np.concatenate(means), np.concatenate(embeddings)
 

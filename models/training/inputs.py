@@ -172,7 +172,7 @@ def prepare_films(
     Args:
         sequences: how many of the simulations are used, those of a random order's beginning; None for all.
         seed: of that order.
-        advance: told how many entries were done.
+        advance: called with the number of entries done.
 
     Raises:
         InputError: films that are too short, or too few sequences.
@@ -265,7 +265,7 @@ def _prepared(
 
 
 def _check_rate(pairs: Pairs, rows: NDArray[np.int64], front_end: FrontEnd) -> None:
-    """Make sure that the clips have the rate that the front end's frequencies are told by."""
+    """Refuse clips of another frame rate than the front end's frequencies assume."""
     table = pairs.table
     seconds = (table.end[rows] - table.start[rows]) / NANOSECONDS
     rate = (table.frame_count[rows] - 1) / np.maximum(seconds, 1e-9)

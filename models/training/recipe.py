@@ -118,7 +118,7 @@ class NetworkSpec:
 class LossSpec:
     """Attributes:
     name: see `models.learner.Loss`.
-    targets: what is told; none for the contrastive loss.
+    targets: what the network estimates; none for the contrastive loss.
     components: of the mixture.
     margin: of the contrastive loss.
     """

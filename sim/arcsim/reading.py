@@ -210,15 +210,15 @@ def _supported(content: Mapping[str, Any], where: str, accept: frozenset[str]) -
     acting = tuple(stage for stage in STAGES if stage in _acting(content, where))
     left_out = tuple(stage for stage in acting if stage in accept)
     refused = [stage for stage in acting if stage not in (*accept, *SIMULATED)]
-    told = [
+    reasons = [
         f"{what} {', '.join(names)}"
         for what, names in (("the keys", keys), ("the contents of", filled), ("the stages", refused))
         if names
     ]
-    if told:
+    if reasons:
         fixes = ["remove what is not supported"] if keys or filled else []
         fixes += ['add the stages to the scene\'s "disable", or accept to leave them out'] if refused else []
-        raise InputError(f"not supported: {'; '.join(told)}", where=where, fix="; ".join(fixes))
+        raise InputError(f"not supported: {'; '.join(reasons)}", where=where, fix="; ".join(fixes))
     return left_out
 
 

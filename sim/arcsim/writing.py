@@ -1,4 +1,4 @@
-"""Writing scenes as ArcSim 0.2.1 reads them. What ArcSim cannot be told is refused by name.
+"""Writing scenes as ArcSim 0.2.1 reads them. What ArcSim's format cannot express is refused by name.
 
 All stages that are not simulated here are disabled in what is written, and those that are where the scene does without
 them, so that ArcSim runs what the scene says. The sweeps of strain limits are not written: ArcSim meets its limits by
@@ -55,7 +55,7 @@ def write_scene(file: ArcsimScene, folder: Path, *, name: str = "scene") -> Path
 
 
 def _expressible(scene: Scene) -> QuadraticNormal:
-    """The scene's wind force, where ArcSim can be told it and all else."""
+    """The scene's wind force, where ArcSim's format can express it and all else."""
     refused: list[str] = []
     if len(scene.handles.times) > 1 or any(any(offset) for offset in scene.handles.offsets):
         refused.append("moving handles")

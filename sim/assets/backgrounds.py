@@ -1,7 +1,7 @@
 """Procedural backgrounds: skies, hills, foliage, buildings, each with its own weather, light, colours and focus.
 
 They are no likenesses. They vary in what a picture's statistics have (brightness, colour, contrast, spectral slope,
-edges, horizons), so that nothing about a scene can be told from what is behind it.
+edges, horizons), so that the background carries no information about a scene.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The Blender worker as a process: started when first needed, restarted where it crashes or hangs, ended cleanly.
 
-Blender lives in that process alone: beside torch in one process it hung at exit. The worker is told nothing of lakes,
+Blender lives in that process alone: beside torch in one process it hung at exit. The worker knows nothing of lakes,
 recipes or torch; it gets resolved scenes and meshes, and gives pictures back (`sim.blender.protocol`).
 """
 
@@ -85,7 +85,7 @@ class WorkerProcess:
 
         Args:
             timeout: for each answer [s].
-            setup: what a fresh worker is told first: the scene that the messages are about.
+            setup: first message to a fresh worker: the scene that later messages change.
 
         Raises:
             RenderError: the worker refused a message, or was lost as often as `attempts` at the same one.

@@ -66,7 +66,7 @@ class Build:
     """One build of a recipe into a lake.
 
     Args:
-        say: told what people should know meanwhile, a line each.
+        say: called with a line of progress for the user.
         device: where workers compute.
     """
 

@@ -175,7 +175,7 @@ def results(client: Client, jobs: Iterable[Job], *, say: Callable[[str], None]) 
     are no workers, the jobs wait for new ones, for `PATIENCE`. Leaving the iteration early cancels what still runs.
 
     Args:
-        say: told, as a line for people, that nobody works and that somebody does again.
+        say: called with a line for the user when no worker is left, and when one is back.
 
     Raises:
         WorkerError: workers kept dying over one job; no workers for `PATIENCE`; the scheduler is gone.

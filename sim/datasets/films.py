@@ -1,4 +1,4 @@
-"""What is filmed: one film a recording, each of a sequence, with a place that tells nothing of it."""
+"""One film a recording, each of a sequence, under a file name that reveals nothing about it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""From the renderer's colours to the camera's file: gray, noise, then JPEGs of a size that tells nothing, or H.264."""
+"""From the renderer's colours to the camera's file: gray, noise, then JPEGs of one size, which reveals nothing, or
+H.264."""
 
 from __future__ import annotations
 

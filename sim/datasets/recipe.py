@@ -56,7 +56,7 @@ class CameraSpec:
         rate_factor: x264's constant rate factor, 0 to 51; smaller is better. Of "h264" alone.
         read_noise: standard deviation that does not depend on the light, in 8-bit steps.
         shot_noise: of a full-scale (255) pixel, in 8-bit steps; its square is in proportion to the light.
-        frame_slot: length of every stored JPEG, so that it tells nothing; see `sim.datasets.picture.jpegs`. Records
+        frame_slot: length of every stored JPEG, so that it reveals nothing; see `sim.datasets.picture.jpegs`. Records
             are a whole multiple of it long, those of H.264 too [B].
     """
 

@@ -15,7 +15,7 @@ from sim.effects.parameter import Value, strength
 class Porosity(PressureEffect):
     """The normal force is multiplied by 1 − φ at every speed: holes that jets pass freely.
 
-    Under one steady speed this cannot be told from another air density or wind gain; `Permeability` can, by its
+    Under one steady speed this looks like another air density or wind gain; `Permeability` can, by its
     dependence on speed.
 
     Attributes:

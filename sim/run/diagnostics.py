@@ -26,7 +26,7 @@ that it derives from no energy, and gives some in every cycle. (12 columns witho
 2.4 s. In 4 m/s of wind the compression passes 0.3 within 1.2 s in the automatic step, half of it and a quarter. With
 constant stiffness it stays at 0.02.) The declared damping takes more than the tables give. In the ball faces are
 stretched to twice their length and stiffer than the 15 % that the stable step is estimated for: in the automatic step
-most such sheets diverge within a second or two more, in half of it none. Either end is told and not stored."""
+most such sheets diverge within a second or two more, in half of it none. Both are reported and not stored."""
 _LATE = 4
 """Share of the kept frames that is looked at, the last quarter: starts are rough, and no sheet uncrumples."""
 

@@ -104,8 +104,8 @@ def test_predicting_the_training_mean_costs_one() -> None:
 
 
 def test_what_a_regression_tells_is_in_the_targets_units() -> None:
-    told = regression().told(torch.tensor([[1.0, -1.0]]))
-    torch.testing.assert_close(told, torch.tensor([[7.0, 0.1]]))
+    values = regression().point_estimates(torch.tensor([[1.0, -1.0]]))
+    torch.testing.assert_close(values, torch.tensor([[7.0, 0.1]]))
 
 
 def test_the_posterior_loss_is_the_mean_negative_log_likelihood_of_standardised_logits() -> None:

@@ -56,7 +56,7 @@ def test_a_range_that_the_model_cannot_use_is_refused() -> None:
     cases = [
         (("density", 0.01, 0.10), "0.05 to 0.4"),
         (("density", 0.10, 0.50), "0.05 to 0.4"),
-        (("bending_scale", -4.0, -3.5), "does not tell the bending_scale"),
+        (("bending_scale", -4.0, -3.5), "does not estimate the bending_scale"),
     ]
     assert (
         unrefused(

@@ -28,7 +28,7 @@ class CameraProbe:
         shortest, longest: steps between neighbouring stamps [s].
         frames: in the file.
         duration: from the first stamp to the last [s].
-        start: where the metadata tell it, else `None`.
+        start: from the metadata, else `None`.
     """
 
     container: str

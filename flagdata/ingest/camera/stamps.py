@@ -79,9 +79,7 @@ def survey(
     steps = np.diff(ordered)
     if len(steps) == 0:
         if fallback_rate is None:
-            raise InputError(
-                "there are not two time stamps to tell a frame rate by", where=where, fix="give a longer recording"
-            )
+            raise InputError("fewer than two time stamps: no frame rate", where=where, fix="give a longer recording")
         period = 1 / (fallback_rate * tick)
         origin = int(ordered[0]) if len(ordered) else 0
         return Timing(
@@ -174,7 +172,7 @@ class StampRepair(Generic[T]):
         self._counts[kind] = self._counts.get(kind, 0) + 1
 
     def findings(self) -> list[Finding]:
-        told = {
+        kinds = {
             "stamps-missing": (
                 Severity.WARNING,
                 "frames have no time stamp; each was put one frame period after its predecessor",
@@ -193,7 +191,7 @@ class StampRepair(Generic[T]):
                 kind=kind, severity=severity, what=f"{self._counts[kind]} {text}",
                 where=f"frame {self._where[kind]}", count=self._counts[kind],
             )
-            for kind, (severity, text) in told.items()
+            for kind, (severity, text) in kinds.items()
             if kind in self._counts
         ]  # fmt: skip
 

@@ -30,7 +30,7 @@ class Start:
 
 
 UNKNOWN = 946_684_800 * NANOSECONDS
-"""2000-01-01T00:00:00Z: the start of a recording of which nobody knows when it began, told by --start unknown."""
+"""2000-01-01T00:00:00Z: the start of a recording whose start time is unknown, given by --start unknown."""
 _RECORDED = "recording time in the video"
 _WHOLE_SECOND = 1 / 12**0.5  # σ of an instant cut to whole seconds
 _EARLIEST = 315_532_800 * NANOSECONDS  # 1980: before it a stamp is an unset clock (epochs of 1904, 1970 and 1980)

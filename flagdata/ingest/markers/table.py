@@ -86,7 +86,7 @@ def read_table(path: Path, options: MarkerOptions | None = None) -> Mapping[str,
     Raises:
         NotFoundError: no such file.
         LimitError: a table too large to be read.
-        InputError: columns or values that are missing or malformed, markers that are told twice in a frame or lie in
+        InputError: columns or values that are missing or malformed, markers that occur twice in a frame or lie in
             two places of the cloth.
         UnknownNameError: a column that is none of these.
         UsageError: a rate that the table needs, or has no use for.

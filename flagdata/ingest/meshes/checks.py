@@ -1,4 +1,4 @@
-"""What can be told to be wrong with a mesh sequence from its own numbers: units, scale, faces turned over."""
+"""Errors of a mesh sequence that its own numbers show: units, scale, faces turned over."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def findings(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
         for kind, count in counts.items():
             if count:
                 first.setdefault(kind, index)
-    told = (
+    kinds = (
         ("faces-turned-over", flipped, "faces lie the other way round in the material than most"),
         ("faces-without-area", degenerate, "faces have no area in the material"),
         ("loose-vertices", loose, "vertices belong to no face"),
@@ -72,7 +72,7 @@ def findings(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
             kind=kind, severity=Severity.WARNING, what=f"{count} {what}", count=count, where=f"frame {first[kind]}",
             fix="look at the export's texture coordinates",
         )
-        for kind, count, what in told
+        for kind, count, what in kinds
         if count
     )  # fmt: skip
     return (*odd, *in_pieces(sequence))

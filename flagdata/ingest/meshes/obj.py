@@ -179,7 +179,7 @@ def _assembled(
     textured = bool((uv >= 0).all())
     if textured:
         rest = np.full((len(positions), 2), np.nan)
-        rest[vertex[::-1]] = texture[uv[::-1]]  # the first mention counts, so that a seam is told where it is
+        rest[vertex[::-1]] = texture[uv[::-1]]  # the first mention counts, so that a seam keeps its place
         faces.refuse(
             (texture[uv] != rest[vertex]).any(axis=1),
             "a vertex has two material coordinates: a seam, which is not supported",

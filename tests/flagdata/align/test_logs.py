@@ -138,7 +138,7 @@ def test_an_unknown_rotor_widens_sigma() -> None:
 
 def test_logs_of_different_winds_are_refused_with_the_reason() -> None:
     sonic, cup = Two(seed=4, hours=1.5, related=False).logs()
-    with pytest.raises(RefusedError, match="no offset can be told: ") as refused:
+    with pytest.raises(RefusedError, match="no offset can be estimated: ") as refused:
         found(sonic, cup)
     assert refused.value.exit_code == 3
 
