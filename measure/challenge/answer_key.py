@@ -30,7 +30,7 @@ class Acting:
 
 @dataclass(frozen=True, kw_only=True)
 class AnswerKey:
-    """What the participant is not told of a set.
+    """What a participant must find out about a set.
 
     Attributes:
         name: of the set.

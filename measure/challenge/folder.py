@@ -32,7 +32,7 @@ from sim.material import named
 from sim.mesh import grid
 
 Floats = NDArray[np.float64]
-_EPOCH = 1_600_000_000  # of every file of a set: when it was written would tell what was simulated with it
+_EPOCH = 1_600_000_000  # of every file of a set: the time of writing would show which sets were simulated together
 MODEL_COLUMNS, MODEL_ROWS = 15, 10
 """Cells of the participant's mesh: 176 vertices."""
 HEIGHT = 2.0
@@ -200,7 +200,7 @@ def read_set(folder: Path) -> Experiment:
         markers = _array(beside["markers.npy"])
         specimen = Specimen(
             mesh=mesh, material=named(flag["material"]), held=corners(mesh.rest), anchors=np.array(flag["pins"]),
-            stiffness=flag["pin_stiffness"], gravity=tuple(flag["gravity"]), anchors_told=False,
+            stiffness=flag["pin_stiffness"], gravity=tuple(flag["gravity"]), anchors_given=False,
         )  # fmt: skip
         recordings = tuple(
             Trajectory(

@@ -21,7 +21,7 @@ by blanks (empty in sheets from before they were kept), and how many sets were g
 
 def row(name: str, sheet: Mapping[str, Any]) -> dict[str, str]:
     """The row of a sheet as `measure.challenge.sheet.as_dict` gives it; shares are "hits/count [low, high]"."""
-    shares = {what: _told(share) for what, share in sheet["shares"].items()}
+    shares = {what: _share_text(share) for what, share in sheet["shares"].items()}
     return {
         "challenge": name, "title": str(sheet["title"]), "code_version": str(sheet["code_version"]),
         "criteria": " ".join(sheet.get("criteria", [])), "sets": str(sum(sheet["sets"].values())), **shares,
@@ -70,7 +70,7 @@ def write(path: Path, entries: list[dict[str, str]]) -> None:
     rewrite(path, stream.getvalue())
 
 
-def _told(share: Mapping[str, Any]) -> str:
+def _share_text(share: Mapping[str, Any]) -> str:
     if not share["count"]:
         return ""
     return f"{share['hits']}/{share['count']} [{share['low']:.3f}, {share['high']:.3f}]"

@@ -26,7 +26,7 @@ def mesh_of(numerics: Numerics, *, width: float, height: float) -> Mesh:
 
 def layout(recipe: ChallengeRecipe, rng: np.random.Generator) -> Floats:
     """(marker, 2) rest coordinates [m]: an uneven grid, each marker moved by up to `jitter` of the spacing, those on
-    the edges along them only, in no order that tells anything."""
+    the edges along them only, in random order."""
     shape = (recipe.marker_columns, recipe.marker_rows)
     size = np.array([recipe.width, recipe.height])
     places = np.stack(np.meshgrid(*(np.linspace(0, 1, n) for n in shape), indexing="ij"), axis=-1)

@@ -53,7 +53,7 @@ def null_batches(recipe: ChallengeRecipe, *, seed: int, kinds: int) -> list[Null
             )
         specimen = Specimen(
             mesh=mesh, material=named(recipe.materials[index % len(recipe.materials)]), held=held, anchors=along_pole,
-            stiffness=handles.ARCSIM_STIFFNESS, anchors_told=False,
+            stiffness=handles.ARCSIM_STIFFNESS, anchors_given=False,
         )  # fmt: skip
         made.append(
             banks.prior_batch(

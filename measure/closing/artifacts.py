@@ -127,7 +127,7 @@ def fingerprint(experiment: Experiment) -> str:
     total = hashlib.sha256()
     total.update(canonical({
         "held": list(specimen.held), "stiffness": repr(specimen.stiffness),
-        "anchors-told": specimen.anchors_told, "gravity": list(specimen.gravity),
+        "anchors-told": specimen.anchors_given, "gravity": list(specimen.gravity),
         "air": [type(specimen.air).__name__, *vars(specimen.air).items()],
         "material": [material.density, material.damping],
         "density-uncertainty": specimen.density_uncertainty if specimen.mass_known else None,

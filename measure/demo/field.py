@@ -124,7 +124,7 @@ def make_field(recipe: FieldRecipe, folder: Path, *, advance: Callable[[int], No
 
 
 def film(recipe: FieldRecipe) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """What happens in front of the camera, and what nobody is told.
+    """Simulate the film, with its hidden true values.
 
     Returns:
         The true wind [m/s] at `WIND_RATE` from `BEFORE` seconds before the first frame on; that at each frame [m/s];

@@ -64,9 +64,9 @@ class TrackedRecipe:
         rate: of the cameras [Hz].
         noise: standard deviation of a marker's coordinate [m].
         width, height: of the flag [m].
-        density, bending: of the cloth, as factors on the catalog's; nobody is told.
+        density, bending: of the cloth, as factors on the catalog's; hidden from the fit.
         damping: of the cloth [s].
-        vertices: of the mesh that the fit is told to use.
+        vertices: of the mesh that the fit must use.
     """
 
     seed: int
@@ -123,7 +123,7 @@ def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int],
     seen = np.einsum("mv,fvcb->bfmc", onto(flat.rest, markers), _flight(recipe, flat, advance))
     seen = seen + recipe.noise * stream(recipe.seed, "tracked", "noise").standard_normal(seen.shape)
     names = [f"{speed:g} m-s" for speed in recipe.speeds]
-    table, told = folder / "tracks.csv", folder / "tracked.toml"
+    table, recipe_file = folder / "tracks.csv", folder / "tracked.toml"
     with table.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["recording", "frame", "marker", "u", "v", "x", "y", "z"])
@@ -137,7 +137,7 @@ def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int],
         _RECORDING.format(name=name, rate=recipe.rate, noise=recipe.noise, speed=speed)
         for name, speed in zip(names, recipe.speeds, strict=True)
     )
-    told.write_text(
+    recipe_file.write_text(
         RECIPE.format(
             width=recipe.width, height=recipe.height, vertices=recipe.vertices, material=MATERIAL,
             recordings=recordings,
@@ -146,7 +146,12 @@ def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int],
     )  # fmt: skip
     unit = EFFECTS[recipe.effect].parameters()[recipe.parameter].unit
     return Tracks(
-        table=table, recipe=told, effect=recipe.effect, parameter=recipe.parameter, strength=recipe.strength, unit=unit
+        table=table,
+        recipe=recipe_file,
+        effect=recipe.effect,
+        parameter=recipe.parameter,
+        strength=recipe.strength,
+        unit=unit,
     )
 
 

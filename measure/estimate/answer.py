@@ -1,4 +1,4 @@
-"""What a measurement says of each quantity: a value with its interval, a bound, or that the film told nothing of it."""
+"""The measurement of each quantity: a value with its interval, a bound, or "not constrained by this clip"."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from models.targets import TARGETS
 
 LEAST_INFORMATION = 0.05
 """Information of a posterior over its prior, Kullback–Leibler of Gaussians of the same moments [nat]. Below it the film
-told nothing: a posterior of the same mean then has 78 % of the prior's standard deviation or more."""
+did not constrain it: a posterior of the same mean then has 78 % of the prior's standard deviation or more."""
 SHORT = {"wind_speed": "wind", "density": "area weight", "bending_scale": "bending", "anisotropy": "anisotropy"}
 """Names in the one-line answer."""
 HEADLINE = ("wind_speed", "density")
@@ -49,8 +49,8 @@ class Quantity:
     information: float
 
     @property
-    def told(self) -> bool:
-        """Whether the film says more of it than was assumed."""
+    def constrained(self) -> bool:
+        """Whether the film adds information to the prior."""
         return self.information >= LEAST_INFORMATION and self.span.bound is not Bound.NOTHING
 
     def phrase(self, *, first: bool) -> str:
@@ -60,9 +60,9 @@ class Quantity:
             first: whether the level of an interval is stated; that of a bound always is.
         """
         short, bound = SHORT[self.name], self.span.bound
-        if not self.told:
+        if not self.constrained:
             low, high = (self._number(end) for end in self.assumed)
-            return f"{short}: not told by this clip; {low} to {high}{self._suffix} is what was assumed"
+            return f"{short}: not constrained by this clip (prior range {low} to {high}{self._suffix})"
         stated = f"{self.span.level * 100:.3g} %"
         if bound is None:
             shown = self.span.phrase(self._digits)
@@ -72,7 +72,7 @@ class Quantity:
 
     def finding(self) -> Finding | None:
         """Why it is bounded on one side only; None where it is not, or where nothing lies beyond the end."""
-        if self.value is not None or not self.told:
+        if self.value is not None or not self.constrained:
             return None
         other = "more" if self.span.bound is Bound.LEAST else "less"
         return Finding(
@@ -104,7 +104,7 @@ class Quantity:
         return {
             "unit": self.unit, "value": self.value, "sigma": self.sigma, "interval": self.span.ends(),
             "level": self.span.level, "bound": None if self.span.bound is None else self.span.bound.value,
-            "assumed": list(self.assumed), "information": self.information, "told": self.told,
+            "assumed": list(self.assumed), "information": self.information, "constrained": self.constrained,
         }  # fmt: skip
 
 
@@ -155,8 +155,8 @@ def information(posterior: NDArray[np.float64], prior: NDArray[np.float64]) -> f
 def sentence(found: Sequence[Quantity]) -> str:
     """The answer in one line."""
     shown = [quantity for name in HEADLINE for quantity in found if quantity.name == name]
-    told = [quantity for quantity in shown if quantity.told]
-    leading = next((quantity for quantity in told if quantity.span.bound is None), None)
-    first = [quantity.phrase(first=quantity is leading) for quantity in told]
-    rest = [quantity.phrase(first=False) for quantity in shown if not quantity.told]
+    constrained = [quantity for quantity in shown if quantity.constrained]
+    leading = next((quantity for quantity in constrained if quantity.span.bound is None), None)
+    first = [quantity.phrase(first=quantity is leading) for quantity in constrained]
+    rest = [quantity.phrase(first=False) for quantity in shown if not quantity.constrained]
     return "; ".join([", ".join(first), *rest] if first else rest)

@@ -39,7 +39,9 @@ def artifact(
     parents = [] if subject.artifact is None else [subject.artifact.id]
     parents += [] if network.artifact is None else [network.artifact.id]
     start = subject.film.start
-    estimates = {q.name: q for q in measured.quantities if q.told and q.value is not None}  # no bounds among them
+    estimates = {
+        q.name: q for q in measured.quantities if q.constrained and q.value is not None
+    }  # no bounds among them
     wind = estimates.get(WIND)
     flags = quality_flags(measured.noticed(anyway=True))
     return Artifact(

@@ -34,8 +34,10 @@ class CheckedGate:
             return [Reason(kind="familiar", what=f"nothing stands out, p = {found.p:.3f} over all checks", p=found.p)]
         # The first speaks for all checks together.
         return [
-            Reason(kind=told.kind, what=told.sentence, p=told.p if place else found.p, fix=told.fix, blank=told.blank)
-            for place, told in enumerate(found.reasons)
+            Reason(
+                kind=cause.kind, what=cause.sentence, p=cause.p if place else found.p, fix=cause.fix, blank=cause.blank
+            )
+            for place, cause in enumerate(found.reasons)
         ]
 
     def level(self, false_alarm: float) -> float:

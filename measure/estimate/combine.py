@@ -115,10 +115,10 @@ def _cloth(white: NDArray[np.float64], correlation: float) -> NDArray[np.float64
     for k, window in enumerate(white):
         mean, covariance = window.mean(axis=0), np.atleast_2d(np.cov(window.T))
         values, vectors = np.linalg.eigh(covariance)
-        told = values < 1
-        gain = vectors[:, told] * (1 / values[told] - 1)
-        precision += tempered * gain @ vectors[:, told].T
-        information += tempered * (vectors[:, told] / values[told]) @ (vectors[:, told].T @ mean)
+        constrained = values < 1
+        gain = vectors[:, constrained] * (1 / values[constrained] - 1)
+        precision += tempered * gain @ vectors[:, constrained].T
+        information += tempered * (vectors[:, constrained] / values[constrained]) @ (vectors[:, constrained].T @ mean)
         shapes[k] = (window - mean) @ (vectors / np.sqrt(values)) @ vectors.T
     values, vectors = np.linalg.eigh(precision)
     shape = shapes[np.arange(n) % count, np.arange(n)]

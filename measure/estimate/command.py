@@ -148,7 +148,7 @@ def measure(
     elif as_csv:
         csv.writer(sys.stdout, lineterminator="\n").writerows(done.series.rows())
     else:
-        _tell(done, series=step is not None)
+        _report(done, series=step is not None)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -215,14 +215,14 @@ class _Job:
                 cache=self.cache,
             )  # fmt: skip
             _warn(refinement.findings)
-        told = None if refinement is None else refinement.as_dict()
+        refined = None if refinement is None else refinement.as_dict()
         lake = self.lake if self.commit and shown else None
         artifact = None if lake is None else artifact_of(measured, subject, self.network, self.reading).id
         text = None
         if self.report is not None:
             text = self._page(measured, series, subject, artifact, refinement)
         published = lake is not None and keep(
-            lake, measured, subject, self.network, self.reading, series, branch=self.branch, refinement=told
+            lake, measured, subject, self.network, self.reading, series, branch=self.branch, refinement=refined
         )
         if artifact is not None:
             say(f"{artifact[:12]}  measurement, {'committed' if published else 'there already'}")
@@ -232,7 +232,7 @@ class _Job:
 
         if self.zarr is not None and shown:
             with writing("its Zarr folder"), fresh_folder(self.zarr) as scratch:
-                write(scratch, measured, series, told)
+                write(scratch, measured, series, refined)
         if self.report is not None and text is not None:
             with writing("its report"):
                 write_file(self.report, text, command="measure")
@@ -305,15 +305,15 @@ def _given(options: Options, reading: Reading) -> Mapping[str, Any]:
 
 def _several(job: _Job, found: Sequence[Subject], *, as_json: bool) -> None:
     done = [job.do(subject) for subject in found]
-    told = [one for one in done if one.measured.shown(anyway=job.anyway)]
+    shown = [one for one in done if one.measured.shown(anyway=job.anyway)]
     if as_json:
         document("measurements", {"measurements": [one.as_dict(anyway=job.anyway) for one in done]})
     else:
         for one in done:
             source = one.subject.artifact.id[:12] if one.subject.artifact is not None else one.measured.film
-            answer = one.measured.sentence if one in told else f"refused: {one.measured.verdict.sentence}"
+            answer = one.measured.sentence if one in shown else f"refused: {one.measured.verdict.sentence}"
             click.echo(f"{source}  {answer}")
-    if not told:
+    if not shown:
         raise RefusedError(
             f"all {len(done)} clips are unlike what the model was trained on", where="--query",
             fix="look at one with --report, or at all with --anyway",
@@ -326,7 +326,7 @@ def _warn(findings: Sequence[Finding]) -> None:
             say(f"{finding.severity.value}: {finding.what}")
 
 
-def _tell(done: _Done, *, series: bool) -> None:
+def _report(done: _Done, *, series: bool) -> None:
     measured = done.measured
     mark = "refused by the gate, not to be relied on: " if measured.verdict.refused else ""
     click.echo(mark + measured.sentence)
@@ -346,7 +346,7 @@ def _tell(done: _Done, *, series: bool) -> None:
 
 @contextmanager
 def _advancing(label: str, unit: str) -> Iterator[Callable[[int, int], None]]:
-    """A bar whose length is told with its first step."""
+    """A progress bar whose length is given with the first step."""
     with ExitStack() as stack:
         steps: list[Callable[[int], None]] = []
 

@@ -5,7 +5,7 @@ mean m and variance v. Correlations are those of all pairs of windows of a film,
 
 - Of the wind, of which each window has its own posterior: of the errors (m − z)/√v.
 - Of the cloth, of which likelihoods are multiplied: of the scores s = m/v − (1/v − 1) z, the derivatives at the truth
-  of the logarithms of the Gaussian likelihoods that the posteriors stand for. A window that tells nothing has a score
+  of the logarithms of the Gaussian likelihoods that the posteriors stand for. A window without information has a score
   of 0, whereas its error is that of the prior, the same in both. Tempering by the correlation of scores adjusts the
   magnitude of a composite likelihood (Ribatet, Cooley and Davison, Statistica Sinica 22, 2012).
 
@@ -74,7 +74,7 @@ class Errors:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Told:
+class Posteriors:
     """What a model says of films.
 
     Attributes:
@@ -90,7 +90,7 @@ class Told:
     errors: NDArray[np.float64]
 
 
-def told(model: Estimator, films: Iterable[LongFilm], *, draws: int, seed: int) -> Told:
+def posteriors(model: Estimator, films: Iterable[LongFilm], *, draws: int, seed: int) -> Posteriors:
     """What a model says of films whose truth is known, one film a simulation.
 
     Args:
@@ -112,7 +112,7 @@ def told(model: Estimator, films: Iterable[LongFilm], *, draws: int, seed: int) 
     known = truth(columns_of(parameters), scaling.names)
     place = scaling.learned(torch.from_numpy(known)).double().numpy()
     centre, spread = (part.double().cpu().numpy() for part in (model.learners[0].centre, model.learners[0].spread))
-    return Told(
+    return Posteriors(
         names=scaling.quantities, logits=np.array(logits), known=known,
         errors=errors_of((np.array(logits) - centre) / spread, (place - centre) / spread, scaling.quantities),
     )  # fmt: skip
@@ -127,7 +127,7 @@ def errors(model: Estimator, films: Iterable[LongFilm], *, seed: int = 0) -> Err
     Raises:
         InputError: fewer than ten films, or films that do not state the truth.
     """
-    found = told(model, films, draws=_DRAWS, seed=seed)
+    found = posteriors(model, films, draws=_DRAWS, seed=seed)
     if len(found.known) < 10:
         raise InputError(f"{len(found.known)} films", where="films", fix="give ten or more")
     return Errors(names=found.names, values=found.errors)

@@ -71,7 +71,7 @@ class Gate(Protocol):
         is to hold for most draws of these.
 
         Raises:
-            InputError: too few of these to tell such a rate: no window would be strange.
+            InputError: too few of these for such a rate: no window would be strange.
         """
         ...
 
@@ -97,7 +97,7 @@ class FamiliarityGate:
         return [Reason(kind="unlike-training", what=what, p=p)]
 
     def level(self, false_alarm: float) -> float:
-        self.cloud.threshold(false_alarm)  # so many clips can tell such a rate
+        self.cloud.threshold(false_alarm)  # checks that the clips suffice for this rate
         return false_alarm
 
 
@@ -109,7 +109,7 @@ def gate_of(model: Estimator) -> Gate:
     """
     if model.cloud is None:
         raise InputError(
-            "the model does not say what it was trained on, so that nothing tells whether it can judge this film",
+            "the model holds no data on its training clips, so it cannot be checked whether it applies to this film",
             where=f"model {model.name!r}", fix="ship it by python -m models.shipping, which stores its training clips",
         )  # fmt: skip
     return FamiliarityGate(cloud=model.cloud)

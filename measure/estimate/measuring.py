@@ -80,7 +80,7 @@ class Options:
         target = next((target for target in model.targets if target.name == "density"), None)
         if target is None:
             raise UsageError(
-                f"the model {model.name!r} tells no area weight", where="--area-weight", fix="leave it out"
+                f"the model {model.name!r} does not estimate an area weight", where="--area-weight", fix="leave it out"
             )
         least, most = target.low * float(sizes.scale.max()), target.high * float(sizes.scale.min())
         if not least * (1 - 1e-9) <= self.area_weight[0] < self.area_weight[1] <= most * (1 + 1e-9):
@@ -224,7 +224,7 @@ def measure(
     """Measure a film.
 
     Args:
-        gate: what tells whether the model can judge it.
+        gate: decides whether the model applies to the film.
         dependence: of the errors of the film's windows.
         advance: called after each window with how many there are and 1.
 

@@ -91,7 +91,8 @@ def _row(quantity: Quantity, known: Mapping[str, float]) -> dict[str, str | bool
     truth = known.get(quantity.name)
     bound_level = "" if quantity.span.bound is None else f" ({quantity.span.level * 100:.3g} %)"
     return {
-        "name": SHORT[quantity.name], "unit": "" if quantity.unit == "1" else quantity.unit, "told": quantity.told,
+        "name": SHORT[quantity.name], "unit": "" if quantity.unit == "1" else quantity.unit,
+        "constrained": quantity.constrained,
         "value": "" if quantity.value is None else f"{quantity.value:.{digits}f}",
         "interval": quantity.span.phrase(digits) + bound_level,
         "assumed": f"{quantity.assumed[0]:.{digits}f} to {quantity.assumed[1]:.{digits}f}",
@@ -120,6 +121,6 @@ def _delay(series: Beside) -> str | None:
     if series.delay is None:
         return None
     if series.delay.offset is None or series.delay.reasons:
-        return f"no delay between film and anemometer could be told: {'; '.join(series.delay.reasons)}"
+        return f"no delay between film and anemometer could be estimated: {'; '.join(series.delay.reasons)}"
     sigma = "" if series.delay.sigma is None else f" ± {series.delay.sigma:.2f} s (1 σ)"
     return f"{series.delay.offset:+.2f} s{sigma} are to be added to the film's clock to reach the anemometer's"

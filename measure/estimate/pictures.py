@@ -34,7 +34,7 @@ def corner(measured: Measurement) -> str:
             axes = figure.add_subplot(grid[row, column])
             if row == column:
                 quantity = measured.quantities[row]
-                axes.hist(draws[:, row], bins=40, color=_BLUE if quantity.told else _GRAY, histtype="stepfilled")
+                axes.hist(draws[:, row], bins=40, color=_BLUE if quantity.constrained else _GRAY, histtype="stepfilled")
                 low, high = np.clip([quantity.span.low, quantity.span.high], draws[:, row].min(), draws[:, row].max())
                 axes.axvspan(low, high, color=_RUST, alpha=0.15, linewidth=0)
                 axes.set_yticks([])

@@ -310,7 +310,7 @@ def fields() -> tuple[FieldColumn, ...]:
 
 
 def winds() -> tuple[WindColumn, ...]:
-    """The parts of the wind, by which its course is told."""
+    """The components of the wind, by which its course is estimated."""
     return tuple(WindColumn(part=part) for part in range(3))
 
 

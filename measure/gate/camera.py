@@ -17,7 +17,7 @@ def shift(seen: Seen) -> float:
     """Common logarithm of the shift of the rim [px]: the largest over frames of the tiles' median.
 
     A tile's shift is the peak of its phase correlation with the first frame (Kuglin and Hines, 1975). The spectrum is
-    divided by its modulus plus the noise's, so that a tile without texture tells no shift; the peak is refined by a
+    divided by its modulus plus the noise's, so that a tile without texture gives no shift; the peak is refined by a
     parabola.
     """
     found = [_median_shift(seen, frame) for frame in _STEPS if frame < len(seen.gray)]

@@ -35,7 +35,7 @@ class Check:
     logarithm: bool = False
 
     def shown(self, value: float) -> float:
-        """The figure that a person is told."""
+        """The figure in the message."""
         return float(10**value) if self.logarithm else value
 
 

@@ -31,14 +31,14 @@ clips, of the training side, where 1 called still pictures repeated and 0 called
 
 
 @dataclass(frozen=True, kw_only=True)
-class Told:
-    """One reason.
+class Cause:
+    """One reason for a refusal.
 
     Attributes:
         kind: of `measure.gate.reasons`.
-        sentence: what is wrong, with the figure and what is usual.
+        sentence: what is wrong, with the figure and its usual range.
         fix: what can be done.
-        check: the score that speaks for it.
+        check: the score that shows it.
         value: its figure, in the unit that the sentence names; None where none could be measured.
         p: conformal p of the clip by this score alone, at the scale of all.
         blank: whether there is nothing to measure in the clip.
@@ -70,7 +70,7 @@ class Judgement:
     level: float
     false_alarm: float
     confidence: float
-    reasons: tuple[Told, ...]
+    reasons: tuple[Cause, ...]
 
     @property
     def sentence(self) -> str:
@@ -116,7 +116,7 @@ def judge(
 
     Raises:
         InputError: more frames than the model takes, another shape or type, or a rate that the calibration clips are
-            too few to tell.
+            too few for a judgement.
     """
     at = level(len(gate.calibration), false_alarm, confidence)
     wanted = model.front_end.frames
@@ -127,19 +127,19 @@ def judge(
         )
     least = 1 / (len(gate.calibration) + 1)
 
-    def refused(told: Told) -> Judgement:
+    def refused(cause: Cause) -> Judgement:
         return Judgement(
-            familiar=False, p=least, level=at, false_alarm=false_alarm, confidence=confidence, reasons=(told,),
+            familiar=False, p=least, level=at, false_alarm=false_alarm, confidence=confidence, reasons=(cause,),
         )  # fmt: skip
 
     if len(frames) < wanted:
         reason = REASONS["too-few-frames"]
         what = f"{reason.sentence}: {len(frames)} instead of {wanted}"
-        told = Told(kind="too-few-frames", sentence=what, fix=reason.fix, check="frames", value=len(frames), p=least)
-        return refused(told)
+        cause = Cause(kind="too-few-frames", sentence=what, fix=reason.fix, check="frames", value=len(frames), p=least)
+        return refused(cause)
     nothing = blank(frames)
     if nothing is not None:
-        return refused(Told(**vars(nothing), p=least, blank=True))
+        return refused(Cause(**vars(nothing), p=least, blank=True))
     found = features_of(model, frames, summary)
     vector = found.vector(model)
     scores, surprises = gate.scores(vector[None])[0], gate.surprises(vector[None])[0]
@@ -151,12 +151,13 @@ def judge(
     )  # fmt: skip
 
 
-def _reasons(gate: Gate, scores: Vector, surprises: Vector, at: float, *, still: bool) -> tuple[Told, ...]:
+def _reasons(gate: Gate, scores: Vector, surprises: Vector, at: float, *, still: bool) -> tuple[Cause, ...]:
     """Each kind once, of those whose scores would refuse the clip alone. Of a still clip none is about what moves.
 
     A fault shows in many scores. The kinds are in the order of two voices: the surprise of the kind's weightiest score
     as a share of the clip's largest, and, by `_LIKENESS`, the log-likelihood ratio of the kind's likeliest distortion
-    as a share of the largest. The figure that is told is that of the picture's weightiest statistic, where one refuses.
+    as a share of the largest. The figure in the message is that of the picture's weightiest statistic, where one
+    refuses.
     """
     weightiest: dict[str, int] = {}
     pictured: dict[str, int] = {}
@@ -176,12 +177,12 @@ def _reasons(gate: Gate, scores: Vector, surprises: Vector, at: float, *, still:
         weightiest, key=lambda kind: -surprises[weightiest[kind]] / most - _LIKENESS * ratios[kind] / likeliest
     )
     return tuple(
-        _told(gate, place, float(scores[place]), gate.p_value(float(surprises[place])))
+        _cause(gate, place, float(scores[place]), gate.p_value(float(surprises[place])))
         for place in (pictured.get(kind, weightiest[kind]) for kind in order)
     )
 
 
-def _told(gate: Gate, place: int, value: float, p: float) -> Told:
+def _cause(gate: Gate, place: int, value: float, p: float) -> Cause:
     score, reason = SCORES[place], REASONS[SCORES[place].reason]
     check = CHECKS.get(score.name)
     if check is None:
@@ -192,7 +193,7 @@ def _told(gate: Gate, place: int, value: float, p: float) -> Told:
         shown = check.shown(score.sign * value)
         low, high = (check.shown(float(end)) for end in np.quantile(column, _USUAL))
         usual = f"of simulated clips, 98 % have {low:.3g} to {high:.3g}"
-    return Told(
+    return Cause(
         kind=score.reason, sentence=f"{reason.sentence} ({score.what}: {shown:.3g}; {usual})", fix=reason.fix,
         check=score.name, value=shown, p=p,
     )  # fmt: skip

@@ -13,7 +13,7 @@ from measure.gate.seen import SIDE, Seen
 _EDGE = 3
 """Width [px] of the strip along a side in which motion is called cut off."""
 _SMOOTHING = 3.0
-"""σ [px] by which the motion is smoothed before its regions are told apart: folds of one flag are one region."""
+"""σ [px] by which the motion is smoothed before its regions are separated: folds of one flag are one region."""
 _REGION = 0.15
 """Share of the strongest smoothed motion above which a pixel belongs to a region."""
 LEAST_AREA = 1 / SIDE**2

@@ -49,7 +49,7 @@ def calibrated(
         training: films (frames, height, width) gray at the model's rate, one of each simulation.
         validation: films of other simulations, which the network was not trained on, one of each.
         seed: of the distortions.
-        advance: told how many clips were measured.
+        advance: called with the number of clips measured.
         plain, distorted: how many of the training films are taken as they are, and how many are distorted.
 
     Raises:

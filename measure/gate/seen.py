@@ -1,4 +1,4 @@
-"""A clip as the checks see it: its central square, averaged down, with what moves told from what does not."""
+"""The input of the checks: a clip's central square, averaged down, with moving and still parts separated."""
 
 from __future__ import annotations
 

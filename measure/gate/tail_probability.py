@@ -34,7 +34,7 @@ class ExponentialTails:
             InputError: fewer than 20 clips.
         """
         if len(scores) < 20:
-            raise InputError(f"{len(scores)} clips do not tell a tail", fix="give at least 20")
+            raise InputError(f"{len(scores)} clips are too few for a tail", fix="give at least 20")
         start = np.quantile(scores, BODY, axis=0)
         beyond = np.maximum(scores - start, 0)
         excess = beyond.sum(axis=0) / np.maximum((beyond > 0).sum(axis=0), 1)
@@ -65,7 +65,7 @@ def level(count: int, false_alarm: float, confidence: float) -> float:
         count: n, of the calibration clips.
 
     Raises:
-        InputError: shares that are not between 0 and 1, or a rate that so few clips cannot tell.
+        InputError: shares that are not between 0 and 1, or too few clips for the rate.
     """
     if not (0 < false_alarm < 1 and 0 < confidence < 1):
         raise InputError(
@@ -76,7 +76,7 @@ def level(count: int, false_alarm: float, confidence: float) -> float:
     if len(kept) == 0:
         fewest = int(np.ceil(np.log(1 - confidence) / np.log(1 - false_alarm)))
         raise InputError(
-            f"{count} calibration clips cannot tell a false-alarm rate of {false_alarm:g}",
+            f"{count} calibration clips are too few for a false-alarm rate of {false_alarm:g}",
             fix=f"give at least {fewest} clips, or a higher rate",
         )
     return float(k[kept[-1]]) / (count + 1)

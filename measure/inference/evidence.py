@@ -39,7 +39,7 @@ class Evidence(Rows):
         columns: how many are the statistics' and those given beside; the nuisances follow.
         lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
         turning: the same of moments about the pole; None where they are not looked at.
-        course: of the wind, as the errors tell it; None where not looked at.
+        course: of the wind, estimated from the errors; None where not asked for.
         prior: of the calibrated parameters, see `NullModel`.
     """
 

@@ -2,7 +2,7 @@
 
 Segments of data obey r = μ(U) + R δ + ε with ε of covariance Σ. μ and Σ are learnt from null recordings, whose own
 δ is none: their statistics are taken at the calibration they were simulated with, those of data at the one that is
-fitted to them. U is the wind's speed; μ is that of the nominal cloth, as far as nulls of it tell. Recordings of one
+fitted to them. U is the wind's speed; μ is that of the nominal cloth, as far as nulls of it show. Recordings of one
 cloth share the numerics they differ from the fit's by, and what is not linear in its calibration, so that μ has a part
 in common to an experiment: nuisance columns, learnt from the nulls as well.
 """
@@ -166,7 +166,7 @@ def _by_cloth(
 
     A random effect of the cloth beside one of the numerics, predicted linearly (Henderson, Biometrics 31:423, 1975).
     Their variances are found by moments, in units of the covariance and summed over the columns. Empty where they
-    cannot be told apart: one cloth alone, or no cloth by two numerics.
+    cannot be separated: one cloth alone, or no cloth by two numerics.
 
     Args:
         means: (experiment, column).

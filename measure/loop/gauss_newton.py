@@ -80,8 +80,8 @@ def refine(
     """Fit the calibrated parameters and chosen columns to segments, from the linear fit of the statistics on.
 
     Every round uses the errors along the fitted columns alone, with their part of the null model. These alone would
-    lead the calibrated parameters astray by what numerics leave, so that their prior is there what all directions told
-    before.
+    lead the calibrated parameters astray by what numerics leave, so that their prior is there the estimate by all
+    directions before.
 
     Args:
         weighed: the columns of the statistics, but for the calibrated parameters.
@@ -94,8 +94,8 @@ def refine(
     effects = tuple((column, 0.0) for column in own if isinstance(column, EffectColumn))
     values = [*fit.value[: len(THETA)], *(fit.of(c)[0] for c in chosen)]
     model = Model(calibration=whitened.origin, effects=effects).moved(cut(np.array(values, dtype=np.float64)))
-    told = np.array([fit.of(place)[1] for place in range(len(THETA))])
-    part = replace(_part(whitened.null, [*range(len(THETA)), *chosen]), prior=told)
+    prior = np.array([fit.of(place)[1] for place in range(len(THETA))])
+    part = replace(_part(whitened.null, [*range(len(THETA)), *chosen]), prior=prior)
     anchor = model.calibration
     reached = _round(forecaster, segments, model, part, whitened.speeds, tuple(chosen), anchor=anchor)
     for _ in range(ROUNDS - 1):
@@ -118,8 +118,8 @@ def finished(
     """Models of the same columns after one linear step by all directions of the whitened misfit, each fitted to
     some segments, with the standard errors of that step.
 
-    By its own few directions a fit follows effects far from where they are linear, but cannot tell some of them from
-    what numerics leave; by all, it can.
+    By its own few directions a fit follows effects far from where they are linear, but cannot separate some of them
+    from numerical errors; by all directions, it can.
     """
     every = errors_of(models, forecaster, segments)
     made: list[tuple[Model, tuple[float, ...]]] = []

@@ -70,7 +70,7 @@ class Outcome:
     """What an experiment came to, before anything is said of it in sentences.
 
     Attributes:
-        verdict: all numbers of the verdict; what is told in sentences is empty.
+        verdict: all numbers of the verdict; its sentences are empty.
         experiment: in the frame of the fit, with the logs of the wind moved by what they lag.
         lags: (recording,) by how much they were moved [s].
         at_bounds: names of the calibrated parameters that are as small or as large as the model holds.
@@ -94,7 +94,7 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
     """What an experiment came to.
 
     Args:
-        stage: told of progress.
+        stage: called with progress.
 
     Raises:
         InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked at before), or whose
@@ -102,38 +102,38 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
     """
     began = time.perf_counter()
     torch.set_num_threads(1)
-    tell = stage or (lambda what, done, total: None)
+    report = stage or (lambda what, done, total: None)
     if experiment.carried:
         raise InputError(
             "a verdict on a cloth whose attachments move: null experiments of such cloths are not simulated",
             where="close-loop", fix="hold the cloth still, or compare its forecasts (measure.forecasting.observer)",
         )  # fmt: skip
     setting = Setting.of(experiment, workers=options.workers)
-    tell("sensitivities", 0, 1)
+    report("sensitivities", 0, 1)
     found, projection = _looked_at(setting)
     late = (0.0,) * len(setting.speeds) if found.course is None else lags(found.course, setting.segments)
     if any(late):
         setting = setting.moved(late)
         found, projection = _looked_at(setting)
-    tell("sensitivities", 1, 1)
-    bank = plan.bank_for(setting, options, stage=tell)
+    report("sensitivities", 1, 1)
+    bank = plan.bank_for(setting, options, stage=report)
     reference = bank.reference(
         len(setting.segments), noise=setting.design.noise, seed=options.seed, prior=setting.prior
     )
-    tell("base model", 0, 1)
+    report("base model", 0, 1)
     setting, fits = _calibrated(setting, _fits(setting, found, projection, bank), bank)
-    tell("base model", 1, 1)
+    report("base model", 1, 1)
     reference = reference.at(setting.calibration)
     evidence = fits.whitened.evidence(fits.whitened.found)
     judgement, refits = judge(evidence, reference, level=options.level), dict[int, Refit | None]()
     if judgement.conclusion not in (Conclusion.SUFFICIENT, Conclusion.UNTESTED):
-        tell("before and after", 0, 1)
+        report("before and after", 0, 1)
         while new := [column for column in finalists(judgement) if column not in refits]:
             refits |= refit(fits, reference, new, workers=options.workers)
             judgement = judge(evidence, reference, level=options.level, refits=refits)
     solved = Solved(setting=setting, fits=fits, reference=reference, judgement=judgement)
     trial = _trial(solved, options)
-    tell("before and after", 1, 1)
+    report("before and after", 1, 1)
     return _outcome(solved, bank, trial, options, began, late)
 
 

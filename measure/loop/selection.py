@@ -1,8 +1,9 @@
 """Which effect it is: models of the library compared by what they predict on recordings they were not fitted to.
 
-Detection is by the calibrated statistic. Attribution is one rule. Models that held-out scores do not tell from the best
-are the confidence set (after Hansen, Lunde and Nason, Econometrica 79:453, 2011), and of these the ones that pass their
-own predictive test are the verdict. The base model and forces that are none of the library compete like any other.
+Detection is by the calibrated statistic. Attribution is one rule. Models whose held-out scores do not differ
+significantly from the best are the confidence set (after Hansen, Lunde and Nason, Econometrica 79:453, 2011), and of
+these the ones that pass their own predictive test are the verdict. The base model and forces that are none of the
+library compete like any other.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ GUST_COLUMN = -1
 _FIRST = len(THETA)
 
 EQUIVALENT: dict[str, tuple[str, ...]] = {"air-density": ("porosity",)}
-"""Effects that no recording of this kind can tell from a weighed one: both scale the dynamic pressure alone."""
+"""Effects that no recording of this kind can distinguish from a weighed one: both scale the dynamic pressure alone."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,7 +81,8 @@ class Judgement:
             none of the library is as good as they are.
         statistic, p_value: of the global test.
         line: of the errors' spectra that the first of the ranking leaves, where it alone would reject the model.
-        course: how the wind varies, as what the first leaves tells it, where that alone would and it is not turbulence.
+        course: how the wind varies, by the errors that the first leaves, where that alone would and it is not
+            turbulence.
     """
 
     conclusion: Conclusion
@@ -122,12 +124,12 @@ def judge(
 
     def judgement(conclusion: Conclusion, named: Sequence[Weighed], why: str = "") -> Judgement:
         taken = {w.column for w in named}
-        told = [
+        reasoned = [
             replace(w, candidate=replace(w.candidate, why_not=_reason(ranking[0], w, why) * (w.column not in taken)))
             for w in ranking
         ]
         return Judgement(
-            conclusion=conclusion, named=tuple(w.column for w in named), ranking=tuple(told),
+            conclusion=conclusion, named=tuple(w.column for w in named), ranking=tuple(reasoned),
             confident=tuple(w.column for w in confident), statistic=statistic, p_value=p_value,
             line=_swinging(left, reference, level), course=_blown(left, reference, level),
         )  # fmt: skip
@@ -148,8 +150,8 @@ def judge(
 
 
 def _confidence_set(ranking: Sequence[Weighed], evidence: Evidence) -> list[Weighed]:
-    """Models of the library that held-out scores do not tell from the best, best first; none where the base model,
-    which gains nothing, is among them, or where a force that is none of the library leads them all."""
+    """Models of the library whose held-out scores do not differ significantly from the best, best first; none where the
+    base model, which gains nothing, is among them, or where a force that is none of the library leads them all."""
     able = [w for w in ranking if w.admissible]
     forces = gains(evidence, [[i + _FIRST] for i, c in enumerate(columns()) if not isinstance(c, EffectColumn)])
     scores = [*(w.gains for w in able), *forces]
@@ -171,12 +173,12 @@ def _swinging(left: Evidence, reference: Reference, level: float) -> Line | None
 
 
 def _varying(evidence: Evidence) -> Variation | None:
-    """How the wind varies, as the errors tell it; None where its course is not looked at."""
+    """How the wind varies, estimated from the errors; None where its course is not asked for."""
     return None if evidence.course is None else evidence.course.variation(evidence.recording)
 
 
 def _blown(left: Evidence, reference: Reference, level: float) -> Variation | None:
-    """How the wind varies as what is left tells it, where that alone would reject a model and is not turbulence."""
+    """How the wind varies by the remaining errors, where that alone would reject a model and is not turbulence."""
     swing, variation = reference.swing(left), _varying(left)
     if swing is None or variation is None or variation.turbulent:
         return None
@@ -381,11 +383,11 @@ def _reason(best: Weighed, other: Weighed, why: str) -> str:
     if not other.admissible and other.unlike:
         return other.unlike
     if not other.admissible and other.column == GUST_COLUMN:
-        return "their intensity cannot be told from zero"
+        return "their intensity is not significantly above zero"
     if not other.admissible:
         strength = other.candidate.strength
         unit = "" if strength.unit == "1" else f" {strength.unit}"
-        return f"no cloth has it at the strength that fits, {number(strength.value)}{unit}"
+        return f"the fitted value is unphysical: {number(strength.value)}{unit}"
     if not _leads(other.gains, 0 * other.gains, other.recording):
         return "it predicts unseen recordings no better than the base model"
     if _leads(best.gains, other.gains, other.recording):

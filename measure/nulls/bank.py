@@ -110,7 +110,7 @@ def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tupl
 
 
 def _anchors(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[Floats]:
-    """(held, 3) for each recording [m]; where they are not told, taken from all recordings of its cloth."""
+    """(held, 3) for each recording [m]; where they are not given, taken from all recordings of its cloth."""
     cloths: dict[Calibration, list[Trajectory]] = {}
     for cloth, recording in zip(batch.calibrations, recordings, strict=True):
         cloths.setdefault(cloth, []).append(recording)
@@ -151,7 +151,7 @@ def _cache(folder: Path, batch: NullBatch, index: int) -> None:
         buffer, version=np.array(_VERSION), columns=np.array(names()), recording=own.recording, r=own.r,
         response=own.response, error=own.error, marker_error=own.marker_error, lines=own.lines, speeds=nulls.speeds,
         calibration=nulls.calibration, noise=nulls.noise, period=nulls.period, cloth=nulls.cloth,
-        duration=np.array(duration), anchors_told=np.array(batch.specimen.anchors_told), turned=own.turning.r,
+        duration=np.array(duration), anchors_told=np.array(batch.specimen.anchors_given), turned=own.turning.r,
         turning=own.turning.response, moment=own.turning.error, course=own.course.score,
         course_curvature=own.course.curvature,
     )  # fmt: skip
@@ -224,7 +224,7 @@ def load(folder: Path, *, words: str) -> NullBank:
         raise NotFoundError("no null recordings", where=str(folder), fix="build the bank first")
     parts: list[Nulls] = []
     durations: set[float] = set()
-    told: set[bool] = set()
+    given: set[bool] = set()
     count = 0
     for path in paths:
         content = _content(path)
@@ -245,14 +245,14 @@ def load(folder: Path, *, words: str) -> NullBank:
             )
         )  # fmt: skip
         durations.add(round(float(content["duration"]), 1))
-        told.add(bool(content["anchors_told"]))
+        given.add(bool(content["anchors_told"]))
         count = int(own.recording.max()) + 1
-    if len(durations) > 1 or len(told) > 1:
+    if len(durations) > 1 or len(given) > 1:
         lengths = ", ".join(f"{d:g} s" for d in sorted(durations))
         raise CorruptError(
-            f"segments of {lengths}, anchors {' and '.join('told' if t else 'taken from recordings' for t in told)}",
+            f"segments of {lengths}, anchors {' and '.join('given' if g else 'taken from recordings' for g in given)}",
             where=str(folder), fix="build a bank of one design into a folder of its own",
         )  # fmt: skip
     return NullBank(
-        nulls=Nulls.joined(parts), columns=names(), duration=durations.pop(), words=words, anchors_told=told.pop()
+        nulls=Nulls.joined(parts), columns=names(), duration=durations.pop(), words=words, anchors_given=given.pop()
     )

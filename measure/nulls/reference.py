@@ -82,7 +82,7 @@ class NullBank:
         columns: names of the columns.
         duration: of a segment [s].
         words: how they were made.
-        anchors_told: whether they were predicted with the anchors they were simulated with.
+        anchors_given: whether they were predicted with the anchors they were simulated with.
 
     Raises:
         InputError: too few of them, or all of the same numerics.
@@ -92,7 +92,7 @@ class NullBank:
     columns: tuple[str, ...]
     duration: float
     words: str
-    anchors_told: bool = True
+    anchors_given: bool = True
 
     def __post_init__(self) -> None:
         kinds = len(np.unique(self.nulls.numerics))

@@ -1,7 +1,7 @@
 """The winds of nulls: steady where the data's are, and else what the data's logs are, begun elsewhere and stronger.
 
 What a simulation leaves depends on how the wind fluctuates, so that nulls in steady winds calibrate no recording in a
-fluctuating one: its density would be told too high, and its interval too narrow.
+fluctuating one: its density would be estimated too high, and its interval too narrow.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ def _tracked_mean(recording: Trajectory) -> Floats:
 
 
 def as_seen(specimen: Specimen, recordings: Sequence[Trajectory]) -> Specimen:
-    """The cloth with its anchors taken from these recordings; itself where its anchors are told."""
-    if specimen.anchors_told:
+    """The cloth with its anchors taken from these recordings; itself where its anchors are given."""
+    if specimen.anchors_given:
         return specimen
     return replace(specimen, anchors=anchors_of(recordings, specimen.mesh.rest[list(specimen.held)]))

@@ -56,7 +56,7 @@ def of_arcsim(scene: Mapping[str, Any], rest: Floats, *, where: str) -> tuple[Kn
 def of_simulation(artifact: Artifact, rest: Floats) -> Known:
     """What the row of a mesh sequence says that was simulated here; silent for any other.
 
-    Its effects are left aside: whoever looks for what the base model lacks must not be told.
+    Its effects are left aside: the search for missing effects must not know them.
 
     Args:
         rest: (vertex, 2) of its mesh [m].

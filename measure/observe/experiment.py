@@ -60,7 +60,7 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
     specimen = Specimen(
         mesh=mesh, material=_material(known, setup), mass_known=setup.mass_known,
         density_uncertainty=setup.density_uncertainty, held=held,
-        anchors=anchors_of(recordings, seats), anchors_told=False, stiffness=_stiffness(known, setup),
+        anchors=anchors_of(recordings, seats), anchors_given=False, stiffness=_stiffness(known, setup),
         gravity=(
             _agreed([k.gravity for k in known], None, GRAVITY, "gravity")
             if setup.gravity is None else (0.0, 0.0, -setup.gravity)
@@ -75,7 +75,7 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
 def _prepared(seen: Observation, corners: Floats) -> Observation:
     """A recording with even frames and no gaps, its noise settled, its lengths those of the rest shape.
 
-    Whatever is not as it should be becomes NaN first, is told, and is then filled or left out together.
+    Wrong values become NaN and are reported; then all NaN are filled or left out together.
 
     Raises:
         InputError: it cannot be used.
@@ -87,7 +87,7 @@ def _prepared(seen: Observation, corners: Floats) -> Observation:
     edges = shape.Edges.between(seen.markers, where=where)
     seen = frames.without_stuck_markers(seen)
     sigma = _noise(seen)
-    told = shape.check_scale(seen, edges, sigma)
+    scaled = shape.check_scale(seen, edges, sigma)
     seen = frames.without_repeats(shape.without_strays(seen, edges, sigma), sigma)
     period = float(seen.times[1] - seen.times[0])
     filled = fill_positions(seen.positions, seen.markers, period=period, where=where)
@@ -107,7 +107,7 @@ def _prepared(seen: Observation, corners: Floats) -> Observation:
         seen, markers=markers, positions=filled.positions, times=times - begin, seen=filled.seen,
         wind=None if wind is None else wind.later(begin),
         findings=(
-            *seen.findings, *told, *filled.findings, *shape.check_cover(markers, corners, where=where),
+            *seen.findings, *scaled, *filled.findings, *shape.check_cover(markers, corners, where=where),
             *frames.lost_frames(filled.positions, where=where),
         ),
     )  # fmt: skip

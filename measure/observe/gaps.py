@@ -23,7 +23,7 @@ LONGEST = 0.12
 _TRACKED = 0.9  # of what is usual: a recording begins and ends with a frame in which so many markers were tracked
 _LEAST = 0.5  # of the frames: a marker that was tracked in fewer is left out
 _LOST = 0.5  # of the markers: a recording that loses more is refused
-_NEIGHBOURS = 12  # tracked markers that tell by a quadratic map where one among them is that was not
+_NEIGHBOURS = 12  # tracked markers from which a quadratic map gives the place of one among them that was not
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -182,12 +182,12 @@ def _carried(
     """
     found = np.full((len(positions), 3), np.nan)
     nearest = [near[seen[near]][:_NEIGHBOURS] for seen in there]
-    told = np.flatnonzero([len(own) == _NEIGHBOURS for own in nearest])
-    if not len(told):
+    fillable = np.flatnonzero([len(own) == _NEIGHBOURS for own in nearest])
+    if not len(fillable):
         return found
-    kinds, kind = np.unique(np.stack([nearest[frame] for frame in told]), axis=0, return_inverse=True)
+    kinds, kind = np.unique(np.stack([nearest[frame] for frame in fillable]), axis=0, return_inverse=True)
     for place, own in enumerate(kinds):
-        frames = told[kind.ravel() == place]
+        frames = fillable[kind.ravel() == place]
         weights = _weights(markers[own] - markers[marker])
         found[frames] = np.einsum("n,fnc->fc", weights, positions[np.ix_(frames, own)])
     return found

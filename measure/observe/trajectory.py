@@ -169,12 +169,12 @@ class Specimen:
     Attributes:
         mesh: the model's, in its flat rest state; as wide and high as the cloth.
         material: nominal.
-        mass_known: whether its density is known about as well as a material's name tells it.
+        mass_known: whether its density is known at least as well as from a material's name.
         density_uncertainty: relative standard uncertainty of its density, where that is so.
         held: vertices of `mesh` that are attached.
         anchors: (held, 3) where they are tied [m].
         stiffness: of each attachment, on each axis [N/m].
-        anchors_told: whether `anchors` are known by themselves, not taken from where recordings show the attachments.
+        anchors_given: whether `anchors` are known by themselves, not taken from where recordings show the attachments.
         gravity: (x, y, z) [m/s²].
         air: the base model's force.
 
@@ -187,7 +187,7 @@ class Specimen:
     held: tuple[int, ...]
     anchors: Floats
     stiffness: float = ARCSIM_STIFFNESS
-    anchors_told: bool = True
+    anchors_given: bool = True
     mass_known: bool = True
     density_uncertainty: float = DENSITY_UNCERTAINTY
     gravity: tuple[float, float, float] = GRAVITY

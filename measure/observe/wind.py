@@ -24,7 +24,7 @@ from flagdata.signals import WindSeries
 from flagdata.timebase import NANOSECONDS, iso
 from measure.observe.trajectory import Floats, WindTrack
 
-_LONG_GAP = 5.0  # s without a usable sample are told
+_LONG_GAP = 5.0  # s without a usable sample are reported
 _COMPONENTS = ("wind_x", "wind_y", "wind_z")
 
 

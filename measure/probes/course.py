@@ -1,4 +1,4 @@
-"""The course of the wind within a recording, as errors tell it: what a steady wind's model takes for gusts.
+"""The course of the wind within a recording, estimated from errors: what a steady wind's model takes for gusts.
 
 In windows of 0.2 s the errors e are fitted by a wind that is a share c of the mean one stronger, turned to its left, or
 upward: c = g/h with g = Σ w e·s and h = Σ w s², s the sensitivity of the predictions to such a wind. A wind that is the
@@ -10,7 +10,7 @@ Turbulence turns the wind as well, by 0.6 to 1 of what it does along it, and cha
 more than a second to go by. Of courses drawn from von Kármán's spectrum (L from 10 to 150 m in 4 and 8 m/s, three
 recordings of 8 s) 1 % turn by less than 0.43 to 0.51 of what they vary along the wind by this measure, where it is 0.78
 in all, and by less than 0.33 to 0.39 where it is 0.6; 1 % vary within 2 s by more than 1.1 to 1.9 of what they do from
-one 2 s to another. Whether the wind rises tells little: what pushes a flag along the wind lifts it.
+one 2 s to another. Whether the wind rises means little: what pushes a flag along the wind lifts it.
 """
 
 from __future__ import annotations

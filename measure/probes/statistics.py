@@ -59,7 +59,7 @@ class Statistics(Rows):
         lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
         turning: the same of the errors' moment about the pole, see `pole_moment`, its `error` in m⁸/s⁴; None where not
             looked at.
-        course: of the wind, as the errors tell it; None where not looked at.
+        course: of the wind, estimated from the errors; None where not asked for.
         log: (segment, column, nuisance) how r moves with a prior standard deviation of what the wind's log may be off
             by, see `wind_log`; None where the wind is known, as in nulls.
     """
@@ -85,7 +85,7 @@ class Projection:
         spectrum: what their periodograms are taken along; None where lines are not looked at.
         pole_moment: what their moments are taken by; None where they are not looked at.
         turning: (segment, column, frame) the sensitivities' moments, of length 1.
-        gauge: what the wind's course is told by; None where not looked at.
+        gauge: sensitivities from which the wind's course is estimated; None where not asked for.
     """
 
     directions: Tensor
@@ -115,7 +115,7 @@ class Projection:
         return torch.einsum("scf,fs->sc", self.turning, moment).double().cpu().numpy()
 
     def course(self, errors: Tensor) -> Course | None:
-        """The wind's course, as errors (frame, marker, 3, segment) [m] tell it; None where not looked at."""
+        """The wind's course by the errors (frame, marker, 3, segment) [m]; None where not asked for."""
         return None if self.gauge is None else self.gauge.course(_clipped(errors, self.scale))
 
     def lines(self, errors: Tensor) -> Floats | None:

@@ -6,8 +6,8 @@ recording has nuisances of its own, since loggers are set up and clocks are alig
 do, they are always fitted, under their priors, and nothing that they explain counts as an effect.
 
 A lag τ that is not small beside the time in which the wind changes is not of first order. It is found beforehand from
-the course of the wind as the errors tell it, which for a log that lags is L(t + τ)/L(t) − 1, and the log is moved by
-it.
+the course of the wind estimated from the errors, which for a log that lags is L(t + τ)/L(t) − 1, and the log is moved
+by it.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def sensitivities(
 
 
 def lags(course: Course, segments: Segments) -> tuple[float, ...]:
-    """(recording,) by how much each log lags, most probably, as the course of the wind along itself tells it [s].
+    """(recording,) by how much each log lags, most probably, by the course of the wind along itself [s].
 
     Least squares of the windows about their mean, as large as they are, under the prior of the clock; 0 where the wind
     is steady or the clock is known.

@@ -79,10 +79,10 @@ def propose(
     if effect is None and outcome.strengths:
         spec = effect_file.write(outcome, folder).spec
     proposal_log.add(folder / "proposals.json", outcome, effect=spec)
-    _tell(outcome, spec, folder, as_json=as_json, text=words(outcome))
+    _report(outcome, spec, folder, as_json=as_json, text=words(outcome))
 
 
-def _tell(outcome: Outcome, spec: str, folder: Path, *, as_json: bool, text: str) -> None:
+def _report(outcome: Outcome, spec: str, folder: Path, *, as_json: bool, text: str) -> None:
     if as_json:
         document("proposal", {"effect": spec, **outcome.as_dict()})
     else:

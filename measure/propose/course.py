@@ -25,7 +25,7 @@ BIN = 0.2
 """Duration of a stretch [s]: five frames at 25 a second."""
 _LEVEL = 0.9
 _RARE = 0.01
-"""Probability of a line in white noise below which it is told."""
+"""Probability of a line in white noise below which it is reported."""
 _SLOW = 3
 """Periods in a recording below which a line is no more than a trend."""
 
@@ -114,9 +114,9 @@ def _words(by_recording: list[Estimate], speeds: list[float], spread: float, lin
         for e, u in zip(by_recording, speeds, strict=True)
     )
     text = f"{means}; in time it varies by {spread:.2g}{unit}, errors included"
-    told = [
+    significant = [
         f"{one.frequency:.2f} Hz ({100 * one.share:.0f} %; f L/U = {one.frequency * height / u:.2g}) at {u:.1f} m/s"
         for one, u in zip(lines, speeds, strict=True)
         if one.p_value < _RARE
     ]
-    return f"{text}, with lines at {', '.join(told)}; L is the cloth's height" if told else text
+    return f"{text}, with lines at {', '.join(significant)}; L is the cloth's height" if significant else text

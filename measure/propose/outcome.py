@@ -135,7 +135,7 @@ class Retest:
         if self.apart.value <= 0:
             return Decision.REJECTED, f"{lower}, but the same freedom spent on {wrong} lowers it as much"
         if self.apart.low <= 0:
-            return Decision.KEPT, f"{lower}; its form is open: {wrong} cannot be told from it"
+            return Decision.KEPT, f"{lower}; its form is open: {wrong} fits as well"
         return Decision.KEPT, f"{lower}, and lower than with the same freedom spent on {wrong}"
 
 

@@ -64,16 +64,16 @@ def propose(
         candidates: terms, or strengths of an effect from a file.
         known: strengths that the model has already.
         controls: terms that are not taken, but may be what a proposal is compared with.
-        stage: told of progress.
+        stage: called with progress.
 
     Raises:
         InputError: recordings that cannot be used, are too few, or are of calm air.
     """
     torch.set_num_threads(1)
-    tell = stage or (lambda what, done, total: None)
+    report = stage or (lambda what, done, total: None)
     setting = made_ready(experiment)
-    bank = plan.bank_for(setting, options, stage=tell)
-    return weigh(setting, candidates, bank, columns(), known=known, controls=controls, options=options, stage=tell)
+    bank = plan.bank_for(setting, options, stage=report)
+    return weigh(setting, candidates, bank, columns(), known=known, controls=controls, options=options, stage=report)
 
 
 def made_ready(experiment: Experiment) -> Setting:

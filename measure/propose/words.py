@@ -6,7 +6,7 @@ from measure.propose.outcome import Outcome, Retest
 from measure.verdict.record import Estimate
 
 _NEAREST = 4
-"""Terms beside those looked at that are told."""
+"""Further terms that are listed."""
 
 
 def words(outcome: Outcome) -> str:

@@ -25,7 +25,7 @@ from sim.run import load
 from sim.run.recipe import Recipe
 
 SCENES = {"density": ("flag-wide",), "fabric_density": ("flag-fabrics", "flag-fabrics-damped")}
-"""Recipes that are simulated, and whose ranges are searched, by the area weight that a model tells."""
+"""Recipes that are simulated, and whose ranges are searched, by the area weight that a model estimates."""
 LEARNED = {
     "density": {"flag-wide": 3600},
     "fabric_density": {"flag-wide": 3600, "flag-fabrics": 800, "flag-fabrics-damped": 800},
@@ -53,7 +53,7 @@ class Clip:
 
 
 def scenes_of(estimator: Estimator) -> tuple[Recipe, ...]:
-    """Recipes that are simulated to refine what a model tells.
+    """Recipes that are simulated to refine a model's estimates.
 
     Raises:
         InputError: a model of another kind of cloth.
@@ -72,12 +72,12 @@ def space_of(estimator: Estimator) -> Space:
 
 
 def _weighed(estimator: Estimator) -> str:
-    """The area weight that a model of flags tells, a key of `SCENES`."""
+    """The area weight that a model of flags estimates, a key of `SCENES`."""
     names = estimator.learners[0].scaling.names
     found = [target for target in SCENES if target in names]
     if not found:
         raise InputError(
-            f"the model tells {', '.join(names) or 'nothing'}, and no area weight of a flag",
+            f"the model estimates {', '.join(names) or 'nothing'}, but no area weight of a flag",
             where=f"model {estimator.name!r}", fix="take the model of flags that comes with the package",
         )  # fmt: skip
     return found[0]

@@ -4,7 +4,7 @@
 
 with `Metamodel`'s predictive density as p(y_j | cloth, w_j); summaries of clips are taken as independent given cloth
 and wind. The 16 parameters of the cloth are drawn from their prior and weighted, and each wind is integrated over a
-grid, since it is what clips tell most of. Where evaluations were made does not weigh on the result, other than by how
+grid, since clips constrain it most. Where evaluations were made does not weigh on the result, other than by how
 well the density is known there: they may follow the amortised posterior without counting the data twice.
 """
 

@@ -85,7 +85,7 @@ class Settings:
             )  # fmt: skip
         if self.budget < self.fewest:
             raise InputError(
-                f"{self.budget} evaluations tell no interval of {REGRESSORS + 1} regressors",
+                f"{self.budget} evaluations are too few for an interval of {REGRESSORS + 1} regressors",
                 where="budget",
                 fix=f"give at least {self.fewest}",
             )
@@ -113,7 +113,7 @@ def refine(
         advance: called with the number of clips that were simulated.
 
     Raises:
-        InputError: a model that tells no posterior of wind, density, scale and anisotropy, a clip that does not fit it,
+        InputError: a model without a posterior of wind, density, scale and anisotropy, a clip that does not fit it,
             a recipe without ranges, a space of another box, or too many simulations that failed.
     """
     chosen, several = settings or Settings(), tuple([targets] if isinstance(targets, Target) else targets)
@@ -150,7 +150,7 @@ class _Run:
         begun = time.perf_counter()
         embedded = [e.embed(t.clip[None])[0] for e, t in zip(self.evaluators, self.targets, strict=True)]
         observed = [start.summaries(self.estimator, row[None])[0] for row in embedded]
-        told = [
+        estimates = [
             start.amortised(
                 self.estimator, target.clip, self.space, seed=child_seed(self.settings.seed, "amortised"), draws=400
             )
@@ -163,7 +163,7 @@ class _Run:
         found, reached, inferring = None, False, 0.0
         while True:
             own = time.perf_counter()
-            asked = self._first(told) if found is None else self._next(found, len(ends), len(rounds))
+            asked = self._first(estimates) if found is None else self._next(found, len(ends), len(rounds))
             inferring += time.perf_counter() - own
             for clip, evaluator in enumerate(self.evaluators):
                 groups[clip] += evaluator.evaluate(asked[clip], self.settings.replicates, advance=self.advance)
@@ -191,7 +191,7 @@ class _Run:
         seconds = {stage: sum(g.seconds[stage] for group in groups for g in group) for stage in STAGES}
         return Refinement(
             targets=self.targets, level=self.settings.level, intervals=self._intervals(found),
-            amortised=self._spans(told[0], self._prior()[:, :4]),
+            amortised=self._spans(estimates[0], self._prior()[:, :4]),
             bending=bending_table(self.space, found, self.settings.level), rounds=tuple(rounds),
             traces=self._traces(np.concatenate(points, axis=1), groups, metrics, embedded, ends), floor=floor,
             reached=reached, stopped=stopped, posterior=found, evaluators=self.evaluators,
@@ -199,13 +199,13 @@ class _Run:
             findings=self._findings(found, metrics, groups, embedded, reached), seed=self.settings.seed,
         )  # fmt: skip
 
-    def _first(self, told: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    def _first(self, estimates: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
         """(clip, θ, 17): draws of the amortised posteriors, widened; the cloth of each clip's in turn."""
         count = self.settings.fewest // self.settings.replicates
         rng = stream(self.settings.seed, OWN, "first")
-        wide = [start.widened(draws, self.settings.widening, self.space) for draws in told]
+        wide = [start.widened(draws, self.settings.widening, self.space) for draws in estimates]
         chosen = np.stack([draws[rng.choice(len(draws), count, replace=False)] for draws in wide])
-        turn = np.arange(count) % len(told)
+        turn = np.arange(count) % len(estimates)
         shared = chosen[turn, np.arange(count)]
         base = start.completed(self.space, shared, seed=self.settings.seed)
         return self._with_winds(base, chosen[:, :, 0])
@@ -236,9 +236,9 @@ class _Run:
             rows = np.concatenate([g.embedding for g in group])
             place = np.repeat(np.arange(len(group)), [len(g.embedding) for g in group])
             there = np.isfinite(rows).all(axis=1)
-            told = start.summaries(self.estimator, rows[there])
+            summaries = start.summaries(self.estimator, rows[there])
             known = regressors(self.space.reported(points[clip]), self.space)[place[there]]
-            models.append(Metamodel.fit(known, told, place[there]))
+            models.append(Metamodel.fit(known, summaries, place[there]))
         return posterior(self.space, models, observed, seed=child_seed(self.settings.seed, OWN, "posterior", number))
 
     def _prior(self) -> NDArray[np.float64]:

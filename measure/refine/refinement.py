@@ -20,8 +20,8 @@ from measure.refine.trace import Trace
 
 METHOD = (
     "Clips are simulated at draws of the network's posterior, then at draws of the refined one, in replicates, and "
-    "filmed as the target was. What the network tells of wind and area weight is regressed on the parameters; the "
-    "regression's predictive Student-t density is the likelihood of what it tells of the target (synthetic likelihood, "
+    "filmed as the target was. The network's estimates of wind and area weight are regressed on the parameters; the "
+    "regression's predictive Student-t density is the likelihood of its estimates of the target (synthetic likelihood, "
     "Wood 2010), and weighs draws of the prior."
 )
 
@@ -36,7 +36,7 @@ class Interval:
         median: of the posterior; None where its draws pile up at an end of the range beyond which there may be more.
         span: the central interval, or a bound on one side (`measure.ends`).
         prior_share: width of the central interval over that of the prior's of the same level: near 1 where the clip
-            tells nothing.
+            does not constrain it.
     """
 
     name: str
@@ -92,7 +92,7 @@ class Refinement:
         targets: what was measured.
         level: of all intervals.
         intervals: of `QUANTITIES`, then of the other clips' winds.
-        amortised: the same before any evaluation, as far as the network tells it, of the first target.
+        amortised: the network's own estimate of the same, before any evaluation, of the first target.
         bending: (15, 3) median and interval of each bending coefficient under its prior [N·m].
         rounds: in their order.
         traces: of each target, distances in the replicates' covariance.

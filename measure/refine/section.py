@@ -48,18 +48,18 @@ def section(refinement: Refinement, *, in_motion: bool = True) -> Markup:
 
 
 def _rows(refinement: Refinement) -> list[dict[str, str]]:
-    """The table of quantities: refined and, where the network tells it, amortised."""
+    """The table of quantities: refined and, where the network estimates it, amortised."""
     about = {quantity.name: quantity for quantity in QUANTITIES}
     before = {entry.name: entry for entry in refinement.amortised}
     rows = []
     for entry in refinement.intervals:
         name, _, clip = entry.name.partition(".")
         quantity = about[name]
-        told = "the clip tells little beyond what was assumed" if entry.prior_share > 0.9 else ""
+        note = "the clip hardly narrows the prior" if entry.prior_share > 0.9 else ""
         rows.append(
             {
                 "about": quantity.about + (f", clip {int(clip) + 1}" if clip else ""), "unit": quantity.unit,
-                "refined": entry.phrase(quantity.digits), "told": told,
+                "refined": entry.phrase(quantity.digits), "note": note,
                 "amortised": before[entry.name].phrase(quantity.digits) if entry.name in before else "",
             }
         )  # fmt: skip

@@ -3,7 +3,7 @@
 Runia et al. 2020, table 1: 15 bending coefficients, each a tenth to ten times its material's, area weight and wind
 speed. Bending is searched in logarithms, so that the centre is the material itself; its prior is what the scene's
 recipe draws, which may be uniform in the factor, or a mixture of what several draw. Single bending coefficients can
-hardly be told apart, so that three combinations of their logarithms are reported: scale, anisotropy and nonlinearity.
+hardly be separated, so that three combinations of their logarithms are reported: scale, anisotropy and nonlinearity.
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ class Space:
         return (low, high) if self.common is None else (low * self.common.low, high * self.common.high)
 
     @property
-    def told(self) -> tuple[Range, Range, Range, Range]:
+    def start_ranges(self) -> tuple[Range, Range, Range, Range]:
         """Ranges of wind, density, bending scale and anisotropy: of the latter two the prior's mean and `_REACH` of its
         standard deviations either way, within the box."""
         table = np.log10(self.material.bending)

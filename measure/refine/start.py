@@ -1,8 +1,8 @@
 """Where a refinement starts: draws of the amortised posterior, completed to 17 parameters by the prior.
 
-The network tells wind, density, scale and anisotropy of bending. The 15 coefficients follow from the prior given these
-two: of many prior draws the one whose scale and anisotropy are nearest is taken (sampling-importance-resampling with
-the narrowest kernel), so that the rest is as the prior has it.
+The network estimates wind, density, scale and anisotropy of bending. The 15 coefficients follow from the prior given
+these two: of many prior draws the one whose scale and anisotropy are nearest is taken (sampling-importance-resampling
+with the narrowest kernel), so that the rest is as the prior has it.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ from measure.refine.space import DENSITY, DIMENSION, WIND, Space
 from models.estimator import Estimator
 from models.restriction import Known
 
-TOLD = ("wind_speed", "density", "bending_scale", "anisotropy")
-"""Targets that a network must tell for a refinement to start from it."""
+TARGETS = ("wind_speed", "density", "bending_scale", "anisotropy")
+"""Targets that a network must estimate for a refinement to start from it."""
 SUMMARISED = ("wind_speed", "density")
-"""Targets whose estimates summarise a clip: networks tell next to nothing of bending (decision 025)."""
+"""Targets whose estimates summarise a clip: clips hardly constrain bending (decision 025)."""
 _POOL = 20_000
 _MARGIN = 1e-3  # of a logit's range: parameters at the very end of theirs have none
 
 
 def require(estimator: Estimator) -> None:
-    """Make sure that a network tells `TOLD`, each with a distribution.
+    """Refuse a network that does not estimate `TARGETS`, each with a distribution.
 
     Raises:
         InputError: it does not.
     """
     names = tuple(target.name for target in estimator.targets)
-    if any(name not in names for name in TOLD):
+    if any(name not in names for name in TARGETS):
         raise InputError(
-            f"the model tells {', '.join(names) or 'nothing'}, a refinement starts from {', '.join(TOLD)}",
+            f"the model estimates {', '.join(names) or 'nothing'}; a refinement needs {', '.join(TARGETS)}",
             where=f"model {estimator.name!r}", fix="take a model of the posterior loss with these targets",
         )  # fmt: skip
 
@@ -58,17 +58,17 @@ def summaries(estimator: Estimator, embedding: NDArray[np.float64]) -> NDArray[n
         return out
     rows = torch.from_numpy(embedding[finite]).to(estimator.device).float()
     widths = [int(learner.network.dimension) for learner in estimator.learners]  # pyright: ignore[reportArgumentType]
-    told: list[Tensor] = []
+    means: list[Tensor] = []
     for learner, part in zip(estimator.learners, rows.split(widths, dim=1), strict=True):
-        told.append(learner.mixture(part).mean() * learner.spread + learner.centre)
-    out[finite] = torch.stack(told).mean(dim=0)[:, columns].double().sigmoid().cpu().numpy()
+        means.append(learner.mixture(part).mean() * learner.spread + learner.centre)
+    out[finite] = torch.stack(means).mean(dim=0)[:, columns].double().sigmoid().cpu().numpy()
     return out
 
 
 def amortised(
     estimator: Estimator, clip: NDArray[np.uint8], space: Space, *, seed: int, draws: int
 ) -> NDArray[np.float64]:  # fmt: skip
-    """Draws of `TOLD` for a clip (frame, height, width): (draw, 4), in the targets' units. Where the space's area
+    """Draws of `TARGETS` for a clip (frame, height, width): (draw, 4), in the targets' units. Where the space's area
     weights are fewer than the network's, they are what is known of it."""
     target = next(target for target in estimator.targets if target.name == "density")
     low, high = max(space.density.low, target.low), min(space.density.high, target.high)
@@ -77,43 +77,43 @@ def amortised(
         known = Known.everywhere("density", low, high, count=1)
     found = estimator.estimate(estimator.inputs(clip[None]), seed=seed, draws=draws, known=known)
     names = [target.name for target in found.targets]
-    return found.draws[0][:, [names.index(name) for name in TOLD]].astype(np.float64)
+    return found.draws[0][:, [names.index(name) for name in TARGETS]].astype(np.float64)
 
 
 def _logits(values: NDArray[np.float64], space: Space) -> NDArray[np.float64]:
-    """Logits of the places of values (…, 4) of `TOLD` in the ranges of the space, much as networks learn them."""
+    """Logits of the places of values (…, 4) of `TARGETS` in the ranges of the space, much as networks learn them."""
     low, high = _ends(space)
     share = np.clip((values - low) / (high - low), _MARGIN, 1 - _MARGIN)
     return np.log(share / (1 - share))
 
 
 def _ends(space: Space) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(4,) lower and upper ends of `TOLD`."""
-    return np.array([entry.low for entry in space.told]), np.array([entry.high for entry in space.told])
+    """(4,) lower and upper ends of `TARGETS`."""
+    return np.array([entry.low for entry in space.start_ranges]), np.array([entry.high for entry in space.start_ranges])
 
 
 def widened(values: NDArray[np.float64], factor: float, space: Space) -> NDArray[np.float64]:
-    """Draws (n, 4) of `TOLD` with their logits' deviations from the mean enlarged."""
+    """Draws (n, 4) of `TARGETS` with their logits' deviations from the mean enlarged."""
     low, high = _ends(space)
     z = _logits(values, space)
     z = z.mean(axis=0) + factor * (z - z.mean(axis=0))
     return low + (high - low) / (1 + np.exp(-z))
 
 
-def completed(space: Space, told: NDArray[np.float64], *, seed: int) -> NDArray[np.float64]:
-    """Points (n, 17) of [−1, 1]¹⁷ with the wind and density of `told` (n, 4), and bending of the prior as near to its
+def completed(space: Space, given: NDArray[np.float64], *, seed: int) -> NDArray[np.float64]:
+    """Points (n, 17) of [−1, 1]¹⁷ with the wind and density of `given` (n, 4), and bending of the prior as near to its
     scale and anisotropy as 20,000 draws come, no draw twice."""
     pool = space.prior(stream(seed, "refine", "pool"), _POOL)
-    offered, wanted = space.reported(pool)[:, 2:4], told[:, 2:4]
+    offered, wanted = space.reported(pool)[:, 2:4], given[:, 2:4]
     spread = offered.std(axis=0)
     tree = KDTree(offered / spread)
     taken: set[int] = set()
-    out = np.empty((len(told), DIMENSION))
+    out = np.empty((len(given), DIMENSION))
     for i, row in enumerate(wanted / spread):
-        _, near = tree.query(row, k=len(told) + 1)
+        _, near = tree.query(row, k=len(given) + 1)
         place = next(int(n) for n in np.atleast_1d(near) if int(n) not in taken)
         taken.add(place)
         out[i] = pool[place]
     values = space.values(out)
-    values[:, DENSITY], values[:, WIND] = told[:, 1], told[:, 0]
+    values[:, DENSITY], values[:, WIND] = given[:, 1], given[:, 0]
     return space.unit(values)

@@ -3,7 +3,7 @@
 Films of six windows of 1.2 s are simulated of the cloths that the shipped model was trained on, each with a seed of its
 own (`measure.estimate.long_films`). One window of each: ranks of simulation-based calibration (Talts et al.,
 arXiv:1804.06788), coverage, and expected coverage by random points (TARP). Two, four and six: coverage, error and width
-of the answer that `flagdata measure` gives. How errors of two windows correlate is told by how far they are apart.
+of the answer that `flagdata measure` gives. Errors of two windows correlate by their distance in time.
 
 FLAGDATA_WINDOWS_FILMS says how many films (300).
 """
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from flagdata.console import progress
 from flagdata.rng import child_seed, stream
 from measure.estimate.combine import OWN, combined
-from measure.estimate.dependence import Told, of_model, told
+from measure.estimate.dependence import Posteriors, of_model, posteriors
 from measure.estimate.long_films import LongFilm, simulated
 from models import estimator
 from models.estimator import Estimator
@@ -44,7 +44,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     model = estimator.shipped()
     own, datasets = child_seed(seed, "measure-windows", "films"), list[str]()
     films = _noted(simulated(model, count=FILMS, windows=WINDOWS, seed=own), datasets)
-    found = told(model, films, draws=_DRAWS, seed=own)
+    found = posteriors(model, films, draws=_DRAWS, seed=own)
     answers = {count: _answers(model, found, count, seed=seed) for count in TOGETHER}
     resamples = Resamples.of(answers[1].group, generator=stream(seed, "measure-windows", "bootstrap"))
     dependence, dataset = of_model(model), np.array(datasets)
@@ -80,7 +80,7 @@ def _noted(films: Iterable[LongFilm], datasets: list[str]) -> Iterator[LongFilm]
             advance(1)
 
 
-def _answers(model: Estimator, found: Told, count: int, *, seed: int) -> Predictions:
+def _answers(model: Estimator, found: Posteriors, count: int, *, seed: int) -> Predictions:
     """What is said of each film by its first windows together, the wind their mean."""
     learner = model.learners[0]
     names = learner.scaling.quantities
@@ -102,7 +102,7 @@ def _answers(model: Estimator, found: Told, count: int, *, seed: int) -> Predict
     )  # fmt: skip
 
 
-def _correlations(found: Told) -> list[float]:
+def _correlations(found: Posteriors) -> list[float]:
     """Of the errors of the wind's logit, standardised, in windows that are 1, 2, … apart."""
     error = found.errors[..., found.names.index(WIND)]
     return [

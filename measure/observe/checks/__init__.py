@@ -1,4 +1,4 @@
-"""What can be wrong with a recording before any model is fitted: refused, or told, never left to look like physics.
+"""Errors of a recording, found before any model is fitted: refused or reported, never left to look like physics.
 
 `frames` looks at time, `shape` at the cloth's lengths, `attachment` at the pins, `surroundings` at wind and
 gravity, `inertia` at what they do to the motion.

@@ -20,7 +20,7 @@ _ELSEWHERE = 0.02  # of the cloth's size: pins of two recordings further apart a
 
 
 def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Refuse pins that move with the cloth, and tell those that move a little.
+    """Refuse pins that move with the cloth, and report those that move a little.
 
     Raises:
         InputError: a pin among the markers moves by more than three tenths of what the median marker does, or one
@@ -65,7 +65,7 @@ def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]
 
 
 def beside_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Tell markers away from the pins that stand as still as these: the cloth may be held there too."""
+    """Report markers away from the pins that stand as still as these: the cloth may be held there too."""
     moved = _motion(recording.positions, recording.noise)
     size = float(np.ptp(specimen.mesh.rest, axis=0).max())
     still = moved <= max(_STILL * size, recording.noise)

@@ -22,7 +22,7 @@ _JITTER = 0.1  # of a frame: times that are further off an even grid are not of 
 _REPEATED = 0.02  # of the usual squared step: a frame that moved less repeats the one before
 _MANY = 0.2  # of the frames: repeats that are so many mean a lower rate
 _FROZEN = 0.95  # of the frames: repeats that are so many are no repeats but a cloth that stands still
-_AROUND = 5  # frames on either side that tell the usual step
+_AROUND = 5  # frames on either side that give the usual step
 _NEIGHBOURS = 4
 _MOVED_ON = 20.0  # times the smallest steps there are: the neighbours of a stuck marker move as much
 _PINNED = 0.5  # of the frames: a marker that stands still in so many is held
@@ -43,7 +43,7 @@ def even(seen: Observation) -> Observation:
     if count < FEWEST or span < SHORTEST * (1 - 1e-9):
         raise InputError(
             f"{count} frames over {span:.3g} s", where=where,
-            fix=f"record at least {SHORTEST:g} s and {FEWEST} frames: less does not tell one effect from another",
+            fix=f"record at least {SHORTEST:g} s and {FEWEST} frames: with less, effects cannot be distinguished",
         )  # fmt: skip
     step = float(np.median(np.diff(seen.times)))
     if not _SLOWEST <= 1 / step <= _FASTEST:

@@ -5,8 +5,8 @@ momentum changes by what the air and gravity give. All but the wind's speed is s
 the balance holds is the wind that the motion shows. A rate that is twice the true one doubles it, a wind of 3.6 times
 the true one divides it by 3.6 in terms of the wind that is given.
 
-In calm air the balance tells nothing of the clock: the air's force and the inertia both go by the inverse square of
-the time. There a swinging cloth tells it, whose energy of motion comes from its height.
+In calm air the balance does not constrain the clock: the air's force and the inertia both go by the inverse square of
+the time. There a swinging cloth constrains it: its energy of motion comes from its height.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ _FACTORS = np.geomspace(1 / 12, 12, 241)  # of the wind, in steps of 2 %
 _EXPLAINED = 0.4  # of the moment's variance: a balance that explains less says nothing of the wind
 # The wind that the motion shows over the one given. In 72 recordings with and without strong effects (3 to 8 m/s, 25
 # and 60 Hz, 0 to 4 mm of noise) it is 0.81 to 1.09, once 1.36, once nothing: no false alarm, at most 4.1 % (95 %). With
-# the rate twice or half the true one, km/h for m/s or the reverse, 25 of them give 1.68 or more, 0.54 or less: told.
+# the rate twice or half the true one, km/h for m/s or the reverse, 25 of them give 1.68 or more, 0.54 or less:
+# reported.
 _SHOWN = (0.65, 1.5)
 _SWING = (0.4, 2.0)  # energy of motion over that from height; released reference runs give 0.77 to 0.87
 _CALM = 0.5  # m/s
@@ -62,7 +63,7 @@ class Motion:
 
 
 def check_inertia(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Tell a wind or a clock with which the cloth's inertia does not fit."""
+    """Report a wind or a clock with which the cloth's inertia does not fit."""
     if recording.wind.speed < _CALM:
         return _check_swing(recording, specimen)
     factor = wind_shown(recording, specimen)
@@ -113,7 +114,8 @@ def wind_shown(recording: Trajectory, specimen: Specimen) -> float | None:
 
 
 def swing(recording: Trajectory, specimen: Specimen) -> float | None:
-    """Growth of the energy of motion over loss of height, by least squares in time; None where neither tells the other.
+    """Growth of the energy of motion over loss of height, by least squares in time; None where neither determines the
+    other.
 
     It is 1 less what friction takes, and goes with the square of the frame rate.
     """

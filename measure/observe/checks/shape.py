@@ -142,7 +142,7 @@ def without_strays(seen: Observation, edges: Edges, sigma: float) -> Observation
 
 
 def check_cover(markers: Floats, corners: Floats, *, where: str) -> tuple[Finding, ...]:
-    """Tell parts of the cloth that are far from any marker.
+    """Report parts of the cloth that are far from any marker.
 
     Args:
         corners: (corner, 2) of its outline.

@@ -73,7 +73,7 @@ def check_up(recording: Trajectory, specimen: Specimen) -> None:
 
 
 def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Refuse a cloth that flies upwind, and tell one that flies far aside.
+    """Refuse a cloth that flies upwind, and report one that flies far aside.
 
     Raises:
         InputError: on the average it streams against the wind as it was given.
@@ -106,7 +106,7 @@ def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding,
 
 
 def check_strength(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Tell a cloth that hangs in a strong wind or flies in none: wrong units, or another wind than that at the flag."""
+    """Report a cloth that hangs in a strong wind or flies in none: wrong units, or not the wind at the flag."""
     ratio = _ratio(specimen, recording.wind)
     pins = centre_of_pins(recording, specimen)
     seats = specimen.mesh.rest[list(specimen.held)].mean(axis=0)
@@ -117,18 +117,18 @@ def check_strength(recording: Trajectory, specimen: Specimen) -> tuple[Finding, 
     calm, strong = ratio < _CALM and out > _FLAT, ratio > _STRONG and out < _LIMP
     if not (calm or strong):
         return ()
-    told = "flies nearly flat, though its wind" if calm else "hangs limp, though its wind"
+    motion = "flies nearly flat, though its wind" if calm else "hangs limp, though its wind"
     return (
         Finding(
             kind="wind-does-not-fit", severity=Severity.WARNING, where=f"recording {recording.name!r}", value=ratio,
-            what=f"the cloth {told} of {recording.wind.speed:.3g} m/s has {ratio:.2g} times the force of its weight",
+            what=f"the cloth {motion} of {recording.wind.speed:.3g} m/s has {ratio:.2g} times the force of its weight",
             fix="check the unit of the wind, and the clock of its log",
         ),
     )  # fmt: skip
 
 
 def check_sides(recording: Trajectory) -> tuple[Finding, ...]:
-    """Tell rest coordinates whose v runs downward: top and bottom, and the two faces, are exchanged."""
+    """Report rest coordinates whose v runs downward: top and bottom, and the two faces, are exchanged."""
     design = np.concatenate([recording.markers, np.ones((len(recording.markers), 1))], axis=1)
     slope = np.linalg.lstsq(design, recording.positions.mean(axis=0), rcond=None)[0]
     if slope[1, 2] > -_DOWNWARD:

@@ -72,7 +72,7 @@ def test_an_end_that_nothing_bounds_is_null_in_json_and_no_value_is_given() -> N
 
 def test_draws_at_both_ends_of_the_range_are_not_told() -> None:
     nothing = Span(low=0.0, high=math.inf, level=1.0, bound=Bound.NOTHING, estimated=False)
-    assert not replace(STRONG, span=nothing).told
+    assert not replace(STRONG, span=nothing).constrained
 
 
 def test_the_weight_of_a_small_flag_is_told_to_a_gram() -> None:
@@ -105,8 +105,8 @@ def found(
 def test_a_posterior_that_is_the_prior_tells_nothing_and_a_narrow_one_does() -> None:
     rng = stream(2, "told")
     prior = rng.uniform(0.1, 0.17, size=(5000, 1))
-    assert not found(rng.uniform(0.1, 0.17, size=(400, 1)), prior, "density", assumed=(0.1, 0.17)).told
-    assert found(rng.normal(0.13, 0.01, size=(400, 1)), prior, "density", assumed=(0.1, 0.17)).told
+    assert not found(rng.uniform(0.1, 0.17, size=(400, 1)), prior, "density", assumed=(0.1, 0.17)).constrained
+    assert found(rng.normal(0.13, 0.01, size=(400, 1)), prior, "density", assumed=(0.1, 0.17)).constrained
 
 
 def test_the_interval_holds_its_share_of_the_draws() -> None:

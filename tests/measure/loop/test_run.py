@@ -210,7 +210,7 @@ def test_a_bank_of_other_segments_is_refused(specimen: Specimen, bank: Path) -> 
 
 
 def test_a_bank_with_anchors_known_in_another_way_is_refused(specimen: Specimen, bank: Path) -> None:
-    data = recorded(replace(specimen, anchors_told=False), seed=5)
+    data = recorded(replace(specimen, anchors_given=False), seed=5)
     with pytest.raises(InputError, match="anchors were told, those of the recordings are taken from where"):
         close_loop(data, Options(bank=bank, level=0.1))
 

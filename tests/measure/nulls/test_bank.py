@@ -25,7 +25,7 @@ CLOTHS = (Calibration(density=1.2, damping=2e-3), Calibration(density=0.8, bendi
 @pytest.fixture(scope="module")
 def batch(specimen: Specimen) -> NullBatch:
     """Two cloths, each in two winds, on soft springs: anchors are seen some millimetres downstream of themselves."""
-    soft = replace(specimen, stiffness=100.0, anchors_told=False)
+    soft = replace(specimen, stiffness=100.0, anchors_given=False)
     return NullBatch(
         specimen=soft, markers=specimen.mesh.rest, rate=25.0, duration=2.4, noise=0.0, seed=4,
         calibrations=tuple(cloth for cloth in CLOTHS for _ in range(2)), speeds=(4.0, 6.0, 4.0, 6.0),
@@ -50,8 +50,8 @@ def test_anchors_that_are_not_told_are_taken_from_the_recordings_of_each_cloth(b
         np.testing.assert_allclose(found.calibration, np.tile(steps, (len(segments), 1)))
 
 
-def test_anchors_that_are_told_are_those_of_the_simulation(batch: NullBatch) -> None:
-    told = replace(batch, specimen=replace(batch.specimen, anchors_told=True))
-    unlike, like = (evaluate(own, 0, (LEAN,))[0].statistics for own in (batch, told))
+def test_given_anchors_are_those_of_the_simulation(batch: NullBatch) -> None:
+    given = replace(batch, specimen=replace(batch.specimen, anchors_given=True))
+    unlike, like = (evaluate(own, 0, (LEAN,))[0].statistics for own in (batch, given))
     # Anchors a stretch too far downstream: the model's own springs draw it once more, and all errors grow.
     assert like.error.mean() < unlike.error.mean()

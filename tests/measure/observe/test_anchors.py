@@ -45,8 +45,8 @@ def test_what_was_filled_in_does_not_move_an_anchor(specimen: Specimen) -> None:
     )
 
 
-@pytest.mark.parametrize("told", [True, False])
-def test_what_is_told_stays(specimen: Specimen, told: bool) -> None:
-    known = replace(specimen, anchors_told=told)
+@pytest.mark.parametrize("given", [True, False])
+def test_given_anchors_stay(specimen: Specimen, given: bool) -> None:
+    known = replace(specimen, anchors_given=given)
     found = as_seen(known, [flat(specimen, "a", PULL, 20)])
-    np.testing.assert_allclose(found.anchors - specimen.anchors, np.zeros((2, 3)) + (0 if told else PULL), atol=1e-12)
+    np.testing.assert_allclose(found.anchors - specimen.anchors, np.zeros((2, 3)) + (0 if given else PULL), atol=1e-12)

@@ -66,10 +66,10 @@ def test_a_common_factor_widens_the_box_and_moves_all_coefficients_together() ->
     np.testing.assert_allclose(np.cov(logs[:, 0], logs[:, 1])[0, 1], np.log(32) ** 2 / 12, rtol=0.05)
 
 
-def test_draws_of_the_prior_lie_within_what_is_told_of_the_space() -> None:
+def test_draws_of_the_prior_lie_within_the_start_ranges() -> None:
     space = Space.of(load("flag-fabrics"))
-    told = space.reported(space.prior(np.random.default_rng(2), 5_000))[:, :4]
-    for column, entry in zip(told.T, space.told, strict=True):
+    drawn = space.reported(space.prior(np.random.default_rng(2), 5_000))[:, :4]
+    for column, entry in zip(drawn.T, space.start_ranges, strict=True):
         assert entry.low <= column.min() <= column.max() <= entry.high
 
 
