@@ -26,7 +26,7 @@ WIND = Quantity(
 WEIGHT = Quantity(
     name="density", unit="kg/m²", value=0.13, sigma=0.014, span=whole(0.11, 0.16), assumed=(0.1, 0.17), information=0.3
 )
-UNTOLD = Quantity(
+UNCONSTRAINED = Quantity(
     name="density", unit="kg/m²", value=0.135, sigma=0.02, span=whole(0.1, 0.17), assumed=(0.1, 0.17), information=0.001
 )
 STRONG = Quantity(
@@ -43,11 +43,11 @@ def test_the_answer_is_one_line() -> None:
     assert sentence([WIND, WEIGHT]) == "wind 4.3 m/s [3.9, 4.8] 90 %, area weight 0.13 kg/m² [0.11, 0.16]"
 
 
-def test_what_the_film_did_not_tell_is_said_so() -> None:
-    assert sentence([WIND, UNTOLD]) == (
-        "wind 4.3 m/s [3.9, 4.8] 90 %; area weight: not told by this clip; 0.10 to 0.17 kg/m² is what was assumed"
+def test_a_quantity_without_information_is_reported_with_its_prior_range() -> None:
+    assert sentence([WIND, UNCONSTRAINED]) == (
+        "wind 4.3 m/s [3.9, 4.8] 90 %; area weight: not constrained by this clip (prior range 0.10 to 0.17 kg/m²)"
     )
-    assert sentence([UNTOLD]).startswith("area weight: not told")
+    assert sentence([UNCONSTRAINED]).startswith("area weight: not constrained")
 
 
 def test_a_wind_at_the_end_of_what_the_model_knows_is_bounded_on_one_side_with_the_reason() -> None:
@@ -55,7 +55,7 @@ def test_a_wind_at_the_end_of_what_the_model_knows_is_bounded_on_one_side_with_t
         "wind at least 9.4 m/s, 95 % (the model's range ends at 10.0 m/s), "
         "area weight 0.13 kg/m² [0.11, 0.16] 90 %"
     )  # fmt: skip
-    assert sentence([CALM, UNTOLD]).startswith("wind at most 0.5 m/s, 95 %; area weight: not told")
+    assert sentence([CALM, UNCONSTRAINED]).startswith("wind at most 0.5 m/s, 95 %; area weight: not constrained")
     finding = STRONG.finding()
     assert finding is not None
     assert finding.kind == "wind-speed-at-end"

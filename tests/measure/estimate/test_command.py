@@ -102,7 +102,7 @@ def measurements(lake: Path) -> Sequence[dict[str, object]]:
 def test_a_video_file_is_answered_in_one_line(film: Path, model_folder: Path) -> None:
     done = run(film, *SIZED, "--model", model_folder, "--anyway")
     assert len(done.stdout.splitlines()) == 1
-    assert re.search(r"wind(: not told by this clip| \d+\.\d m/s \[\d+\.\d, \d+\.\d\] 90 %)", done.stdout)
+    assert re.search(r"wind(: not constrained by this clip| \d+\.\d m/s \[\d+\.\d, \d+\.\d\] 90 %)", done.stdout)
 
 
 def test_the_shipped_model_measures_a_file_without_any_option_but_the_films(tmp_path: Path) -> None:

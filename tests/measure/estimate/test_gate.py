@@ -108,7 +108,7 @@ def test_a_gate_of_too_few_clips_to_tell_the_rate_is_refused_and_lets_nothing_pa
     """Of 15 clips the smallest p is 1/16, above any level of a rate of 5 %."""
     rng = stream(2, "cloud")
     gate = FamiliarityGate(cloud=Familiarity.of(rng.normal(size=(300, 3)), rng.normal(size=(15, 3))))
-    with pytest.raises(InputError, match="15 validation clips cannot tell"):
+    with pytest.raises(InputError, match="15 validation clips are too few"):
         verdict([[reason(0.5)]], false_alarm=0.05, level=gate.level)
 
 

@@ -117,7 +117,7 @@ def test_the_level_leaves_room_for_few_calibration_clips(model: Estimator, gate:
 def test_frames_that_are_no_window_are_an_error(model: Estimator, gate: Gate) -> None:
     with pytest.raises(InputError, match="one window of the film"):
         judge(clip(1, frames=20), model, gate)
-    with pytest.raises(InputError, match="calibration clips cannot tell"):
+    with pytest.raises(InputError, match="calibration clips are too few"):
         judge(clip(1)[:12], model, gate, false_alarm=0.01)
 
 
