@@ -11,6 +11,7 @@ import pytest
 from flagdata.errors import FlagdataError, InputError, TimeError, UnknownNameError, UsageError
 from flagdata.ingest.anemometer.draft.questions import OpenFactsError
 from flagdata.schema import SampleFlag
+from tests.flagdata.ingest.anemometer.cases import case
 
 Check = Callable[..., None]
 
@@ -38,454 +39,128 @@ NEXT = "2026-05-01T12:00:01Z,3.2"
 DATE = {"date": dt.date(2026, 5, 1)}
 
 REFUSED = [
-    pytest.param(
-        {
-            "content": csv("2026-05-01T12:00:00Z,3,4", header="time,wind_speed,wind_speed"),
-            "error": InputError,
-            "says": "2 columns are called 'wind_speed'",
-        },
-        id="column-twice",
-    ),
-    pytest.param({"content": csv(), "error": InputError, "where": "line 2", "says": "no row"}, id="header-only"),
-    pytest.param({"content": b"time,wind_speed", "error": InputError, "says": "no row"}, id="header-without-line-end"),
-    pytest.param({"content": csv("", "", ""), "error": InputError, "says": "no row"}, id="header-and-blank-lines"),
-    pytest.param(
-        {"content": csv("2026-05-01T12:00:00,3"), "error": TimeError, "where": "line 2", "says": "--zone"}, id="no-zone"
-    ),
-    pytest.param(
-        {
-            "content": csv("2026-05-01 12:00:00,3"),
-            "error": UnknownNameError,
-            "says": "Europe/Amsterdam",
-            "options": {"zone": "Europe/Amsterdm"},
-        },
-        id="wrong-zone-name",
-    ),
-    pytest.param(
-        {"content": csv("2026-05-01 12:00:00,3"), "error": TimeError, "options": {"zone": "+15:00"}},
-        id="zone-beyond-14-h",
-    ),
-    pytest.param(
-        {
-            "content": csv("2026-03-29 02:30:00,3"),
-            "error": TimeError,
-            "where": "line 2",
-            "says": "does not exist",
-            "options": {"zone": "Europe/Amsterdam"},
-        },
-        id="time-set-forward",
-    ),
-    pytest.param(
-        {
-            "content": csv("2026-10-25 02:30:00,3"),
-            "error": TimeError,
-            "where": "line 2",
-            "says": "occurs twice",
-            "options": {"zone": "Europe/Amsterdam"},
-        },
-        id="time-set-back",
-    ),
-    pytest.param(
-        {"content": csv("yesterday,3", "today,4"), "error": InputError, "where": "line 2"}, id="no-stamp-readable"
-    ),
-    pytest.param({"content": csv("2026-13-01T12:00:00Z,3"), "error": InputError, "where": "line 2"}, id="month-13"),
-    pytest.param({"content": csv("2026-02-30T12:00:00Z,3"), "error": InputError, "where": "line 2"}, id="30-february"),
-    pytest.param({"content": csv("2026-02-29T12:00:00Z,3"), "error": InputError}, id="29-february-in-a-common-year"),
-    pytest.param({"content": csv("2026-05-01T25:00:00Z,3"), "error": InputError, "where": "line 2"}, id="hour-25"),
-    pytest.param({"content": csv("2026-05-01T12:60:00Z,3"), "error": InputError, "where": "line 2"}, id="minute-60"),
-    pytest.param({"content": csv("0000-05-01T12:00:00Z,3"), "error": InputError, "where": "line 2"}, id="year-0000"),
-    pytest.param(
-        {"content": csv(ROW, "x,1", "y,2", "z,3"), "error": InputError, "says": "3 of 4"}, id="most-stamps-bad"
-    ),
-    pytest.param({"content": stamped("a", "b", "d", "3"), "error": InputError, "says": "3 of 4"}, id="most-values-bad"),
-    pytest.param(
-        {"content": stamped("", "NaN", "---", "n/a"), "error": InputError, "says": "not one value"},
-        id="all-values-missing",
-    ),
-    pytest.param(
-        {"content": csv("a,b,c,d", "a,b,c,d", ROW), "error": InputError, "where": "line 2"}, id="most-lines-ragged"
-    ),
-    pytest.param(
-        {"content": csv("2026-05-01T12:00:00Z;3.1", "2026-05-01T12:00:01Z;3.1"), "error": InputError},
-        id="other-delimiter",
-    ),
-    pytest.param(
-        {"content": csv(ROW, header="time,speed"), "error": OpenFactsError, "says": "--unit"}, id="column-missing"
-    ),
-    pytest.param(
-        {
-            "content": csv(ROW, header="time,wind_sped"),
-            "error": InputError,
-            "says": "did you mean 'wind_sped'",
-            "options": {"recipe": "generic-csv"},
-        },
-        id="column-missing-recipe-named",
-    ),
-    pytest.param(
-        {
-            "content": csv(ROW),
-            "error": UnknownNameError,
-            "says": "did you mean 'generic-csv'",
-            "options": {"recipe": "generic-cvs"},
-        },
-        id="recipe-unknown",
-    ),
-    pytest.param(
-        {
-            "content": csv(ROW),
-            "error": FlagdataError,
-            "says": "no such recipe file",
-            "options": {"recipe": "/nowhere/x.toml"},
-        },
-        id="recipe-file-absent",
-    ),
-    pytest.param(
-        {"content": csv(ROW), "error": UnknownNameError, "says": "did you mean 'nmea'", "options": {"format": "nmae"}},
-        id="format-unknown",
-    ),
-    pytest.param(
-        {"content": csv(ROW), "error": OpenFactsError, "says": "--unit", "options": {"format": "delimited"}},
-        id="format-without-recipe",
-    ),
-    pytest.param(
-        {"content": csv(ROW), "error": UsageError, "says": "--date is not used", "options": DATE},
-        id="option-of-another-format",
-    ),
-    pytest.param(
-        {"content": csv(ROW, NEXT), "error": UsageError, "options": {"azimuth": 1.0}}, id="azimuth-without-components"
-    ),
-    pytest.param(
-        {"content": csv(ROW), "error": InputError, "says": "no encoding", "options": {"encoding": "utf-99"}},
-        id="encoding-unknown",
-    ),
-    pytest.param(
-        {"content": csv(ROW), "error": InputError, "options": {"encoding": "base64"}}, id="encoding-not-of-text"
-    ),
-    pytest.param(
-        {
-            "content": "time,wind_speed\n2026-05-01T12:00:00Z,3 §\n".encode("cp1252"),
-            "error": InputError,
-            "where": "line 2",
-            "says": "cp1252",
-            "options": {"encoding": "utf-8"},
-        },
-        id="encoding-wrong",
-    ),
-    pytest.param(
-        {
-            "error": TimeError,
-            "where": "line 32",
-            "says": "split the file",
-            "content": csv(
-                *(f"2026-05-01T13:00:{i:02d}Z,3" for i in range(30)),
-                *(f"2026-05-01T12:00:{i:02d}Z,3" for i in range(30)),
-            ),
-        },
-        id="clock-set-back-an-hour",
-    ),
-    pytest.param(
-        {
-            "error": TimeError,
-            "says": "backwards",
-            "content": csv(*(f"2026-05-01T12:{(37 * i) % 60:02d}:00Z,3" for i in range(40))),
-        },
-        id="time-all-mixed-up",
-    ),
-    pytest.param(
-        {
-            "content": stamped(*GOOD),
-            "error": FlagdataError,
-            "says": "nowhere idle",
-            "options": {"zero_offset": "estimate"},
-        },
-        id="estimate-of-zero-without-idling",
-    ),
-]
+    case("column-twice", content=csv("2026-05-01T12:00:00Z,3,4", header="time,wind_speed,wind_speed"),
+         error=InputError, says="2 columns are called 'wind_speed'"),
+    case("header-only", content=csv(), error=InputError, where="line 2", says="no row"),
+    case("header-without-line-end", content=b"time,wind_speed", error=InputError, says="no row"),
+    case("header-and-blank-lines", content=csv("", "", ""), error=InputError, says="no row"),
+    case("no-zone", content=csv("2026-05-01T12:00:00,3"), error=TimeError, where="line 2", says="--zone"),
+    case("wrong-zone-name", content=csv("2026-05-01 12:00:00,3"), error=UnknownNameError, says="Europe/Amsterdam",
+         options={"zone": "Europe/Amsterdm"}),
+    case("zone-beyond-14-h", content=csv("2026-05-01 12:00:00,3"), error=TimeError, options={"zone": "+15:00"}),
+    case("time-set-forward", content=csv("2026-03-29 02:30:00,3"), error=TimeError, where="line 2",
+         says="does not exist", options={"zone": "Europe/Amsterdam"}),
+    case("time-set-back", content=csv("2026-10-25 02:30:00,3"), error=TimeError, where="line 2", says="occurs twice",
+         options={"zone": "Europe/Amsterdam"}),
+    case("no-stamp-readable", content=csv("yesterday,3", "today,4"), error=InputError, where="line 2"),
+    case("month-13", content=csv("2026-13-01T12:00:00Z,3"), error=InputError, where="line 2"),
+    case("30-february", content=csv("2026-02-30T12:00:00Z,3"), error=InputError, where="line 2"),
+    case("29-february-in-a-common-year", content=csv("2026-02-29T12:00:00Z,3"), error=InputError),
+    case("hour-25", content=csv("2026-05-01T25:00:00Z,3"), error=InputError, where="line 2"),
+    case("minute-60", content=csv("2026-05-01T12:60:00Z,3"), error=InputError, where="line 2"),
+    case("year-0000", content=csv("0000-05-01T12:00:00Z,3"), error=InputError, where="line 2"),
+    case("most-stamps-bad", content=csv(ROW, "x,1", "y,2", "z,3"), error=InputError, says="3 of 4"),
+    case("most-values-bad", content=stamped("a", "b", "d", "3"), error=InputError, says="3 of 4"),
+    case("all-values-missing", content=stamped("", "NaN", "---", "n/a"), error=InputError, says="not one value"),
+    case("most-lines-ragged", content=csv("a,b,c,d", "a,b,c,d", ROW), error=InputError, where="line 2"),
+    case("other-delimiter", content=csv("2026-05-01T12:00:00Z;3.1", "2026-05-01T12:00:01Z;3.1"), error=InputError),
+    case("column-missing", content=csv(ROW, header="time,speed"), error=OpenFactsError, says="--unit"),
+    case("column-missing-recipe-named", content=csv(ROW, header="time,wind_sped"), error=InputError,
+         says="did you mean 'wind_sped'", options={"recipe": "generic-csv"}),
+    case("recipe-unknown", content=csv(ROW), error=UnknownNameError, says="did you mean 'generic-csv'",
+         options={"recipe": "generic-cvs"}),
+    case("recipe-file-absent", content=csv(ROW), error=FlagdataError, says="no such recipe file",
+         options={"recipe": "/nowhere/x.toml"}),
+    case("format-unknown", content=csv(ROW), error=UnknownNameError, says="did you mean 'nmea'",
+         options={"format": "nmae"}),
+    case("format-without-recipe", content=csv(ROW), error=OpenFactsError, says="--unit",
+         options={"format": "delimited"}),
+    case("option-of-another-format", content=csv(ROW), error=UsageError, says="--date is not used", options=DATE),
+    case("azimuth-without-components", content=csv(ROW, NEXT), error=UsageError, options={"azimuth": 1.0}),
+    case("encoding-unknown", content=csv(ROW), error=InputError, says="no encoding", options={"encoding": "utf-99"}),
+    case("encoding-not-of-text", content=csv(ROW), error=InputError, options={"encoding": "base64"}),
+    case("encoding-wrong", content="time,wind_speed\n2026-05-01T12:00:00Z,3 §\n".encode("cp1252"), error=InputError,
+         where="line 2", says="cp1252", options={"encoding": "utf-8"}),
+    case("clock-set-back-an-hour", error=TimeError, where="line 32", says="split the file",
+         content=csv(*(f"2026-05-01T13:00:{i:02d}Z,3" for i in range(30)), *(f"2026-05-01T12:00:{i:02d}Z,3"
+             for i in range(30)))),
+    case("time-all-mixed-up", error=TimeError, says="backwards",
+         content=csv(*(f"2026-05-01T12:{(37 * i) % 60:02d}:00Z,3" for i in range(40)))),
+    case("estimate-of-zero-without-idling", content=stamped(*GOOD), error=FlagdataError, says="nowhere idle",
+         options={"zero_offset": "estimate"}),
+]  # fmt: skip
 REPORTED = [
-    pytest.param(
-        {
-            "finding": "newest-first",
-            "count": 40,
-            "samples": 40,
-            "content": csv(*(f"2026-05-01T12:{59 - i:02d}:00Z,3" for i in range(40))),
-        },
-        id="newest-first",
-    ),
-    pytest.param(
-        {
-            "content": csv(ROW, "when?,3", NEXT),
-            "finding": "unreadable-stamps",
-            "count": 1,
-            "where": "line 3",
-            "samples": 2,
-        },
-        id="unreadable-stamp",
-    ),
-    pytest.param(
-        {"content": csv(ROW, "2026-05-01T12:00:60Z,3", NEXT), "finding": "unreadable-stamps", "count": 1},
-        id="second-60",
-    ),
-    pytest.param(
-        {
-            "content": stamped("3", "abc", "4", "5"),
-            "finding": "unreadable-values",
-            "count": 1,
-            "where": "line 3",
-            "flag": SampleFlag.MISSING,
-            "flagged": 1,
-            "samples": 4,
-        },
-        id="unreadable-value",
-    ),
-    pytest.param(
-        {
-            "content": stamped("3", "NaN", "4"),
-            "finding": "missing-values",
-            "count": 1,
-            "flag": SampleFlag.MISSING,
-            "flagged": 1,
-        },
-        id="nan",
-    ),
-    pytest.param({"content": stamped("3", "nan", "4"), "finding": "missing-values", "count": 1}, id="nan-lower"),
-    pytest.param(
-        {"content": stamped("3", "---", "4"), "finding": "missing-values", "count": 1, "where": "line 3"}, id="dashes"
-    ),
-    pytest.param({"content": stamped("3", "", "4"), "finding": "missing-values", "count": 1}, id="empty-value"),
-    pytest.param({"content": stamped("3", "   ", "4"), "finding": "missing-values", "count": 1}, id="blank-value"),
-    pytest.param(
-        {
-            "content": stamped("3", "inf", "4"),
-            "finding": "out-of-range",
-            "count": 1,
-            "flag": SampleFlag.OUT_OF_RANGE,
-            "flagged": 1,
-        },
-        id="infinity",
-    ),
-    pytest.param(
-        {"content": stamped("3", "-Infinity", "4"), "finding": "out-of-range", "count": 1}, id="minus-infinity"
-    ),
-    pytest.param({"content": stamped("3", "1e999", "4"), "finding": "out-of-range", "count": 1}, id="overflow"),
-    pytest.param(
-        {"content": stamped("3", "1.#INF", "4"), "finding": "out-of-range", "count": 1}, id="microsoft-infinity"
-    ),
-    pytest.param({"content": stamped("3", "0x10", "4"), "finding": "unreadable-values", "count": 1}, id="hexadecimal"),
-    pytest.param(
-        {
-            "content": csv(ROW, '2026-05-01T12:00:01Z,"3,2"', "2026-05-01T12:00:02Z,3"),
-            "finding": "unreadable-values",
-            "count": 1,
-        },
-        id="decimal-comma",
-    ),
-    pytest.param(
-        {
-            "content": csv(ROW, '2026-05-01T12:00:01Z,"1,003.2"', "2026-05-01T12:00:02Z,3"),
-            "finding": "unreadable-values",
-            "count": 1,
-        },
-        id="thousands",
-    ),
-    pytest.param(
-        {"content": stamped("3", "4 m/s", "4"), "finding": "unreadable-values", "count": 1}, id="unit-in-cell"
-    ),
-    pytest.param(
-        {
-            "content": stamped("3", "-0.4", "4"),
-            "finding": "negative-speed",
-            "count": 1,
-            "where": "line 3",
-            "flag": SampleFlag.OUT_OF_RANGE,
-            "flagged": 1,
-        },
-        id="negative",
-    ),
-    pytest.param(
-        {"content": stamped("3", "-0.01", "4"), "finding": "negative-speed", "count": 1}, id="minus-zero-point-zero-one"
-    ),
-    pytest.param(
-        {
-            "content": csv(ROW, "2026-05-01T12:00:01Z,3,4", "2026-05-01T12:00:02Z,3"),
-            "finding": "malformed-lines",
-            "count": 1,
-            "where": "line 3",
-            "samples": 2,
-        },
-        id="too-many-cells",
-    ),
-    pytest.param(
-        {
-            "content": csv(ROW, "2026-05-01T12:00:01Z", "2026-05-01T12:00:02Z,3"),
-            "finding": "malformed-lines",
-            "count": 1,
-            "where": "line 3",
-        },
-        id="too-few-cells",
-    ),
-    pytest.param(
-        {
-            "content": csv(ROW, '2026-05-01T12:00:01Z,"3', "2026-05-01T12:00:02Z,3"),
-            "finding": "malformed-lines",
-            "count": 1,
-            "where": "line 3",
-            "samples": 2,
-        },
-        id="unclosed-quote",
-    ),
-    pytest.param(
-        {"content": csv(ROW, NEXT) + b"2026-05-01T12:0", "finding": "cut-off", "where": "line 4", "samples": 2},
-        id="cut-off-in-a-stamp",
-    ),
-    pytest.param(
-        {"content": csv(ROW, "time,wind_speed", NEXT), "finding": "unreadable-stamps", "count": 1, "where": "line 3"},
-        id="repeated-header",
-    ),
-    pytest.param(
-        {"content": stamped(*GOOD) + bytes(200), "finding": "nul-bytes", "count": 200, "samples": 20}, id="nul-tail"
-    ),
-    pytest.param(
-        {"content": stamped("3", "4\x00", "4"), "finding": "unreadable-values", "count": 1}, id="nul-in-a-value"
-    ),
-    pytest.param(
-        {"content": b"time,wind_speed\r\n" + f"{ROW}\n{NEXT}\r\n".encode(), "finding": "mixed-line-ends", "samples": 2},
-        id="mixed-line-ends",
-    ),
-    pytest.param(
-        {
-            "content": "time,wind_speed,ort\n2026-05-01T12:00:00Z,3,Köln\n".encode("latin-1"),
-            "finding": "encoding-assumed",
-            "samples": 1,
-        },
-        id="latin-1",
-    ),
-    pytest.param(
-        {
-            "content": csv(
-                ROW,
-                NEXT,
-                NEXT,
-                "2026-05-01T12:00:02Z,3",
-                "2026-05-01T12:00:03Z,4",
-                "2026-05-01T12:00:04Z,3",
-                "2026-05-01T12:00:05Z,4",
-            ),
-            "finding": "duplicate-rows",
-            "count": 1,
-            "where": "line 4",
-            "samples": 6,
-        },
-        id="duplicate-row",
-    ),
-    pytest.param(
-        {
-            "finding": "duplicate-stamps",
-            "count": 1,
-            "where": "line 4",
-            "samples": 5,
-            "content": csv(
-                ROW,
-                NEXT,
-                "2026-05-01T12:00:01Z,9",
-                "2026-05-01T12:00:02Z,3",
-                "2026-05-01T12:00:03Z,4",
-                "2026-05-01T12:00:04Z,4",
-            ),
-        },
-        id="duplicate-stamp-other-value",
-    ),
-    pytest.param(
-        {
-            "finding": "coarse-stamps",
-            "count": 40,
-            "flag": SampleFlag.TIME_UNSURE,
-            "flagged": 40,
-            "samples": 40,
-            "content": csv(*(f"2026-05-01T12:00:{i // 4:02d}Z,{3 + i % 5}" for i in range(40))),
-        },
-        id="whole-seconds-at-4-hz",
-    ),
-    pytest.param(
-        {
-            "finding": "time-backwards",
-            "count": 1,
-            "where": "line 4",
-            "flag": SampleFlag.TIME_UNSURE,
-            "flagged": 1,
-            "content": csv(ROW, "2026-05-01T12:00:02Z,3", NEXT, "2026-05-01T12:00:03Z,3"),
-            "samples": 4,
-        },
-        id="a-second-late",
-    ),
-    pytest.param(
-        {
-            "finding": "time-backwards",
-            "count": 1,
-            "where": "line 12",
-            "samples": 19,
-            "content": csv(
-                *(f"{('1980-01-01' if i == 10 else '2026-05-01')}T12:00:{i:02d}Z,{v}" for i, v in enumerate(GOOD))
-            ),
-        },
-        id="one-stamp-of-1980",
-    ),
-    pytest.param(
-        {
-            "finding": "time-backwards",
-            "count": 1,
-            "where": "line 12",
-            "samples": 19,
-            "content": csv(
-                *(f"{('2099-01-01' if i == 10 else '2026-05-01')}T12:00:{i:02d}Z,{v}" for i, v in enumerate(GOOD))
-            ),
-        },
-        id="one-stamp-of-2099",
-    ),
-    pytest.param(
-        {
-            "finding": "gaps",
-            "count": 1,
-            "where": "line 12",
-            "samples": 20,
-            "content": csv(*(f"2026-05-01T12:00:{i + 7 * (i >= 10):02d}Z,{v}" for i, v in enumerate(GOOD))),
-        },
-        id="gap",
-    ),
-    pytest.param(
-        {
-            "finding": "clocks-set-back",
-            "count": 120,
-            "samples": 180,
-            "options": {"zone": "Europe/Amsterdam"},
-            "content": csv(
-                *(f"2026-10-25 01:{m:02d}:00,3" for m in range(60)),
-                *(f"2026-10-25 02:{m:02d}:00,4" for m in range(60)),
-                *(f"2026-10-25 02:{m:02d}:00,5" for m in range(60)),
-            ),
-        },
-        id="hour-that-occurs-twice",
-    ),
-    pytest.param(
-        {
-            "finding": "stale-repeats",
-            "count": 30,
-            "flag": SampleFlag.STALE,
-            "flagged": 30,
-            "content": stamped(*GOOD, *["7.7"] * 31, *GOOD),
-        },
-        id="stuck",
-    ),
-    pytest.param(
-        {
-            "finding": "dead-zone",
-            "count": 3,
-            "flag": SampleFlag.DEAD_ZONE,
-            "flagged": 3,
-            "content": stamped("3", "0", "0", "0", "2"),
-        },
-        id="calm-below-the-threshold",
-    ),
-]
+    case("newest-first", finding="newest-first", count=40, samples=40,
+         content=csv(*(f"2026-05-01T12:{59 - i:02d}:00Z,3" for i in range(40)))),
+    case("unreadable-stamp", content=csv(ROW, "when?,3", NEXT), finding="unreadable-stamps", count=1, where="line 3",
+         samples=2),
+    case("second-60", content=csv(ROW, "2026-05-01T12:00:60Z,3", NEXT), finding="unreadable-stamps", count=1),
+    case("unreadable-value", content=stamped("3", "abc", "4", "5"), finding="unreadable-values", count=1,
+         where="line 3", flag=SampleFlag.MISSING, flagged=1, samples=4),
+    case("nan", content=stamped("3", "NaN", "4"), finding="missing-values", count=1, flag=SampleFlag.MISSING,
+         flagged=1),
+    case("nan-lower", content=stamped("3", "nan", "4"), finding="missing-values", count=1),
+    case("dashes", content=stamped("3", "---", "4"), finding="missing-values", count=1, where="line 3"),
+    case("empty-value", content=stamped("3", "", "4"), finding="missing-values", count=1),
+    case("blank-value", content=stamped("3", "   ", "4"), finding="missing-values", count=1),
+    case("infinity", content=stamped("3", "inf", "4"), finding="out-of-range", count=1, flag=SampleFlag.OUT_OF_RANGE,
+         flagged=1),
+    case("minus-infinity", content=stamped("3", "-Infinity", "4"), finding="out-of-range", count=1),
+    case("overflow", content=stamped("3", "1e999", "4"), finding="out-of-range", count=1),
+    case("microsoft-infinity", content=stamped("3", "1.#INF", "4"), finding="out-of-range", count=1),
+    case("hexadecimal", content=stamped("3", "0x10", "4"), finding="unreadable-values", count=1),
+    case("decimal-comma", content=csv(ROW, '2026-05-01T12:00:01Z,"3,2"', "2026-05-01T12:00:02Z,3"),
+         finding="unreadable-values", count=1),
+    case("thousands", content=csv(ROW, '2026-05-01T12:00:01Z,"1,003.2"', "2026-05-01T12:00:02Z,3"),
+         finding="unreadable-values", count=1),
+    case("unit-in-cell", content=stamped("3", "4 m/s", "4"), finding="unreadable-values", count=1),
+    case("negative", content=stamped("3", "-0.4", "4"), finding="negative-speed", count=1, where="line 3",
+         flag=SampleFlag.OUT_OF_RANGE, flagged=1),
+    case("minus-zero-point-zero-one", content=stamped("3", "-0.01", "4"), finding="negative-speed", count=1),
+    case("too-many-cells", content=csv(ROW, "2026-05-01T12:00:01Z,3,4", "2026-05-01T12:00:02Z,3"),
+         finding="malformed-lines", count=1, where="line 3", samples=2),
+    case("too-few-cells", content=csv(ROW, "2026-05-01T12:00:01Z", "2026-05-01T12:00:02Z,3"),
+         finding="malformed-lines", count=1, where="line 3"),
+    case("unclosed-quote", content=csv(ROW, '2026-05-01T12:00:01Z,"3', "2026-05-01T12:00:02Z,3"),
+         finding="malformed-lines", count=1, where="line 3", samples=2),
+    case("cut-off-in-a-stamp", content=csv(ROW, NEXT) + b"2026-05-01T12:0", finding="cut-off", where="line 4",
+         samples=2),
+    case("repeated-header", content=csv(ROW, "time,wind_speed", NEXT), finding="unreadable-stamps", count=1,
+         where="line 3"),
+    case("nul-tail", content=stamped(*GOOD) + bytes(200), finding="nul-bytes", count=200, samples=20),
+    case("nul-in-a-value", content=stamped("3", "4\x00", "4"), finding="unreadable-values", count=1),
+    case("mixed-line-ends", content=b"time,wind_speed\r\n" + f"{ROW}\n{NEXT}\r\n".encode(), finding="mixed-line-ends",
+         samples=2),
+    case("latin-1", content="time,wind_speed,ort\n2026-05-01T12:00:00Z,3,Köln\n".encode("latin-1"),
+         finding="encoding-assumed", samples=1),
+    case("duplicate-row",
+         content=csv(ROW, NEXT, NEXT, "2026-05-01T12:00:02Z,3", "2026-05-01T12:00:03Z,4", "2026-05-01T12:00:04Z,3",
+             "2026-05-01T12:00:05Z,4"),
+         finding="duplicate-rows", count=1, where="line 4", samples=6),
+    case("duplicate-stamp-other-value", finding="duplicate-stamps", count=1, where="line 4", samples=5,
+         content=csv(ROW, NEXT, "2026-05-01T12:00:01Z,9", "2026-05-01T12:00:02Z,3", "2026-05-01T12:00:03Z,4",
+             "2026-05-01T12:00:04Z,4")),
+    case("whole-seconds-at-4-hz", finding="coarse-stamps", count=40, flag=SampleFlag.TIME_UNSURE, flagged=40,
+         samples=40, content=csv(*(f"2026-05-01T12:00:{i // 4:02d}Z,{3 + i % 5}" for i in range(40)))),
+    case("a-second-late", finding="time-backwards", count=1, where="line 4", flag=SampleFlag.TIME_UNSURE, flagged=1,
+         content=csv(ROW, "2026-05-01T12:00:02Z,3", NEXT, "2026-05-01T12:00:03Z,3"), samples=4),
+    case("one-stamp-of-1980", finding="time-backwards", count=1, where="line 12", samples=19,
+         content=csv(*(f"{('1980-01-01' if i == 10 else '2026-05-01')}T12:00:{i:02d}Z,{v}" for i,
+             v in enumerate(GOOD)) )),
+    case("one-stamp-of-2099", finding="time-backwards", count=1, where="line 12", samples=19,
+         content=csv(*(f"{('2099-01-01' if i == 10 else '2026-05-01')}T12:00:{i:02d}Z,{v}" for i,
+             v in enumerate(GOOD)) )),
+    case("gap", finding="gaps", count=1, where="line 12", samples=20,
+         content=csv(*(f"2026-05-01T12:00:{i + 7 * (i >= 10):02d}Z,{v}" for i, v in enumerate(GOOD)))),
+    case("hour-that-occurs-twice", finding="clocks-set-back", count=120, samples=180,
+         options={"zone": "Europe/Amsterdam"},
+         content=csv(*(f"2026-10-25 01:{m:02d}:00,3" for m in range(60)), *(f"2026-10-25 02:{m:02d}:00,4"
+             for m in range(60)), *(f"2026-10-25 02:{m:02d}:00,5" for m in range(60)))),
+    case("stuck", finding="stale-repeats", count=30, flag=SampleFlag.STALE, flagged=30,
+         content=stamped(*GOOD, *["7.7"] * 31, *GOOD)),
+    case("calm-below-the-threshold", finding="dead-zone", count=3, flag=SampleFlag.DEAD_ZONE, flagged=3,
+         content=stamped("3", "0", "0", "0", "2")),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("case", REFUSED)

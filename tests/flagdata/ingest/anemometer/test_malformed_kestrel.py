@@ -9,6 +9,7 @@ import pytest
 
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.schema import SampleFlag
+from tests.flagdata.ingest.anemometer.cases import case
 
 Check = Callable[..., None]
 
@@ -30,96 +31,31 @@ def kestrel_day(day: int, speed: str = "2.5") -> str:
 
 
 REFUSED = [
-    pytest.param({"content": kestrel(), "error": InputError, "where": "line 6", "says": "no rows"}, id="no-rows"),
-    pytest.param(
-        {"content": kestrel(kestrel_day(13), kestrel_day(14)), "error": TimeError, "says": "--zone"}, id="no-zone"
-    ),
-    pytest.param(
-        {"content": kestrel(kestrel_day(5)), "error": TimeError, "says": "dmy or mdy", "options": UTC},
-        id="date-order-unknowable",
-    ),
-    pytest.param(
-        {
-            "content": kestrel(kestrel_day(13), "6/14/2026 10:00;300;2;20;1010"),
-            "error": TimeError,
-            "says": "mixes",
-            "options": UTC,
-        },
-        id="date-orders-mixed",
-    ),
-    pytest.param(
-        {
-            "content": kestrel(kestrel_day(13)),
-            "error": TimeError,
-            "says": "it is dmy",
-            "options": {"date_order": "mdy", **UTC},
-        },
-        id="date-order-told-wrong",
-    ),
-    pytest.param(
-        {
-            "content": kestrel(kestrel_day(13), head=KESTREL_HEAD.replace("m/s", "Bft")),
-            "error": InputError,
-            "where": "line 5",
-            "says": "Beaufort",
-            "options": UTC,
-        },
-        id="beaufort",
-    ),
-    pytest.param(
-        {"content": kestrel("13/6/2026;300;2;20;1010"), "error": TimeError, "says": "time of day", "options": UTC},
-        id="no-time-of-day",
-    ),
-    pytest.param(
-        {
-            "content": kestrel(kestrel_day(13), head=KESTREL_HEAD.replace("Wind Speed", "Gust")),
-            "error": InputError,
-            "options": {"format": "kestrel", **UTC},
-        },
-        id="no-wind-column",
-    ),
-    pytest.param(
-        {"content": kestrel(kestrel_day(13)), "error": UsageError, "options": {"date_order": "ydm"}},
-        id="date-order-in-words",
-    ),
-]
+    case("no-rows", content=kestrel(), error=InputError, where="line 6", says="no rows"),
+    case("no-zone", content=kestrel(kestrel_day(13), kestrel_day(14)), error=TimeError, says="--zone"),
+    case("date-order-unknowable", content=kestrel(kestrel_day(5)), error=TimeError, says="dmy or mdy", options=UTC),
+    case("date-orders-mixed", content=kestrel(kestrel_day(13), "6/14/2026 10:00;300;2;20;1010"), error=TimeError,
+         says="mixes", options=UTC),
+    case("date-order-told-wrong", content=kestrel(kestrel_day(13)), error=TimeError, says="it is dmy",
+         options={"date_order": "mdy", **UTC}),
+    case("beaufort", content=kestrel(kestrel_day(13), head=KESTREL_HEAD.replace("m/s", "Bft")), error=InputError,
+         where="line 5", says="Beaufort", options=UTC),
+    case("no-time-of-day", content=kestrel("13/6/2026;300;2;20;1010"), error=TimeError, says="time of day",
+         options=UTC),
+    case("no-wind-column", content=kestrel(kestrel_day(13), head=KESTREL_HEAD.replace("Wind Speed", "Gust")),
+         error=InputError, options={"format": "kestrel", **UTC}),
+    case("date-order-in-words", content=kestrel(kestrel_day(13)), error=UsageError, options={"date_order": "ydm"}),
+]  # fmt: skip
 REPORTED = [
-    pytest.param(
-        {"content": kestrel(kestrel_day(13), kestrel_day(14)), "finding": "date-order", "samples": 2, "options": UTC},
-        id="header-lies-about-dates",
-    ),
-    pytest.param(
-        {
-            "content": kestrel(kestrel_day(13), kestrel_day(14, "99")),
-            "finding": "out-of-range",
-            "count": 1,
-            "flag": SampleFlag.OUT_OF_RANGE,
-            "flagged": 1,
-            "options": UTC,
-        },
-        id="speed-beyond-the-impeller",
-    ),
-    pytest.param(
-        {
-            "content": kestrel(kestrel_day(13), kestrel_day(14, "--")),
-            "finding": "missing-values",
-            "count": 1,
-            "flag": SampleFlag.MISSING,
-            "flagged": 1,
-            "options": UTC,
-        },
-        id="dashes",
-    ),
-    pytest.param(
-        {
-            "finding": "units-repaired",
-            "count": 1,
-            "options": UTC,
-            "content": kestrel(kestrel_day(13), kestrel_day(14), head=KESTREL_HEAD.replace("°C", "‚ÑC")),
-        },
-        id="units-mojibake",
-    ),
-]
+    case("header-lies-about-dates", content=kestrel(kestrel_day(13), kestrel_day(14)), finding="date-order",
+         samples=2, options=UTC),
+    case("speed-beyond-the-impeller", content=kestrel(kestrel_day(13), kestrel_day(14, "99")), finding="out-of-range",
+         count=1, flag=SampleFlag.OUT_OF_RANGE, flagged=1, options=UTC),
+    case("dashes", content=kestrel(kestrel_day(13), kestrel_day(14, "--")), finding="missing-values", count=1,
+         flag=SampleFlag.MISSING, flagged=1, options=UTC),
+    case("units-mojibake", finding="units-repaired", count=1, options=UTC,
+         content=kestrel(kestrel_day(13), kestrel_day(14), head=KESTREL_HEAD.replace("°C", "‚ÑC"))),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("case", REFUSED)

@@ -10,6 +10,7 @@ import pytest
 
 from flagdata.errors import LimitError
 from flagdata.ingest.anemometer import Limits, read_log
+from tests.flagdata.ingest.anemometer.cases import case
 
 Check = Callable[..., None]
 
@@ -33,20 +34,12 @@ GOOD = [f"{3 + 0.1 * (i % 7):.1f}" for i in range(20)]
 ROW = "2026-05-01T12:00:00Z,3.1"
 
 REFUSED = [
-    pytest.param(
-        {"content": stamped(*GOOD), "error": LimitError, "says": "10 lines", "options": {"limits": Limits(rows=10)}},
-        id="rows",
-    ),
-    pytest.param(
-        {"content": stamped(*GOOD), "error": LimitError, "says": "100", "options": {"limits": Limits(size=100)}},
-        id="bytes",
-    ),
-    pytest.param(
-        {"content": csv(ROW + "0" * 70000), "error": LimitError, "where": "line 2", "says": "65536"}, id="line"
-    ),
-    pytest.param({"content": csv(ROW) + b"9" * 3000000, "error": LimitError, "where": "line 3"}, id="line-without-end"),
-    pytest.param({"content": b"," * 100000, "error": LimitError}, id="one-line-of-commas"),
-]
+    case("rows", content=stamped(*GOOD), error=LimitError, says="10 lines", options={"limits": Limits(rows=10)}),
+    case("bytes", content=stamped(*GOOD), error=LimitError, says="100", options={"limits": Limits(size=100)}),
+    case("line", content=csv(ROW + "0" * 70000), error=LimitError, where="line 2", says="65536"),
+    case("line-without-end", content=csv(ROW) + b"9" * 3000000, error=LimitError, where="line 3"),
+    case("one-line-of-commas", content=b"," * 100000, error=LimitError),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("case", REFUSED)

@@ -9,6 +9,7 @@ import pytest
 
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.schema import SampleFlag
+from tests.flagdata.ingest.anemometer.cases import case
 
 Check = Callable[..., None]
 
@@ -39,153 +40,42 @@ def toa5_row(i: int, *, record: int | None = None, u: str = "1.5", diag: str = "
 UTC = {"zone": "UTC"}
 
 REFUSED = [
-    pytest.param(
-        {"content": TOA5_HEAD.encode()[:120], "error": InputError, "says": "four header lines"}, id="header-cut-off"
-    ),
-    pytest.param({"content": toa5(), "error": InputError, "where": "line 5", "options": UTC}, id="header-alone"),
-    pytest.param(
-        {"content": toa5(*map(toa5_row, range(5))), "error": TimeError, "where": "line 5", "says": "--zone"},
-        id="no-zone",
-    ),
-    pytest.param(
-        {
-            "content": toa5(head=TOA5_HEAD.replace("Ux", "co2").replace("Uy", "h2o").replace("Uz", "x")),
-            "error": InputError,
-            "where": "line 2",
-            "says": "co2",
-        },
-        id="no-wind-column",
-    ),
-    pytest.param(
-        {
-            "content": toa5(toa5_row(0), head=TOA5_HEAD.replace('"m/s","m/s","m/s"', '"V","V","V"')),
-            "error": InputError,
-            "where": "line 3",
-            "says": "'V'",
-            "options": UTC,
-        },
-        id="wind-in-volts",
-    ),
-    pytest.param(
-        {
-            "content": toa5(toa5_row(0), head=TOA5_HEAD.replace("TIMESTAMP", "WHEN")),
-            "error": InputError,
-            "where": "line 2",
-            "options": UTC,
-        },
-        id="no-timestamp-column",
-    ),
-    pytest.param(
-        {
-            "content": toa5(toa5_row(0), head=TOA5_HEAD.replace('"C",""', '"C"')),
-            "error": InputError,
-            "where": "line 2",
-            "options": UTC,
-        },
-        id="units-line-short",
-    ),
-    pytest.param(
-        {"content": csv(ROW, ROW, ROW, ROW), "error": InputError, "where": "line 1", "options": {"format": "toa5"}},
-        id="named-but-other",
-    ),
-    pytest.param(
-        {"content": toa5(toa5_row(0)), "error": UsageError, "says": "radians", "options": {"azimuth": 270.0}},
-        id="azimuth-in-degrees",
-    ),
-]
+    case("header-cut-off", content=TOA5_HEAD.encode()[:120], error=InputError, says="four header lines"),
+    case("header-alone", content=toa5(), error=InputError, where="line 5", options=UTC),
+    case("no-zone", content=toa5(*map(toa5_row, range(5))), error=TimeError, where="line 5", says="--zone"),
+    case("no-wind-column", content=toa5(head=TOA5_HEAD.replace("Ux", "co2").replace("Uy", "h2o").replace("Uz", "x")),
+         error=InputError, where="line 2", says="co2"),
+    case("wind-in-volts", content=toa5(toa5_row(0), head=TOA5_HEAD.replace('"m/s","m/s","m/s"', '"V","V","V"')),
+         error=InputError, where="line 3", says="'V'", options=UTC),
+    case("no-timestamp-column", content=toa5(toa5_row(0), head=TOA5_HEAD.replace("TIMESTAMP", "WHEN")),
+         error=InputError, where="line 2", options=UTC),
+    case("units-line-short", content=toa5(toa5_row(0), head=TOA5_HEAD.replace('"C",""', '"C"')), error=InputError,
+         where="line 2", options=UTC),
+    case("named-but-other", content=csv(ROW, ROW, ROW, ROW), error=InputError, where="line 1",
+         options={"format": "toa5"}),
+    case("azimuth-in-degrees", content=toa5(toa5_row(0)), error=UsageError, says="radians",
+         options={"azimuth": 270.0}),
+]  # fmt: skip
 REPORTED = [
-    pytest.param(
-        {
-            "content": toa5(*map(toa5_row, range(5)), toa5_row(5, u='"NAN"')),
-            "finding": "missing-values",
-            "count": 1,
-            "flag": SampleFlag.MISSING,
-            "flagged": 1,
-            "options": UTC,
-        },
-        id="nan",
-    ),
-    pytest.param(
-        {
-            "content": toa5(*map(toa5_row, range(5)), toa5_row(5, u="-7999")),
-            "finding": "missing-values",
-            "count": 1,
-            "where": "line 10",
-            "options": UTC,
-        },
-        id="minus-7999",
-    ),
-    pytest.param(
-        {
-            "content": toa5(*map(toa5_row, range(5)), toa5_row(5, u='"INF"')),
-            "finding": "out-of-range",
-            "count": 1,
-            "options": UTC,
-        },
-        id="infinite",
-    ),
-    pytest.param(
-        {
-            "content": toa5(toa5_row(0), toa5_row(1), toa5_row(5), toa5_row(6)),
-            "finding": "records-lost",
-            "count": 3,
-            "where": "line 7",
-            "options": UTC,
-        },
-        id="records-lost",
-    ),
-    pytest.param(
-        {
-            "content": toa5(toa5_row(0), toa5_row(1), toa5_row(2, record=0), toa5_row(3, record=1)),
-            "finding": "records-restarted",
-            "count": 1,
-            "where": "line 7",
-            "options": UTC,
-        },
-        id="records-restarted",
-    ),
-    pytest.param(
-        {
-            "content": toa5(*map(toa5_row, range(5)), toa5_row(5, diag="4096")),
-            "finding": "sensor-fault",
-            "count": 1,
-            "where": "line 10",
-            "flag": SampleFlag.SENSOR_FAULT,
-            "flagged": 1,
-            "options": UTC,
-        },
-        id="diagnostic",
-    ),
-    pytest.param(
-        {
-            "content": toa5(*map(toa5_row, range(5))) + b'"2026-05-01 12:0',
-            "finding": "cut-off",
-            "samples": 5,
-            "options": UTC,
-        },
-        id="cut-off-row",
-    ),
-    pytest.param(
-        {
-            "content": toa5(toa5_row(0), '"2026-05-01 12:00:00.05",101,1.5', toa5_row(2)),
-            "finding": "malformed-lines",
-            "count": 1,
-            "where": "line 6",
-            "options": UTC,
-        },
-        id="row-short",
-    ),
-    pytest.param(
-        {
-            "content": toa5(*map(toa5_row, (0, 1, 2, 2, 3, 4, 5, 6, 7, 8, 9, 10))),
-            "finding": "duplicate-rows",
-            "count": 1,
-            "samples": 11,
-            "options": UTC,
-        },
-        id="duplicate",
-    ),
-]
+    case("nan", content=toa5(*map(toa5_row, range(5)), toa5_row(5, u='"NAN"')), finding="missing-values", count=1,
+         flag=SampleFlag.MISSING, flagged=1, options=UTC),
+    case("minus-7999", content=toa5(*map(toa5_row, range(5)), toa5_row(5, u="-7999")), finding="missing-values",
+         count=1, where="line 10", options=UTC),
+    case("infinite", content=toa5(*map(toa5_row, range(5)), toa5_row(5, u='"INF"')), finding="out-of-range", count=1,
+         options=UTC),
+    case("records-lost", content=toa5(toa5_row(0), toa5_row(1), toa5_row(5), toa5_row(6)), finding="records-lost",
+         count=3, where="line 7", options=UTC),
+    case("records-restarted", content=toa5(toa5_row(0), toa5_row(1), toa5_row(2, record=0), toa5_row(3, record=1)),
+         finding="records-restarted", count=1, where="line 7", options=UTC),
+    case("diagnostic", content=toa5(*map(toa5_row, range(5)), toa5_row(5, diag="4096")), finding="sensor-fault",
+         count=1, where="line 10", flag=SampleFlag.SENSOR_FAULT, flagged=1, options=UTC),
+    case("cut-off-row", content=toa5(*map(toa5_row, range(5))) + b'"2026-05-01 12:0', finding="cut-off", samples=5,
+         options=UTC),
+    case("row-short", content=toa5(toa5_row(0), '"2026-05-01 12:00:00.05",101,1.5', toa5_row(2)),
+         finding="malformed-lines", count=1, where="line 6", options=UTC),
+    case("duplicate", content=toa5(*map(toa5_row, (0, 1, 2, 2, 3, 4, 5, 6, 7, 8, 9, 10))), finding="duplicate-rows",
+         count=1, samples=11, options=UTC),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("case", REFUSED)
