@@ -238,13 +238,15 @@ def continued(time: Instants, jumps: Sequence[Jump], choice: ClockChoice | None)
 
 
 def report(
-    time: Instants, jumps: Sequence[Jump], line: NDArray[np.int64], choice: ClockChoice | None, *, kept: bool = False
-) -> tuple[Finding, ...]:
+    time: Instants, jumps: Sequence[Jump], line: NDArray[np.int64], choice: ClockChoice | None, *, kept: bool = False,
+    sortable: bool = False,
+) -> tuple[Finding, ...]:  # fmt: skip
     """What is said of clocks that were set anew and continued: the jump, its line, and what remains in doubt.
 
     Args:
         time: (n,) as the clock showed it.
         kept: whether the stamps stay as they are, since so many rows may be missing instead.
+        sortable: whether rows have stamps of their own, so that they may be sorted.
     """
     found: list[Finding] = []
     for jump in jumps:
@@ -268,7 +270,7 @@ def report(
             fix = "to let those rows end where the others begin: --clock last"
         elif abs(jump.size) == HOUR:
             fix += "; if it is daylight saving, and the stamps state no offset, name the place by --zone Region/City"
-        fix += f"; {SORT}" if jump.size < 0 else ""
+        fix += f"; {SORT}" if sortable and jump.size < 0 else ""
         found.append(Finding(
             kind=f"clock-set-{'back' if jump.size < 0 else 'on'}", value=jump.size / NANOSECONDS, where=f"line {at}",
             severity=Severity.WARNING if choice is None else Severity.NOTE, count=1 if kept else rows, what=what,

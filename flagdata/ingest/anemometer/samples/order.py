@@ -179,7 +179,8 @@ def _runs_back(reading: Reading, where: str, *, settable: bool) -> TimeError:
     at = int(falls[np.argmax((reached - time)[falls])])
     out = len(time) - len(clock.longest_rise(time))
     places = f"in {len(falls)} places, the farthest " if len(falls) > 1 else ""
-    ways = [clock.SORT, f"if one log's clock was set anew, {clock.CHOICES}"] if settable else [clock.SORT]
+    ways = [clock.SORT] if reading.stamped else []
+    ways += [f"if one log's clock was set anew, {clock.CHOICES}"] if settable else []
     ways += ["if files were joined, split the file there and ingest the parts by themselves", _STATIONS]
     return TimeError(
         f"time runs backwards {places}by {(reached - time)[at] / NANOSECONDS:.1f} s, from {iso(int(reached[at]))} to "
@@ -201,7 +202,7 @@ def _continued(reading: Reading, jumps: tuple[Jump, ...], choice: ClockChoice | 
         return reading
     time, shifted = clock.continued(reading.time, every, choice)
     flags = np.where(shifted, reading.flags | SampleFlag.TIME_UNSURE, reading.flags)
-    found = clock.report(reading.time, every, reading.line, choice)
+    found = clock.report(reading.time, every, reading.line, choice, sortable=reading.stamped)
     return replace(reading, time=time).with_findings(found, flags=flags)
 
 

@@ -140,6 +140,9 @@ def test_a_clock_that_starts_anew_years_back_is_refused_with_all_ways_out(made: 
         in_order(made(at), where="x")
     assert all(way in (caught.value.fix or "") for way in ("--clock first", "--clock sort", "split the file"))
     assert after(in_order(made(at), where="x", choice="first")) == list(range(9000))
+    with pytest.raises(TimeError) as caught:
+        in_order(made(at, stamped=False), where="x")
+    assert "sort" not in (caught.value.fix or "")
     with pytest.raises(UsageError, match="first or last"):
         WindOptions(clock="both")  # type: ignore[arg-type]
 
@@ -163,6 +166,7 @@ def test_a_streams_clock_set_back_for_good_leaves_its_rate(read: Read) -> None:
     found = read("\n".join(lines) + "\n")
     (back,) = [finding for finding in found.findings if finding.kind == "clock-set-back"]
     assert back.value == -3600
+    assert "sort" not in (back.fix or "")  # the lines of a stream have no stamps to be sorted by
     # a row lies half-way between two marks of a second
     assert after(found) == pytest.approx((np.arange(300) + 0.5).tolist(), abs=1e-6)
 
