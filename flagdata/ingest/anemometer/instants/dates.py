@@ -103,8 +103,8 @@ def date_form(texts: Sequence[str], *, given: Order | None, where: str) -> tuple
     if 4 not in widths and (sign == "-" or given == "ymd"):
         orders = (*orders, "ymd")
     highest = {"d": 31, "m": 12, "y": 9999}
-    fit = [one for one in orders if bool((numbers <= [highest[letter] for letter in one]).all())]
-    chosen = fit if given is None else [one for one in fit if one == given]
+    fit: list[Order] = [one for one in orders if bool((numbers <= [highest[letter] for letter in one]).all())]
+    chosen: list[Order] = fit if given is None else [one for one in fit if one == given]
     points = len(chosen) > 1 and sign == "." and not any(map(_TWELVE.search, filled))
     if not fit:
         raise TimeError("the dates are in no one order", where=where, fix="the file mixes several orders: split it")
