@@ -39,13 +39,15 @@ def ft(body: str) -> str:
     return f"${body}*{reduce(xor, body.encode(), 0):02X}"
 
 
-def test_sentences_of_an_ft_sensor_are_a_table_and_those_with_a_fault_have_no_values(read: Read) -> None:
+def test_sentences_of_an_ft_sensor_with_a_fault_are_flagged_and_damaged_ones_are_left_out(read: Read) -> None:
     sentences = [ft(f"WI,WVP=00{4 + at % 5}.4,21{at % 9},{int(at == 7)}") for at in range(30)]
     sentences[9] = sentences[9][:-2] + "00"
     lines = (f"2026-05-01T12:00:{at:02d}Z {sentence}\n" for at, sentence in enumerate(sentences))
     log = read("".join(lines))
     speed = log.series.channels["wind_speed"]
-    assert np.flatnonzero(np.isnan(speed)).tolist() == [7, 9]
+    assert np.flatnonzero(log.series.flags).tolist() == [7]
+    assert log.series.flags[7] == SampleFlag.SENSOR_FAULT
+    assert ((log.series.time - log.series.time[0]) // 10**9).tolist() == [at for at in range(30) if at != 9]
     assert speed[:5] == pytest.approx([4.4, 5.4, 6.4, 7.4, 8.4])
     assert np.degrees(log.series.channels["wind_direction"][:3]) == pytest.approx([210.0, 211.0, 212.0])
-    assert "ft-sentences" in {finding.kind for finding in log.findings}
+    assert {"sensor-fault", "checksum-errors"} <= {finding.kind for finding in log.findings}
