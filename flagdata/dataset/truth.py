@@ -40,7 +40,7 @@ class WindTruth:
         sigma: standard uncertainty [m/s], the root sum of squares of the parts below; NaN when a part cannot be known.
         sigma_mean: standard error of the mean of a correlated series [m/s]; NaN with fewer than two blocks.
         sigma_sensor: accuracy of the instrument, its resolution and its dead zone; does not shrink by averaging [m/s];
-            NaN where nothing is known of them and the readings show no step.
+            NaN where they are unknown and the readings show no step.
         sigma_clock: what the uncertainty of the common clock does to the mean [m/s].
         coverage: share of the window that usable samples speak for, 0 to 1.
         staleness: age of the newest usable sample at the end [s]; infinite when there is none before the end.

@@ -13,7 +13,7 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
     """The verdict on an experiment.
 
     Args:
-        stage: told of progress.
+        stage: called with progress.
 
     Raises:
         InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked at before), or whose

@@ -42,7 +42,7 @@ class Options:
         false_alarm: rate of the gate.
         seed: of all draws.
         refine: simulated clips of a refinement; None for none.
-        area_weight: range in which the cloth's area weight is known to lie [kg/m²]; None if nothing is known of it.
+        area_weight: range in which the cloth's area weight is known to lie [kg/m²]; None if it is unknown.
 
     Raises:
         UsageError: a refinement of a flag whose size is not known.

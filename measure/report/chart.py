@@ -1,6 +1,6 @@
 """Charts as SVG that takes its colours from the page: axes, lines, points, intervals.
 
-A chart is 640 units wide unless told otherwise. Everything it writes is escaped; classes are styled in `page.css`.
+A chart is 640 units wide by default. Everything it writes is escaped; classes are styled in `page.css`.
 """
 
 from __future__ import annotations

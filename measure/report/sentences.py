@@ -17,7 +17,7 @@ def heading(verdict: Verdict) -> str:
         Conclusion.UNTESTED: "The base model cannot be tested: there are too few kinds of nulls for the level",
         Conclusion.SUFFICIENT: "No effect needed: the base model explains these recordings",
         Conclusion.EFFECT: f"The base model lacked {named}",
-        Conclusion.ONE_OF: f"The base model lacked one of {named}: these recordings cannot tell which",
+        Conclusion.ONE_OF: f"The base model lacked one of {named}: these recordings do not decide which",
         Conclusion.PARTLY: f"Partly explained: {partly}",
         Conclusion.OUTSIDE: "The base model lacks something that no effect of the library explains",
     }[verdict.conclusion]
@@ -73,7 +73,7 @@ def as_large(test: NullTest) -> int:
 
 
 def control_warnings(verdict: Verdict) -> list[str]:
-    """Where the wrong effect helps as much as the named one, or cannot be told from it: one sentence each."""
+    """Where the wrong effect helps as much as the named one, or hardly less: one sentence each."""
     found = []
     for c in verdict.comparisons:
         if c.apart is None or not known(c.apart):
@@ -82,7 +82,7 @@ def control_warnings(verdict: Verdict) -> list[str]:
             what = f"the control {c.control_name} does as well as the named effect, so that the attribution fails there"
             found.append(f"{_begun(c.what)}: {what}.")
         elif c.apart.low <= 0:
-            found.append(f"{_begun(c.what)}: the control {c.control_name} cannot be told from the named effect there.")
+            found.append(f"{_begun(c.what)}: the control {c.control_name} and the named effect fit equally well there.")
     return found
 
 
@@ -92,7 +92,7 @@ def control_summary(verdict: Verdict) -> str:
     if apart is None or not known(apart):
         return ""
     control = next((c.control_name for c in verdict.comparisons if c.control_name), "the best wrong effect")
-    told = "the named effect does better" if apart.low > 0 else "the named effect cannot be told from it"
+    told = "the named effect does better" if apart.low > 0 else "the two fit equally well"
     return (
         f"With {control} instead, the misfit of the recordings left out is larger by {estimate_text(apart)} nat per "
         f"segment ({level_text(apart.level)}): {told}."
@@ -100,7 +100,7 @@ def control_summary(verdict: Verdict) -> str:
 
 
 def reduction_warnings(verdict: Verdict) -> list[str]:
-    """Where the effect changed nothing that can be told from zero, or nothing was to be gained: one sentence each."""
+    """Where the effect's reduction of the error is not significant, or nothing was to be gained: one sentence each."""
     found = []
     for c in verdict.comparisons:
         if not known(c.after):
@@ -109,7 +109,7 @@ def reduction_warnings(verdict: Verdict) -> list[str]:
             what = "the base model's error is no larger than the numerical floor, so that nothing could be gained"
             found.append(f"{_begun(c.what)}: {what}.")
         elif known(c.reduction) and c.reduction.low <= 0:
-            found.append(f"{_begun(c.what)}: the reduction cannot be told from zero.")
+            found.append(f"{_begun(c.what)}: the reduction is not significant.")
     return found
 
 

@@ -37,7 +37,7 @@ _SEPARATES: dict[frozenset[str], str] = {
 
 
 _ROUGH = 0.1
-"""Relative uncertainty of the density from which on weighing the cloth tells more than its name."""
+"""Relative uncertainty of the density above which weighing the cloth is better than the material's name."""
 _AXES = ("along the wind", "across the wind", "up")
 
 
@@ -133,24 +133,24 @@ def ratios(experiment: Experiment) -> tuple[str, ...]:
     if experiment.specimen.mass_known:
         return ()
     told = (
-        "The mass of the cloth is not known: motion tells forces per mass alone, so that density, bending and the "
+        "The mass of the cloth is not known: motion shows forces per mass alone, so that density, bending and the "
         f"strengths of forces are ratios to a density of {number(experiment.specimen.material.density)} kg/m²."
     )
     return (told,)
 
 
 def clocks(experiment: Experiment, late: Sequence[float]) -> tuple[str, ...]:
-    """By how much the logs of the wind were moved, as the errors told it [s]; nothing where none was."""
+    """By how much the logs of the wind were moved, estimated from the errors [s]; nothing where none was."""
     moved = [
         f"{recording.name} by {number(lag, digits=2)} s"
         for recording, lag in zip(experiment.recordings, late, strict=True)
         if lag
     ]
-    return (f"the log of the wind lags, as the motion tells it, and was moved: {', '.join(moved)}",) if moved else ()
+    return (f"by the motion of the cloth the log of the wind lags; it was moved: {', '.join(moved)}",) if moved else ()
 
 
 def separating(verdict: Verdict) -> str:
-    """The cheapest experiment known that tells the named effects apart."""
+    """The cheapest known experiment that separates the named effects."""
     if verdict.conclusion is not Conclusion.ONE_OF:
         return ""
     pairs = [text for effects, text in _SEPARATES.items() if effects <= set(verdict.named)]
@@ -160,7 +160,7 @@ def separating(verdict: Verdict) -> str:
 
 
 def proposal(modes: Sequence[Mode], *, whole: bool = True) -> str:
-    """What the corrective field looks like: the modes that are told best.
+    """What the corrective field looks like: the most significant modes.
 
     Args:
         whole: whether it stands for all that the base model lacks, or for what a named effect leaves.
@@ -205,7 +205,7 @@ def _weighed(specimen: Specimen) -> tuple[str, ...]:
         return ()
     told = f"its density is known to {100 * known:.2g} % (one standard deviation)"
     weighing = (
-        ": a pressure of the air that is off by as much is told from another weight only by how the cloth stretches, "
+        ": a pressure of the air that is off by as much differs from another weight only in how the cloth stretches, "
         "which a cloth that was weighed to 2 % would settle (density-uncertainty = 0.02)"
     )
     return (told + weighing if known >= _ROUGH else told,)

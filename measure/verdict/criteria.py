@@ -22,7 +22,7 @@ class Criteria:
     Attributes:
         level: of the global test, and of the same test of what a model with effects leaves: rejected at p ≤ level.
         interval: level of all intervals.
-        fewest_kinds: kinds of numerics below which their spread cannot be told.
+        fewest_kinds: kinds of numerics below which their spread cannot be estimated.
         simulated_kinds: kinds of numerics that are simulated at least where no bank is given. A level of 0.05 can be
             tested by 19; of 40, one kind whose groups are all as far does not save the base model.
         alike_noise: difference of the markers' noise up to which nulls stand for the data [m]: it moves statistics
@@ -32,7 +32,7 @@ class Criteria:
         lead: standard errors of the paired difference of held-out scores by which a model must be behind to leave the
             confidence set, and by which one must lead a model that it contains.
         strength_factor: standard deviation of the logarithm of a strength by what the fit's mesh and a mistold cloth do
-            to an effect, which nulls do not show: the root mean square of ln(told/true) of eight strengths that were
+            to an effect, which nulls do not show: the root mean square of ln(reported/true) of eight strengths that were
             named rightly (decision 030).
         least_turned: a wind that varies across its mean by less than this share of what it does along it is not
             turbulence (see `course`).

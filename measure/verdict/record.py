@@ -153,7 +153,7 @@ class NullTest:
         critical: the statistic beyond which the base model is rejected; None where there are too few kinds for any.
         nulls: how they were made, in words: how many, from which parameters, with which numerics.
         open: whether the interval of p holds the level, so that another draw of nulls could decide otherwise; None in
-            documents that do not tell.
+            documents without it.
         settling: kinds of numerics whose interval would not hold it, if the same share of them is as far; None where
             the test is not open, or 1,000 would not do.
     """
@@ -194,7 +194,7 @@ class Verdict:
 
     Attributes:
         conclusion: see `Conclusion`.
-        named: the effect, or the effects that cannot be told apart; empty for none.
+        named: the effect, or the effects that fit equally well; empty for none.
         words: the verdict in a sentence or three.
         test: of the base model.
         parameters: of the base model.
@@ -202,7 +202,7 @@ class Verdict:
         comparisons: on unseen data.
         residuals: of every recording.
         assumptions: what was taken as given.
-        separating: the cheapest experiment that would tell the named effects apart; empty where one is named.
+        separating: the cheapest experiment that would separate the named effects; empty where one is named.
         proposal: what the corrective field looks like and the terms it proposes, where the library has no answer.
         apart: half misfit of the wrong-effect control less that of what was named, a segment, over all recordings left
             out in turn [nat]; None where no control was run.

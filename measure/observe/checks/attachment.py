@@ -1,4 +1,4 @@
-"""The pins: whether what is said to be held stands still, and where it is instead."""
+"""The pins: whether the vertices given as held stand still, and where they are instead."""
 
 from __future__ import annotations
 

@@ -149,7 +149,7 @@ def test_the_identity_is_that_of_all_that_was_known(specimen: Specimen) -> None:
         (Conclusion.OUTSIDE, ()),
         (Conclusion.EFFECT, ("lift",)),
         (Conclusion.PARTLY, ("lift",)),
-        (Conclusion.ONE_OF, ("lift",)),  # the best of those that cannot be told apart
+        (Conclusion.ONE_OF, ("lift",)),  # the best of those that fit equally well
     ],
 )
 def test_a_verdict_leaves_a_larger_model_where_an_effect_acts(

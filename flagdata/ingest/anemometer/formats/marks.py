@@ -124,7 +124,7 @@ class TimeLine:
                 "the stream's clock stands still",
                 where=f"{where}, line {at[0]}",
                 fix="check that the receiver has a fix; if the wind came at a steady rate that is known, leave out "
-                "what tells the time and give --start TIME --rate HZ",
+                "the columns of the time and give --start TIME --rate HZ",
             )
         spacing = float(np.median(np.diff(marks))) / NANOSECONDS
         time = self.bursts.placed(lines, winds, at, marks) if winds else None

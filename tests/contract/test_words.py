@@ -1,0 +1,51 @@
+"""The words of messages, help and docstrings: none that only this project uses so."""
+
+from __future__ import annotations
+
+import ast
+import re
+
+from tests.contract.imports import ROOT, modules, tree
+
+PRODUCT = ("flagdata", "sim", "models", "measure")
+FORBIDDEN = {
+    r"(?<![-\w])(un)?told\b": "a file states, the program infers, the user gives, a message reports",
+    r"\btells?\b": "a file states, the program infers, the user gives, a message reports",
+    r"\b(re)?stated again\b": "converted",
+    r"\bstrangers?\b": "other users",
+    r"\bstood up\b": "transposed",
+    r"\blying\b": "transposed",
+    r"\b(nothing|something|little) is known of\b": "unknown",
+    r"\brooms of\b": "stages of",
+    r"\b(is|are|was|were) doubted\b": "is reported with a warning",
+    r"\bis said to be\b": "is reported as",
+}
+"""Pattern → what a colleague from another laboratory would say."""
+
+
+def strings(source: ast.Module) -> list[tuple[int, str]]:
+    """(line, text) of all string constants: docstrings, messages, help, the constant parts of f-strings."""
+    return [
+        (node.lineno, node.value)
+        for node in ast.walk(source)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ]
+
+
+def offences(source: ast.Module) -> list[str]:
+    return [
+        f"{line}: {found.group()!r}: {plain}"
+        for line, text in strings(source)
+        for pattern, plain in FORBIDDEN.items()
+        if (found := re.search(pattern, text, re.IGNORECASE))
+    ]
+
+
+def test_strings_of_the_product_use_plain_words() -> None:
+    found = [f"{path.relative_to(ROOT)}:{line}" for path in modules(*PRODUCT) for line in offences(tree(path))]
+    assert found == []
+
+
+def test_docstrings_and_parts_of_f_strings_count_and_names_do_not() -> None:
+    assert len(offences(ast.parse('"""What is told."""\nx = f"it {y} tells"\n'))) == 2
+    assert offences(ast.parse("told = file.tell()\n")) == []
