@@ -32,8 +32,8 @@ class Criteria:
         lead: standard errors of the paired difference of held-out scores by which a model must be behind to leave the
             confidence set, and by which one must lead a model that it contains.
         strength_factor: standard deviation of the logarithm of a strength by what the fit's mesh and a mistold cloth do
-            to an effect, which nulls do not show: the root mean square of ln(reported/true) of eight strengths that were
-            named rightly (decision 030).
+            to an effect, which nulls do not show: the root mean square of ln(reported/true) of eight strengths that
+            were named rightly (decision 030).
         least_turned: a wind that varies across its mean by less than this share of what it does along it is not
             turbulence (see `course`).
         most_within: nor is one whose variance within two seconds is more than so many times that between stretches.
