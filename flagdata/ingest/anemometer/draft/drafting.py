@@ -40,6 +40,8 @@ _PLAIN = {
     "wind_z": ("wind z", "upward wind"),
 }  # fmt: skip
 """Words of a heading that state a quantity in full; others are understood, and what is understood is inferred."""
+_WRITINGS = {"iso": "ISO 8601", "elapsed-s": "a count of seconds", "elapsed-ms": "a count of milliseconds"}
+"""Forms of stamps that have a name."""
 _LISTED = 5
 """Sites that a question names."""
 _WIDE = 40
@@ -195,7 +197,14 @@ def _time(
         origin = "stated"
     else:
         origin = "given" if options.date_order is not None else "inferred"
-    parts.facts.append(Fact(what="time", value=f"{shown} as {time.form}", origin=origin, evidence=time.evidence))
+    parts.facts.append(
+        Fact(
+            what="time",
+            value=f"{shown} as {_WRITINGS.get(time.form, time.form)}",
+            origin=origin,
+            evidence=time.evidence,
+        )
+    )
     if dates.is_elapsed(time.form):
         if options.start is None:
             question = f"{shown} counts from a start: at what instant was the first row?"

@@ -85,7 +85,7 @@ def of_columns(shape: Shape, columns: tuple[int, ...], order: str | None, form: 
         return None
     kept = _distinct(fitting, texts)
     read = parse(texts, kept[0])[0]
-    evidence = f"first {texts[0]!r}"
+    evidence = f"the first is {texts[0]!r}"
     swapped = [one for one in forms if _same_but_order(one, kept[0]) and one not in fitting]
     if len(kept) == 1 and order is not None:
         evidence = f"the order {order} was given"
