@@ -1,7 +1,8 @@
 """Pages as their reader sees them: the files they show, the commands they give, and a runner of these commands.
 
 Commands run in this process, because importing the package anew for each would take most of the time. The runner knows
-what the pages use of a shell: variables, `export`, and the last line of a command's output as a variable.
+what the pages use of a shell: variables, `export`, `cd`, and the last line of a command's output as a variable. Other
+programs that they name are started.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import contextlib
 import io
 import re
 import shlex
+import subprocess
 from dataclasses import dataclass, field
 from pathlib import Path
 from string import Template
@@ -44,9 +46,11 @@ class Shell:
     """Runs commands in the current folder.
 
     Attributes:
+        patch: undoes what `cd` and `export` change.
         variables: set by earlier commands.
     """
 
+    patch: pytest.MonkeyPatch
     variables: dict[str, str] = field(default_factory=dict)
 
     def run(self, command: str) -> str:
@@ -60,7 +64,17 @@ class Shell:
             self.variables[assigned[1]] = self.run(assigned[2]).splitlines()[-1]
             return ""
         verb, *arguments = shlex.split(Template(command).substitute(self.variables))
-        assert verb == "flagdata", f"the runner knows no {verb!r}"
+        if verb == "cd":
+            self.patch.chdir(*arguments)
+        elif verb == "export":
+            self.patch.setenv(*arguments[0].split("=", 1))
+        elif verb == "flagdata":
+            return self._flagdata(command, arguments)
+        else:
+            subprocess.run([verb, *arguments], check=True)
+        return ""
+
+    def _flagdata(self, command: str, arguments: list[str]) -> str:
         out, err = io.StringIO(), io.StringIO()
         with (
             pytest.raises(SystemExit) as ended,

@@ -83,7 +83,7 @@ def test_every_command_of_closing_the_loop_runs(folder: Path, monkeypatch: pytes
 
     monkeypatch.setattr("measure.closing.close.close_loop", instead)
     monkeypatch.chdir(folder)
-    shell = Shell()
+    shell = Shell(patch=monkeypatch)
     for command in commands("closing-the-loop.md"):
         shell.run(command)
     speeds = [[round(r.wind.speed, 1) for r in experiment.recordings] for experiment in judged]
@@ -145,7 +145,7 @@ def test_every_command_of_proposing_runs(folder: Path, tmp_path: Path, monkeypat
     made = tmp_path / "out" / "close-loop" / "proposal"
     made.mkdir(parents=True)
     (made / "proposed_1f2e3d.py").write_text(RISING_LOWER, encoding="utf-8")
-    shell = Shell()
+    shell = Shell(patch=monkeypatch)
     for command in commands("proposals.md"):
         shell.run(command)
     (first, plain), (_, known), (tried, tested) = calls

@@ -64,9 +64,9 @@ def enter(folder: Path, patch: pytest.MonkeyPatch, page: str) -> None:
         (folder / name).write_text(text, encoding="utf-8")
 
 
-def run_page(page: str) -> list[str]:
-    shell = Shell()
-    return [shell.run(command) for command in commands(page) if not command.startswith("export ")]
+def run_page(page: str, patch: pytest.MonkeyPatch) -> list[str]:
+    shell = Shell(patch=patch)
+    return [shell.run(command) for command in commands(page)]
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def started(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         enter(folder, patch, "start.md")
         assert "export FLAGDATA_LAKE=field.lake" in commands("start.md")
-        run_page("start.md")
+        run_page("start.md", patch)
     record = next(iter(Lake.open(folder / "field.lake").rows("kind = 'recording'").to_pylist()))
     whole = Lake.open(folder / "field.lake").object_path(record["object"]).read_bytes()
     (folder / "damaged.mcap").write_bytes(whole[: len(whole) // 2])
@@ -108,7 +108,7 @@ def test_every_command_of_a_page_that_goes_on_from_the_start_runs(
     folder = tmp_path / "copy"
     shutil.copytree(started, folder)
     enter(folder, monkeypatch, page)
-    assert any(run_page(page))
+    assert any(run_page(page, monkeypatch))
 
 
 @pytest.mark.parametrize("page", ALONE)
@@ -124,7 +124,7 @@ def test_every_command_of_a_page_that_stands_alone_runs(
         Lake.create(tmp_path / "lake")
         for number, row in enumerate(files(page)["fabrics.csv"].splitlines()[1:]):
             write_flag(tmp_path / row.split(",")[0], np.full(35, 3.0 + number), RECIPE)
-    assert any(run_page(page))
+    assert any(run_page(page, monkeypatch))
 
 
 def test_the_transcripts_of_a_draft_are_what_the_program_prints(

@@ -16,18 +16,15 @@ def _quadratic(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("method", list(PEERS))
-def test_the_first_evaluation_is_the_centre_and_all_stay_in_the_box(method: str) -> None:
+def test_it_begins_at_the_centre_stays_in_the_box_and_depends_on_its_seed_alone(method: str) -> None:
     trace = minimise(method, _quadratic, dimension=2, budget=13, seed=1)
     assert len(trace) == 13
     np.testing.assert_array_equal(trace.points[0], [0.0, 0.0])
     assert np.abs(trace.points).max() <= 1
-
-
-@pytest.mark.parametrize("method", list(PEERS))
-def test_the_same_seed_gives_the_same_trace_and_another_seed_another(method: str) -> None:
-    first, again, other = (minimise(method, _quadratic, dimension=2, budget=12, seed=seed) for seed in (1, 1, 2))
-    np.testing.assert_array_equal(first.points, again.points)
-    assert not np.array_equal(first.points, other.points)
+    again = minimise(method, _quadratic, dimension=2, budget=12, seed=1)
+    np.testing.assert_array_equal(trace.points[:12], again.points)
+    other = minimise(method, _quadratic, dimension=2, budget=4, seed=2)
+    assert not np.array_equal(trace.points[:4], other.points)
 
 
 def test_expected_improvement_finds_the_minimum_of_a_quadratic_within_sixteen_evaluations() -> None:

@@ -13,6 +13,7 @@ from flagdata.errors import InputError
 from flagdata.rng import child_seed
 from measure.refine.evaluator import Evaluator
 from measure.refine.procedure import Settings, refine
+from measure.refine.refinement import Refinement
 from measure.refine.section import section
 from measure.refine.simulator import Request, Simulator
 from measure.refine.space import QUANTITIES
@@ -22,6 +23,7 @@ from models.estimator import Estimator
 from sim.run.recipe import Recipe
 
 SETTINGS = Settings(budget=36, batch=8, seed=4)
+WHOLE = replace(SETTINGS, to_floor=False)
 
 
 @pytest.fixture(scope="module")
@@ -32,11 +34,16 @@ def target(recipe: Recipe, view: FixedView) -> Target:
     return Target(name="known", clip=clip, view=view, truth={"wind_speed": 6.0, "density": 0.135})
 
 
+@pytest.fixture(scope="module")
+def whole(recipe: Recipe, estimator: Estimator, target: Target, tmp_path_factory: pytest.TempPathFactory) -> Refinement:
+    """All 36 evaluations."""
+    return refine(target, estimator, recipe, settings=WHOLE, cache=tmp_path_factory.mktemp("whole"))
+
+
 def test_killed_and_resumed_it_gives_the_same_result(
-    recipe: Recipe, estimator: Estimator, target: Target, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    settings = replace(SETTINGS, to_floor=False)
-    whole = refine(target, estimator, recipe, settings=settings, cache=tmp_path / "a")
+    recipe: Recipe, estimator: Estimator, target: Target, whole: Refinement, tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
     made: list[int] = []
     films = Simulator.films
 
@@ -49,10 +56,10 @@ def test_killed_and_resumed_it_gives_the_same_result(
     with monkeypatch.context() as patch:
         patch.setattr(Simulator, "films", dying)
         with pytest.raises(KeyboardInterrupt):
-            refine(target, estimator, recipe, settings=settings, cache=tmp_path / "b")
+            refine(target, estimator, recipe, settings=WHOLE, cache=tmp_path / "b")
     again: list[int] = []
     monkeypatch.setattr(Simulator, "films", lambda self, r: again.append(len(r)) or films(self, r))
-    resumed = refine(target, estimator, recipe, settings=settings, cache=tmp_path / "b")
+    resumed = refine(target, estimator, recipe, settings=WHOLE, cache=tmp_path / "b")
     assert sum(made) + sum(again) == whole.evaluations == 36
     np.testing.assert_array_equal(resumed.traces[0].points, whole.traces[0].points)
     np.testing.assert_array_equal(resumed.traces[0].distances, whole.traces[0].distances)
@@ -85,16 +92,13 @@ def test_two_clips_share_a_cloth_and_have_a_wind_each(recipe: Recipe, estimator:
     assert [entry.name for entry in found.intervals] == [*(q.name for q in QUANTITIES), "wind_speed.1"]
 
 
-def test_the_section_shows_the_answer_the_steps_and_both_in_motion(
-    recipe: Recipe, estimator: Estimator, target: Target
-) -> None:
-    found = refine(target, estimator, recipe, settings=SETTINGS)
-    page = section(found)
-    assert found.sentence in page
+def test_the_section_shows_the_answer_the_steps_and_both_in_motion(whole: Refinement) -> None:
+    page = section(whole)
+    assert whole.sentence in page
     assert page.count("image/webp") == 2
     assert [f"step {step}:" in page for step in (0, 10, 20, 40)] == [True, True, True, False]
     assert page.count("<tr>") == 1 + len(QUANTITIES) + 1 + 15
-    for entry in found.as_dict()["intervals"]:
+    for entry in whole.as_dict()["intervals"]:
         assert entry["low"] <= entry["median"] <= entry["high"]
 
 
