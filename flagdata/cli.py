@@ -25,7 +25,7 @@ VERBS: dict[str, tuple[str, str]] = {
     "simulate": ("sim.commands:simulate", "Simulate cloth in the wind: mesh sequences from a recipe or a scene."),
     "build": ("sim.datasets.command:build", "Build a data set: sequences, their films, ground truth and a card."),
     "train": ("models.training.command:train", "Train a network on the clips of a lake, and commit it."),
-    "evaluate": ("models.evaluation.command:evaluate", "Judge trained networks on clips they never saw, in one table."),
+    "evaluate": ("models.evaluation.command:evaluate", "Evaluate trained networks on test clips, in one table."),
     "measure": ("measure.estimate.command:measure", "Measure wind and cloth from a film, with intervals, or refuse."),
     "close-loop": ("measure.closing.command:close_loop", "Find what the model of a cloth lacks, and add it."),
     "propose": ("measure.propose.command:propose", "Propose an effect that the library lacks, and test it."),
@@ -33,10 +33,10 @@ VERBS: dict[str, tuple[str, str]] = {
     "show": ("flagdata.commands.lake:show", "Show one artifact, its parents and its report."),
     "log": ("flagdata.commands.lake:log", "List commits."),
     "tag": ("flagdata.commands.lake:tag", "Name a version for good, list or delete tags."),
-    "branch": ("flagdata.commands.lake:branch", "Begin, list or delete lines of work."),
+    "branch": ("flagdata.commands.lake:branch", "Begin, list or delete branches."),
     "merge": ("flagdata.commands.lake:merge", "Commit on main what a branch changed."),
     "diff": ("flagdata.commands.lake:diff", "Rows and objects added and removed between two versions."),
-    "withdraw": ("flagdata.commands.lake:withdraw", "Take artifacts off a branch; tags keep them."),
+    "withdraw": ("flagdata.commands.lake:withdraw", "Hide artifacts from a branch; tags still show them."),
     "query": ("flagdata.commands.query:query", "Select rows of the catalog by filter or SQL."),
     "export": (
         "flagdata.commands.export:export",
@@ -44,11 +44,11 @@ VERBS: dict[str, tuple[str, str]] = {
     ),
     "verify": ("flagdata.commands.upkeep:verify", "Re-hash every object."),
     "doctor": ("flagdata.commands.upkeep:doctor", "Find and explain what is wrong with a lake."),
-    "gc": ("flagdata.commands.upkeep:gc", "Delete what nothing refers to."),
+    "gc": ("flagdata.commands.upkeep:gc", "Delete unreferenced files."),
     "recover": ("flagdata.commands.upkeep:recover", "Salvage a record that was cut off."),
-    "challenge": ("measure.challenge.command:challenge", "Grade closing the loop on sealed data sets."),
+    "challenge": ("measure.challenge.command:challenge", "Benchmark close-loop on blind data sets."),
     "blender-setup": ("sim.blender.command:blender_setup", "Make the environment that Blender renders in."),
-    "demo": ("measure.demo.command:demo", "Make a small field recording and take it through everything."),
+    "demo": ("measure.demo.command:demo", "Make a synthetic recording and run every step on it."),
 }
 
 _HELP = "see the command's --help"

@@ -282,7 +282,7 @@ def withdraw(
     as_json: bool,
     lake_path: str,
 ) -> None:
-    """Take artifacts off a branch, a recording with its clips.
+    """Hide artifacts from a branch, a recording with its clips.
 
     Tags, and the branch that this one began from, keep showing them; gc frees what no ref shows any more.
     """

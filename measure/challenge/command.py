@@ -18,7 +18,7 @@ _ONLY = click.option("--only", multiple=True, metavar="SET", help="Take this set
 
 @click.group()
 def challenge() -> None:
-    """Grade closing the loop on recordings whose undeclared effect is sealed.
+    """Benchmark close-loop on recordings whose true effect is hidden.
 
     Keys are opened by `score` alone, and only of sets whose verdict is filed. Until then `challenge.json` holds a hash
     of each.

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 @dataclass(frozen=True, kw_only=True)
 class Reason:
     """Attributes:
-    sentence: what is said, without a final stop.
+    sentence: for the message, without a final stop.
     fix: what the user can do.
-    of_motion: whether it is about what moves, so that it is no reason where nothing does.
+    of_motion: whether it concerns the moving region, and so needs one.
     """
 
     sentence: str
@@ -20,11 +20,11 @@ class Reason:
 
 REASONS: dict[str, Reason] = {
     "no-motion": Reason(
-        sentence="nothing in the picture moves as a flag does",
+        sentence="nothing in the picture moves like a flag",
         fix="crop to the flag, or choose a part of the film in which it flies",
     ),
     "cut-off": Reason(
-        sentence="the picture's edge cuts through what moves",
+        sentence="the picture's edge cuts through the moving cloth",
         of_motion=True,
         fix="crop or film so that the whole flag is in the frame",
     ),
@@ -37,20 +37,21 @@ REASONS: dict[str, Reason] = {
     ),
     "too-few-frames": Reason(sentence="there are too few frames", fix="give a longer film"),
     "low-frame-rate": Reason(
-        sentence="frames are held: the true frame rate is lower than the model's",
+        sentence="frames look duplicated: the real frame rate is below the model's",
         fix="film at the model's rate or more",
     ),
     "too-dark": Reason(
-        sentence="the picture is darker, flatter or noisier than those known", fix="film by daylight, or expose longer"
+        sentence="the picture is darker, flatter or noisier than the training clips",
+        fix="film by daylight, or expose longer",
     ),
     "several-flags": Reason(sentence="more than one region moves", fix="crop to one flag", of_motion=True),
     "scale": Reason(
-        sentence="what moves is larger or smaller in the picture than the flags known",
+        sentence="the flag is larger or smaller in the picture than in the training clips",
         fix="crop so that the flag takes a half to most of the frame",
         of_motion=True,
     ),
     "unlike-cloth": Reason(
-        sentence="what moves does not move as simulated cloth does",
+        sentence="the motion is unlike that of simulated cloth",
         fix="make sure that the crop holds a flag on a pole and little else that moves",
         of_motion=True,
     ),
