@@ -216,7 +216,7 @@ def test_a_bank_of_other_segments_is_refused(specimen: Specimen, plain: Experime
 
 def test_a_bank_with_anchors_known_in_another_way_is_refused(specimen: Specimen, plain: Experiment, bank: Path) -> None:
     data = replace(plain, specimen=replace(specimen, anchors_given=False))
-    with pytest.raises(InputError, match="anchors were told, those of the recordings are taken from where"):
+    with pytest.raises(InputError, match="anchors were given, those of the recordings are taken from where"):
         close_loop(data, Options(bank=bank, level=0.1))
 
 
