@@ -95,37 +95,37 @@ def _without_empty(reading: Reading) -> Reading:
 
 def _without_copies(reading: Reading) -> Reading:
     """The rows without those that come again with the stamp and the values of another."""
-    time = reading.time
-    if not np.any(np.diff(time) <= 0):
+    time, steps = reading.time, np.diff(reading.time)
+    if not np.any(steps <= 0):
         return reading
-    order = np.argsort(time, kind="stable")
-    at = np.flatnonzero(np.diff(time[order]) == 0)
-    earlier, later = order[at], order[at + 1]
-    alike, beside = ~_differ(reading, earlier, later), later == earlier + 1
-    again, twice = np.zeros((2, len(time)), dtype=bool)
-    again[later[alike & ~beside]], twice[later[alike & beside]] = True, True
-    back = (time[1:] <= np.maximum.accumulate(time)[:-1]) & (np.diff(time) != 0)
-    varied = any(len(np.unique(values[again & np.isfinite(values)])) > 1 for values in reading.channels.values())
-    if varied and int(again.sum()) >= _AGAIN * int(back.sum()):
-        what = "{n} rows bring earlier stamps and values again, as when downloads of a logger overlap"
-        return _without_copies(reading.without(again, "repeated-stretch", what))
-    shared = np.diff(time) == 0
-    differ = _differ(reading, np.arange(len(time) - 1), np.arange(1, len(time)))
+    if np.any(steps < 0):
+        order = np.argsort(time, kind="stable")
+        at = np.flatnonzero(np.diff(time[order]) == 0)
+        at = at[order[at + 1] != order[at] + 1]
+        again = np.zeros(len(time), dtype=bool)
+        again[order[at + 1][~_differ(reading, order[at], order[at + 1])]] = True
+        back = (time[1:] <= np.maximum.accumulate(time)[:-1]) & (steps != 0)
+        varied = any(len(np.unique(values[again & np.isfinite(values)])) > 1 for values in reading.channels.values())
+        if varied and int(again.sum()) >= _AGAIN * int(back.sum()):
+            what = "{n} rows bring earlier stamps and values again, as when downloads of a logger overlap"
+            return _without_copies(reading.without(again, "repeated-stretch", what))
+    shared, differ = steps == 0, _differ(reading, slice(None, -1), slice(1, None))
+    twice = np.concatenate(([False], shared & ~differ))
     changes = float(differ[~shared].mean()) * int(shared.sum()) if not shared.all() else 0.0
     copied = changes >= _CHANGES and int((differ & shared).sum()) <= _COPIED * changes
     if not (copied or (shared.all() and not differ.any())):
         # Coarse stamps make equal rows too: isolated pairs alone are the same row written twice, and not those beside
         # which a fast logger left out a step: there the second is a sample that came late.
         period = clock.usual(time)
-        wide = np.concatenate(([False], (np.diff(time) > 1.5 * period) & (period < _FAST), [False, False]))
+        wide = np.concatenate(([False], (steps > 1.5 * period) & (period < _FAST), [False, False]))
         twice &= ~(wide[:-2] | wide[2:]) & (int(shared.sum()) <= max(1.0, _ISOLATED * len(shared)))
     what = "{n} rows repeat the row before in stamp and in all values that are read: copies"
     return reading.without(twice, "duplicate-rows", what)
 
 
-def _differ(reading: Reading, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _differ(reading: Reading, one: NDArray[np.int64] | slice, other: NDArray[np.int64] | slice) -> NDArray[np.bool_]:
     """(m,) whether rows have other values than others."""
-    differ = np.zeros(len(one), dtype=bool)
+    differ = np.zeros(len(reading.line[one]), dtype=bool)
     for values in reading.channels.values():
         first, second = values[one], values[other]
         differ |= ~((first == second) | (np.isnan(first) & np.isnan(second)))
