@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -32,9 +33,10 @@ def commands() -> list[str]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The shortest demonstration."""
+    """The shortest demonstration, of half as many frames a second."""
     out = tmp_path_factory.mktemp("readme") / "out" / "demo"
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("measure.demo.field.FieldRecipe", partial(FieldRecipe, frame_rate=30))
         Shell(patch=patch).run(f"flagdata demo --out {out} --minutes {SHORTEST} --part field")
     return out
 
