@@ -1,6 +1,6 @@
 """The one place where text becomes a path: an address of a storage, stream or machine is refused as what it is.
 
-A path library takes `s3://bucket/lake` for a folder `s3:` here; whoever gave it meant a service that flagdata does not
+A path library takes `s3://bucket/lake` for a folder `s3:` here; the user meant a service that flagdata does not
 read or write.
 """
 

@@ -24,7 +24,7 @@ def is_folder(path: Path) -> bool:
 def check_input(path: Path, *, noun: str = "file", limit: int | None = None) -> None:
     """Make sure that a file can be read to its end, before it is opened.
 
-    Devices and pipes may have no end, and opening a pipe waits for whoever writes to it. Files of the kernel, as those
+    Devices and pipes may have no end, and opening a pipe waits for a writer. Files of the kernel, as those
     of /proc, state that they are empty.
 
     Args:

@@ -1,4 +1,4 @@
-"""Recipes by name or by path: where the text of one is found. What it says is parsed by whoever knows its form.
+"""Recipes by name or by path: where the text of one is found. Its content is parsed by the module that knows its form.
 
 Each kind of recipe has a folder of `catalogs` with files NAME.toml. Wherever one is named, a path that ends in .toml
 names the user's own file in its place.

@@ -35,7 +35,7 @@ CLOUD = "cloud.safetensors"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Estimates:
-    """What was said of n clips.
+    """Estimates for n clips.
 
     Attributes:
         targets: what the columns are.
@@ -75,7 +75,7 @@ class Estimator:
     widening: (target,) factors by which each distribution is spread about its mean, on the logits; found on validation
         clips, 1 where none was needed.
     cloud: the training clips' summaries; None where the model has none.
-    card: what is known of it.
+    card: its description.
     """
 
     name: str
@@ -136,7 +136,7 @@ class Estimator:
     def estimate(
         self, inputs: Tensor, *, seed: int = 0, draws: int = DRAWS, known: Known | None = None
     ) -> Estimates:  # fmt: skip
-        """What is said of inputs (n, *shape), see `inputs`.
+        """Estimates for inputs (n, *shape), see `inputs`.
 
         Args:
             seed: of the draws; the same inputs and seed give the same draws.

@@ -35,7 +35,7 @@ class Loss(StrEnum):
 
 
 class Learner(nn.Module):
-    """Inputs to a loss, and to what is said of clips.
+    """Inputs to a loss and to estimates.
 
     Args:
         network: of `models.registry.NETWORKS`.

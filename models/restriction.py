@@ -1,7 +1,7 @@
 """What a model says of clips of which something is known: its posterior, restricted to where the known quantity lies.
 
 Of a joint posterior p(θ | x) under a prior π, the posterior under the prior that is π within a range and 0 outside
-is p(θ | x) restricted to that range (Bayes' rule). So whoever weighed the flag gets the wind of a flag of that weight.
+is p(θ | x) restricted to that range (Bayes' rule). With a weighed flag the wind is that of a flag of that weight.
 Draws outside are discarded; as only some are left, many more are drawn than are returned.
 """
 

@@ -2,7 +2,7 @@
 
 card.json            what it is: recipe, data, seeds, scores, limits; "format" is `FORMAT`
 weights.safetensors  the learner's parameters and buffers
-…                    more tensors or pictures, by whoever writes it
+…                    more tensors or pictures
 SHA256SUMS           of all of these, checked before any of them is used; see `flagdata.checksums`
 """
 

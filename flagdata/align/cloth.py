@@ -36,7 +36,7 @@ def cloth_recording(
 
     Args:
         camera: the film, ingested.
-        cloth: what is known of it; the recording's session is its fabric.
+        cloth: its known properties; the recording's session is its fabric.
         progress: called with 1 for each frame copied.
 
     Raises:

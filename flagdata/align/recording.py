@@ -53,7 +53,8 @@ class Alignment:
         findings: what the catalog should know of it.
         details: numbers for the report (offset, interval, confidence, …), JSON.
         curve: the search that led to it, a JSON document attached to the record; `None` where nothing was searched.
-        parameters: what is known of the cloth, by the names that simulated recordings have, SI; the recipe has it too.
+        parameters: known properties of the cloth, by the names that simulated recordings have, SI; the recipe has it
+            too.
     """
 
     clock: ClockModel

@@ -86,7 +86,7 @@ def sniff_sources(sources: Sequence[Path], options: Given, *, given: frozenset[s
 
 
 def _completed(source: Path, ranked: tuple[Guess, ...], options: Given) -> tuple[Guess, ...]:
-    """The guesses, a draft among them completed by what was said beside --sniff."""
+    """The guesses, a draft among them completed by the options beside --sniff."""
     from flagdata.ingest.anemometer import completed
 
     wind = options.wind.wind

@@ -60,11 +60,11 @@ def classify(
     if not is_folder(path):
         check_input(path)
     if format_name == CAMERA:
-        return Guess(format="video", score=1.0, reasons=("it was said to be a camera's",), kind="camera")
+        return Guess(format="video", score=1.0, reasons=("given as a camera's",), kind="camera")
     if format_name == MESHES:
-        return Guess(format="mesh folder", score=1.0, reasons=("it was said to be meshes",), kind="meshes")
+        return Guess(format="mesh folder", score=1.0, reasons=("given as meshes",), kind="meshes")
     if format_name == MARKERS:
-        return Guess(format="marker table", score=1.0, reasons=("it was said to be markers",), kind="markers")
+        return Guess(format="marker table", score=1.0, reasons=("given as markers",), kind="markers")
     if format_name is not None:
         if format_name not in FORMATS:
             raise UnknownNameError.of("format", format_name, [CAMERA, MESHES, MARKERS, *FORMATS], where="--as")

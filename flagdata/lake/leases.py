@@ -40,7 +40,7 @@ class LeaseState:
     """A staging folder as another process sees it: its owner, whether it lives, and the objects it holds.
 
     Attributes:
-        leased: whether there is a lease at all; without, nothing proves that whoever made the folder is dead.
+        leased: whether there is a lease at all; without, nothing proves that the process that made the folder is dead.
     """
 
     folder: Path
@@ -156,8 +156,8 @@ def _try_lock(descriptor: int) -> bool:
 
 @contextmanager
 def _locked(staging: Path, mode: int) -> Iterator[None]:
-    """Take the lock behind a turnstile: whoever waits for it holds the turnstile, so that a stream of shared holders
-    cannot keep an exclusive one out for ever. Not to be nested."""
+    """Take the lock behind a turnstile: a process that waits for it holds the turnstile, so that a stream of shared
+    holders cannot keep an exclusive one out for ever. Not to be nested."""
     with ExitStack() as held:
         with _opened(staging / _TURN) as turn:
             fcntl.flock(turn, fcntl.LOCK_EX)

@@ -59,7 +59,7 @@ def _reading(entry: Entry) -> Iterator[None]:
 
 
 class Lineage:
-    """What is known of branches at the head.
+    """The branches at the head.
 
     Args:
         history: of the catalog, in any order.

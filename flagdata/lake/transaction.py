@@ -1,6 +1,6 @@
 """A transaction: objects put first, rows collected, one Delta append publishes them all or nothing.
 
-Whoever asks what was published gets it from the transaction's result, which was complete before publication: a disk
+What was published is read from the transaction's result, which was complete before publication: a disk
 that refuses to be read afterwards changes no answer.
 """
 

@@ -108,7 +108,7 @@ def _definitions(source: Path, copy: _Copy) -> None:
 
 
 class _Copy:
-    """The record being written, and what is known of the channels so far."""
+    """The record being written, and the channels read so far."""
 
     def __init__(self, out: IO[bytes]) -> None:
         self.findings: list[Finding] = []

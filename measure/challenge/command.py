@@ -107,7 +107,7 @@ def bank(folder: Path, recipe: str, seed: int, kinds: int, workers: int, as_json
 @click.option("--bank", type=LocalPath(), help="Folder of simulated nulls that the sets share.")
 @json_option
 def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path | None, as_json: bool) -> None:
-    """Judge the sets that have no verdict yet, and file what is said with its hash."""
+    """Judge the sets that have no verdict yet, and file the verdicts with their hashes."""
     from measure.challenge.filing import filed
     from measure.challenge.fitter import ClosingTheLoop
     from measure.challenge.folder import ChallengeFolder

@@ -1,4 +1,4 @@
-"""A verdict beside the key: what was said, what was true, and whether they agree."""
+"""A verdict beside the answer key: the claim, the truth, and whether they agree."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class Outcome:
 
     @property
     def outside_said(self) -> bool:
-        """Whether the library was said not to suffice."""
+        """Whether the verdict is that the library does not suffice."""
         return self.conclusion in (Conclusion.OUTSIDE, Conclusion.PARTLY)
 
     @property

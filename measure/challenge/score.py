@@ -1,4 +1,4 @@
-"""Opens the keys of sets whose verdicts are filed, and grades what was said.
+"""Opens the keys of sets whose verdicts are filed, and grades them.
 
 Definitions, in the words of the sheet:
 

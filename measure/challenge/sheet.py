@@ -62,7 +62,7 @@ def as_dict(sheet: Sheet) -> dict[str, Any]:
 
 
 def confusion(sheet: Sheet) -> dict[str, dict[str, int]]:
-    """What was true → what was said → how often."""
+    """Truth → verdict → how often."""
     table: dict[str, Counter[str]] = {}
     for outcome in sheet.outcomes:
         table.setdefault(_truth(outcome), Counter())[_said(outcome)] += 1

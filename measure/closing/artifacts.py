@@ -120,7 +120,7 @@ def read(path: Path) -> tuple[Verdict, str]:
 
 
 def fingerprint(experiment: Experiment) -> str:
-    """SHA-256 of all that is known of an experiment, and how well: cloth, pins, recordings and wind; not of names and
+    """SHA-256 of an experiment with its uncertainties: cloth, pins, recordings and wind; not of names and
     files."""
     specimen = experiment.specimen
     material = specimen.material

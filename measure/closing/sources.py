@@ -27,10 +27,10 @@ class Reading:
         rate: frames a second [Hz]; None for what the source says.
         unit: of positions.
         noise: standard deviation of a coordinate [m]; None to estimate it.
-        up: axis of the recordings that points up; all else is said with z up.
+        up: axis of the recordings that points up; all other options use z up.
         axis: along which the air goes; None for what a log's directions and `north` say.
         north: where north lies, from +x towards +y [rad].
-        offset: from a log's first sample to the first frame [s]; None if nothing is said.
+        offset: from a log's first sample to the first frame [s]; None if not given.
         sensor, zone: how a log's file is read, where it does not say so itself: see `WindOptions`.
         confirm: asks whether a drafted reading of a log is right.
     """

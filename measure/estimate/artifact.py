@@ -1,4 +1,4 @@
-"""A measurement in the lake: what was said, of which film, by which network.
+"""A measurement in the lake: the estimates, the film, the network.
 
 Its identity is a hash of what went in: the film's artifact or content, the network, the options and the seed. Its
 object is a Zarr folder with the posterior's draws, the windows' series and the whole answer as JSON.

@@ -74,7 +74,7 @@ class Options:
         }  # fmt: skip
 
     def known(self, sizes: Sizes, model: Estimator) -> Known | None:
-        """What is known of the cloth, at each size considered, as that of a flag of the model's own size."""
+        """The given range of the cloth, at each size considered, as that of a flag of the model's own size."""
         if self.area_weight is None:
             return None
         target = next((target for target in model.targets if target.name == "density"), None)
@@ -167,7 +167,7 @@ class Measurement:
         return sentence(self.quantities)
 
     def shown(self, *, anyway: bool) -> bool:
-        """Whether anything is said of it: of a refused film only `anyway`, of one with nothing to measure never."""
+        """Whether it is reported: a refused film only `anyway`, of one with nothing to measure never."""
         return self.verdict.measurable and (anyway or not self.verdict.refused)
 
     def noticed(self, *, anyway: bool) -> tuple[Finding, ...]:

@@ -26,7 +26,7 @@ class Section:
     Attributes:
         anchor: its id in the page.
         title: its heading.
-        body: HTML, escaped by whoever made it.
+        body: HTML, already escaped.
     """
 
     anchor: str

@@ -79,7 +79,7 @@ _LEARNING = 0.6
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Gate:
-    """What is known of simulated clips.
+    """Statistics of simulated clips.
 
     Attributes:
         centre, scale: (f,) median and spread of each feature over plain clips.

@@ -67,7 +67,7 @@ class Options(plan.NullOptions):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outcome:
-    """What an experiment came to, before anything is said of it in sentences.
+    """The numerical result of an experiment, without sentences.
 
     Attributes:
         verdict: all numbers of the verdict; its sentences are empty.

@@ -1,6 +1,6 @@
 """Experiments as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is named.
 
-    title, up           "z", "-y", …: the axis of the recordings that points up; all else is said with z up
+    title, up           "z", "-y", …: the axis of the recordings that points up; all other entries use z up
     [test]              level of the global test, nulls: how many null recordings
     [cloth]             width, height, or mesh (an OBJ with texture coordinates in metres); vertices of the model mesh
     [material]          name (of catalogs/materials) or file (TOML, or ArcSim JSON); thicken, density, damping,
@@ -69,7 +69,7 @@ class WindSource:
     clock: float | None = None
 
     def certain(self, track: WindTrack) -> WindTrack:
-        """The track with what is said of its uncertainty."""
+        """The track with its stated uncertainty."""
         said = {"gain": self.gain, "direction": self.direction, "clock": self.clock}
         return replace(track, **{name: value for name, value in said.items() if value is not None})
 

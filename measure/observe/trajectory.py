@@ -164,7 +164,7 @@ class Trajectory:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Specimen:
-    """What is known of the cloth before anything is fitted.
+    """The cloth before anything is fitted.
 
     Attributes:
         mesh: the model's, in its flat rest state; as wide and high as the cloth.

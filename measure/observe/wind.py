@@ -57,12 +57,12 @@ class LogPlacement:
             raise UsageError("both an offset and a start are given", where="wind", fix="keep one of them")
 
     def first_frame(self, series: WindSeries) -> int:
-        """Instant of the first frame on the log's clock [UTC ns]; the log's first sample where nothing is said."""
+        """Instant of the first frame on the log's clock [UTC ns]; by default the log's first sample."""
         return self.start if self.start is not None else int(series.time[0]) + round((self.offset or 0.0) * NANOSECONDS)
 
 
 def track(series: WindSeries, placement: LogPlacement, *, where: str) -> tuple[WindTrack, tuple[Finding, ...]]:
-    """The wind that a log holds, without its unusable samples, and what is to be known of it.
+    """The wind that a log holds, without its unusable samples, and its metadata.
 
     Raises:
         InputError: no usable samples, or nothing that gives a direction.

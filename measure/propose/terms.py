@@ -96,7 +96,7 @@ def local(method: str, *place: float) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Field:
-    """What is known of a field.
+    """Description of a field.
 
     Attributes:
         unit: of its coefficient.

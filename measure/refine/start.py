@@ -69,7 +69,7 @@ def amortised(
     estimator: Estimator, clip: NDArray[np.uint8], space: Space, *, seed: int, draws: int
 ) -> NDArray[np.float64]:  # fmt: skip
     """Draws of `TARGETS` for a clip (frame, height, width): (draw, 4), in the targets' units. Where the space's area
-    weights are fewer than the network's, they are what is known of it."""
+    weights are fewer than the network's, they stand for the clip."""
     target = next(target for target in estimator.targets if target.name == "density")
     low, high = max(space.density.low, target.low), min(space.density.high, target.high)
     known = None

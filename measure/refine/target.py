@@ -24,7 +24,7 @@ class Target:
         name: for tables and pictures.
         clip: (frame, height, width) uint8 gray.
         view: how simulated flags are filmed to be compared with it.
-        truth: name → value of what is known of it, SI; for the trace's dashed line and for scores.
+        truth: name → its known values, SI; for the trace's dashed line and for scores.
     """
 
     name: str

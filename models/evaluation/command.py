@@ -266,7 +266,7 @@ class _Desk:
 
     @property
     def _stated(self) -> str:
-        """What is known of all clips, in words."""
+        """The given range of all clips, in words."""
         if self._known is None:
             return ""
         _, low, high = self._known

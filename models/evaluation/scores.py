@@ -82,7 +82,7 @@ SCORES: dict[str, Score] = {
 }
 """By name. "accuracy" is the share of clips whose error is at most 0.5 (Acc@0.5 for wind in m/s); "bias" is the mean of
 estimate less truth; "relative_error" is the RMSE over the standard deviation of the truth over the clips tested, which
-is 1 for whoever always says their mean, and equals √(1 - R²)."""
+is 1 for a constant prediction of their mean, and equals √(1 - R²)."""
 
 
 def rmse_bound(accuracy: float) -> float:

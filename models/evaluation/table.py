@@ -318,6 +318,6 @@ LEGEND = (
     f"Brackets: {100 * LEVEL:.0f} % intervals, sequences drawn with replacement; of several runs they are the mean's "
     "and do not hold what another training run would give, which the range of the runs shows. Bound: "
     "0.5 √(1 − Acc@0.5) m/s, the least RMSE that goes with the accuracy. Area weight error / spread: RMSE over the "
-    "standard deviation of the true area weight over the clips tested, which are draws of its prior; 1 for whoever "
-    "always says the mean."
+    "standard deviation of the true area weight over the clips tested, which are draws of its prior; 1 for a constant "
+    "prediction of the mean."
 )

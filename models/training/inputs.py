@@ -81,7 +81,7 @@ class Files:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prepared:
-    """Inputs of n entries, `variants` of each, and what is known of them.
+    """Inputs of n entries, `variants` of each, and their known parameters.
 
     Attributes:
         maps: (n, variants, *shape) float16 or uint8: an array, or files that are read as they are needed.

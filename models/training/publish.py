@@ -34,7 +34,7 @@ def network_artifact(recipe: TrainingRecipe, data: dict[str, Any]) -> Artifact:
 def card_of(
     recipe: TrainingRecipe, data: dict[str, Any], trained: Trained, *, batches: dict[str, Any]
 ) -> dict[str, Any]:
-    """All that is known of a model, as JSON."""
+    """The description of a model, as JSON."""
     learner = trained.learner
     best = trained.course.best
     return {

@@ -1,6 +1,6 @@
 """Blender's own environment: where it is, how it is made, and whether the worker can use it.
 
-Blender's module binds whoever imports it to one version of Python and to NumPy 1. It is therefore installed apart, in a
+Blender's module needs one version of Python and NumPy 1. It is therefore installed apart, in a
 virtual environment that holds nothing else, and flagdata's own environment knows of it only by the path of its Python.
 """
 

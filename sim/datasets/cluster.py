@@ -142,7 +142,7 @@ def _lost() -> WorkerError:
 def _next(client: Client, running: as_completed, say: Callable[[str], None]) -> tuple[Future, Any]:
     """The next job that is done, and its result.
 
-    A result counts when it is here: that of a worker which died over sending it is made again, by whoever works then.
+    A result counts when it is here: that of a worker which died over sending it is made again by another.
 
     Raises:
         WorkerError: nobody has worked for `PATIENCE`, or the scheduler is gone.

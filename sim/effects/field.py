@@ -279,7 +279,7 @@ class FieldEffect(Effect):
         """What broadcasts to (vertex, 3, batch) [m/s²]."""
 
     def cloth(self, cloth: Cloth) -> Cloth:
-        """The cloth on which it acts; the same where nothing is said."""
+        """The cloth on which it acts; by default the same."""
         return cloth
 
     def apply(self, system: System, state: State) -> tuple[System, State]:

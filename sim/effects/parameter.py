@@ -39,7 +39,7 @@ class Role(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Described:
-    """What is known of a parameter before any measurement.
+    """A parameter's prior knowledge.
 
     Attributes:
         role: strength or shape.

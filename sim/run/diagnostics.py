@@ -33,7 +33,7 @@ _LATE = 4
 
 @dataclass(frozen=True, kw_only=True)
 class Diagnosis:
-    """What is known of one member.
+    """Diagnostics of one member.
 
     Attributes:
         energies: name → value at each kept frame [J]: kinetic, stretching, bending, gravity, and where there are such,

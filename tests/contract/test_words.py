@@ -15,10 +15,11 @@ FORBIDDEN = {
     r"\bstrangers?\b": "other users",
     r"\bstood up\b": "transposed",
     r"\blying\b": "transposed",
-    r"\b(nothing|something|little) is known of\b": "unknown",
+    r"\b(nothing|something|little|what|all that) is known of\b": "unknown, or the properties of",
     r"\brooms of\b": "stages of",
     r"\b(is|are|was|were) doubted\b": "is reported with a warning",
-    r"\bis said to be\b": "is reported as",
+    r"\b(is|are|was|were) said\b": "is reported, is given",
+    r"\bwhoever\b": "the user, the caller",
 }
 """Pattern → what a colleague from another laboratory would say."""
 

@@ -12,7 +12,7 @@ Kinds of findings, by severity:
   damaged-references, index-damaged, stream-appeared, order-by-name, truncated (within a transport packet);
 - errors: truncated, corrupt-packets, corrupt-frames, size-changed, clock-reset.
 
-Names are imported when they are first used: whoever ingests an anemometer's log needs no decoder of video.
+Names are imported when they are first used: ingesting an anemometer's log needs no video decoder.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from flagdata.ingest.camera.stamps import Timing
 
 @dataclass(frozen=True, kw_only=True)
 class SourceFacts:
-    """What is known of a camera source once its first frame is decoded.
+    """Properties of a camera source once its first frame is decoded.
 
     Attributes:
         container, codec, pixel_format: names as FFmpeg has them.

@@ -1,4 +1,4 @@
-"""When a recording began: from the user, or from metadata with what is known of their habits, never from guesses."""
+"""When a recording began: from the user, or from metadata, corrected for known habits of cameras; never guessed."""
 
 from __future__ import annotations
 

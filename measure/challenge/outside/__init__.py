@@ -1,4 +1,4 @@
-"""Effects that are not in the library, written for challenges alone: whoever fits must not know them.
+"""Effects that are not in the library, written for challenges alone: the fit must not know them.
 
 They keep the library's contract (null value, frames of reference), which `tests/measure/challenge/test_outside.py`
 holds.

@@ -137,7 +137,7 @@ def check_sides(recording: Trajectory) -> tuple[Finding, ...]:
         Finding(
             kind="rest-upside-down", severity=Severity.WARNING, where=f"recording {recording.name!r}",
             value=float(slope[1, 2]),
-            what="v runs downward on the cloth as it hangs: what is said of its top holds for its bottom",
+            what="v runs downward on the cloth as it hangs: statements about its top apply to its bottom",
             fix="let v run from the bottom to the top, and u from the hoist to the fly",
         ),
     )  # fmt: skip

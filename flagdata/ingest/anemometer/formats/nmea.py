@@ -171,7 +171,7 @@ def reading_of(stream: Stream, time: Instants, options: WindOptions, *, where: s
     """The sentences of a stream at these instants (n,).
 
     Raises:
-        InputError: all are empty, or a platform that was said to be fixed moves.
+        InputError: all are empty, or a platform that was given as fixed moves.
         UsageError: an azimuth that nothing can be turned by.
     """
     line = np.array(stream.line, dtype=np.int64)
@@ -344,7 +344,7 @@ def _others_seen(kinds: Counter[str]) -> str:
 
 
 def _placed(count: int, placed: Placed) -> tuple[Finding, ...]:
-    """What is said of sentences that have their time from others."""
+    """Finding on sentences that have their time from others."""
     if placed.marks < 2:
         return placed.findings
     kind, what = (

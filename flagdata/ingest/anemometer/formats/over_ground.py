@@ -1,4 +1,4 @@
-"""Which winds of a network are wind over ground, by what is known of its platform."""
+"""Which winds of a network are wind over ground, by the motion of its platform."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from flagdata.signals import Series
 def settled(
     channels: Mapping[str, Series], options: WindOptions, *, speeds: list[float], source: str, where: str
 ) -> tuple[dict[str, Series], Finding]:
-    """The channels with wind over ground among them where the platform is fixed, and what is said of it.
+    """The channels with wind over ground among them where the platform is fixed, and its findings.
 
     Args:
         channels: apparent, theoretical and true wind.
@@ -24,14 +24,14 @@ def settled(
         source: the messages that wind over ground was read from.
 
     Raises:
-        InputError: a platform that was said to be fixed moves.
+        InputError: a platform that was given as fixed moves.
         UsageError: an azimuth that nothing can be turned by.
     """
     speed = float(np.median(speeds)) if speeds else None
     moving = speed is not None and speed > MOVING
     if options.platform == "fixed":
         if moving:
-            what = f"the platform was said to be fixed, but moves at {speed:.1f} kn over ground in the median"
+            what = f"the platform was given as fixed, but moves at {speed:.1f} kn over ground in the median"
             raise InputError(what, where=where, fix="leave out --platform")
         return _fixed(channels, options, source, where)
     if options.azimuth is not None:

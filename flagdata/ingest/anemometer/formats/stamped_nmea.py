@@ -1,7 +1,7 @@
 """NMEA 0183 sentences, each after the stamp of the computer that logged it: "2026-05-01T12:00:00.123Z,$WIMWV,…".
 
 So log LCJ CV7, Calypso, Gill, Vaisala and other instruments whose sentences carry no time themselves; a TAG block (IEC
-61162-450, parameter "c") is such a stamp too. What the sentences mean is said in nmea.py. Sources for the instruments:
+61162-450, parameter "c") is such a stamp too. The sentences are explained in nmea.py. Sources for the instruments:
 LCJ Capteurs, CV7 user manual (MWV relative, and XDR); Calypso Instruments, ULP STD user manual, 3.1 (data format NMEA
 0183).
 """

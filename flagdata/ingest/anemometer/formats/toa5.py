@@ -100,7 +100,7 @@ def _averaging(processing: str, time: Instants) -> float | None:
 
 
 def _mean_of_angles(name: str, names: Sequence[str]) -> Finding:
-    """What is said of a direction that the logger averaged as a number: 350° and 10° make 180° then."""
+    """Finding on a direction that the logger averaged as a number: 350° and 10° make 180° then."""
     vectors = [other for other in names if other.endswith("WVc(2)")]  # the second of its numbers is the direction
     beside = f"; {', '.join(repr(other) for other in vectors)} may be the mean of vectors" if vectors else ""
     what = f"{name!r} is the mean of a vane's readings as numbers, which is wrong where they pass north{beside}"

@@ -208,7 +208,7 @@ def disordered(time: Instants) -> bool:
 def sorted_as_given(
     time: Instants, line: NDArray[np.int64], choice: ClockChoice | None
 ) -> tuple[NDArray[np.int64], Finding] | None:
-    """The order of rows that the user says to be out of order, and what is said of it; `None` where there is none.
+    """The order of rows that the user says to be out of order, and its finding; `None` where there is none.
 
     Rows of one stamp stay in the file's order.
     """
@@ -241,7 +241,7 @@ def report(
     time: Instants, jumps: Sequence[Jump], line: NDArray[np.int64], choice: ClockChoice | None, *, kept: bool = False,
     sortable: bool = False,
 ) -> tuple[Finding, ...]:  # fmt: skip
-    """What is said of clocks that were set anew and continued: the jump, its line, and what remains in doubt.
+    """Finding on clocks that were set anew and continued: the jump, its line, and what remains in doubt.
 
     Args:
         time: (n,) as the clock showed it.

@@ -102,7 +102,7 @@ def settle(
     shown = motion(reading, positions or {})
     if given == "fixed" and shown is not None:
         raise InputError(
-            f"the platform was said to be fixed, but {shown.text}", where=where,
+            f"the platform was given as fixed, but {shown.text}", where=where,
             fix="say --platform moving: its wind is then apparent wind; where the log's wind is over ground, "
             "computed from a moving platform: --platform corrected",
         )  # fmt: skip
@@ -137,18 +137,18 @@ def _renamed(
     reading: Reading, names: Mapping[str, str], kind: str, what: str, *, severity: Severity = Severity.WARNING,
     value: float | None = None, fix: str | None = None,
 ) -> Reading:  # fmt: skip
-    """The reading with channels under other names, and what is said of it."""
+    """The reading with channels under other names, and its findings."""
     found = Finding(kind=kind, severity=severity, what=what, value=value, fix=fix)
     channels = {names.get(name, name): values for name, values in reading.channels.items()}
     return replace(reading, channels=channels).with_findings((found,))
 
 
 def check_corrected(reading: Reading, given: Platform | None, *, where: str) -> None:
-    """Raises InputError where the platform's motion is said to have been taken out, and no wind is over ground."""
+    """Raises InputError where the platform's motion is stated to have been removed, and no wind is over ground."""
     if given != "corrected" or "wind_speed" in reading.channels or {"wind_x", "wind_y"} <= set(reading.channels):
         return
     raise InputError(
-        "no wind over ground in the log, which was said to be corrected for its platform's motion", where=where,
+        "no wind over ground in the log, which was given as corrected for its platform's motion", where=where,
         fix="say --platform moving: its wind is then apparent wind",
     )  # fmt: skip
 

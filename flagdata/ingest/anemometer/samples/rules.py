@@ -377,7 +377,7 @@ def steady(reading: Reading) -> Reading:
 
 
 def future(reading: Reading, *, now: int) -> Reading:
-    """Rows that are stamped more than a day after `now` [UTC ns]; of a clock that is a little fast nothing is said."""
+    """Rows that are stamped more than a day after `now` [UTC ns]; a clock that is a little fast is not reported."""
     what = f"{{n}} rows are stamped after today, the last {iso(int(reading.time.max()))}: a wrong clock or date"
     fix = "check the logger's clock and the order of day, month and year; years of two digits are taken as 1970 to 2069"
     return reading.marked(reading.time > now + 86_400 * NANOSECONDS, "stamps-in-future", what, fix=fix)

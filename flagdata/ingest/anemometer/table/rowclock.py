@@ -76,7 +76,7 @@ class RowClock:
         return dates.is_elapsed(self.form) or bool(self.utc.view().all())
 
     def order(self, line: NDArray[np.int64], choice: ClockChoice | None) -> tuple[Order, tuple[Finding, ...]]:
-        """The rows from the oldest on, for logs that list the newest first or out of order; and what is said of it.
+        """The rows from the oldest on, for logs that list the newest first or out of order; and its findings.
 
         Args:
             line: (n,) numbers of the rows' lines, for messages.

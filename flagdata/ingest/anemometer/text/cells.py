@@ -40,7 +40,7 @@ class Numbers:
     Attributes:
         value: (n,) float64, NaN unless `state` is NUMBER, or CALM or BELOW with 0.
         state: (n,) uint8 of `Cell`.
-        limit: the largest number that a value was said to be below; 0 where none was.
+        limit: the largest upper limit of a censored value; 0 where none was.
     """
 
     value: NDArray[np.float64]
