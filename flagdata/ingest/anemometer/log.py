@@ -101,7 +101,8 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     for rule in rules.RULES:
         reading = rule(reading)
     reading = rules.future(reading, now=time.time_ns())
-    findings = (*reading.findings, *(() if reading.drafted else doubts.reported(reading)))
+    answered = recipe.expect if isinstance(recipe, recipes.Recipe) else frozenset[str]()
+    findings = (*reading.findings, *(() if reading.drafted else doubts.reported(reading, answered)))
     findings = (*findings, *_nothing_measured(reading, where=str(path)))
     series = WindSeries(
         time=reading.time, channels=reading.channels, flags=reading.flags, sensor=reading.sensor,

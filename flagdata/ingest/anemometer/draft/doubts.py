@@ -95,8 +95,12 @@ def doubts(reading: Reading, recipe: Recipe, *, assumed: frozenset[str], left_ou
     return (*of_values, *of_reader)
 
 
-def reported(reading: Reading) -> tuple[Finding, ...]:
-    """What speaks against the column or the unit of the wind that an exact format or a recipe has read."""
+def reported(reading: Reading, answered: frozenset[str]) -> tuple[Finding, ...]:
+    """What speaks against the column or the unit of the wind that an exact format or a recipe has read.
+
+    Args:
+        answered: keys of doubts whose numbers are right, as the recipe says.
+    """
     speed = next((one for one in ("wind_speed", "apparent_wind_speed") if one in reading.channels), None)
     if speed is None or not len(reading.time):
         return ()
@@ -104,7 +108,7 @@ def reported(reading: Reading) -> tuple[Finding, ...]:
     seen = _seen(reading, written, "m/s", assumed=False, left_out=0, now=0)
     return tuple(
         Finding(kind="doubtful-numbers", severity=Severity.WARNING, what=f"{speed}: {text}", fix=CHECKS[key][1])
-        for key in _OF_THE_COLUMN if (text := CHECKS[key][0](seen))
+        for key in _OF_THE_COLUMN if key not in answered and (text := CHECKS[key][0](seen))
     )  # fmt: skip
 
 

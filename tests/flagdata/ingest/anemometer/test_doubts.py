@@ -178,6 +178,9 @@ def test_a_recipe_is_read_and_what_speaks_against_its_column_is_reported(log_fil
     assert "changes, as a sum does" in said["grows"][0]
     assert "whole numbers from 0 to 354" in " ".join(said["angles"])
     assert said["fast"] == []
+    recipe.write_text(recipe.read_text() + '[expect]\nconfirmed = ["code"]\n')
+    log = read_log(log_file(ODD["code"].replace("(km/h)", "(m/s)")), WindOptions(recipe=str(recipe)))
+    assert "doubtful-numbers" not in {found.kind for found in log.findings}
 
 
 def seen(speed: NDArray[np.float64], unit_name: str, days: float = 0.01) -> str:
