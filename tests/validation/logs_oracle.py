@@ -128,7 +128,8 @@ def _outcome(at: Path, entry: Mapping[str, Any], folder: Path) -> str:
         shutil.copy(at.with_suffix(".toml"), recipe)
         options["recipe"] = str(recipe)
     if "limits" in options:
-        options["limits"] = Limits(**options["limits"])
+        known = Limits.__dataclass_fields__
+        options["limits"] = Limits(**{name: value for name, value in options["limits"].items() if name in known})
     if "date" in options:
         options["date"] = dt.date.fromisoformat(options["date"])
     if "start" in options:
