@@ -1,4 +1,4 @@
-"""Whoever fits cannot know what challenges are made of: neither by import nor while it runs."""
+"""The fitted code cannot know what challenges are made of: neither by import nor while it runs."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""The words of messages, help and docstrings: none that only this project uses so."""
+"""The words of messages, help and docstrings, and of the names of tests: none that only this project uses so."""
 
 from __future__ import annotations
 
 import ast
 import re
 
-from tests.contract.imports import ROOT, modules, tree
+from tests.contract.imports import ROOT, modules, statements, tree
 
 PRODUCT = ("flagdata", "sim", "models", "measure")
 FORBIDDEN = {
@@ -22,6 +22,7 @@ FORBIDDEN = {
     r"\bwhoever\b": "the user, the caller",
 }
 """Pattern → what a colleague from another laboratory would say."""
+ANY = re.compile("|".join(FORBIDDEN), re.IGNORECASE)
 
 
 def strings(source: ast.Module) -> list[tuple[int, str]]:
@@ -33,20 +34,43 @@ def strings(source: ast.Module) -> list[tuple[int, str]]:
     ]
 
 
-def offences(source: ast.Module) -> list[str]:
+def laws(source: ast.Module) -> list[tuple[int, str]]:
+    """(line, text) of what a module of tests says of itself: its docstrings, and the names of its tests as words."""
+    found = [(1, ast.get_docstring(source) or "")]
+    for node in statements(source):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            found.append((node.lineno, ast.get_docstring(node) or ""))
+            if node.name.startswith("test_"):
+                found.append((node.lineno, node.name.replace("_", " ")))
+    return found
+
+
+def offences(texts: list[tuple[int, str]]) -> list[str]:
     return [
         f"{line}: {found.group()!r}: {plain}"
-        for line, text in strings(source)
+        for line, text in texts
+        if ANY.search(text)
         for pattern, plain in FORBIDDEN.items()
         if (found := re.search(pattern, text, re.IGNORECASE))
     ]
 
 
 def test_strings_of_the_product_use_plain_words() -> None:
-    found = [f"{path.relative_to(ROOT)}:{line}" for path in modules(*PRODUCT) for line in offences(tree(path))]
+    found = [f"{path.relative_to(ROOT)}:{line}" for path in modules(*PRODUCT) for line in offences(strings(tree(path)))]
     assert found == []
 
 
-def test_docstrings_and_parts_of_f_strings_count_and_names_do_not() -> None:
-    assert len(offences(ast.parse('"""What is told."""\nx = f"it {y} tells"\n'))) == 2
-    assert offences(ast.parse("told = file.tell()\n")) == []
+def test_names_and_docstrings_of_tests_use_plain_words() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for path in modules("tests")
+        for line in offences([(1, path.stem.replace("_", " ")), *laws(tree(path))])
+    ]
+    assert found == []
+
+
+def test_docstrings_and_parts_of_f_strings_count_and_other_names_do_not() -> None:
+    assert len(offences(strings(ast.parse('"""What is told."""\nx = f"it {y} tells"\n')))) == 2
+    assert offences(strings(ast.parse("told = file.tell()\n"))) == []
+    assert offences(laws(ast.parse('def tell() -> None:\n    print("told")\n'))) == []
+    assert len(offences(laws(ast.parse('def test_rooms_of() -> None:\n    """Strangers."""\n')))) == 2

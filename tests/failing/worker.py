@@ -61,7 +61,7 @@ def run(arguments: list[str], folder: Path) -> int:
         main(arguments)
     except SystemExit as ended:
         code = int(ended.code or 0)
-    except BaseException:  # noqa: BLE001  the test is told of it
+    except BaseException:  # noqa: BLE001  the test gets it
         traceback.print_exc()
     sys.stdout.flush()
     sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""Whatever ends a command, its user is told in one form."""
+"""Whatever ends a command, the error has one form."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A small lake of films whose waves tell the wind, for the tests of training and of what is trained."""
+"""A small lake of films whose waves depend on the wind, for the tests of training and of what is trained."""
 
 from __future__ import annotations
 

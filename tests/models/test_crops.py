@@ -1,4 +1,4 @@
-"""Crops: what is cut is where it was said to be, mirrored where it was said to be."""
+"""Crops: what is cut is where the crop states, mirrored where it states so."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def test_windows_apart_are_those_of_all_windows() -> None:
 
 
 def test_a_ramp_moves_along_its_slope_by_the_ridge_less() -> None:
-    """I = s (x − d t): u (s² + r) = s² d, and nothing is known of motion along the lines of equal gray."""
+    """I = s (x − d t): u (s² + r) = s² d, and motion along the lines of equal gray is unknown."""
     slope, step = 0.1, 0.7
     x = torch.arange(40.0, dtype=torch.float64)
     frames = torch.stack([(slope * (x - step * t)).expand(40, 40) for t in range(3)])
@@ -113,7 +113,7 @@ def test_the_two_coarser_of_three_scales_are_those_of_a_clip_of_half_the_size() 
     torch.testing.assert_close(three[-len(CHANNELS) :], two)
 
 
-def test_the_finest_scale_tells_motion_of_a_tenth_of_a_pixel_of_the_clip() -> None:
+def test_the_finest_scale_resolves_a_tenth_of_a_pixel_of_the_clip() -> None:
     """A steady 0.1 px of the clip is 0.05 of the finest scale's."""
     across = np.broadcast_to(0.1 * np.arange(FRAMES)[:, None, None], (FRAMES, SIZE, SIZE))
     maps = flow_maps(warped(across, np.zeros_like(across), grain=6.0), scales=3)

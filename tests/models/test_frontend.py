@@ -135,7 +135,7 @@ def test_a_clip_without_contrast_is_still_finite() -> None:
         assert FrontEnd(maps=maps, size=SIZE)(flat).isfinite().all()
 
 
-def test_front_ends_are_told_apart_by_all_that_shapes_them() -> None:
+def test_front_ends_are_distinguished_by_all_that_shapes_them() -> None:
     ends = [FrontEnd(maps="wave-maps"), FrontEnd(maps="spectral-maps"), FrontEnd(maps="wave-maps", size=112),
             FrontEnd(maps="wave-maps", rate=30.0), FrontEnd(maps="wave-maps", temporal_sigma=1.5)]  # fmt: skip
     assert len({end.hash for end in ends}) == len(ends)

@@ -103,7 +103,7 @@ def test_predicting_the_training_mean_costs_one() -> None:
     assert learner.loss(torch.zeros_like(target), target, torch.arange(50)).item() == pytest.approx(1, rel=1e-5)
 
 
-def test_what_a_regression_tells_is_in_the_targets_units() -> None:
+def test_what_a_regression_predicts_is_in_the_targets_units() -> None:
     values = regression().point_estimates(torch.tensor([[1.0, -1.0]]))
     torch.testing.assert_close(values, torch.tensor([[7.0, 0.1]]))
 

@@ -47,7 +47,7 @@ def test_false_alarms_are_as_rare_as_stated() -> None:
     assert familiarity.unfamiliar(draws(8, 20_000), false_alarm=0.05).mean() == pytest.approx(0.05, abs=4 * 0.0069)
 
 
-def test_unfamiliar_clips_are_told() -> None:
+def test_unfamiliar_clips_are_detected() -> None:
     familiarity = Familiarity.of(draws(9, 500), draws(10, 999))
     away = draws(11, 200) + np.array([8.0, 0, 0, 0, 0])
     assert familiarity.unfamiliar(away, false_alarm=0.01).mean() > 0.95
@@ -85,7 +85,7 @@ def test_it_is_the_same_after_storing() -> None:
     np.testing.assert_array_equal(again.p_value(draws(20, 10)), familiarity.p_value(draws(20, 10)))
 
 
-def test_a_rate_that_the_validation_clips_cannot_tell_is_an_error() -> None:
+def test_a_rate_too_low_for_the_validation_clips_is_an_error() -> None:
     familiarity = Familiarity.of(draws(21, 50), draws(22, 50))
     with pytest.raises(InputError, match="at least 99 clips"):
         familiarity.threshold(0.01)

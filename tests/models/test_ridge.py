@@ -45,7 +45,7 @@ def test_targets_that_are_noise_are_shrunk_to_their_mean() -> None:
 def test_the_penalty_is_judged_on_sequences_not_on_clips() -> None:
     """Features by which a sequence is recognised predict its other clips, and nothing of sequences never seen.
 
-    15 random numbers tell 20 sequences apart. By clips left out they are taken at full weight; by sequences, shrunk.
+    15 random numbers identify 20 sequences. By clips left out they are taken at full weight; by sequences, shrunk.
     """
     g = np.random.Generator(np.random.PCG64(6))
     sequence = np.repeat(np.arange(20), 10)

@@ -98,7 +98,7 @@ def test_the_end_may_be_given_in_three_ways(write: Write) -> None:
     assert [read_scene(write({"duration": None, **end})).frames for end, _ in cases] == [frames for _, frames in cases]
 
 
-def test_all_that_is_not_supported_is_told_at_once(write: Write) -> None:
+def test_everything_unsupported_is_reported_at_once(write: Write) -> None:
     entry = {"data": "m.json", "sheen": 1, "strain_limits": [0.95, 1.05]}
     changes = {
         **cloth(materials=[entry], texture="a.png", remeshing={"size": [0.02, 0.5]}),
@@ -190,7 +190,7 @@ def test_a_scene_that_is_written_comes_back(
         ({"limits": StrainLimits(high=math.inf)}, "without an upper one"),
     ],
 )
-def test_what_arcsim_cannot_be_told_is_not_written(changes: dict[str, Any], word: str, tmp_path: Path) -> None:
+def test_what_arcsim_cannot_represent_is_not_written(changes: dict[str, Any], word: str, tmp_path: Path) -> None:
     scene = replace(flag(material=named("paper"), wind_speed=4, columns=6), **changes)
     with pytest.raises(InputError, match=word):
         write_scene(ArcsimScene(scene=scene, frame_time=0.04, frame_steps=8, frames=1), tmp_path)

@@ -45,7 +45,7 @@ def test_catalog_agrees_with_the_distributed_files(reference_data: Path) -> None
         np.testing.assert_array_equal(cloth.bending, content["bending"])
 
 
-def test_a_fingerprint_tells_cloths_by_their_mass_and_stiffness_alone() -> None:
+def test_a_fingerprint_depends_on_mass_and_stiffness_alone() -> None:
     cloth = material.named("camel-ponte-roma")
     assert replace(cloth, name="another", source="", damping=5e-3).fingerprint == cloth.fingerprint
     others = [cloth.scaled(**{what: 1.01}) for what in ("density", "stretching", "bending")]

@@ -4,10 +4,10 @@ Each is three winds of 10 s on an irregular mesh of 486 vertices: nothing undecl
 linear tangential drag, and an internal damping of 30 ms. A verdict is right if it names what acted, alone or as one of
 several, and names nothing where only a calibrated parameter differs. All four are judged by the same bank of nulls, and
 then by banks that were drawn anew: verdicts that differ between them depend on the draw. The verdicts
-are made twice: with nothing said of how well the cloth was weighed, and weighed to 2 %.
+are made twice: with the weight's uncertainty not given, and given as 2 %.
 
 The other three are damped by ArcSim's steps alone, like 2.5 ms where a motion is slow beside them and less where it is
-not, so that whether the interval of damping holds is told of the fourth alone.
+not, so that only for the fourth it is reported whether the interval of damping contains the true value.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ WINDS = (3, 5, 7)
 DRAWS = tuple(range(1, 1 + int(os.environ.get("FLAGDATA_DRAWS", "3"))))
 """Of the nulls, some 13 minutes of a core each; FLAGDATA_DRAWS says how many."""
 KNOWN = tuple(float(known) for known in os.environ.get("FLAGDATA_KNOWN", f"{DENSITY_UNCERTAINTY:g},0.02").split(","))
-"""Relative standard uncertainties of the density that is declared: where nothing is said of it, and of a cloth that was
+"""Relative standard uncertainties of the density that is declared: where it is not given, and of a cloth that was
 weighed; FLAGDATA_KNOWN says which are tried."""
 _UNIT = 1e-4  # m, of the stored positions
 _SHOWN = 7
-"""Candidates that are told."""
+"""Candidates that the page reports."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +92,7 @@ def _heading(draw: int, known: float) -> str:
 
 
 def _once(place: Path, name: str, experiment: Experiment, seed: int) -> dict[str, Any]:
-    """A verdict as it is told, from its file where it was made before."""
+    """A verdict as the page reports it, from its file where it was made before."""
     kept = place / f"{name}-{experiment.specimen.density_uncertainty:g}.json"
     if not kept.exists():
         told = _told(close_loop(experiment, Options(bank=place / "nulls", seed=seed)), CASES[name])

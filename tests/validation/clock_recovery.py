@@ -1,8 +1,8 @@
 """Is the hidden offset of two clocks found, and does its interval cover it as often as it says?
 
-Field recordings of 10 minutes are made with drawn flags in gusty wind, each with an offset that is told to nobody; the
-clock estimator sees the frames (as uint8 pictures at 25 Hz) and the anemometer's log alone. As many recordings in
-steady wind must all be refused.
+Field recordings of 10 minutes are made with drawn flags in gusty wind, each with a hidden offset; the clock
+estimator gets the frames (as uint8 pictures at 25 Hz) and the anemometer's log alone. As many recordings in steady wind
+must all be refused.
 """
 
 from __future__ import annotations

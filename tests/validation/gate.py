@@ -104,7 +104,7 @@ def _kind(judged: list[Judgement], name: str) -> dict[str, Any]:
 
 
 def _real(model: Estimator, gate: Gate) -> dict[str, Any]:
-    """What is said of the windows of a real recording of two flags (DynTex 571c110), if it is there."""
+    """The gate's answers for the windows of a real recording of two flags (DynTex 571c110), if it is there."""
     path = REFERENCE / _CLIP
     if not path.exists():
         return dict(ABSENT)

@@ -2,7 +2,7 @@
 
 The gate's own distortions (`measure.gate.distortions`) are not used here. Films of one flag are altered as a careless
 recording would be; trees, people and sheets are drawn or simulated. All of them then go through the camera of the data
-set: H.264 at a rate factor of 18 to 24, so that no kind is told by its coding.
+set: H.264 at a rate factor of 18 to 24, so that the coding identifies no kind.
 """
 
 from __future__ import annotations

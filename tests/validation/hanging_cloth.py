@@ -2,9 +2,9 @@
 
 Runia et al. 2020 (supplement, hanging cloth) measured three of Bouman's recordings by refinement: 0.17, 0.24 and
 0.39 kg/m² were found as 0.22, 0.29 and 0.45. Those films are real and ours are simulated, so that the errors are put
-beside each other, not compared. The spread of what is tested is stated with them: whoever always says the mean weight
-of the training clips errs by it. What remains for somebody who knows the material by name, and nothing of the weight
-that was drawn for it, is stated too.
+beside each other, not compared. The spread of the tested weights is reported with them: it is the error of always
+predicting the mean of the training clips. The error of knowing the material's name, but not its drawn weight, is
+reported too.
 
 The films are those of the test side of `clothsim-wide`, in a lake that FLAGDATA_CLOTH_LAKE names.
 """

@@ -81,7 +81,7 @@ def _noted(films: Iterable[LongFilm], datasets: list[str]) -> Iterator[LongFilm]
 
 
 def _answers(model: Estimator, found: Posteriors, count: int, *, seed: int) -> Predictions:
-    """What is said of each film by its first windows together, the wind their mean."""
+    """The estimate of each film from its first windows together, the wind their mean."""
     learner = model.learners[0]
     names = learner.scaling.quantities
     own = np.array([name in OWN for name in names])

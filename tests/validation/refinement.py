@@ -185,7 +185,7 @@ def _changed(count: int, space: Space, *, frames: int, seed: int, folder: Path) 
 
 
 def _arcsim(count: int, *, frames: int, seed: int) -> list[Target]:
-    """Runs of the reference simulator, of as many views as there must be; how they were filmed is not told."""
+    """Runs of the reference simulator, of as many views as there must be; the estimator does not get their cameras."""
     otherwise = DrawnView(prior=named(RENDERS), assets=Assets())
     clips = reference_clips(REFERENCE / "arcsim", seed, frames, views=-(-count // REFERENCE_RUNS))
     return [

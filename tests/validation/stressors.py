@@ -5,7 +5,7 @@ simulated by the base model on other meshes and by other steps, with density, be
 differ from the declared ones. The recordings are then made worse by one thing each: a log of 1 Hz, a clock that is
 off, a wrong direction, markers that were not tracked, more or coloured noise, another frame rate. In two more cases the
 simulation itself differs: the cloth is of another material than the declared one, or the turbulence has three
-components. Turbulence that a log does not hold is an effect of the library, and is told rightly as gusts.
+components. Turbulence that a log does not hold is an effect of the library, and is rightly reported as gusts.
 
 Environment variables: FLAGDATA_STRESSORS (how many nulls of each kind), FLAGDATA_STRESSORS_FOLDER (where banks,
 recordings and verdicts are kept; a run that was stopped goes on there).
@@ -83,7 +83,7 @@ class Truth:
 
 @dataclass(frozen=True, kw_only=True)
 class Recorded:
-    """What a user would bring of one recording: markers, how noisy they are said to be [m], and a log."""
+    """What a user would bring of one recording: markers, their stated noise [m], and a log."""
 
     positions: Floats
     rate: float

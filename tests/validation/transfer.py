@@ -2,7 +2,7 @@
 
 Each change is filmed anew from flags that no model has seen: another mesh, another integrator, another renderer, other
 textures, a noisier camera; and runs of the reference simulator (../shared/data/arcsim), which share no code with ours,
-filmed by our rasteriser. What the model's own doubt says of them is told beside the errors.
+filmed by our rasteriser. The model's own test of unfamiliar clips is reported beside the errors.
 """
 
 from __future__ import annotations

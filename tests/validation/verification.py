@@ -146,7 +146,7 @@ def observed_order(
 ) -> tuple[float, float, float, float]:
     """Weighted least squares of v = v0 + c sᵖ: p with its 68 % range (χ² within 1 of its least), and v0.
 
-    The range ends at the ends of what is tried where the values tell no more.
+    The range ends at the ends of what is tried where the values give no bound.
     """
     fits = []
     for order in _ORDERS_TRIED:

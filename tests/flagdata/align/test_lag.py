@@ -63,7 +63,7 @@ def test_intervals_of_field_recordings_cover_the_offset_at_their_level(scene: Sc
             sigmas.append(found.sigma)
             covered += bool(found.interval[0] <= offset <= found.interval[1])
     accepted = len(errors)
-    assert accepted >= 2 * FIELDS / 3  # the rest is too noisy to tell and says so
+    assert accepted >= 2 * FIELDS / 3  # the rest is too noisy and reported so
     # 90 % of n by the binomial distribution, at the 1 % and 99.9 % points: chance alone fails this once in a hundred.
     assert binom.ppf(0.01, accepted, 0.9) <= covered
     scores = np.array(errors) / np.array(sigmas)

@@ -28,7 +28,7 @@ RATE = 10
 
 
 def scene(folder: Path, *, log_shift: float = 0.0) -> tuple[Lake, str, str]:
-    """Six seconds of film in a log whose speed is the second's number: its mean over a window tells the window."""
+    """Six seconds of film in a log whose speed is the second's number: its mean over a window identifies the window."""
     lake = Lake.create(folder)
     with lake.transaction("scene") as transaction:
         times = START + np.arange(FRAMES, dtype=np.int64) * (SECOND // RATE)
@@ -157,7 +157,7 @@ def test_a_log_an_hour_from_its_film_is_warned_of_before_the_search(tmp_path: Pa
         invoke("align", camera, wind, *STAMPS, "--lake", str(lake.path))
 
 
-def test_spans_hours_apart_are_told_with_the_way_they_lie() -> None:
+def test_spans_hours_apart_are_reported_with_their_order() -> None:
     film, names = (START, START + 600 * SECOND), ("cam", "mast")
     early = (film[0] - 9000 * SECOND, film[0] - 5400 * SECOND)
     found = by_spans(film, early, names=names)

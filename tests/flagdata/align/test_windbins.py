@@ -25,7 +25,7 @@ def ramp_log(
 ) -> WindSeries:
     """A wind of 1 m/s + 1 m/s a second since START, by an instrument that gives the mean of the time before a stamp.
 
-    The mean of a ramp over a second is its value in the middle of it, so speeds tell what instants they are of.
+    The mean of a ramp over a second is its value in the middle of it, so each speed identifies its instant.
     """
     at = (np.arange(count) + 1) * spacing + phase
     stamp = at + jitter * stream(1, "jitter").uniform(-0.5, 0.5, count)

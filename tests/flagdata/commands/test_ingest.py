@@ -22,7 +22,7 @@ def run(lake: Lake, capsys: pytest.CaptureFixture[str]) -> Run:
     return lambda *arguments: invoke(capsys, "ingest", *arguments, "--lake", lake.path)
 
 
-def test_kind_is_told_by_content_not_by_name(run, lake: Lake, video: Path, wind_log: Path, tmp_path: Path) -> None:
+def test_kind_is_inferred_from_content_not_name(run, lake: Lake, video: Path, wind_log: Path, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_bytes(video.read_bytes())
     (tmp_path / "b.mp4").write_bytes(wind_log.read_bytes())
     code, out, _ = run(tmp_path / "a.csv", tmp_path / "b.mp4", "--json")

@@ -85,7 +85,7 @@ def test_the_anemometers_of_a_table_come_in_whole_or_not_at_all(run: Run, lake: 
     path = tmp_path / "mast.csv"
     rows = [row.rpartition(",")[0] + ",400" for row in ROWS]
     path.write_text("\n".join(["time,Spd80m (m/s),Spd40m (m/s)", *rows]) + "\n")
-    assert run(path)[0] == 3  # the second is doubted, and nothing of the first is kept
+    assert run(path)[0] == 3  # the second is refused, and nothing of the first is kept
     assert lake.rows().num_rows == 0
     assert run(path, *STORM)[0] == 0
     assert lake.view(None)[0].version == 1  # one commit

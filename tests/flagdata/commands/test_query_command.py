@@ -143,7 +143,7 @@ def test_a_query_that_fails_leaves_no_arrow_file(run: Run, tmp_path: Path) -> No
     assert list(tmp_path.iterdir()) == []
 
 
-def test_nothing_found_is_said_and_is_no_failure(run: Run) -> None:
+def test_an_empty_result_is_reported_and_is_no_failure(run: Run) -> None:
     code, out, err = run("--where", "wind > 100")
     assert (code, out) == (0, "")
     assert "no rows of 4 match" in err

@@ -74,7 +74,7 @@ def test_a_range_holds_for_exactly_the_known_numbers_in_it(winds: list[float | N
     assert numbers(found.table()) == wanted
 
 
-def test_a_query_too_large_for_memory_is_told_so_and_leaves_no_file(
+def test_a_query_too_large_for_memory_is_an_error_and_leaves_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,4 @@
-"""The decoded cache gives back what was decoded, within its size, whoever else uses or damages it."""
+"""The decoded cache gives back what was decoded, within its size, even if other programs use or damage it."""
 
 from __future__ import annotations
 

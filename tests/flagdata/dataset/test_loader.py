@@ -234,7 +234,7 @@ def test_worker_processes_end_with_their_loader(pairs):
     assert len(children) == 2
     began = time.monotonic()
     del loader
-    # Workers that were not told to end are killed after 5 s each: 10 s.
+    # Workers that got no signal to end are killed after 5 s each: 10 s.
     assert time.monotonic() - began < 8
     assert not any(child.is_alive() for child in children)
 

@@ -186,7 +186,7 @@ def test_a_recording_that_was_aligned_anew_gives_its_clips_once(lake, add_record
     assert set(flagdata.open(lake.path).pairs(f"recording = '{old}'").table.recording.tolist()) == {old}
 
 
-def test_what_is_not_there_is_said(source):
+def test_what_is_missing_is_an_error(source):
     with pytest.raises(NotFoundError, match="no clips match"):
         source.pairs("wind > 100")
     with pytest.raises(

@@ -177,7 +177,7 @@ def test_dead_zone_widens_the_interval_by_what_it_may_hide():
     assert "wind-dead-zone" in result.flags
 
 
-def test_unknown_accuracy_is_said():
+def test_unknown_accuracy_is_reported():
     assert "sensor-accuracy-unknown" in truth(series(np.arange(0, 121), 5.0), 100).flags
     known = Sensor(name="cup", accuracy=0.1)
     assert truth(series(np.arange(0, 121), 5.0, sensor=known), 100).flags == ()

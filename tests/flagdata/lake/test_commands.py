@@ -32,7 +32,7 @@ def test_init_makes_a_lake_that_the_others_open(run: Run, tmp_path: Path) -> Non
     assert not (tmp_path / "a").exists()
 
 
-def test_a_missing_lake_is_told_in_three_lines_with_the_fix(run: Run, tmp_path: Path) -> None:
+def test_a_missing_lake_is_reported_in_three_lines_with_a_fix(run: Run, tmp_path: Path) -> None:
     ended = run("ls", "--lake", tmp_path)
     assert ended.code == 1
     assert ended.out == ""
@@ -97,7 +97,7 @@ def test_ls_counts_clips_and_lists_them_on_request(run: Run, lake: Lake, put_tex
     assert " 9 B" not in run("ls", "--kind", "clip").out
 
 
-def test_log_tells_each_commit_and_a_commit_names_a_version(run: Run, lake: Lake, put_text: Put) -> None:
+def test_log_lists_each_commit_and_a_commit_names_a_version(run: Run, lake: Lake, put_text: Put) -> None:
     put_text(lake, "a")
     put_text(lake, "b")
     commits = run("log", "--json").document["commits"]
@@ -160,7 +160,7 @@ def test_withdraw_says_what_went_along(run: Run, lake: Lake, put_text: Put) -> N
     assert run("ls", "--json").document["artifacts"] == []
 
 
-def test_withdraw_takes_a_recording_s_clips_without_being_told(run: Run, lake: Lake, put_text: Put) -> None:
+def test_withdraw_takes_a_recordings_clips_without_an_option(run: Run, lake: Lake, put_text: Put) -> None:
     recording = put_text(lake, "recording")
     with lake.transaction("clips") as tx:
         for i in range(200):
@@ -169,7 +169,7 @@ def test_withdraw_takes_a_recording_s_clips_without_being_told(run: Run, lake: L
     assert (done.code, done.out) == (0, "version 3: 1 withdrawn from main, 200 clips went along\n")
 
 
-def test_refs_that_are_not_there_are_not_found_and_names_that_cannot_be_are_told_by_their_noun(run: Run) -> None:
+def test_missing_refs_are_not_found_and_errors_of_names_say_branch_or_tag(run: Run) -> None:
     for ref in ("999", "nope", "c" + "0" * 16):
         ended = run("ls", "--at", ref, "--json")
         assert (ended.code, ended.document["kind"]) == (1, "not-found")
@@ -206,9 +206,7 @@ def test_verify_and_doctor_exit_with_3_when_the_lake_is_damaged(run: Run, lake: 
     assert "error: dangling-row" in run("doctor").out
 
 
-def test_a_bit_that_flipped_in_the_catalog_is_told_by_verify_and_by_a_deep_doctor(
-    run: Run, lake: Lake, put_text: Put
-) -> None:
+def test_verify_and_a_deep_doctor_find_a_flipped_bit_in_the_catalog(run: Run, lake: Lake, put_text: Put) -> None:
     put_text(lake, "a")
     path = next((lake.path / "catalog").glob("*.parquet"))
     data = bytearray(path.read_bytes())

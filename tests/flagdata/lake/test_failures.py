@@ -274,12 +274,12 @@ def test_of_several_processes_that_make_a_lake_at_once_one_does(tmp_path: Path) 
     assert doctor(Lake.open(tmp_path / "lake"), grace=NOW) == ()
 
 
-def test_a_folder_without_a_lake_is_told_with_the_fix(tmp_path: Path) -> None:
+def test_a_folder_without_a_lake_is_an_error_with_a_fix(tmp_path: Path) -> None:
     with pytest.raises(NotFoundError, match="flagdata init"):
         Lake.open(tmp_path)
 
 
-def test_a_damaged_checkpoint_is_told_and_the_fix_that_is_named_works(lake: Lake, put_text: Put) -> None:
+def test_a_damaged_checkpoint_is_reported_with_a_fix_that_works(lake: Lake, put_text: Put) -> None:
     for i in range(40):
         put_text(lake, str(i))
     log = lake.path / "catalog" / "_delta_log"

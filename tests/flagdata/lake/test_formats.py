@@ -81,7 +81,7 @@ def test_a_lake_that_is_moved_stays_whole(lake: Lake, put_text: Put, tmp_path: P
     assert doctor(moved) == ()
 
 
-def test_of_two_appends_at_one_version_the_second_is_told_and_publishes_nothing(lake: Lake, put_text: Put) -> None:
+def test_of_two_appends_at_one_version_the_second_fails_and_publishes_nothing(lake: Lake, put_text: Put) -> None:
     put_text(lake, "a")
     base = lake.catalog.head()
     rows = lake.rows()
@@ -127,7 +127,7 @@ def test_rows_come_in_the_order_of_commit_then_start_then_frame(lake: Lake) -> N
     assert lake.rows("kind = 'clip'")["name"].to_pylist() == expected
 
 
-def test_a_damaged_log_entry_is_told_by_its_name(lake: Lake, put_text: Put) -> None:
+def test_the_error_of_a_damaged_log_entry_names_it(lake: Lake, put_text: Put) -> None:
     put_text(lake, "a")
     put_text(lake, "b")
     entry = lake.path / "catalog" / "_delta_log" / "00000000000000000001.json"

@@ -276,7 +276,7 @@ VERBS = [
 def test_each_verb_that_writes_refuses_a_lake_that_can_only_be_read_before_it_works(
     lake: Lake, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """What is named to them is not there, so whoever looks at its input first says so instead."""
+    """Their input does not exist: a verb that looks at its input first reports that instead."""
     monkeypatch.setattr(os, "access", lambda path, mode: not (mode & os.W_OK and str(path).startswith(str(lake.path))))
     refused = (1, "flagdata: this lake can be read, but not written", True)
     offenders = {}

@@ -176,7 +176,7 @@ def test_the_name_of_a_deleted_tag_never_shows_anything_else(lake: Lake, put_tex
     assert names(lake, "v1") == ["a"]
 
 
-def test_what_cannot_be_deleted_is_told(lake: Lake) -> None:
+def test_what_cannot_be_deleted_is_an_error(lake: Lake) -> None:
     lake.tag("v1")
     lake.branch("b")
     with pytest.raises(UsageError, match="main"):

@@ -1,4 +1,4 @@
-"""Mesh sequences come back bit for bit, equal ones are one object, and damage is told."""
+"""Mesh sequences come back bit for bit, equal ones are one object, and damage is an error."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def test_a_damaged_chunk_is_an_error(tmp_path: Path) -> None:
         read_meshes(path)
 
 
-def test_another_store_and_a_newer_format_are_told_apart(tmp_path: Path) -> None:
+def test_another_store_and_a_newer_format_are_distinguished(tmp_path: Path) -> None:
     with pytest.raises(CorruptError, match="not a Zarr store"):
         read_meshes(tmp_path)
     path = tmp_path / "a.zarr"

@@ -124,7 +124,7 @@ def test_a_ref_that_cannot_be_read_is_an_error_and_stops_collection(lake: Lake, 
 
 
 @pytest.mark.parametrize("lost", [0, 2, 3])
-def test_a_lost_entry_of_the_log_is_told_by_all_and_nothing_is_collected(lake: Lake, put_text: Put, lost: int) -> None:
+def test_every_reader_reports_a_lost_log_entry_and_nothing_is_collected(lake: Lake, put_text: Put, lost: int) -> None:
     artifacts = [put_text(lake, text) for text in "abc"]
     entry = lake.path / "catalog" / "_delta_log" / f"{lost:020d}.json"
     content = entry.read_bytes()
@@ -187,7 +187,7 @@ def test_a_bit_that_flips_anywhere_in_a_file_of_the_catalog_is_found_and_stops_c
     assert "catalog-file-missing" in kinds(verify_catalog(Lake.open(lake.path)))
 
 
-def test_a_branch_whose_ref_is_lost_is_told_and_its_objects_are_not_collected(lake: Lake, put_text: Put) -> None:
+def test_a_branch_whose_ref_is_lost_is_reported_and_its_objects_are_kept(lake: Lake, put_text: Put) -> None:
     lake.branch("try")
     artifact = put_text(lake, "a", branch="try")
     (lake.path / "refs" / "branches" / "try.json").unlink()
@@ -399,7 +399,7 @@ def test_leftovers_of_the_commit_protocol_are_explained_and_collected(lake: Lake
     assert lake.rows().num_rows == 1
 
 
-def test_what_lies_in_staging_without_a_lease_is_told_and_collected_after_the_grace_period(lake: Lake) -> None:
+def test_staged_files_without_a_lease_are_reported_and_collected_after_the_grace_period(lake: Lake) -> None:
     file, folder = lake.staging / "notes.txt", lake.staging / "mine"
     folder.mkdir()
     for path in (file, folder / "inner.mcap"):

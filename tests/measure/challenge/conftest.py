@@ -22,7 +22,7 @@ def _made(path: Path, *, seed: int = 3) -> ChallengeFolder:
 
 @pytest.fixture
 def make_tiny() -> Callable[..., ChallengeFolder]:
-    """Makes the same four sets of two recordings wherever it is told to."""
+    """Makes the same four sets of two recordings in any folder."""
     return _made
 
 

@@ -184,14 +184,14 @@ def test_the_corrective_field_names_no_effect() -> None:
 def test_the_control_is_separated_where_its_interval_does_not_reach_zero(
     conclusion: Conclusion, half: float, separated: bool
 ) -> None:
-    """Worse by 1 nat a segment; several named are not told apart."""
+    """Worse by 1 nat a segment; several named effects are not separated."""
     said = verdict(conclusion, "lift", apart=estimate(1.0, half))
     outcome = Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", said))
     assert outcome.separated is separated
     assert graded("x", [outcome]).separated.value == separated
 
 
-def test_without_a_control_nothing_is_said_of_it() -> None:
+def test_without_a_control_nothing_is_separated() -> None:
     alone = verdict(Conclusion.EFFECT, "lift", apart=None)
     assert Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", alone)).separated is None
     none = Outcome.of(key("a", Kind.NULL), filing("a", verdict(Conclusion.SUFFICIENT, apart=estimate(1.0, 0.5))))

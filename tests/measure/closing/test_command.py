@@ -84,7 +84,7 @@ def test_winds_are_one_for_all_or_one_each(table: Path, capsys: pytest.CaptureFi
 
 
 @pytest.mark.parametrize("option", ["--offset=2", "--sensor=generic-csv", "--zone=+02:00"])
-def test_what_is_said_of_a_log_is_not_ignored_where_there_is_none(
+def test_options_of_a_log_are_not_ignored_where_there_is_none(
     table: Path, option: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     code, told = said([str(table), "--rate", str(RATE), "--wind", "4", option], capsys)
@@ -101,7 +101,7 @@ def test_a_log_is_read_as_its_sensor_and_zone_say(table: Path, tmp_path: Path) -
     np.testing.assert_allclose(calm.wind.at(np.array([0.0, 0.5])), [[5, 0, 0], [5.5, 0, 0]])
 
 
-def test_a_warning_that_may_be_what_was_found_is_said_with_the_verdict() -> None:
+def test_a_warning_that_may_explain_the_verdict_is_reported_with_it() -> None:
     whole = verdict(Conclusion.EFFECT, Size(across=3, up=3, frames=20, stretch=2))
     doubt = Finding(kind="inertia-does-not-fit", severity=Severity.WARNING, what="it moves as in 8 m/s", where="flag")
     other = replace(doubt, kind="cloth-not-covered", what="no marker near", severity=Severity.NOTE)
@@ -189,7 +189,7 @@ def test_a_speed_needs_an_axis_and_a_source_a_place(table: Path) -> None:
         read(["nowhere"], [], Reading(), None)
 
 
-def test_recordings_of_one_name_are_told_apart(table: Path) -> None:
+def test_recordings_of_one_name_get_names_that_differ(table: Path) -> None:
     names = [seen.name for seen in read([str(table), str(table)], ["4"], Reading(rate=RATE), None)]
     assert len(set(names)) == 4
 

@@ -107,7 +107,7 @@ def test_what_was_kept_comes_back_as_it_was(lake: Lake, specimen: Specimen) -> N
     lake.objects.check(stored)
 
 
-def test_a_folder_that_is_no_measurement_is_told(tmp_path: Path) -> None:
+def test_a_folder_that_is_no_measurement_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "other.zarr").mkdir()
     with pytest.raises(CorruptError):
         read(tmp_path / "other.zarr")

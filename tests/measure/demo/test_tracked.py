@@ -1,4 +1,4 @@
-"""The demonstration's tracked flag: files a user could have brought, which do not tell what acted on the cloth."""
+"""The demonstration's tracked flag: files a user could have brought, which do not state what acted on the cloth."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_the_files_are_an_experiment_without_findings_that_matter(made: Tracks) 
     np.testing.assert_allclose(np.ptp(experiment.specimen.mesh.rest, axis=0), [0.9, 0.6])
 
 
-def test_neither_file_tells_what_acted(made: Tracks) -> None:
+def test_neither_file_states_what_acted(made: Tracks) -> None:
     told = made.recipe.read_text(encoding="utf-8")
     assert not [effect for effect in EFFECTS if effect in told]
     assert set(tomllib.loads(told)) == {"title", "cloth", "material", "pins", "recording"}

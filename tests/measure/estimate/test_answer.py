@@ -1,4 +1,4 @@
-"""The answer in words: what is told, what is not, and by how much the film added to what was assumed."""
+"""The answer in words: which quantities get a value, which do not, and how much the film added to what was assumed."""
 
 from __future__ import annotations
 
@@ -70,12 +70,12 @@ def test_an_end_that_nothing_bounds_is_null_in_json_and_no_value_is_given() -> N
     assert (WIND.as_dict()["bound"], WIND.as_dict()["level"]) == (None, 0.9)
 
 
-def test_draws_at_both_ends_of_the_range_are_not_told() -> None:
+def test_draws_at_both_ends_of_the_range_give_no_value() -> None:
     nothing = Span(low=0.0, high=math.inf, level=1.0, bound=Bound.NOTHING, estimated=False)
     assert not replace(STRONG, span=nothing).constrained
 
 
-def test_the_weight_of_a_small_flag_is_told_to_a_gram() -> None:
+def test_the_weight_of_a_small_flag_is_given_to_a_gram() -> None:
     small = Quantity(
         name="density", unit="kg/m²", value=0.0325, sigma=0.003, span=whole(0.028, 0.038), assumed=(0.025, 0.0425),
         information=0.4,
@@ -102,7 +102,7 @@ def found(
     )[0]
 
 
-def test_a_posterior_that_is_the_prior_tells_nothing_and_a_narrow_one_does() -> None:
+def test_a_posterior_equal_to_the_prior_gives_no_value_and_a_narrow_one_does() -> None:
     rng = stream(2, "told")
     prior = rng.uniform(0.1, 0.17, size=(5000, 1))
     assert not found(rng.uniform(0.1, 0.17, size=(400, 1)), prior, "density", assumed=(0.1, 0.17)).constrained

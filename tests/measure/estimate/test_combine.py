@@ -59,7 +59,7 @@ def test_windows_that_err_alike_are_worth_one() -> None:
     assert effective(1000, 0.25) == pytest.approx(4, rel=0.01)
 
 
-def test_a_window_that_tells_nothing_changes_nothing() -> None:
+def test_an_uninformative_window_changes_nothing() -> None:
     rng = stream(4, "nothing")
     told = posterior(1.0, 0.5, 40_000, rng)
     wide = rng.normal(0.0, 1.3, size=told.shape)  # wider than the prior
@@ -76,7 +76,7 @@ def test_windows_of_the_priors_width_keep_their_shape() -> None:
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.5])
-def test_intervals_cover_what_they_say_when_errors_correlate_as_told(correlation: float) -> None:
+def test_intervals_cover_as_stated_when_errors_correlate_as_given(correlation: float) -> None:
     # 800 flags, five windows each, observed with noise of variance 1 that correlates between windows.
     rng = stream(5, "coverage")
     problems, covered = 800, 0

@@ -112,7 +112,7 @@ def test_the_shipped_model_measures_a_file_without_any_option_but_the_films(tmp_
     assert "size-assumed" in [finding["kind"] for finding in found["findings"]]  # type: ignore[index, union-attr]
 
 
-def test_the_shipped_model_of_hanging_cloth_tells_weights_of_its_range(film: Path) -> None:
+def test_the_shipped_model_of_hanging_cloth_gives_weights_of_its_range(film: Path) -> None:
     found = answer(film, "--flag-size", "1x1", "--model", "wave-cloth", "--anyway")
     low, high = found["quantities"]["density"]["interval"]  # type: ignore[index]
     assert 0.079 <= low < high <= 0.454
@@ -273,7 +273,7 @@ def test_a_wind_series_is_a_table_and_a_data_set(lake: Path, model_folder: Path,
         (("FILM", "--lake", "nowhere"), 1, "no lake here"),
     ],
 )
-def test_what_cannot_be_measured_is_told_with_the_fix(
+def test_what_cannot_be_measured_is_an_error_with_a_fix(
     film: Path, lake: Path, arguments: tuple[str, ...], code: int, words: str
 ) -> None:
     named = {"FILM": str(film), "LAKE": str(lake)}

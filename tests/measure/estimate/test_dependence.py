@@ -31,7 +31,7 @@ def simulated(correlation: float, *, noise: float, films: int = 4000) -> Errors:
 
 @pytest.mark.parametrize("noise", [0.1, 20.0])
 @pytest.mark.parametrize("correlation", [0.0, 0.7])
-def test_the_correlation_of_the_cloths_likelihoods_is_found_whether_they_tell_much_or_little(
+def test_the_correlation_of_likelihoods_is_found_whether_they_are_narrow_or_wide(
     correlation: float, noise: float
 ) -> None:
     value, upper = simulated(correlation, noise=noise).correlation("density")

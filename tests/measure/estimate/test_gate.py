@@ -104,7 +104,7 @@ def test_of_a_film_in_which_nothing_is_seen_or_moves_there_is_nothing_to_measure
     assert not verdict([[[found]]], false_alarm=0.05, level=exact).measurable
 
 
-def test_a_gate_of_too_few_clips_to_tell_the_rate_is_refused_and_lets_nothing_pass() -> None:
+def test_a_gate_of_too_few_clips_for_the_rate_is_refused_and_lets_nothing_pass() -> None:
     """Of 15 clips the smallest p is 1/16, above any level of a rate of 5 %."""
     rng = stream(2, "cloud")
     gate = FamiliarityGate(cloud=Familiarity.of(rng.normal(size=(300, 3)), rng.normal(size=(15, 3))))

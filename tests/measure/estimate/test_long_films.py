@@ -41,7 +41,7 @@ def test_a_film_goes_on_from_window_to_window_and_moves(films: list[LongFilm], s
         assert 0 < across < 3 * np.median(steps)
 
 
-def test_films_state_what_the_model_tells(films: list[LongFilm], shipped: Estimator) -> None:
+def test_films_state_the_models_quantities(films: list[LongFilm], shipped: Estimator) -> None:
     known = truth(columns_of([film.parameters for film in films]), shipped.learners[0].scaling.names)
     assert np.isfinite(known).all()
     assert len(np.unique(known[:, 0])) == len(films)

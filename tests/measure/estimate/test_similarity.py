@@ -47,7 +47,7 @@ def cloth(*, density: float, bending: float, scale: float = 1.0) -> Material:
     )  # fmt: skip
 
 
-def test_what_the_model_is_told_back_makes_half_a_flag_move_like_the_whole() -> None:
+def test_values_scaled_back_make_half_a_flag_move_like_the_whole() -> None:
     # The simulator knows nothing of similarity: air and gravity are the same for both.
     told = np.array([4.0, 0.12, np.log10(3e-5)])
     names = ("wind_speed", "density", "bending_scale")

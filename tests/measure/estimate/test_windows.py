@@ -57,14 +57,14 @@ def test_frames_that_are_shown_twice_are_counted() -> None:
     assert window.repeats == 1
 
 
-def test_a_part_of_the_film_begins_and_ends_where_it_is_told() -> None:
+def test_a_part_of_the_film_begins_and_ends_as_given() -> None:
     layout = lay_out(frames=5, spacings=(0.04,), rate=25.0, duration=4.0, step=0.04, first=1.0, last=1.4)
     windows = list(cut(numbered(np.arange(101) / 25), layout))
     assert shown(windows[0].clips[0])[0] == 25
     assert shown(windows[-1].clips[0])[-1] == 35
 
 
-def test_a_film_that_is_too_short_is_told_how_long_it_must_be() -> None:
+def test_the_error_of_too_short_a_film_states_the_length_needed() -> None:
     with pytest.raises(InputError, match=r"at least 1\.16 s, 30 frames"):
         lay_out(frames=30, spacings=(0.04,), rate=25.0, duration=1.0, step=None)
 

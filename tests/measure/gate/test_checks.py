@@ -1,4 +1,4 @@
-"""The image statistics: each fault is told by its own, on made clips whose fault has a known size."""
+"""The image statistics: each fault is detected by its own, on made clips whose fault has a known size."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_a_camera_that_shakes_moves_all_edges() -> None:
     assert 10 ** value("sway", shaken) > 10 * 10 ** value("sway", film())
 
 
-def test_held_frames_are_told() -> None:
+def test_held_frames_are_detected() -> None:
     clip = film()
     held = clip[(np.floor(np.arange(FRAMES) / 2.5) * 2.5).astype(int)]
     assert value("held", clip) > -0.5
@@ -41,13 +41,13 @@ def test_held_frames_are_told() -> None:
     assert value("uneven", held) > 5 * value("uneven", clip)
 
 
-def test_a_loop_is_told_and_a_periodic_flutter_with_noise_is_none() -> None:
+def test_a_loop_is_detected_and_a_periodic_flutter_with_noise_is_none() -> None:
     clip = film(noise=1.5)
     assert value("loop", clip[np.arange(FRAMES) % 9]) < -2
     assert value("loop", clip) > -1
 
 
-def test_a_film_that_stands_still_at_its_end_is_told() -> None:
+def test_a_film_that_stands_still_at_its_end_is_detected() -> None:
     clip = film()
     assert value("stopped", clip[np.minimum(np.arange(FRAMES), 9)]) < -1
     assert abs(value("stopped", clip)) < 0.3
@@ -82,7 +82,7 @@ def test_a_still_picture_with_noise_has_no_motion() -> None:
     assert value("energy", still) < value("energy", film()) - 2
 
 
-def test_under_exposure_is_told_by_level_contrast_and_noise() -> None:
+def test_under_exposure_is_detected_by_level_contrast_and_noise() -> None:
     clip = film()
     rng = np.random.default_rng(3)
     dark = np.clip(clip * 0.1 + rng.normal(0, 3, clip.shape), 0, 255).astype(np.uint8)

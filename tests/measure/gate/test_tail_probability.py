@@ -10,7 +10,7 @@ from measure.gate.tail_probability import BODY, ExponentialTails, joint_p, level
 
 
 def test_one_more_surprise_is_e_times_rarer_in_an_exponential_tail() -> None:
-    """Exponential scores of any scale: 20 % lie above 0, and 20 %/e above 1; 20,000 draws tell it to 0.01."""
+    """Exponential scores of any scale: 20 % lie above 0, and 20 %/e above 1; 20,000 draws estimate it to 0.01."""
     rng = np.random.default_rng(1)
     scores = rng.exponential(1, (20_000, 2)) * np.array([0.3, 70]) + np.array([5, -2])
     surprise = ExponentialTails.of(scores, np.zeros(2)).surprise(scores)
@@ -47,7 +47,7 @@ def test_more_calibration_clips_bring_the_level_nearer_to_the_rate() -> None:
     assert levels[-1] == pytest.approx(0.05, abs=0.003)
 
 
-def test_a_rate_that_the_calibration_clips_cannot_tell_is_an_error() -> None:
+def test_a_rate_too_low_for_the_calibration_clips_is_an_error() -> None:
     """No threshold above all of 44 clips keeps to 5 % with 90 %: 0.95⁴⁴ = 0.105; with 45 it does, 0.95⁴⁵ = 0.099."""
     with pytest.raises(InputError, match="at least 45 clips"):
         level(44, 0.05, 0.9)

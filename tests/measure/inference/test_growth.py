@@ -29,7 +29,7 @@ def test_chance_is_taken_for_none() -> None:
     assert (found == 0).mean() > 0.88
 
 
-def test_no_power_is_told_of_one_damping_or_of_two_experiments() -> None:
+def test_one_damping_or_two_experiments_give_a_power_of_zero() -> None:
     rng = np.random.default_rng(3)
     assert power(np.exp(rng.standard_normal(20)), np.zeros(20)) == 0.0
     assert power(np.array([1.0, 9.0]), np.array([0.0, 1.0])) == 0.0

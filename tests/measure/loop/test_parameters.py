@@ -47,7 +47,7 @@ def test_codes_do_not_make_the_interval_wider_than_the_scale_did() -> None:
 
 
 def test_nulls_that_are_off_by_more_than_the_scale_widen_it() -> None:
-    """An error of 5 % by nulls stands although the cloth is said to be known to 2 %."""
+    """An error of 5 % by nulls is kept although the recipe gives the weight to 2 %."""
     errors = {"density": 0.05, "bending": 0.8, "damping": 0.1}
     density = told(Calibration(), errors, weighed=0.02)["density"].before
     assert math.log(density.high) == pytest.approx(REACH * 0.05, rel=1e-6)

@@ -126,8 +126,8 @@ def test_a_strong_effect_is_named_and_helps_where_it_was_not_fitted(dragged: Ver
         assert left_out.control_name == "tangential-quadratic-drag"
         assert left_out.apart is not None
         assert left_out.apart.value > 0
-    # At 3.5 m/s alone, by four segments, both drags may be within the floor's reach; both recordings together tell them
-    # apart by six standard errors, and the fast one tells them apart by itself, in metres too.
+    # At 3.5 m/s alone, by four segments, both drags may be within the floor's reach; both recordings together separate
+    # them by six standard errors, and so does the fast one by itself, in metres too.
     assert dragged.apart is not None
     assert dragged.apart.low > 0
     assert fast.apart is not None
@@ -196,7 +196,7 @@ def test_turning_the_world_changes_nothing_of_what_is_judged(specimen: Specimen,
         close(its.wind.velocity, mine.wind.velocity)
 
 
-def test_a_level_that_the_bank_cannot_test_is_said_to_be_so(pulled: Experiment, bank: Path) -> None:
+def test_a_level_that_the_bank_cannot_test_is_reported(pulled: Experiment, bank: Path) -> None:
     """Nine kinds of numerics: no p is below 1/10."""
     verdict = close_loop(pulled, Options(bank=bank))
     assert verdict.conclusion is Conclusion.UNTESTED

@@ -1,4 +1,4 @@
-"""Null recordings are predicted with what would be known of data: anchors that are not told are taken from them."""
+"""Null recordings are predicted from what a user would give; anchors not given are taken from the recordings."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def batch(specimen: Specimen) -> NullBatch:
     )  # fmt: skip
 
 
-def test_anchors_that_are_not_told_are_taken_from_the_recordings_of_each_cloth(batch: NullBatch) -> None:
+def test_anchors_that_are_not_given_are_taken_from_the_recordings_of_each_cloth(batch: NullBatch) -> None:
     nulls, _ = evaluate(batch, 0, (LEAN,))
     recordings = batch.simulate()
     shown = [as_seen(batch.specimen, recordings[first : first + 2]) for first in (0, 2)]

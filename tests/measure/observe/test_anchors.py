@@ -1,4 +1,4 @@
-"""Anchors taken from recordings: the mean place of each attachment, and only where they are not told."""
+"""Anchors taken from recordings: the mean place of each attachment, and only where they are not given."""
 
 from __future__ import annotations
 

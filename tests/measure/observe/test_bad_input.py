@@ -1,4 +1,4 @@
-"""What is wrong with a recording is refused or told with its reason; nothing is found in one that is in order."""
+"""What is wrong with a recording is refused or reported with its reason; one in order gives no finding."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_pins_where_the_cloth_moves_are_refused_and_the_still_points_named(seen:
         observe([replace(seen, markers=[WIDTH, 0.0] + seen.markers * [-1.0, 1.0])], SETUP)
 
 
-def test_a_cloth_that_is_still_elsewhere_too_is_told(seen: Observation):
+def test_a_cloth_that_is_still_elsewhere_too_is_reported(seen: Observation):
     assert kinds(seen, replace(SETUP, pins=Hold.HOIST_CORNERS)) == {"still-away-from-pins"}
 
 
@@ -95,7 +95,7 @@ def test_a_still_cloth_is_refused(seen: Observation):
         observe([replace(seen, positions=np.repeat(seen.positions[:1], len(seen.times), axis=0))], SETUP)
 
 
-def test_lost_markers_are_told_and_left_out(seen: Observation):
+def test_lost_markers_are_reported_and_left_out(seen: Observation):
     def lose(positions: np.ndarray) -> None:
         positions[20:, [5, 6]] = np.nan
 
@@ -115,14 +115,14 @@ def test_zeros_and_stuck_positions_are_not_taken_for_tracks(seen: Observation):
     assert error < 10e-3  # cubic over 60 to 80 ms of a 1.5 Hz wave; unrepaired 0.9 m and 30 mm
 
 
-def test_exchanged_markers_are_told(seen: Observation):
+def test_exchanged_markers_are_reported(seen: Observation):
     def exchange(positions: np.ndarray) -> None:
         positions[50:52, [20, 60]] = positions[50:52, [60, 20]]
 
     assert kinds(moved(seen, exchange)) == {"markers-astray", "markers-missing"}
 
 
-def test_repeated_frames_are_told_and_many_are_refused(seen: Observation):
+def test_repeated_frames_are_reported_and_many_are_refused(seen: Observation):
     def few(positions: np.ndarray) -> None:
         positions[[40, 90, 91]] = positions[[39, 89, 89]]
 
@@ -146,7 +146,7 @@ def test_frames_that_the_times_say_are_missing_are_interpolated(seen: Observatio
         observe([replace(seen, positions=seen.positions[keep], times=seen.times[keep])], SETUP)
 
 
-def test_frames_lost_silently_are_told(seen: Observation):
+def test_frames_lost_silently_are_reported(seen: Observation):
     keep = np.ones(len(seen.times), dtype=bool)
     keep[[50, 120]] = False
     cut = replace(seen, positions=seen.positions[keep], times=np.arange(keep.sum()) / RATE)
@@ -175,7 +175,7 @@ def test_another_axis_up_is_refused(seen: Observation, up: Up, what: str):
         observe([wrong], SETUP)
 
 
-def test_a_wind_it_streams_against_is_refused_and_one_across_told(seen: Observation):
+def test_a_wind_it_streams_against_is_refused_and_one_across_reported(seen: Observation):
     with pytest.raises(InputError, match="streams upwind"):
         observe([replace(seen, wind=WindTrack.constant((-5.0, 0.0, 0.0)))], SETUP)
     assert kinds(replace(seen, wind=WindTrack.constant((1.5, 4.8, 0.0)))) == {"flies-aside"}
@@ -189,7 +189,7 @@ def test_a_wind_log_beside_the_recording_in_time_is_refused(seen: Observation):
     assert kinds(replace(seen, wind=log.later(120.0))) == set()
 
 
-def test_a_wind_in_other_units_by_far_is_told_or_refused(seen: Observation):
+def test_a_wind_in_other_units_by_far_is_reported_or_refused(seen: Observation):
     assert kinds(replace(seen, wind=WindTrack.constant((0.3, 0.0, 0.0)))) == {"wind-does-not-fit"}
     with pytest.raises(InputError, match="unit of the wind"):
         observe([replace(seen, wind=WindTrack.constant((50.0, 0.0, 0.0)))], SETUP)
@@ -200,7 +200,7 @@ def test_slow_motion_played_as_if_real_is_refused(seen: Observation):
         observe([replace(seen, times=seen.times * 5.0)], SETUP)
 
 
-def test_rest_coordinates_upside_down_are_told(seen: Observation):
+def test_rest_coordinates_upside_down_are_reported(seen: Observation):
     turned = replace(seen, markers=[0.0, HEIGHT] + seen.markers * [1.0, -1.0])
     assert kinds(turned) == {"rest-upside-down"}
 

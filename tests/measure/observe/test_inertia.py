@@ -88,7 +88,7 @@ def test_a_swinging_plate_gains_what_its_height_loses_times_the_squared_error_of
     assert [f.kind for f in found] == ["inertia-does-not-fit"] * told
 
 
-def test_what_would_mend_it_is_said(vane) -> None:
+def test_the_rate_or_wind_that_would_fit_is_reported(vane) -> None:
     recording, specimen = vane
     (found,) = check_inertia(replace(recording, rate=2 * RATE), specimen)
     assert found.kind == "inertia-does-not-fit"

@@ -46,7 +46,7 @@ def test_departures_from_a_polynomial_vanish_on_it():
     np.testing.assert_allclose(fits.of(quadratic), 0.0, atol=1e-12)
 
 
-def test_two_frames_tell_nothing():
+def test_two_frames_are_too_few():
     seen = flag()
     with pytest.raises(InputError, match="too few values"):
         estimate(seen.markers, replace(seen, positions=seen.positions[:2], times=seen.times[:2]).positions, where="")

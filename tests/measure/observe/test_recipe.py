@@ -127,7 +127,7 @@ def test_an_arcsim_folder_needs_nothing_else(folder: Path, tmp_path: Path):
     }  # fmt: skip
 
 
-def test_a_rate_other_than_the_folders_own_is_told(folder: Path):
+def test_a_rate_other_than_the_folders_own_is_reported(folder: Path):
     assert "rate-not-as-described" not in {f.kind for f in from_folder(folder, rate=RATE).findings}
     assert "rate-not-as-described" in {f.kind for f in from_folder(folder, rate=25.0).findings}
 

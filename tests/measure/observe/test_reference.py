@@ -95,7 +95,7 @@ def test_wrong_pins_wind_and_scale_of_real_runs_are_refused(reference_data: Path
 
 
 def doubted(seen: Observation) -> bool:
-    """Whether a recording is refused, or told to be one that inertia does not fit."""
+    """Whether a recording is refused, or reported as one that inertia does not fit."""
     try:
         observed = observe([seen])
     except InputError:

@@ -1,4 +1,4 @@
-"""What was simulated here is observed with the scene it was simulated with, its effects untold."""
+"""What was simulated here is observed with the scene it was simulated with, without its effects."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ def test_times_count_from_the_first_frame(placement: LogPlacement):
     assert not found
 
 
-def test_an_assumed_clock_and_a_gap_are_told_and_unusable_samples_left_out():
+def test_an_assumed_clock_and_a_gap_are_reported_and_unusable_samples_left_out():
     log = series(wind_x=[1.0] * 12, wind_y=[0.0] * 12)
     log.flags[2:9] = SampleFlag.MISSING
     wind, found = track(log, LogPlacement(), where="log")

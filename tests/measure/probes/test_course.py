@@ -1,4 +1,4 @@
-"""The wind's course as errors tell it: found where it was, called turbulence where it may be."""
+"""The wind's course, inferred from errors: found where it was, called turbulence where it may be."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def gusty(own_recording: Trajectory) -> Segments:
     return Segments.of([replace(own_recording, wind=WindTrack(times=times, velocity=logged))])
 
 
-def test_a_gauge_tells_the_course_of_a_wind_that_was_not_logged(forecaster: Forecaster, gusty: Segments) -> None:
+def test_a_gauge_recovers_the_course_of_a_wind_that_was_not_logged(forecaster: Forecaster, gusty: Segments) -> None:
     segments = gusty
     nominal = [Calibration()] * len(segments)
     base = forecaster.errors(*forecaster.system(segments, nominal), segments)
@@ -138,7 +138,7 @@ def test_a_gauge_tells_the_course_of_a_wind_that_was_not_logged(forecaster: Fore
     phase = OMEGA * middles.ravel()
     waves = np.stack([np.sin(phase), np.cos(phase)], axis=1)
     (sine, cosine), *_ = np.linalg.lstsq(waves, value[..., ALONG].ravel(), rcond=None)
-    # The mean of a sine over a window, and what an observer tells late: by two frames or so.
+    # The mean of a sine over a window, and an observer's delay: by two frames or so.
     mean = np.sinc(OMEGA * gauge.window * segments.period / 2 / np.pi)
     assert np.hypot(sine, cosine) == pytest.approx(SWAY * mean, rel=0.1)
     assert 0 < -np.arctan2(cosine, sine) / OMEGA < 3 * segments.period

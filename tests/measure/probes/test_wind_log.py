@@ -94,7 +94,7 @@ def test_a_forecast_never_compares_with_what_was_filled_in(forecaster: Forecaste
 
 
 @pytest.mark.parametrize("lag", [-0.45, 0.0, 0.3])
-def test_the_course_of_a_log_that_lags_tells_by_how_much(lag: float) -> None:
+def test_the_course_of_a_log_that_lags_gives_the_lag(lag: float) -> None:
     period, count, window = 0.04, 10, 5
     fine = np.arange(-3.0, 16.0, 0.1)
     speed = 5 + 0.7 * np.sin(2 * np.pi * 0.3 * fine) + 0.4 * np.sin(2 * np.pi * 0.17 * fine + 1)
@@ -117,7 +117,7 @@ def test_the_course_of_a_log_that_lags_tells_by_how_much(lag: float) -> None:
     assert lags(course, segments) == pytest.approx((lag,), abs=0.03)
 
 
-def test_a_steady_wind_tells_no_lag(own_recording: Trajectory) -> None:
+def test_a_steady_wind_gives_no_lag(own_recording: Trajectory) -> None:
     segments = Segments.of([own_recording])
     course = Course(score=np.ones((len(segments), 10, 3)), curvature=np.ones((len(segments), 10, 3, 3)))
     assert lags(course, segments) == (0.0,)

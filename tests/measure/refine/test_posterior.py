@@ -56,7 +56,7 @@ def test_intervals_cover_as_often_as_they_say_after_few_evaluations(recipe: Reci
     assert (inside <= most).all()
 
 
-def test_two_clips_of_one_cloth_tell_more_of_it_than_one(recipe: Recipe) -> None:
+def test_two_clips_of_one_cloth_constrain_it_more_than_one(recipe: Recipe) -> None:
     space, rng = Space.of(recipe), np.random.default_rng(6)
     points, summaries = _rows(space, rng, 2000)
     model = Metamodel.fit(regressors(space.reported(points), space), summaries, np.arange(2000))
@@ -83,10 +83,10 @@ def test_what_says_nothing_leaves_the_prior(recipe: Recipe) -> None:
     assert found.effective > 0.75 * CLOTHS
 
 
-def test_a_wind_that_the_network_tells_along_a_curve_is_found_from_few_evaluations(recipe: Recipe) -> None:
+def test_a_wind_that_the_network_gives_along_a_curve_is_found_from_few_evaluations(recipe: Recipe) -> None:
     """A response that no regressor has, flat in faint wind and at the range's end, as networks' are. Evaluations lie
-    where refinements have them, about the wind that is asked for. Beside whoever knows the curve: the noise over its
-    slope, by the delta method."""
+    where refinements have them, about the wind that is asked for. Compared with an estimate that knows the curve: the
+    noise over its slope, by the delta method."""
     space, rng = Space.of(recipe), np.random.default_rng(11)
 
     def told(points: np.ndarray) -> np.ndarray:

@@ -1,5 +1,5 @@
-"""The procedure end to end, on a coarse flag and a network of random weights: what it tells means nothing, how it goes
-does."""
+"""The procedure end to end, on a coarse flag and a network of random weights: its steps are tested,
+not its values."""
 
 from __future__ import annotations
 

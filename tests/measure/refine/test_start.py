@@ -1,4 +1,4 @@
-"""A refinement starts from what the network says of the clip and from what is known of the cloth."""
+"""A refinement starts from the network's estimates of the clip and from the given properties of the cloth."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from models.estimator import Estimator
 from sim.run.recipe import Recipe
 
 
-def test_completed_points_have_the_wind_and_the_area_weight_that_were_told(recipe: Recipe) -> None:
+def test_completed_points_have_the_given_wind_and_area_weight(recipe: Recipe) -> None:
     space = Space.of(recipe)
     told = np.array([[3.0, 0.12, -4.0, 0.1], [7.5, 0.165, -3.9, -0.2]])
     values = space.values(start.completed(space, told, seed=0))

@@ -69,7 +69,7 @@ def test_missing_numbers_and_open_intervals_come_back() -> None:
     assert differences(from_document(document), whole) == []
 
 
-def test_a_document_that_does_not_tell_whether_another_draw_could_decide_otherwise_is_read() -> None:
+def test_a_document_that_does_not_state_whether_another_draw_could_decide_otherwise_is_read() -> None:
     document = written(verdict(Conclusion.EFFECT))
     for name in ("open", "settling"):
         del document["test"][name]

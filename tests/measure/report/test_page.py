@@ -119,7 +119,7 @@ def test_the_page_refers_to_no_other_file(whole: Verdict, html: str) -> None:
     assert not re.search(r"url\((?!\s*[\"']?data:)", html)
 
 
-def test_what_cannot_be_seen_is_told(whole: Verdict, html: str) -> None:
+def test_charts_tables_and_controls_have_labels_for_screen_readers(whole: Verdict, html: str) -> None:
     """Every chart has a name, every table's heads have a scope, every control a label."""
     read = parsed(html)
     for svg in read.all("svg"):

@@ -23,7 +23,7 @@ def test_too_few_nulls_for_the_level_are_called_so() -> None:
     assert sentences.test_sentence(test).startswith("The base model cannot be tested: p = 0.05")
 
 
-def test_the_test_is_told_with_its_interval_and_how_many_nulls_reach_it() -> None:
+def test_the_test_is_reported_with_its_interval_and_the_nulls_that_reach_it() -> None:
     whole = verdict(Conclusion.SUFFICIENT)
     reached = sum(v >= whole.test.statistic for v in whole.test.null)
     told = sentences.test_sentence(whole.test)
@@ -66,7 +66,7 @@ def test_a_control_that_does_as_well_as_the_named_effect_is_pointed_out() -> Non
     assert "attribution fails" in warning
 
 
-def test_a_control_that_cannot_be_told_from_the_named_effect_is_pointed_out() -> None:
+def test_a_control_that_fits_as_well_as_the_named_effect_is_reported() -> None:
     whole = verdict(Conclusion.EFFECT)
     near, far = (replace(whole.comparisons[0], apart=about(0.3, half, unit="1")) for half in (0.4, 0.2))
     (warning,) = sentences.control_warnings(replace(whole, comparisons=(near, far)))

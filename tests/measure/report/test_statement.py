@@ -1,4 +1,4 @@
-"""What is said of what the library lacks."""
+"""Sentences about what the library lacks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from measure.verdict.record import Conclusion
 from tests.measure.report.verdicts import verdict
 
 
-def test_the_modes_that_are_told_best_are_said_first() -> None:
+def test_the_most_certain_modes_are_reported_first() -> None:
     modes = [
         Mode(column=FieldColumn(axis=0, mode=(1, 0)), value=0.5, error=0.1),
         Mode(column=FieldColumn(axis=1, mode=(0, 0)), value=3.0, error=0.2),
@@ -35,7 +35,7 @@ def test_the_modes_that_are_told_best_are_said_first() -> None:
     assert "fits the remaining errors best, per mass: across" in proposal(modes, whole=False)
 
 
-def test_a_strength_that_is_another_in_every_recording_is_told_with_its_values() -> None:
+def test_a_strength_that_is_another_in_every_recording_is_reported_with_its_values() -> None:
     partly = verdict(Conclusion.PARTLY)
     assert "the errors that remain are larger than those of simulated nulls" in sentence(partly)
     ranking = [replace(c, heterogeneity=None if c.why_not else 0.001) for c in partly.ranking]
@@ -46,14 +46,14 @@ def test_a_strength_that_is_another_in_every_recording_is_told_with_its_values()
     assert "the errors that remain" not in said
 
 
-def test_a_line_is_said_as_what_a_cylinder_sheds() -> None:
+def test_a_line_is_reported_as_a_cylinders_vortex_shedding() -> None:
     # A Strouhal number of 0.2: 1.33 Hz for each m/s is a width of 0.15 m.
     said = shedding(Line(far=9.0, reduced=0.2 / 0.15, direction=1))
     assert "across the wind at 1.3 Hz for each m/s" in said
     assert "0.15 m" in said
 
 
-def test_a_course_that_is_not_turbulence_is_said_in_shares_of_the_wind() -> None:
+def test_a_course_that_is_not_turbulence_is_given_in_percent_of_the_wind() -> None:
     said = blowing(Variation(whole=np.array([0.0169, -0.0001, 0.03]), fast=np.array([0.0144, 0.0, 0.02])))
     told = "varies by 13 % of its mean along its own direction, by 12 % within two seconds, and by 0 % across it"
     assert told in said

@@ -16,7 +16,7 @@ def of_wind(
     truth: list[float] | NDArray, mean: list[float] | NDArray, *, group: list[int] | NDArray | None = None,
     label: str = "made", embedding: NDArray | None = None, samples: NDArray | None = None,
 ) -> Predictions:  # fmt: skip
-    """Predictions of wind speed alone; each clip is its own sequence unless told otherwise."""
+    """Predictions of wind speed alone; each clip is its own sequence unless `group` is given."""
     return Predictions(
         label=label, targets=("wind_speed",), truth=np.asarray(truth, dtype=np.float64)[:, None],
         mean=np.asarray(mean, dtype=np.float64)[:, None],
@@ -33,7 +33,7 @@ def posterior(
     """θ ~ N(0, 1) seen with noise of variance 1: the posterior is N(x / 2, σ²) with σ² = 1/2.
 
     Draws are of N(x / 2 + shift σ, (wide σ)²), so wide = 1 and shift = 0 is exact. Each clip has its own θ; `group`
-    of them are said to be of one sequence.
+    of them form one sequence.
     """
     random = generator(seed)
     truth = random.normal(size=(clips, targets))

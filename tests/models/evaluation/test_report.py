@@ -114,7 +114,7 @@ def test_unknown_labels_and_no_predictions_are_refused() -> None:
         evaluate([], data="made", seed=0)
 
 
-def test_few_sequences_a_missing_triplet_and_a_target_that_never_changes_are_said() -> None:
+def test_few_sequences_a_missing_triplet_and_a_constant_target_are_reported() -> None:
     made = of_wind(np.ones(5), np.arange(5), embedding=np.eye(5), samples=np.ones((5, 3)))
     found = evaluate([made], data="made", seed=0, draws=10)
     assert {finding.kind for finding in found.findings} == {"no-triplets", "few-sequences", "no-tarp"}

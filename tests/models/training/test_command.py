@@ -107,7 +107,7 @@ def test_models_are_judged_with_intervals_over_simulations(lake: Path, tmp_path:
     assert '"rmse"' in text
 
 
-def test_triplets_are_told_of_clips_of_other_lengths_and_cloth_is_read_from_embeddings(
+def test_triplets_are_scored_on_clips_of_other_lengths_and_cloth_is_read_from_embeddings(
     lake: Path, tmp_path: Path
 ) -> None:
     found = run(
@@ -178,7 +178,7 @@ def test_clips_beyond_the_range_of_their_target_are_refused_before_anything_is_p
     assert not (tmp_path / "cache").exists()
 
 
-def test_a_model_of_hanging_cloth_tells_the_same_quantities_in_its_own_ranges(
+def test_a_model_of_hanging_cloth_estimates_the_same_quantities_in_its_own_ranges(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Trained, shipped and judged by the commands that are there for flags."""

@@ -28,7 +28,7 @@ def no_blender(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def interpreter(path: Path, *, out: str = "", err: str = "", code: int = 0) -> Path:
-    """A program in Python's place that prints what it is told to, whatever it is asked."""
+    """A program in Python's place that prints `out` and `err`, whatever it is asked."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.with_suffix(".out").write_text(out)
     path.with_suffix(".err").write_text(err)

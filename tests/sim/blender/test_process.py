@@ -95,7 +95,7 @@ def test_a_lost_worker_is_replaced_and_its_frame_redone(tmp_path, mode, timeout)
         answers = process.request(frames(4), timeout=timeout, setup=setup)
         assert process.restarts == 1
     assert [answer.fields["index"] for answer in answers] == [0, 1, 2, 3]
-    assert (tmp_path / "count").read_text() == "7"  # 5 asked once, frame 1 twice, the scene told again
+    assert (tmp_path / "count").read_text() == "7"  # 5 asked once, frame 1 twice, the scene sent again
 
 
 def test_a_worker_that_keeps_crashing_is_given_up_with_its_last_words(tmp_path):

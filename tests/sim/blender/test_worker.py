@@ -128,7 +128,7 @@ def test_a_killed_worker_is_replaced_and_gives_the_same_bytes(worker: WorkerProc
     np.testing.assert_array_equal(np.stack([answer.arrays["rgba"] for answer in answers]), before)
 
 
-def test_what_blender_refuses_is_said_and_the_worker_lives_on(worker: WorkerProcess) -> None:
+def test_what_blender_refuses_is_reported_and_the_worker_lives_on(worker: WorkerProcess) -> None:
     pid = worker.pid
     with pytest.raises(RenderError, match="NO_SUCH_ENGINE"):
         worker.request([scene(engine="NO_SUCH_ENGINE")], timeout=TIMEOUT)

@@ -85,7 +85,7 @@ def test_samples_are_means_of_the_gusts_the_flag_felt(make: Make) -> None:
     team = gusty(make)
     member = team.member(0)
     series = anemometer.read(IDEAL, team, member, instrument=1, seed=1, begin=BEGIN).series
-    assert series.time[0] >= BEGIN + 10**9  # nothing is known of the air before the simulation
+    assert series.time[0] >= BEGIN + 10**9  # the air before the simulation is unknown
     system, _ = team.assemble([member])
     for stamp, speed in list(zip(series.time.tolist(), series.channels["wind_speed"].tolist(), strict=True))[::7]:
         end = (stamp - BEGIN) / 1e9

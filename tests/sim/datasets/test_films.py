@@ -36,7 +36,7 @@ def test_seeds_and_identities_are_all_different() -> None:
         assert len(set(distinct)) == len(every)
 
 
-def test_the_order_of_films_tells_nothing_of_their_sequences() -> None:
+def test_the_order_of_films_is_independent_of_their_sequences() -> None:
     # In a random order neighbours share their sequence with probability (r - 1)/(n - 1) = 4/1499: 4 of 1499 expected.
     sequences = [film.sequence for film in films(load("flagsim-small"), "train")]
     together = sum(a == b for a, b in itertools.pairwise(sequences))

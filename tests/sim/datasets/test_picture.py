@@ -1,4 +1,4 @@
-"""The camera behind the picture: noise of the stated size, files whose length tells nothing."""
+"""The camera behind the picture: noise of the stated size, files whose length reveals nothing."""
 
 from __future__ import annotations
 

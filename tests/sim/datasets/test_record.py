@@ -1,4 +1,4 @@
-"""Films whose wind only an anemometer tells: ground truth comes out as for a real recording."""
+"""Films whose wind only an anemometer measures: ground truth comes out as for a real recording."""
 
 from __future__ import annotations
 

@@ -163,7 +163,7 @@ def test_friction_slows_a_sliding_sheet_exponentially_and_at_second_order_of_the
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
 
 
-def test_pressure_is_told_from_weight_by_nothing_where_stiffness_is_free() -> None:
+def test_pressure_and_weight_are_confounded_where_stiffness_is_free() -> None:
     """Newton's law by the mass: a = g + (pressure + inner forces)/m. So a pressure that is 1.6 times as large moves a
     cloth as one that is 1.6 times lighter, and as many times softer in stretching and in bending, and no other."""
     flat = grid(width=0.6, height=0.4, columns=6, rows=4)

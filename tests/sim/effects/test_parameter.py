@@ -12,7 +12,7 @@ from sim.effects.porosity import Porosity
 from sim.effects.shear import Shear
 
 
-def test_a_refused_value_is_told_with_what_is_admissible_and_expected() -> None:
+def test_a_refused_value_is_reported_with_its_admissible_range_and_expected_value() -> None:
     with pytest.raises(InputError) as caught:
         Porosity(open_share=torch.tensor([0.1, 1.5]))
     assert caught.value.where == "Porosity.open_share"

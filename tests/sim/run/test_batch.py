@@ -1,4 +1,4 @@
-"""Batches: a member's result is its own, whatever else is simulated with it; what fails is told and kept apart."""
+"""Batches: a member's result is its own, whatever else is simulated with it; what fails is reported and kept apart."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ def test_what_is_wrong_is_refused_with_its_place() -> None:
     assert not unrefused(lambda text: read(text), cases, where=".")
 
 
-def test_a_recipe_that_is_not_there_is_told() -> None:
+def test_a_missing_recipe_is_an_error() -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'hanging-cloth'"):
         load("hanging-cloht")
     with pytest.raises(NotFoundError):

@@ -55,7 +55,7 @@ def test_a_failed_member_makes_the_command_fail_and_is_named(run: Run, tmp_path:
         (["hanging-cloth", "--branch", "trail"], 1, "trail"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_done_is_told(run: Run, arguments: list[str], code: int, word: str) -> None:
+def test_what_cannot_be_done_is_an_error(run: Run, arguments: list[str], code: int, word: str) -> None:
     assert run(*arguments)[0] == code
     assert word in run(*arguments)[2]
 

@@ -1,8 +1,8 @@
 """Experiments of a flag by MuJoCo: drawn from a seed, simulated, and written as a user would bring them.
 
 What is declared is one nominal cloth, level winds along +x and nothing else. What is simulated is another cloth by
-another method: density, stretching, bending and damping differ from the nominal ones, and an effect that nobody is told
-of may act.
+another method: density, stretching, bending and damping differ from the nominal ones, and an undeclared effect
+may act.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 In every column the line is the run of dark pixels around the darkest one, and its height is that run's centroid,
 weighted with darkness above a floor. A line that moves during the exposure is smeared into a band, whose centroid is
-the line's place at mid-exposure as long as it moves evenly; its width says how far it moved. What cannot be told is
+the line's place at mid-exposure as long as it moves evenly; its width says how far it moved. What cannot be located is
 flagged and left out, never filled.
 
 The error of a height is estimated from the track itself: `scatter` compares every column with the parabola through its

@@ -53,7 +53,7 @@ def page(case: Case, seen: Observations, study: Study, verdict: Verdict) -> str:
 
 
 def as_json(case: Case, seen: Observations, study: Study, verdict: Verdict) -> dict[str, Any]:
-    """Everything the page tells, as JSON values; errors are natural logarithms, None where a model has no flutter."""
+    """Everything on the page, as JSON values; errors are natural logarithms, None where a model has no flutter."""
     return {
         "case": case.name,
         "seed": case.seed,

@@ -1,4 +1,4 @@
-"""What is known of a case before it is measured: the sheet, the air, the camera, which clips and lengths may be fitted.
+"""What a case states before it is measured: the sheet, the air, the camera, which clips and lengths may be fitted.
 
 It stands in `paper-flag.toml`.
 """

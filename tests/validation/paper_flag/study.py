@@ -83,7 +83,7 @@ class Outcome:
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """Everything the report tells.
+    """Everything in the report.
 
     Attributes:
         shapes: candidate → the motion of its model in time with a free factor, at the first whole clip held out.

@@ -65,7 +65,7 @@ def test_a_line_smeared_by_even_motion_is_where_it_was_at_mid_exposure() -> None
     assert np.median(width) > 18
 
 
-def test_what_cannot_be_told_is_flagged_and_left_out() -> None:
+def test_what_cannot_be_located_is_flagged_and_left_out() -> None:
     height = sheet()
     height[200:230] = np.nan  # faded
     values = drawn(height)

@@ -126,7 +126,7 @@ def test_the_base_model_does_not_flutter_and_the_planted_one_is_found(found: stu
     assert {cell.factor for cell in found.declared} == {1.0, 0.5}
 
 
-def test_the_verdict_and_its_page_tell_what_the_numbers_are(
+def test_the_verdict_and_its_page_state_what_the_numbers_are(
     found: studied.Study, seen: Observations, case: Case
 ) -> None:
     verdict = judge(case, seen, found)

@@ -34,8 +34,8 @@ class Verdict:
 
     Attributes:
         best: the model in time with the least error on what was not fitted.
-        remaining_fitted: models in time that the kinds fitted to cannot tell from the best of them.
-        remaining: those that all kinds cannot tell from the best.
+        remaining_fitted: models in time that the fitted kinds cannot distinguish from the best of them.
+        remaining: those that all kinds cannot distinguish from the best.
         insufficient: kinds in which the best misses what was measured, by its mean |log error|.
         tolerance: kind → mean |log error| that measurement and mesh leave open.
     """

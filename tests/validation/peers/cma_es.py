@@ -18,7 +18,7 @@ class CmaEs:
     """See `tests.validation.peers.registry.Optimiser`.
 
     It asks for a whole generation at once, 4 + ⌊3 ln d⌋ points, in place of `batch`, after the centre. Of a generation
-    that the budget cuts it is told nothing.
+    that the budget cuts it gets no values.
     """
 
     def __init__(self, dimension: int, *, seed: int, batch: int) -> None:

@@ -25,7 +25,7 @@ PEERS = Registry(
 
 
 class Optimiser(Protocol):
-    """Asks for points and is told what they gave. The same seed and answers give the same questions."""
+    """Asks for points and gets their values. The same seed and answers give the same questions."""
 
     def ask(self) -> NDArray[np.float64]:
         """Points (q, d) of [−1, 1]ᵈ to be evaluated next; the first is the centre."""

@@ -2,8 +2,8 @@
 
 Calibrated on the repeats of two programmes, judged on those of two others. The cloth's mass is not known, so that its
 density stands for the ratio of mass to drag. What the calibrated model lacks is sought among effects of the tracker and
-of the cloth, on the fitted programmes alone, added, and judged on the others. What is left is told in numbers: what is
-the same all the time at a node, what a frame's nodes share, and the rest.
+of the cloth, on the fitted programmes alone, added, and judged on the others. Reported are the errors
+that remain: what is constant at a node, what a frame's nodes share, and the rest.
 """
 
 from __future__ import annotations

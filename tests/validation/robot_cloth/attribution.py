@@ -72,7 +72,7 @@ def sought(
     Args:
         swings: programme → its repeats; at least two programmes.
         start: the calibrated model without any effect.
-        advance: is told that one more candidate has been tried.
+        advance: called after each candidate.
     """
     folds = [
         ([swing for name, own in swings.items() if name != left_out for swing in own], list(swings[left_out]))

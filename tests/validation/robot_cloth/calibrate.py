@@ -46,7 +46,7 @@ class Fit:
 
     Attributes:
         parameters: of the cloth, with the strengths of effects.
-        tracker: how its nodes are told.
+        tracker: how its nodes are measured.
         sought: names of the tracker's effects that were fitted.
     """
 

@@ -1,9 +1,9 @@
-"""A/A: whether two repeats of one programme can be told apart by how a model errs on them.
+"""A/A: whether two repeats of one programme can be distinguished by how a model errs on them.
 
 From the instant at which the tool moves, recordings are cut into segments. A segment's errors along each sensitivity of
 the model, and their size, are its features. The programme is the same, so that without a difference between two repeats
 the features of a pair of segments may be swapped: the test flips the signs of their differences, all of the 2ⁿ ways.
-Pairs share recordings, so that how many of them are told apart is judged by repeats whose segments were shuffled.
+Pairs share recordings, so that how many of them differ is judged by repeats whose segments were shuffled.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def features(swing: Swing, model: Linear, lag: float) -> Floats:
 
 def shuffled(repeats: Sequence[Floats], rng: np.random.Generator) -> list[Floats]:
     """Repeats of one programme whose features (segment, feature) have changed places, segment by segment: what they
-    might have been, if nothing told them apart. All are cut to the shortest."""
+    might have been, if they did not differ. All are cut to the shortest."""
     count = min(len(own) for own in repeats)
     stacked = np.stack([own[:count] for own in repeats])
     order = rng.permuted(np.tile(np.arange(len(repeats)), (count, 1)), axis=1).T

@@ -26,7 +26,7 @@ LEVEL = 0.05
 MOVED = 0.06
 """By which one of a pair's stamps are moved for the control [s]: less than a frame of the camera."""
 SHUFFLES = 200
-"""How often the repeats' segments are shuffled, to find how many pairs are told apart by chance."""
+"""How often the repeats' segments are shuffled, to find how many pairs differ by chance."""
 _START = 0.3  # s of lag that the calibration starts from
 
 
@@ -80,14 +80,14 @@ class HeldCloth:
         completed: calibrated with all that was added.
         camera: (3, 3) the map A of it, as rows; zero where it was not added.
         reductions: on the held-out programmes, as one effect after another is added; the first is the calibrated model.
-        late: what tells latencies from another freedom of each frame; None where they were not added.
+        late: what separates latencies from another freedom of each frame; None where they were not added.
         of_fitted, of_held_out: model → error, before and after.
         parts: of the held-out errors with all that was added: what is the same all the time at a node, what a frame's
             nodes share beside it, and the rest, root mean squares [m].
         median: of the held-out errors of the calibrated model [m].
         extents: width and height in motion, tracked and predicted [m], held out.
         pairs: of repeats.
-        p_pairs: chance of so many pairs at `LEVEL`, or more, if nothing told repeats apart.
+        p_pairs: chance of so many pairs at `LEVEL`, or more, if repeats did not differ.
     """
 
     fitted: tuple[str, ...]
@@ -110,7 +110,7 @@ class HeldCloth:
 
     @property
     def apart(self) -> Share:
-        """Pairs of repeats that are told apart at `LEVEL`; they share recordings, so that the bounds are too narrow."""
+        """Pairs of repeats that differ at `LEVEL`; they share recordings, so that the bounds are too narrow."""
         return Share.of(pair.p <= LEVEL for pair in self.pairs)
 
     @property
@@ -236,7 +236,7 @@ def _extents(swings: Sequence[Swing], left: Sequence[Floats]) -> dict[str, tuple
 
 
 def _pairs(cloth: Cloth, swings: Mapping[str, Sequence[Swing]], fit: Fit, seed: int) -> tuple[tuple[Pair, ...], float]:
-    """All pairs of repeats, and the chance of as many told apart if the repeats' segments may change places."""
+    """All pairs of repeats, and the chance that as many differ if the repeats' segments may change places."""
     every = [swing for own in swings.values() for swing in own]
     beside = dict(zip((swing.name for swing in every), linear(cloth, every, fit)[0], strict=True))
     lag = fit.parameters.lag

@@ -159,7 +159,7 @@ class Truth:
 
     Attributes:
         delay: standard deviation of the frames' latencies [s].
-        camera: map of places that the camera tells wrongly.
+        camera: the camera's wrong map of places.
         offsets: standard deviation of the nodes' offsets [m].
     """
 
@@ -169,7 +169,7 @@ class Truth:
 
 
 def _followed(swing: Swing, cloth: Cloth, truth: Truth, *, seed: int) -> tuple[Swing, Floats]:
-    """What a tracker tells of a cloth, with 1 mm of noise, and its latencies. Offsets are alike in all recordings.
+    """A cloth as a tracker reports it, with 1 mm of noise, and its latencies. Offsets are alike in all recordings.
 
     Stamps are given when a frame has been worked on: its latency makes the interval before it longer. The cloth is that
     of the fit's own mesh: numerics are not at stake here.
@@ -186,7 +186,7 @@ def _followed(swing: Swing, cloth: Cloth, truth: Truth, *, seed: int) -> tuple[S
 
 
 def _programmes(truth: Truth) -> tuple[Cloth, dict[str, list[Swing]], dict[str, Floats]]:
-    """Two programmes of two repeats each, as a tracker tells them; latencies by recording."""
+    """Two programmes of two repeats each, as a tracker reports them; latencies by recording."""
     plain = {
         (name, k): _swing(f"{name}_rep{k}", frequency=frequency, duration=4.0 + 0.1 * k)
         for name, frequency in (("slow", 0.7), ("fast", 1.1))
@@ -220,7 +220,7 @@ def test_what_acts_is_named_first_and_leaves_next_to_nothing_to_others(truth: Tr
         assert later.gains[0].value < 0.03 * largest
 
 
-def test_latencies_are_found_where_the_cloth_moves_and_told_from_another_freedom() -> None:
+def test_latencies_are_found_where_the_cloth_moves_and_separated_from_another_freedom() -> None:
     cloth, told, lates = _programmes(Truth(delay=0.04))
     known, unseen = told["slow"], told["fast"]
     start = Fit.start(known, Parameters())
@@ -239,18 +239,18 @@ def test_latencies_are_found_where_the_cloth_moves_and_told_from_another_freedom
 
 
 def test_offsets_and_the_cameras_map_are_those_of_the_tracker() -> None:
-    """The map is told up to what the cloth never shows; where it swings in depth alone, that is the depth's column."""
+    """The map is found up to what the cloth never shows; where it swings in depth alone, that is the depth's column."""
     cloth, told, _ = _programmes(Truth(camera=TURNED))
     known = [swing for own in told.values() for swing in own]
     fit = calibrated(cloth, known, Fit.start(known, Parameters()).with_effect(OFFSETS).with_effect(CAMERA))
-    # Swings of 0.2 m and 1 mm of noise over some hundred frames of nine nodes tell it to 1e-4; what the cloth's fit
+    # Swings of 0.2 m and 1 mm of noise over some hundred frames of nine nodes give it to 1e-4; what the cloth's fit
     # shares with the map is more.
     np.testing.assert_allclose(fit.tracker.camera[:2, 1], np.array(TURNED)[:2, 1], atol=0.01)
     plain = Fit.start(known, Parameters())
     assert lower(left_errors(cloth, known, fit)).mean() < 0.5 * lower(left_errors(cloth, known, plain)).mean()
 
 
-def test_a_faultless_tracker_tells_nodes_where_they_are() -> None:
+def test_a_faultless_tracker_reports_nodes_where_they_are() -> None:
     swing = _swing("one")
     plain = Tracker.faultless([swing])
     np.testing.assert_array_equal(plain.seen(swing.positions), swing.positions)

@@ -1,14 +1,14 @@
 """What a camera and its tracker do to the nodes of a cloth that they follow: three effects, each with a null value.
 
-A node at x(t) is told in frame i, stamped t_i, as
+A node at x(t) is reported in frame i, stamped t_i, as
 
     y_i = o + x + s + A (x − x̄),   x = x(t_i − lag − τ_i),
 
 with o an offset of each node (the tracker's idea of the outline and of the rest shape), A a linear map about the mean
 place x̄ with a shift s (the camera's pose and its scale of depth) and τ_i the latency of the frame beyond the usual lag
 (stamps are given when a frame has been worked on). Offsets and map are fitted on some recordings and kept for others. A
-latency is a frame's own: it is sought by the upper half of the nodes, which the attachments tell best, and judged by
-the lower one.
+latency is a frame's own: it is fitted to the upper half of the nodes, which the attachments determine best, and judged
+by the lower one.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _FAR = 0.1  # m: a node that is farther off was lost by the tracker
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tracker:
-    """How nodes are told; the null values are a tracker that errs in nothing.
+    """How nodes are measured; the null values are a tracker that errs in nothing.
 
     Attributes:
         offsets: (node, 3) o [m].
@@ -59,7 +59,7 @@ class Tracker:
         )  # fmt: skip
 
     def seen(self, places: Floats) -> Floats:
-        """(frame, node, 3) where the tracker tells nodes that are at `places` [m]."""
+        """(frame, node, 3) where the tracker reports nodes that are at `places` [m]."""
         return self.offsets + self.shift + places + (places - self.about) @ self.camera.T
 
 

@@ -168,7 +168,7 @@ def test_the_dialect_is_found(text: list[str], delimiter: str, decimal: str) -> 
     assert (shape.delimiter, shape.decimal, shape.header) == (delimiter, decimal, 1)
 
 
-def test_lines_above_the_heading_and_units_below_it_are_told_apart() -> None:
+def test_lines_above_the_heading_and_units_below_it_are_distinguished() -> None:
     shape = shape_of(lines("logger 7\nsite: roof\ntime;wind\n;m/s", "{n};{v}"))
     assert shape is not None
     assert (shape.preamble, shape.header, shape.names, shape.units) == (2, 2, ("time", "wind"), ("", "m/s"))

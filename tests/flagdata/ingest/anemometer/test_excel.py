@@ -54,7 +54,7 @@ def test_a_sheet_with_dates_is_read_by_its_recipe(book: Book) -> None:
     assert log.series.channels["air_temperature"][0] == pytest.approx(293.15)
 
 
-def test_a_makers_export_in_a_sheet_is_told_as_its_text_is(book: Book) -> None:
+def test_a_makers_export_in_a_sheet_is_identified_like_its_text(book: Book) -> None:
     rows = [
         ["z6-01234", "Port1", None, "Port8"], ["# Records: 3", "ATMOS 22 Ultrasonic Anemometer", None, "Barometer"],
         ["Timestamps", " m/s Wind Speed", "° Wind Direction", " kPa Reference Pressure"],

@@ -51,7 +51,7 @@ def nrg(*, zone: str = "UTC-5:00", unit: str = "m/s") -> str:
     return "\n".join([*head, "Data", "\t".join(columns), *rows])
 
 
-def test_nrg_channels_are_told_by_their_history(read: Read) -> None:
+def test_nrg_channels_are_identified_by_their_history(read: Read) -> None:
     log = read(nrg())
     assert (log.format, first(log)) == ("nrg", "2026-05-01T17:00:00Z")
     assert log.series.channels["wind_speed"].tolist() == [5, 6, 7, 8, 9]
@@ -153,7 +153,7 @@ def test_a_toa5_table_saved_by_a_spreadsheet_is_read_with_its_own_order_of_dates
     assert kinds(log)["several-anemometers"] == 1
 
 
-def test_a_toa5_table_whose_dates_could_be_either_order_is_refused_unless_told(read: Read) -> None:
+def test_a_toa5_table_with_ambiguous_dates_is_refused_unless_the_order_is_given(read: Read) -> None:
     text = resaved([f"09/01/2026 12:0{i}:00" for i in range(4)])
     with pytest.raises(TimeError, match="day/month or month/day") as caught:
         read(text, zone="UTC")

@@ -325,7 +325,7 @@ def test_no_value_on_nmea_2000_is_missing_and_a_cut_line_is_left_out(read: Read)
     assert kinds(log)["cut-off"] == 1
 
 
-def test_several_devices_on_nmea_2000_are_told_apart_by_address(read: Read) -> None:
+def test_several_devices_on_nmea_2000_are_distinguished_by_address(read: Read) -> None:
     text = "".join(raw(2 * i, speed=500 + i) + raw(2 * i + 1, device=7) for i in range(4))
     with pytest.raises(InputError, match="several devices") as caught:
         read(text)
@@ -408,7 +408,7 @@ def test_milliseconds_in_brackets_before_another_mark_are_a_computers_stamp(read
     ("options", "says", "fix"),
     [({}, "if its platform moves", "--platform fixed"), ({"platform": "moving"}, "of a moving platform", "")],
 )
-def test_wind_over_ground_on_a_network_is_said_to_be_computed_where_something_moves(
+def test_wind_over_ground_on_a_network_is_reported_as_computed_where_something_moves(
     read: Read, options: dict[str, str], says: str, fix: str
 ) -> None:
     log = read("".join(raw(i, speed=500 + i, reference=0) for i in range(4)), **options)

@@ -1,4 +1,4 @@
-"""Two logs of one wind that are hours apart are told; two winds, and two logs on one clock, are not."""
+"""Two logs of one wind that are hours apart are reported; two winds, and two logs on one clock, are not."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def series(speed: np.ndarray, *, off: float = 0.0, seed: int = 0) -> WindSeries:
 
 
 @pytest.mark.parametrize("off", [-3600, 3600, 5400, -7200])
-def test_two_logs_of_one_wind_an_hour_apart_are_told_with_the_correction(off: int) -> None:
+def test_two_logs_of_one_wind_an_hour_apart_are_reported_with_the_correction(off: int) -> None:
     finding = hours_off(series(wind(1), off=off, seed=2), series(wind(1), seed=3), name="mast")
     assert finding is not None
     assert finding.value == -off
@@ -44,12 +44,12 @@ def test_two_logs_of_one_wind_an_hour_apart_are_told_with_the_correction(off: in
 
 
 @pytest.mark.parametrize("off", [0, 20, -45])
-def test_two_logs_on_one_clock_are_not_told(off: int) -> None:
+def test_two_logs_on_one_clock_are_not_reported(off: int) -> None:
     assert hours_off(series(wind(1), off=off, seed=2), series(wind(1), seed=3), name="mast") is None
 
 
 @pytest.mark.parametrize("seed", range(4, 12))
-def test_two_winds_are_not_told_however_their_weather_goes(seed: int) -> None:
+def test_two_winds_are_not_reported_whatever_their_weather(seed: int) -> None:
     assert hours_off(series(wind(seed), seed=2), series(wind(seed + 100), seed=3), name="mast") is None
 
 

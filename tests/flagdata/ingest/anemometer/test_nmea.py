@@ -156,7 +156,7 @@ def test_a_talker_without_values_is_left_out_beside_one_that_has_some(read: Read
     assert any("talker II are empty" in found.what for found in log.findings)
 
 
-def test_text_before_sentences_that_may_be_a_time_is_told(read: Read) -> None:
+def test_text_before_sentences_that_may_be_a_time_is_reported(read: Read) -> None:
     lines = times("WIMWV,1,R,10,N,A", "WIMWV,1,R,12,N,A").splitlines()
     log = read("\r\n".join(f"day 121 at 43{index:03d} {line}" for index, line in enumerate(lines)))
     (found,) = [found for found in log.findings if found.kind == "text-before-sentences"]
@@ -299,7 +299,7 @@ def test_a_sentence_of_a_burst_has_the_time_of_its_burst(read: Read, order: tupl
     assert (log.series.flags & SampleFlag.TIME_UNSURE).all()
 
 
-def test_a_stream_that_begins_within_a_burst_is_told_by_its_end(read: Read) -> None:
+def test_a_stream_that_begins_within_a_burst_is_timed_by_the_bursts_end(read: Read) -> None:
     log = read(bursts((0, 1, 2, 3), skipped=2))
     known = np.isfinite(log.series.channels["apparent_wind_speed"])
     assert iso(int(log.series.time[known][0]))[11:19] == "11:01:15"
@@ -336,7 +336,7 @@ MDA = "WIMDA,29.8,I,1.0,B,22.0,C,,,78.3,,18.0,C,260.3,T,249.9,M,1.8,N,0.9,M"
         ("6.0", {}, "(MDA) was computed by the instrument from heading and speed of a platform that moves at 6", ""),
     ],
 )
-def test_a_wind_over_ground_is_said_to_be_computed_where_something_moves(
+def test_a_wind_over_ground_is_reported_as_computed_where_something_moves(
     read: Read, speed: str, options: dict[str, str], says: str, fix: str
 ) -> None:
     times = [f"GPRMC,12000{second}.00,A,5759.0,N,01144.3,E,{speed},28.27,010526,,,A" for second in (0, 1)]
@@ -361,7 +361,7 @@ def test_a_wind_that_the_stream_states_over_ground_is_called_so_on_a_fixed_platf
         ([line(MDA), f"${MDA}"], "2 of the first 2 lines are NMEA 0183 sentences, 1 of them with a checksum; 0 more"),
     ],
 )
-def test_only_checksums_that_are_there_are_said_to_be_right(lines: list[str], says: str) -> None:
+def test_only_checksums_that_are_there_are_reported_as_right(lines: list[str], says: str) -> None:
     guess = Nmea().recognise(Head(lines=tuple(lines)))
     assert guess is not None
     assert guess.reasons[0].startswith(says)
@@ -372,7 +372,7 @@ WITHOUT_WIND = [
 ]
 
 
-def test_a_log_without_wind_is_told_that_it_has_none(read: Read) -> None:
+def test_a_log_without_wind_is_refused_as_such(read: Read) -> None:
     with pytest.raises(InputError, match="not a log of a known format") as caught:
         read("\n".join(WITHOUT_WIND))
     assert "hold no sentence of wind" in str(caught.value.fix)

@@ -1,4 +1,4 @@
-"""Notes of how a log was read, one row a kind: each is said where it applies, in words that hold what was done."""
+"""Notes of how a log was read, one row a kind: each is reported where it applies, and states what was done."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ KINDS: Mapping[str, tuple[str, Mapping[str, object], str]] = {
 }  # fmt: skip
 
 
-def test_each_note_is_said_where_it_applies(read: Callable[..., WindLog]) -> None:
+def test_each_note_is_reported_where_it_applies(read: Callable[..., WindLog]) -> None:
     found = {kind: read(text, **options).findings for kind, (text, options, _) in KINDS.items()}
     said = {kind: [one.what for one in findings if one.kind == kind] for kind, findings in found.items()}
     lacking = {kind: said[kind] for kind, (*_, words) in KINDS.items() if words not in " ".join(said[kind])}

@@ -229,7 +229,7 @@ def test_a_word_on_the_clock_is_offered_only_where_it_would_have_the_rows_read(m
 
 
 @pytest.mark.parametrize("choice", ["first", "last", "sort"])
-def test_a_word_on_the_clock_that_nothing_calls_for_is_said_to_be_unused(choice: ClockChoice, made: Made) -> None:
+def test_a_clock_option_that_nothing_calls_for_is_reported_as_unused(choice: ClockChoice, made: Made) -> None:
     (finding,) = in_order(made(np.arange(100)), where="x", choice=choice).findings
     assert f"--clock {choice} is not used" in finding.what
 

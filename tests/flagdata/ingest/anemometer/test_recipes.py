@@ -143,7 +143,7 @@ def test_an_optional_column_may_be_absent(tmp_path: Path) -> None:
     assert with_it.series.channels["air_temperature"] == pytest.approx([293.15])
 
 
-def test_a_testo_style_export_is_told_and_read(read: Read) -> None:
+def test_a_testo_style_export_is_identified_and_read(read: Read) -> None:
     text = "Date;Time;m/s;°C\n01.05.2026;12:00:00;3,25;21,5\n01.05.2026;12:00:01;----;21,5\n"
     log = read(text, zone="+02:00")
     assert "testo-csv" in log.reasons[0]
@@ -152,7 +152,7 @@ def test_a_testo_style_export_is_told_and_read(read: Read) -> None:
     assert iso(int(log.series.time[0])) == "2026-05-01T10:00:00Z"
 
 
-def test_a_skywatch_style_export_is_told_and_read(read: Read) -> None:
+def test_a_skywatch_style_export_is_identified_and_read(read: Read) -> None:
     text = "Date,Time,Wind speed [km/h],Temperature [°C]\n2026-05-01,12:00:00,36.0,20\n2026-05-01,12:00:01,18.0,20\n"
     log = read(text, zone="UTC")
     assert "skywatch-csv" in log.reasons[0]

@@ -237,7 +237,7 @@ def test_an_estimated_wind_is_no_reading(tracked: WindLog) -> None:
         ("fabric/drapetester_fabrics.csv", "unknown", "other"),
     ],
 )
-def test_a_real_file_is_told_for_what_it_is(reference_data: Path, name: str, format_name: str, kind: str) -> None:
+def test_a_real_file_is_identified_correctly(reference_data: Path, name: str, format_name: str, kind: str) -> None:
     best = sniff(reference_data / name)[0]
     assert (best.format, best.kind) == (format_name, kind)
     assert best.reasons

@@ -359,7 +359,7 @@ def idle(made: Made) -> Reading:
         (-0.1, 0.1, Severity.WARNING, "-0.250 m/s in calm air"),
     ],
 )  # fmt: skip
-def test_a_zero_offset_is_subtracted_only_where_asked_and_what_is_left_is_said(
+def test_a_zero_offset_is_subtracted_only_where_asked_and_reported(
     choice: Any, shift: float, severity: Severity, says: str, idle: Reading
 ) -> None:
     done = zero.settle(idle, choice)

@@ -194,7 +194,7 @@ def test_there_are_forty_four_kinds() -> None:
 
 
 def ended(path: Path, kind: Kind, options: Mapping[str, object]) -> tuple[str, str]:
-    """How a file ends, and what is said of it."""
+    """How reading a file ends, and the messages."""
     try:
         log = read_log(path, WindOptions(**options))  # type: ignore[arg-type]
     except OpenFactsError as error:

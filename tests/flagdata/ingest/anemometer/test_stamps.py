@@ -208,7 +208,7 @@ def test_what_nothing_decides_is_refused_with_the_option(name: str) -> None:
 
 
 @pytest.mark.parametrize("year", [1900, 1969, 2201, 3000])
-def test_a_year_outside_the_accepted_ones_is_told_from_what_is_no_date(year: int) -> None:
+def test_a_year_outside_the_accepted_ones_is_distinguished_from_what_is_no_date(year: int) -> None:
     stamps = parse([f"{year}-05-01T12:00:00Z", "2026-02-30T12:00:00Z", "2026-05-01T12:00:00Z", "noon"], "iso")
     assert stamps.valid.tolist() == [False, False, True, False]
     assert stamps.distant.tolist() == [True, False, False, False]

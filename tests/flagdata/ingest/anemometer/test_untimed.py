@@ -74,7 +74,7 @@ def test_options_without_a_rate_keep_their_hash() -> None:
     assert WindOptions(rate=2.0, start=_START).as_dict()["rate"] == 2.0
 
 
-def test_nothing_is_said_of_stamps_that_were_counted(read: Read) -> None:
+def test_generated_stamps_give_no_finding(read: Read) -> None:
     kinds = [f"$IIVWR,{80 + at},L,5.{at},N,,,,\n$IIVWT,{70 + at},L,4.{at},N,,,,\n" for at in range(6)]
     log = read("".join(kinds), start=_START, rate=1.0)
     assert since_start(log) == [at / 2 for at in range(12)]

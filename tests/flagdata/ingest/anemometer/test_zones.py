@@ -51,7 +51,7 @@ def test_what_names_no_zone_or_two_states_none(text: str) -> None:
     assert stated(text.split("\n")) is None
 
 
-def test_a_zone_off_the_preambles_is_told_whatever_reader_is_chosen(read: Read) -> None:
+def test_a_zone_that_contradicts_the_preamble_is_reported_by_every_reader(read: Read) -> None:
     for name in ("nrg", "delimited"):
         log = read(_NRG, format=name, zone="+01:00")
         found = [finding for finding in log.findings if finding.kind == "zone-contradicts"]

@@ -12,7 +12,7 @@ MS = 1_000_000
 
 
 def read(path: Path, options: CameraOptions) -> tuple[CameraInfo, list[Frame], dict[str, Finding]]:
-    """What is said of a file, its frames, and its findings by kind."""
+    """Properties of a file, its frames, and its findings by kind."""
     with open_camera(path, options) as stream:
         frames = list(stream)
         return stream.info, frames, {f.kind: f for f in stream.findings}

@@ -16,7 +16,7 @@ from flagdata.ingest.camera.geometry import Geometry, Orientation, settle_crop, 
 from flagdata.ingest.camera.options import exact
 from tests.refusals import unrefused
 
-# A stored picture whose corners are told apart: 1 2 on top, 3 4 below.
+# A stored picture whose corners differ: 1 2 on top, 3 4 below.
 CORNERS = np.array([[1, 2], [3, 4]], dtype=np.uint8)
 ONE = 1 << 16
 
@@ -122,7 +122,7 @@ def test_scaling_does_not_ring_at_an_edge() -> None:
 
 
 def test_a_moving_picture_moves_by_the_same_share() -> None:
-    # A step edge at column c of 600 px is at c/2 of 300 px: its mid-gray crossing tells to a small part of a pixel.
+    # A step edge at column c of 600 px is at c/2 of 300 px: its mid-gray crossing is exact to a small part of a pixel.
     for column in (200, 251, 333):
         edge = np.zeros((600, 600), dtype=np.uint8)
         edge[:, column:] = 200

@@ -138,7 +138,7 @@ def test_an_automatic_crop_is_used_and_kept_with_its_picture(film: Callable[...,
     ],
     ids=["tip", "corner", "whole flag", "elsewhere"],
 )  # fmt: skip
-def test_a_crop_that_cuts_through_what_moves_is_told_with_the_edges(
+def test_a_crop_that_cuts_through_what_moves_is_reported_with_the_edges(
     crop: str, edges: dict[str, int], film: Callable[..., Path], plain: CameraOptions
 ) -> None:
     """The flag is from 200 to 280 px across and from 60 to 140 px down; blur and compression widen it by a few."""

@@ -155,7 +155,7 @@ def test_a_file_of_one_frame_has_the_stated_rate_and_no_span() -> None:
     assert (timing.origin, timing.span, timing.rate) == (77, 0, 50)
 
 
-def test_every_kind_of_finding_is_told_in_the_packages_docstring() -> None:
+def test_the_packages_docstring_lists_every_kind_of_finding() -> None:
     # Findings are built by keyword, those of StampRepair from a table of kind: (severity, …).
     sources = [path.read_text() for path in Path(camera.__file__).parent.glob("*.py")]
     kinds = {

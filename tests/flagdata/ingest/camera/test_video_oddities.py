@@ -113,7 +113,7 @@ def test_a_playlist_cannot_make_the_reader_open_other_files(tmp_path: Path, cfr6
             open_camera(path, plain)
 
 
-def test_a_probe_tells_the_file_without_needing_a_start(cfr60: Path) -> None:
+def test_a_probe_describes_the_file_without_needing_a_start(cfr60: Path) -> None:
     seen = probe(cfr60)
     assert (seen.codec, seen.width, seen.height, seen.frames, seen.rate) == ("h264", 96, 96, 120, 60.0)
     assert seen.duration == pytest.approx(119 / 60)

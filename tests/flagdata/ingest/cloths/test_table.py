@@ -27,7 +27,7 @@ def written(folder: Path, *lines: str) -> Path:
     return path
 
 
-def test_each_row_is_a_film_with_what_is_known_of_its_cloth(folder: Path) -> None:
+def test_each_row_is_a_film_with_its_cloths_properties(folder: Path) -> None:
     first, second, third = read_cloths(written(folder, HEADING, *ROWS))
     assert (first.film, first.fabric, first.density) == (folder / "a.mp4", "Faux Fur", 0.39)
     assert first.parameters == {

@@ -116,7 +116,7 @@ def test_a_chunk_lost_from_the_store_does_not_pass_for_markers_lost(table: Path,
         read_markers(path)
 
 
-def test_the_command_tells_marker_tables_by_their_columns(
+def test_the_command_identifies_marker_tables_by_their_columns(
     table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
     assert is_marker_table(table)

@@ -85,7 +85,7 @@ def test_what_is_wrong_is_refused(make_folder: Callable[..., Path]) -> None:
     assert not unrefused(lambda frames, conf: read_folder(make_folder(frames, conf=conf, name=next(names))), cases)
 
 
-def test_a_file_that_is_no_folder_is_told(tmp_path: Path) -> None:
+def test_a_file_in_place_of_a_folder_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(NotFoundError, match="no such folder"):
         read_folder(tmp_path / "none")
 

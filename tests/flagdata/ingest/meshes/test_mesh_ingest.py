@@ -68,7 +68,7 @@ def test_a_scene_without_a_wind_has_none() -> None:
     assert [scene_wind(scene) for scene in cases] == [None for scene in cases]
 
 
-def test_the_command_tells_meshes_by_their_content(run: Run, make_folder: Callable[..., Path], lake: Lake) -> None:
+def test_the_command_identifies_meshes_by_their_content(run: Run, make_folder: Callable[..., Path], lake: Lake) -> None:
     folder = make_folder()
     code, out, _ = run(folder, "--name", "square", "--session", "s1")
     assert code == 0
@@ -108,7 +108,7 @@ def test_a_unit_means_nothing_for_a_log(run: Run, tmp_path: Path) -> None:
     assert "'mm' is no unit of speed" in err
 
 
-def test_mixed_units_are_told_with_what_to_do(run: Run, make_folder: Callable[..., Path]) -> None:
+def test_mixed_units_are_reported_with_a_fix(run: Run, make_folder: Callable[..., Path]) -> None:
     text = "vt 0 0\nvt 1 0\nvt 0 1\nv 0 0 0\nv 0 1000 0\nv 0 0 1000\nf 1/1 2/2 3/3\n"
     folder = make_folder({"0000_00.obj": text, "0001_00.obj": text})
     code, _, err = run(folder)

@@ -72,7 +72,7 @@ def test_vertices_that_part_in_one_frame_stay_apart_and_are_reported() -> None:
     assert f"{touching} of these with the same texture" in finding.what
 
 
-def test_a_seam_with_two_textures_stays_and_is_told_from_duplicates() -> None:
+def test_a_seam_with_two_textures_stays_unlike_duplicates() -> None:
     # Two panels that meet at x = 0.5: alike in space along N + 1 vertices each, apart in the texture.
     whole = sheet()
     right = (whole.rest[whole.faces, 0].mean(axis=1) > 0.5)[:, None]
