@@ -19,7 +19,7 @@ SEED_LIMIT = 2**63 - 1
 """Largest seed."""
 DEGREES = "-deg"
 """Suffix of a key whose values are in degrees."""
-_TURN = 2 * math.pi + 1e-3  # rad; a whole turn, rounded by whoever writes it
+_TURN = 2 * math.pi + 1e-3  # rad; a whole turn, as rounded in files
 
 
 class Scale(StrEnum):

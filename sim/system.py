@@ -68,7 +68,7 @@ class Springs:
 
 
 class AnchorMotion(Protocol):
-    """Anchors that move one by one, as they were seen to."""
+    """Anchors that move one by one, as observed."""
 
     def displacement(self, time: float) -> Tensor:
         """(held, 3, batch) from where the system has the anchors [m], at a time [s]."""

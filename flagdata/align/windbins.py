@@ -2,7 +2,7 @@
 
 A bin's stamp is easily half a sample off: a reading stamped t may be of that instant or the mean of the time since the
 reading before. For clips that is nothing; for a clock offset it is the error. So each bin's instant is set by its
-samples' own stamps, by how long the instrument averages and by how late it follows, and what is not known of that goes
+samples' own stamps, by how long the instrument averages and by how late it follows; the uncertainty of these goes
 into σ.
 """
 
@@ -33,7 +33,7 @@ class WindBins:
 
     Attributes:
         average: the bins.
-        sigma: standard uncertainty of all their instants together [s]: what is not known of the
+        sigma: standard uncertainty of all their instants together [s]: the uncertainty of the
             instrument's averaging and lag.
     """
 

@@ -128,7 +128,7 @@ def _answer(question: Open) -> tuple[str, object]:
 
 
 def _expected(question: Open, text: str) -> tuple[str, object]:
-    """What a doubt is answered with: "yes" for right as it is, a number that stands for no value, or a recipe."""
+    """The answers to a check: "yes" where the numbers are right, a number that means no value, or a recipe."""
     if text.lower() == "yes":
         return "expect", question.example
     if text.replace(",", ".").lstrip("+-").replace(".", "", 1).isdigit():

@@ -106,7 +106,7 @@ from flagdata.errors import UsageError
 )
 @click.option(
     "--expect", multiple=True, metavar="KEY",
-    help="Wind: a doubt about a draft that you have answered with yes, by the key that the refusal names; repeatable.",
+    help="Wind: a check of a draft that you have answered with yes, by the key that the refusal names; repeatable.",
 )  # fmt: skip
 @click.option(
     "--accept", metavar="HASH",

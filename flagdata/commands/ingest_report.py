@@ -122,7 +122,7 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
             winds = ", ".join(guess["winds"])
             click.echo(f"    {len(guess['winds'])} anemometers, each becomes an artifact{how}: {winds}")
         for doubt in guess["doubts"]:
-            click.echo(f"    to say: {doubt}")
+            click.echo(f"    to answer: {doubt}")
         if guess["draft"]:
             unfinished = guess["doubts"] or guess["kind"] == "other"
             state = "complete it where it says ?" if unfinished else "nothing is missing"

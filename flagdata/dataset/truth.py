@@ -5,10 +5,10 @@ earlier does not, and nothing after the end does. A sample speaks for the time s
 irregular logger is not biased towards the moments when it was busy; after a gap it speaks for one sampling period only.
 
 The uncertainty is that of the mean wind of such minutes, of which the window is one draw: the standard error of a
-correlated series, the instrument and the clock, all independent. Of an instrument whose accuracy and resolution nobody
-knows, the step seen in its readings is the least that can be said; where not even that is seen, since every reading is
+correlated series, the instrument and the clock, all independent. For an instrument of unknown accuracy and resolution
+the step between its readings is a lower bound; where there is no step, since every reading is
 the same, the uncertainty is unknown and never 0. Not included: the response time of the sensor, its
-distance from the flag, and what it missed while it gave no sample; coverage and staleness speak of that.
+distance from the flag, and what it missed while it gave no sample; coverage and staleness give these.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def over_ground(series: WindSeries) -> Series | None:
     """Speed of the air over ground (n,) [m/s]: the channel itself, or from the horizontal components of a sonic.
 
     `None` when the series has neither. The wind that a moving platform feels, or that its instrument computes as if the
-    platform stood still, is not the wind at a flag; nor are the components that apparent wind was made of.
+    platform were at rest, is not the wind at a flag; nor are the components that apparent wind was made of.
     """
     channels = series.channels
     if "wind_speed" in channels:
@@ -193,7 +193,7 @@ class TruthSeries:
         )
 
     def _known(self, first: int, last: int, past: int) -> Sensor:
-        """The instrument, with the step seen in its readings for a resolution where nobody knows its errors.
+        """The instrument, with the step of its readings as resolution where its errors are unknown.
 
         The step is that of the window, or, where nothing changes in it, of the history from `past` on.
         """

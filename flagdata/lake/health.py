@@ -40,7 +40,7 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
         with collecting(lake.staging):
             states = leases(lake.staging)
             unowned = [(path, last_written(path)) for path in unleased(lake.staging)]
-    # The catalog last: what was put by now is held by a lease seen above, or committed below, or left behind.
+    # The catalog last: what was put by now is protected by a lease read above, or committed below, or left behind.
     marked = mark(lake, grace=grace)
     findings = [*map(_linked, foreign), *marked.findings, *_rows(lake, marked, foreign)]
     if LogGapError.kind in {finding.kind for finding in marked.findings}:

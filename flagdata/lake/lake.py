@@ -58,7 +58,7 @@ class Lake(Store):
                 )
             lake.path.mkdir(parents=True, exist_ok=True)
             try:
-                lake.staging.mkdir()  # whoever makes it, makes the lake
+                lake.staging.mkdir()  # the process that succeeds makes the lake
             except FileExistsError:
                 raise ConflictError(
                     "another process is making a lake there", where=str(lake.path), fix="open that one"

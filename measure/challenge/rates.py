@@ -37,7 +37,7 @@ class Power:
     overall: tuple[float, float, float]
 
     def at(self, strength: Floats, group: str | None = None) -> Floats:
-        """The chance at strengths of any shape, of a group or of one that was not seen."""
+        """The chance at strengths of any shape, of a group or of one outside those graded."""
         half = self.overall[0] if group is None else self.half[group][0]
         return expit(self.slope * np.log(np.asarray(strength) / half))
 

@@ -76,7 +76,7 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
     acted = [o for o in sheet.outcomes if o.key.impact > 0]
     half = _half_rows("class", sheet.power, Counter(_class_name(o) for o in sheet.of_kind(Kind.ONE)))
     if sheet.power is not None:
-        half.append(_half_row("class: one not seen", sheet.power.overall, "–"))
+        half.append(_half_row("class: any other", sheet.power.overall, "–"))
     half += _half_rows("noise, mm", sheet.by_noise, Counter(f"{_MILLI * o.key.noise:g}" for o in acted))
     half += _half_rows("frames a second", sheet.by_rate, Counter(str(o.key.rate) for o in acted))
     gates = [
@@ -105,7 +105,7 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
     strong = (
         "Half-detection strength, as displacement within 0.1 s, with 90 % bounds; strong effects are those of "
         f"{ENOUGH:g} times that, {len(sheet.strong)} sets; from outside the library {len(sheet.strong_outside)}, by "
-        "that of a class that was not seen."
+        "that of any other class."
     )
     parts = [
         f"# Score: {plain(sheet.title)}",
@@ -178,7 +178,7 @@ def _panel(axes: Axes, title: str, power: Power | None, cases: Sequence[tuple[st
             if group == name:
                 height = 1.05 + 0.004 * index if outcome.detected else -0.05 - 0.004 * index
                 axes.plot(_MILLI * outcome.key.impact, height, "o", color=colour, ms=4)
-    axes.semilogx(_MILLI * grid, power.at(grid), color="black", lw=2, label="a group not seen", ls="--")
+    axes.semilogx(_MILLI * grid, power.at(grid), color="black", lw=2, label="any other group", ls="--")
     axes.legend(fontsize=7, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
     axes.grid(alpha=0.3)
 

@@ -18,7 +18,7 @@ from flagdata.commands.confirm import on_command_line
 from flagdata.console import LocalPath, document, in_steps, json_option, say
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.findings import Finding
-from measure.closing.command_line import null_options, refuse, said_of_nulls, stage_bars, told
+from measure.closing.command_line import finding_text, null_options, nulls_given, refuse, stage_bars
 
 if TYPE_CHECKING:
     from measure.closing.artifacts import Closed, Kept
@@ -163,7 +163,7 @@ def close_loop(
     lake = None if lake_path is None else Lake.open(lake_path)
     if lake is not None:
         lake.check_writable()
-    said = said_of_nulls(recipe, level=level, nulls=nulls, bank=bank)
+    said = nulls_given(recipe, level=level, nulls=nulls, bank=bank)
     options = Options(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)), **said)
     setup = _setup(Setup() if recipe is None else recipe.setup, material, density_uncertainty, size, pins)
     if recipe is not None and recipe.recordings:
@@ -177,7 +177,7 @@ def close_loop(
         observed = observe(read(sources, winds, reading, lake), setup)
     refuse(observed.findings)
     verdict = close(observed.experiment, options, stage=stage_bars())
-    verdict = doubted(verdict, observed.findings)
+    verdict = with_warnings(verdict, observed.findings)
     called = name or _name(observed.experiment.recordings[0].name, sources, recipe)
     closed = Closed(
         name=called, experiment=observed.experiment, findings=observed.findings, options=options, verdict=verdict,
@@ -307,10 +307,12 @@ def _places(text: str) -> tuple[tuple[float, float], ...]:
     return tuple(places)
 
 
-def doubted(verdict: Verdict, findings: Sequence[Finding]) -> Verdict:
+def with_warnings(verdict: Verdict, findings: Sequence[Finding]) -> Verdict:
     """The verdict with the remarks on its data; with those in its words that may themselves be what was found."""
-    doubts = [told(finding) for finding in findings if finding.kind in _DOUBTFUL]
+    warnings = [finding_text(finding) for finding in findings if finding.kind in _DOUBTFUL]
     beware = (
-        f" The data themselves may be wrong, which would look like an effect: {'; '.join(doubts)}." if doubts else ""
+        f" The data themselves may be wrong, which would look like an effect: {'; '.join(warnings)}."
+        if warnings
+        else ""
     )
-    return replace(verdict, words=verdict.words + beware, findings=tuple((f.kind, told(f)) for f in findings))
+    return replace(verdict, words=verdict.words + beware, findings=tuple((f.kind, finding_text(f)) for f in findings))

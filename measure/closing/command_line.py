@@ -51,7 +51,7 @@ def null_options(*, level: str) -> Callable[[_Command], _Command]:
     return decorated
 
 
-def said_of_nulls(
+def nulls_given(
     recipe: ExperimentRecipe | None, *, level: float | None, nulls: int | None, bank: Path | None
 ) -> dict[str, Any]:
     """`level` and `nulls` of options, as the command line or else the recipe says them; without what neither does.
@@ -72,10 +72,10 @@ def refuse(findings: Iterable[Finding]) -> None:
     for finding in findings:
         if finding.severity is Severity.ERROR:
             raise InputError(finding.what, where=finding.where, fix=finding.fix or "correct the data")
-        say(f"{finding.severity.value}: {told(finding)}")
+        say(f"{finding.severity.value}: {finding_text(finding)}")
 
 
-def told(finding: Finding) -> str:
+def finding_text(finding: Finding) -> str:
     """Where it was found, and what; a warning with what to do."""
     where = f"{finding.where}: " if finding.where else ""
     fix = f" ({finding.fix})" if finding.fix and finding.severity is Severity.WARNING else ""
@@ -91,11 +91,11 @@ def stage_bars() -> Stage:
     bars: dict[str, tqdm] = {}
     interval = 0.2 if sys.stderr.isatty() else 10.0  # a log file gets a line now and then, not an animation
 
-    def tell(what: str, done: int, total: int) -> None:
+    def advance(what: str, done: int, total: int) -> None:
         if what not in bars:
             bars[what] = tqdm(total=total, desc=what, unit="part", ncols=100, mininterval=interval, file=sys.stderr)
         bars[what].update(done - bars[what].n)
         if done >= total:
             bars[what].close()
 
-    return tell
+    return advance

@@ -1,7 +1,7 @@
 """The wind that the shipped model reads off the demonstration's film, beside the anemometer's.
 
 The film is drawn by kinematics, not simulated, and its flag is none that the model has seen: the section shows what an
-estimate looks like, with its interval and its doubt, not how good it is.
+estimate looks like, with its interval and its novelty, not how good it is.
 """
 
 from __future__ import annotations

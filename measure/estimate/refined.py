@@ -28,7 +28,7 @@ def refined(
 
     Args:
         budget: simulated clips.
-        cropped: whether the film was cropped, so that the view that its record states is not what was seen.
+        cropped: whether the film was cropped, so that the view that its record states is not that of its pictures.
         cache: folder for evaluations, so that an interrupted run goes on; None for none.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Predictions one short horizon ahead, along a recording: the model is put where the cloth was seen, and runs.
+"""Predictions one short horizon ahead, along a recording: the model starts from the cloth as observed, and runs.
 
 At every frame the model is moved onto the observed markers, and its velocity by what the prediction was off, per
 horizon T: x ← x + L e, v ← v + L e/T, with e the markers' prediction error and L its interpolation onto the vertices.

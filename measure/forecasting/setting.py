@@ -22,7 +22,7 @@ Stage = Callable[[str, int, int], object]
 
 @dataclass(frozen=True, kw_only=True)
 class Design:
-    """What is seen, and how, which moves the mean of what numerics leave.
+    """How the cloth is observed, which moves the mean of what numerics leave.
 
     Attributes:
         noise: of a marker's coordinate [m].

@@ -1,4 +1,4 @@
-"""Clips in which there is nothing to measure: nothing moves, or nothing is to be seen.
+"""Clips in which there is nothing to measure: nothing moves, or nothing is visible.
 
 A network gives numbers for every clip, for these as well. They say nothing of a flag, so that none of them is shown,
 not even where the gate is overruled.
@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from measure.gate.clip_statistics import LEAST_DEVIATION, ClipStatistics
 from measure.gate.reasons import REASONS
-from measure.gate.seen import LEAST_DEVIATION, Seen
 
 _FLAT = 1.0
-"""Standard deviation of all gray levels of a clip below which nothing is to be seen: one step of the camera's."""
+"""Standard deviation of all gray levels of a clip below which nothing is visible: one step of the camera's."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,14 +44,14 @@ def blank(frames: NDArray[np.uint8]) -> Blank | None:
         frames: (n, height, width) gray.
 
     Raises:
-        InputError: see `Seen.of`.
+        InputError: see `ClipStatistics.of`.
     """
     contrast = float(frames.std())
     if contrast < _FLAT:
         reason = REASONS["too-dark"]
         what = f"{reason.sentence}: all gray levels lie within {contrast:.2g} of each other"
         return Blank(kind="too-dark", sentence=what, fix=reason.fix, check="contrast", value=contrast)
-    most = float(Seen.of(frames).deviation.max())
+    most = float(ClipStatistics.of(frames).deviation.max())
     if most > LEAST_DEVIATION:
         return None
     what = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from measure.gate.seen import SIDE, Seen
+from measure.gate.clip_statistics import SIDE, ClipStatistics
 
 _TILE = 28
 """Side of a tile of the rim [px]; the picture has four by four, twelve of which are its rim."""
@@ -13,18 +13,18 @@ _STEPS = (3, 8, 15, 29)
 """Frames, after the first, whose shift from it is measured."""
 
 
-def shift(seen: Seen) -> float:
+def shift(clip: ClipStatistics) -> float:
     """Common logarithm of the shift of the rim [px]: the largest over frames of the tiles' median.
 
     A tile's shift is the peak of its phase correlation with the first frame (Kuglin and Hines, 1975). The spectrum is
     divided by its modulus plus the noise's, so that a tile without texture gives no shift; the peak is refined by a
     parabola.
     """
-    found = [_median_shift(seen, frame) for frame in _STEPS if frame < len(seen.gray)]
+    found = [_median_shift(clip, frame) for frame in _STEPS if frame < len(clip.gray)]
     return float(np.log10(max(max(found), 0.01)))
 
 
-def sway(seen: Seen) -> float:
+def sway(clip: ClipStatistics) -> float:
     """Common logarithm of the root mean square translation of the rim from one frame to the next [px/frame].
 
     The translation is that of least squares between slopes and changes (Lucas and Kanade, 1981) over the rim's pixels.
@@ -32,20 +32,20 @@ def sway(seen: Seen) -> float:
     mask = np.ones((SIDE, SIDE), dtype=np.bool_)
     rim = SIDE // 6
     mask[rim:-rim, rim:-rim] = False
-    change = np.diff(seen.gray, axis=0)[:, mask]
-    slopes = np.stack([np.asarray(np.gradient(seen.mean, axis=axis))[mask] for axis in (0, 1)])
+    change = np.diff(clip.gray, axis=0)[:, mask]
+    slopes = np.stack([np.asarray(np.gradient(clip.mean, axis=axis))[mask] for axis in (0, 1)])
     square = slopes @ slopes.T + np.eye(2) * mask.sum() * 0.25
     moved = np.linalg.solve(square, slopes @ change.T)
     return float(np.log10(max(float(np.sqrt(np.square(moved).sum(axis=0).mean())), 1e-3)))
 
 
-def _median_shift(seen: Seen, frame: int) -> float:
+def _median_shift(clip: ClipStatistics, frame: int) -> float:
     shifts = []
     for top in range(0, SIDE, _TILE):
         for left in range(0, SIDE, _TILE):
             if top in (0, SIDE - _TILE) or left in (0, SIDE - _TILE):
                 part = (slice(top, top + _TILE), slice(left, left + _TILE))
-                shifts.append(_phase_shift(seen.gray[0][part], seen.gray[frame][part], seen.still))
+                shifts.append(_phase_shift(clip.gray[0][part], clip.gray[frame][part], clip.still))
     return float(np.hypot(*np.median(shifts, axis=0)))
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from measure.gate import camera, exposure, motion, timing
-from measure.gate.seen import Seen
+from measure.gate.clip_statistics import ClipStatistics
 
-Measure = Callable[[Seen], float]
+Measure = Callable[[ClipStatistics], float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,7 +116,7 @@ def measured(frames: NDArray[np.uint8]) -> NDArray[np.float64]:
     """(len(CHECKS),) statistics of frames (n, height, width) in the order of the table.
 
     Raises:
-        InputError: see `Seen.of`.
+        InputError: see `ClipStatistics.of`.
     """
-    seen = Seen.of(frames)
-    return np.array([check.measure(seen) for check in CHECKS.values()])
+    statistics = ClipStatistics.of(frames)
+    return np.array([check.measure(statistics) for check in CHECKS.values()])

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from measure.gate.seen import SIDE, Seen
+from measure.gate.clip_statistics import SIDE, ClipStatistics
 
 Film = NDArray[np.uint8]
 Distort = Callable[[Film, Film, np.random.Generator, int], Film]
@@ -44,7 +44,7 @@ def _still(film: Film, other: Film, rng: np.random.Generator, count: int) -> Fil
 def _cut(film: Film, other: Film, rng: np.random.Generator, count: int) -> Film:
     """The picture is cut through the moving part, on one side or two."""
     side = min(film.shape[1:])
-    mass = np.asarray(ndimage.zoom(np.sqrt(Seen.of(film).excess), side / SIDE, order=1))
+    mass = np.asarray(ndimage.zoom(np.sqrt(ClipStatistics.of(film).excess), side / SIDE, order=1))
     ends = []
     for profile in (mass.sum(axis=0), mass.sum(axis=1)):
         share = np.cumsum(profile) / max(float(profile.sum()), 1e-6)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from measure.gate.seen import SIDE, Seen
+from measure.gate.clip_statistics import SIDE, ClipStatistics
 
 _EDGE = 3
 """Width [px] of the strip along a side in which motion is called cut off."""
@@ -19,78 +19,78 @@ _REGION = 0.15
 LEAST_AREA = 1 / SIDE**2
 
 
-def area(seen: Seen) -> float:
+def area(clip: ClipStatistics) -> float:
     """Common logarithm of the share of the picture that moves."""
-    return float(np.log10(max(float(seen.moving.mean()), LEAST_AREA)))
+    return float(np.log10(max(float(clip.moving.mean()), LEAST_AREA)))
 
 
-def energy(seen: Seen) -> float:
+def energy(clip: ClipStatistics) -> float:
     """Common logarithm of the mean variance in time beyond noise over the variance of the mean picture."""
-    return float(np.log10(max(float(seen.excess.mean()), 1e-4) / max(seen.contrast, 1e-2) ** 2))
+    return float(np.log10(max(float(clip.excess.mean()), 1e-4) / max(clip.contrast, 1e-2) ** 2))
 
 
-def strength(seen: Seen) -> float:
+def strength(clip: ClipStatistics) -> float:
     """Common logarithm of the strongest deviation in time (99.5 % of the pixels' lie below) over the noise's."""
-    return float(np.log10(max(float(np.quantile(seen.deviation, 0.995)), 1e-2) / max(seen.still, 0.1)))
+    return float(np.log10(max(float(np.quantile(clip.deviation, 0.995)), 1e-2) / max(clip.still, 0.1)))
 
 
-def at_edge(seen: Seen) -> float:
+def at_edge(clip: ClipStatistics) -> float:
     """Root mean deviation within a strip along the side where it is largest, over that of the moving part."""
-    if not seen.moving.any():
+    if not clip.moving.any():
         return 0.0
-    inside = float(seen.excess[seen.moving].mean())
-    amplitude = np.sqrt(seen.excess)
+    inside = float(clip.excess[clip.moving].mean())
+    amplitude = np.sqrt(clip.excess)
     strips = (amplitude[:_EDGE], amplitude[-_EDGE:], amplitude[:, :_EDGE], amplitude[:, -_EDGE:])
     return max(float(strip.mean()) for strip in strips) / np.sqrt(inside)
 
 
-def around(seen: Seen) -> float:
+def around(clip: ClipStatistics) -> float:
     """Share of the outermost eighth of the picture, on all four sides, that moves."""
-    ring = np.ones_like(seen.moving)
+    ring = np.ones_like(clip.moving)
     width = SIDE // 8
     ring[width:-width, width:-width] = False
-    return float(seen.moving[ring].mean())
+    return float(clip.moving[ring].mean())
 
 
-def off_centre(seen: Seen) -> float:
+def off_centre(clip: ClipStatistics) -> float:
     """Distance of the motion's centre of mass from the picture's middle, in sides of the picture."""
-    if not seen.moving.any():
+    if not clip.moving.any():
         return 0.0
-    amplitude = np.sqrt(seen.excess)
+    amplitude = np.sqrt(clip.excess)
     places = (np.arange(SIDE) - (SIDE - 1) / 2) / SIDE
     y, x = (float(amplitude.sum(axis=axis) @ places / amplitude.sum()) for axis in (1, 0))
     return float(np.hypot(y, x))
 
 
-def width(seen: Seen) -> float:
+def width(clip: ClipStatistics) -> float:
     """Width that holds 90 % of the motion, in sides of the picture."""
-    return _extent(np.sqrt(seen.excess).sum(axis=0))
+    return _extent(np.sqrt(clip.excess).sum(axis=0))
 
 
-def height(seen: Seen) -> float:
+def height(clip: ClipStatistics) -> float:
     """Height that holds 90 % of the motion, in sides of the picture."""
-    return _extent(np.sqrt(seen.excess).sum(axis=1))
+    return _extent(np.sqrt(clip.excess).sum(axis=1))
 
 
-def second_region(seen: Seen) -> float:
+def second_region(clip: ClipStatistics) -> float:
     """Motion of the second strongest separate region over that of the strongest, 0 to 1."""
-    amplitude = np.asarray(ndimage.gaussian_filter(np.sqrt(seen.excess), _SMOOTHING), dtype=np.float32)
+    amplitude = np.asarray(ndimage.gaussian_filter(np.sqrt(clip.excess), _SMOOTHING), dtype=np.float32)
     if amplitude.max() <= 0:
         return 0.0
     masses = _masses(amplitude > _REGION * amplitude.max(), amplitude)
     return float(masses[-2] / masses[-1]) if len(masses) > 1 else 0.0
 
 
-def scatter(seen: Seen) -> float:
+def scatter(clip: ClipStatistics) -> float:
     """Share of the motion outside of the largest region of moving pixels that touch."""
-    masses = _masses(seen.moving, np.sqrt(seen.excess))
+    masses = _masses(clip.moving, np.sqrt(clip.excess))
     return 1 - float(masses[-1] / masses.sum()) if len(masses) else 0.0
 
 
-def edges_moving(seen: Seen) -> float:
+def edges_moving(clip: ClipStatistics) -> float:
     """Share of the mean picture's edges, its steepest tenth, that move: all of them where the camera does."""
-    steep = seen.slope >= np.quantile(seen.slope, 0.9)
-    return float(seen.moving[steep].mean())
+    steep = clip.slope >= np.quantile(clip.slope, 0.9)
+    return float(clip.moving[steep].mean())
 
 
 def _masses(inside: NDArray[np.bool_], amplitude: NDArray[np.float32]) -> NDArray[np.float64]:

@@ -140,7 +140,7 @@ class Nulls(Rows):
 
 _POWERS = 3
 _UNSEEN = 1e-9
-"""Share of the mean variance that a column has of which nothing is seen, as of an effect without a moment."""
+"""Share of the mean variance below which a column is unobservable, as that of an effect without a moment."""
 
 
 def _power_of_damping(nulls: Nulls) -> float:

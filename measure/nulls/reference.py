@@ -389,7 +389,7 @@ class Reference:
 
 
 _NOTHING = 1e-6
-"""Mean share below which a column is never seen: that of the columns that are always fitted."""
+"""Mean share below which a column is unobservable: that of the columns that are always fitted."""
 
 
 def unscaled(evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:

@@ -1,4 +1,4 @@
-"""Observed trajectories: what was seen of a cloth, on which specimen, in which wind; read and checked before anything
+"""Observed trajectories: the motion of a cloth, its specimen and its wind; read and checked before anything
 is concluded from them."""
 
 from measure.observe.experiment import Observed, observe

@@ -26,7 +26,7 @@ _DENSER = 2.0
 _SHARED = 0.5
 """Share of the markers of the recording with most that all must have in common, for these to be taken alone."""
 _NEAR = 0.75
-"""Share of a point's weight: it counts as seen where markers of so much were tracked."""
+"""Share of a point's weight: it counts as tracked where markers of so much were tracked."""
 
 
 def at_same_rate(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ...], tuple[Finding, ...]]:

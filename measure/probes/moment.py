@@ -6,7 +6,7 @@ one horizon T ahead have, a unit of mass per area,
 
     M = Σ w (r × e)_z / T²,
 
-w a marker's share of the cloth, r where it is seen, from the axis: the moment per density of what the model lacks.
+w a marker's share of the cloth, r where it is observed, from the axis: the moment per density of what the model lacks.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class PoleMoment:
     """Moments about the pole of some segments.
 
     Attributes:
-        arms: (frame, marker, 2, segment) w (−y, x)/T² [m³/s²] of what is seen.
+        arms: (frame, marker, 2, segment) w (−y, x)/T² [m³/s²] of the observed markers.
         scale: (segment,) root mean square moment of the base model's errors in the recording [m⁴/s²].
     """
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from flagdata.console import LocalPath, document, json_option, say
-from measure.closing.command_line import null_options, refuse, said_of_nulls, stage_bars
+from measure.closing.command_line import null_options, nulls_given, refuse, stage_bars
 
 if TYPE_CHECKING:
     from measure.propose.outcome import Outcome
@@ -66,7 +66,7 @@ def propose(
     if effect is None:
         effect_file.check(folder)
     recipe = recipes.load(recipe_path)
-    said = said_of_nulls(recipe, level=level, nulls=nulls, bank=bank)
+    said = nulls_given(recipe, level=level, nulls=nulls, bank=bank)
     options = NullOptions(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)), **said)
     tried, controls = (dictionary(), ()) if effect is None else (candidates.from_file(effect), dictionary())
     observed = recipes.read(recipe, None if lake_path is None else Lake.open(lake_path))

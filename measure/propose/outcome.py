@@ -80,7 +80,7 @@ class Strength:
     Attributes:
         name: of the term, a Python name; or "Class.parameter" of an effect from a file.
         words: what it is.
-        estimate: fitted to what was seen.
+        estimate: fitted to the observed motion.
         course: in time.
     """
 

@@ -1,4 +1,4 @@
-"""Before and after on data that neither the choice of the terms nor the fit of either model has seen."""
+"""Before and after on data that neither the choice of the terms nor the fit of either model used."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ class Chart:
 
     Attributes:
         title: what it shows, for those who cannot see it.
-        description: what is to be seen in it, likewise.
+        description: what it shows, likewise.
         x, y: scales; y grows upwards when its `start` lies below its `stop`.
         x_label, y_label: quantity and unit.
         width, height: of the whole.

@@ -142,8 +142,8 @@ def _estimate(estimate: Estimate | None, shown: quantity.Display | None = None) 
 def _full(estimate: Estimate) -> Markup:
     """The value, its interval and the interval's level."""
     value, ends = quantity.estimate_parts(estimate)
-    told = f"{ends} {quantity.level_text(estimate.level)}" if ends else ""
-    return _data(estimate.value, value) + Markup('<span class="ends">{}</span>').format(told)
+    ends_text = f"{ends} {quantity.level_text(estimate.level)}" if ends else ""
+    return _data(estimate.value, value) + Markup('<span class="ends">{}</span>').format(ends_text)
 
 
 def _number(value: float | None) -> Markup:

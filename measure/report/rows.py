@@ -33,8 +33,8 @@ def errors_row(comparison: Comparison, scale: Linear) -> Markup:
         edge = scale(min(max(comparison.floor.value, scale.low), scale.high))
         parts.append(f'<rect class="floor" x="{scale(0):.1f}" y="0" width="{edge - scale(0):.1f}" height="{height}"/>')
     parts += [_whisker(estimate, scale, 9.0 + 15 * place, kind) for place, (estimate, kind) in enumerate(there)]
-    told = f"before {estimate_text(comparison.before)}, after {estimate_text(comparison.after)}"
-    return drawing(_WIDTH, height, f"Errors, {comparison.what}", told, "".join(parts))
+    caption = f"before {estimate_text(comparison.before)}, after {estimate_text(comparison.after)}"
+    return drawing(_WIDTH, height, f"Errors, {comparison.what}", caption, "".join(parts))
 
 
 def gain_scale(candidates: Sequence[Candidate]) -> Linear:
@@ -54,8 +54,8 @@ def gain_row(candidate: Candidate, scale: Linear, kind: str) -> Markup:
         unit="1",
     )
     inside = _null(scale, 0.0, 18) + _whisker(estimate, scale, 9, kind)
-    told = with_error(candidate.gain, candidate.gain_error)
-    return drawing(_WIDTH, 18, f"Held-out gain of {candidate.effect}", told, inside)
+    caption = with_error(candidate.gain, candidate.gain_error)
+    return drawing(_WIDTH, 18, f"Held-out gain of {candidate.effect}", caption, inside)
 
 
 def strength_row(candidate: Candidate) -> Markup:
@@ -74,8 +74,8 @@ def strength_row(candidate: Candidate) -> Markup:
     for place, estimate in enumerate(candidate.by_recording):
         if known(estimate):
             parts.append(_whisker(estimate, scale, 9.5 + _STEP * place, "single"))
-    told = "; ".join(estimate_text(e) for e in candidate.by_recording)
-    return drawing(_WIDTH, height, f"{candidate.effect} on each recording alone", told, "".join(parts))
+    caption = "; ".join(estimate_text(e) for e in candidate.by_recording)
+    return drawing(_WIDTH, height, f"{candidate.effect} on each recording alone", caption, "".join(parts))
 
 
 def _null(scale: Linear, value: float, height: float) -> str:

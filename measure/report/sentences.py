@@ -92,10 +92,10 @@ def control_summary(verdict: Verdict) -> str:
     if apart is None or not known(apart):
         return ""
     control = next((c.control_name for c in verdict.comparisons if c.control_name), "the best wrong effect")
-    told = "the named effect does better" if apart.low > 0 else "the two fit equally well"
+    line = "the named effect does better" if apart.low > 0 else "the two fit equally well"
     return (
         f"With {control} instead, the misfit of the recordings left out is larger by {estimate_text(apart)} nat per "
-        f"segment ({level_text(apart.level)}): {told}."
+        f"segment ({level_text(apart.level)}): {line}."
     )
 
 

@@ -55,10 +55,10 @@ def _lacking(outcome: Outcome) -> str:
     """What the library lacks looks like, where it has no answer or half of one."""
     if not outcome.field:
         return ""
-    told = [] if outcome.line is None else [shedding(outcome.line)]
+    sentences = [] if outcome.line is None else [shedding(outcome.line)]
     if outcome.course is not None and outcome.course.whole[ALONG] > 0:
-        told.append(blowing(outcome.course))
-    return " ".join([*told, proposal(outcome.field, whole=outcome.whole)])
+        sentences.append(blowing(outcome.course))
+    return " ".join([*sentences, proposal(outcome.field, whole=outcome.whole)])
 
 
 def sentence(verdict: Verdict) -> str:
@@ -114,11 +114,11 @@ def by_draw(test: NullTest) -> tuple[str, ...]:
         if test.settling is None
         else f"{test.settling} kinds of numerics would settle it, if the same share of them is as far"
     )
-    told = (
+    sentence = (
         f"Another draw of nulls could decide otherwise: the interval of p, [{probability(p.low)}, "
         f"{probability(p.high)}] {level_text(p.level)}, holds the level of {test.level:g}; {more}."
     )
-    return (told,)
+    return (sentence,)
 
 
 def bounds(ended: Sequence[str]) -> tuple[str, ...]:
@@ -132,11 +132,11 @@ def ratios(experiment: Experiment) -> tuple[str, ...]:
     """What the numbers are of where the mass of the cloth is not known; nothing where it is."""
     if experiment.specimen.mass_known:
         return ()
-    told = (
+    sentence = (
         "The mass of the cloth is not known: motion shows forces per mass alone, so that density, bending and the "
         f"strengths of forces are ratios to a density of {number(experiment.specimen.material.density)} kg/m²."
     )
-    return (told,)
+    return (sentence,)
 
 
 def clocks(experiment: Experiment, late: Sequence[float]) -> tuple[str, ...]:
@@ -165,8 +165,8 @@ def proposal(modes: Sequence[Mode], *, whole: bool = True) -> str:
     Args:
         whole: whether it stands for all that the base model lacks, or for what a named effect leaves.
     """
-    told = sorted(modes, key=lambda mode: -abs(mode.value / mode.error))[:3]
-    terms = [f"{_where(mode.column)} ({with_error(mode.value, mode.error)}) m/s²" for mode in told]
+    largest = sorted(modes, key=lambda mode: -abs(mode.value / mode.error))[:3]
+    terms = [f"{_where(mode.column)} ({with_error(mode.value, mode.error)}) m/s²" for mode in largest]
     fitted = "fits the errors best" if whole else "fits the remaining errors best"
     return f"The smooth force field that {fitted}, per mass: {'; '.join(terms)}."
 
@@ -203,12 +203,12 @@ def _weighed(specimen: Specimen) -> tuple[str, ...]:
     known = specimen.density_uncertainty
     if not specimen.mass_known:
         return ()
-    told = f"its density is known to {100 * known:.2g} % (one standard deviation)"
+    known_to = f"its density is known to {100 * known:.2g} % (one standard deviation)"
     weighing = (
         ": a pressure of the air that is off by as much differs from another weight only in how the cloth stretches, "
         "which a cloth that was weighed to 2 % would settle (density-uncertainty = 0.02)"
     )
-    return (told + weighing if known >= _ROUGH else told,)
+    return (known_to + weighing if known >= _ROUGH else known_to,)
 
 
 def assumptions(experiment: Experiment) -> tuple[str, ...]:
@@ -245,5 +245,5 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         "density, bending and internal damping are calibrated, so that what only changes them is not an effect",
         between,
         f"a strength may be off by a factor of {factor} by the fit's mesh and a mistold cloth: its interval says so",
-        "the effect was chosen on all recordings; the errors before and after come from fits that had not seen them",
+        "the effect was chosen on all recordings; the errors before and after come from fits without them",
     )

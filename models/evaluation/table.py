@@ -316,7 +316,7 @@ COLUMNS = (
 )
 LEGEND = (
     f"Brackets: {100 * LEVEL:.0f} % intervals, sequences drawn with replacement; of several runs they are the mean's "
-    "and do not hold what another training run would give, which the range of the runs shows. Bound: "
+    "and do not include the scatter between training runs, which the range of the runs shows. Bound: "
     "0.5 √(1 − Acc@0.5) m/s, the least RMSE that goes with the accuracy. Area weight error / spread: RMSE over the "
     "standard deviation of the true area weight over the clips tested, which are draws of its prior; 1 for a constant "
     "prediction of the mean."

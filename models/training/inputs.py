@@ -246,7 +246,7 @@ def _prepared(
                 still = _unsound(missing, workers)
                 advance(len(missing) - len(still))
                 _warn_of_damage([path for _, path in still if path.exists()])
-                for row, path in still[:1]:  # what is wrong with all of them is said by the first
+                for row, path in still[:1]:  # an error common to all is reported by the first
                     _write(path, made(row), front_end)
                     advance(1)
                 _fill(still[1:], made, front_end, workers, advance)

@@ -1,4 +1,4 @@
-"""What a training has seen of itself: losses by epoch, the best of them, and their curves as a picture."""
+"""Progress of a training: losses by epoch, the best of them, and their curves as a picture."""
 
 from __future__ import annotations
 

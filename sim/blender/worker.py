@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from sim.blender.protocol import Message, decode, encode
 
 _SENSOR = 36.0  # mm, of the camera model; only its ratio to the lens matters
-_CLIP = (0.01, 1000.0)  # m, nearest and farthest that is seen
+_CLIP = (0.01, 1000.0)  # m, nearest and farthest that is rendered
 
 
 class Studio:
@@ -227,7 +227,7 @@ def serve(bpy: Any, source: int, sink: int) -> None:
                 if message.kind == "exit":
                     return
                 send(_answer(studio, message))
-            except (EOFError, BrokenPipeError):  # whoever asked is gone
+            except (EOFError, BrokenPipeError):  # the caller is gone
                 return
 
 

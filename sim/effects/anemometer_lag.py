@@ -23,7 +23,7 @@ class AnemometerLag(AnemometerEffect):
     in gusts than in lulls: that part is `Overspeeding`.)
 
     Attributes:
-        distance: ℓ, the distance constant: the run of wind in which 63 % of a step is seen.
+        distance: ℓ, the distance constant: the run of wind in which the reading makes 63 % of a step.
     """
 
     distance: Annotated[

@@ -11,7 +11,7 @@ from sim.effects.sensor import CameraEffect, Sampling
 
 @dataclass(frozen=True, kw_only=True)
 class FrameRateError(CameraEffect):
-    """Frames are taken at f (1 + ε) and stored as at f: every frequency is seen divided by 1 + ε.
+    """Frames are taken at f (1 + ε) and stored as at f: every frequency appears divided by 1 + ε.
 
     Attributes:
         error: ε.

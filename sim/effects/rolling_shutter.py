@@ -11,7 +11,7 @@ from sim.effects.sensor import CameraEffect, Sampling
 
 @dataclass(frozen=True, kw_only=True)
 class RollingShutter(CameraEffect):
-    """Row r, from 0 at the top to 1 at the bottom, is seen at t + T (r − ½).
+    """Row r, from 0 at the top to 1 at the bottom, is exposed at t + T (r − ½).
 
     Attributes:
         readout: T from the top row to the bottom row; negative for a camera held upside down.

@@ -1,4 +1,4 @@
-"""How meshes are seen: the renderers' contract, and the renderers by name.
+"""How meshes become pictures: the renderers' contract, and the renderers by name.
 
 A renderer turns meshes and render parameters ζ into frames. What all renderers share is one function each: `stage`
 places camera, sun, cloth and pole; `Camera.project` maps the world to pixels; `plate` fits the background; `develop`

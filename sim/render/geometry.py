@@ -23,7 +23,7 @@ class Geometry:
         positions: (vertex, 3) float32, in the world [m].
         uv: (vertex, 2) float32.
         corners: (face, 3) int64 vertex indices: frame after frame, in each the cloth's faces, then the pole's.
-        frame: (face,) int64 the frame a face is seen in.
+        frame: (face,) int64 the frame that a face belongs to.
         cloth: (face,) whether it is cloth.
         vertex_offset: (frame + 1,) int64; frame i has the cloth's vertices offset[i] to offset[i + 1], and the pole's,
             which come after all of them.

@@ -1,4 +1,4 @@
-"""Render parameters ζ: everything that decides how a mesh is seen, one value each, with unit and admissible range.
+"""Render parameters ζ: everything that decides how a mesh is drawn, one value each, with unit and admissible range.
 
 The names are those of Runia et al. 2020, "Exhaustive overview of the render parameters ζ" (appendix); parameters that
 table leaves open are marked in the catalog of priors (`catalogs/renders`), which says where each range is from.

@@ -186,8 +186,8 @@ def page(found: Mapping[str, Any]) -> str:
         "| share | value | of | 90 % bounds |", "|---|---|---|---|",
         *(_share(title, found[key]) for title, key in (
             ("nulls that were rejected", "false_rejections"), ("effects named rightly", "right"),
-            ("effects named rightly, or among several", "right_or_among"), ("effects not seen", "missed"),
-            ("effects told wrongly", "wrong"),
+            ("effects named rightly, or among several", "right_or_among"), ("effects not detected", "missed"),
+            ("effects misnamed", "wrong"),
         )),
         *(_share(f"90 % intervals of {name} that cover", found["covered"][name]) for name in _COVERED),
         "", f"{found['refused']} were refused. The bank holds {found['kinds']} kinds of numerics.", "",

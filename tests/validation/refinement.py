@@ -60,7 +60,7 @@ from tests.validation.transfer import (
 )  # fmt: skip
 
 _OF = {
-    "arcsim": "the reference simulator's runs, filmed by our rasteriser by cameras that are not told",
+    "arcsim": "the reference simulator's runs, filmed by our rasteriser by cameras unknown to it",
     "changed": "flags of another mesh, integrator, step and texture than any learned from, half of them by Cycles",
 }
 """What the targets are, where they are of no lake."""

@@ -62,7 +62,7 @@ class WindOptions:
         wind: which anemometer of a file that holds several, by the label that `sniff` gives it.
         columns: what the columns of a table are, in one line (see `stated_columns`).
         missing: further spellings of "no value" of a table that no recipe describes.
-        expect: doubts about a draft that its user has answered (keys of `draft.doubts`).
+        expect: checks of a draft that its user has answered (keys of `draft.doubts`).
         zero_offset: see `ZeroOffset`; `None` is the recipe's, which is "report" unless it says otherwise.
         limits: see `Limits`.
     """

@@ -21,7 +21,7 @@ class Guess:
         fix: what to do next, where that is not to ingest it.
         draft: a recipe (TOML) for a table that no recipe describes; "?" stands where it is to be completed.
         notes: what was left out, and what is odd.
-        doubts: what must be said before it can be read, each with how to say it.
+        doubts: what must be given before it can be read, each with the option that gives it.
         winds: labels of the anemometers, where a draft names several.
     """
 

@@ -23,7 +23,7 @@ def recording_time(message: bytes) -> str | None:
         return None
     digits = (entries[0x18][1:] + entries[0x19]).hex()
     try:
-        # A wall-clock time; whoever knows the camera's zone attaches it.
+        # A wall-clock time; the caller attaches the camera's zone.
         return datetime.strptime(digits, "%Y%m%d%H%M%S").isoformat()  # noqa: DTZ007
     except ValueError:
         return None

@@ -69,7 +69,7 @@ def luma_of_frame(frame: av.VideoFrame, *, codec: str) -> Luma:
 
 
 def _converted(frame: av.VideoFrame, pixel_format: str) -> av.VideoFrame:
-    """The same picture in another layout, by one thread: with several, swscale was seen to mix up bands of rows."""
+    """The same picture in another layout, by one thread: with several, swscale mixed up bands of rows."""
     return frame.reformat(format=pixel_format, threads=1)
 
 

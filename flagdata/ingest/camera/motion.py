@@ -33,7 +33,7 @@ _FAINTEST = 1.0  # gray levels; less motion than one is coding noise
 _BRIDGE = 8  # px of the images that are compared
 _PAD = 0.15  # of the motion's extent, on each side: the hoist of a flag hardly moves
 _LEAST_SHARE = 0.5
-_GROWTH = 1.8  # the tip of a flag that is seen without it; who walks into the region makes it larger
+_GROWTH = 1.8  # the tip of a flag that is visible without it; a passer-by makes it larger
 _EDGE = 3  # px of the images that are compared, by which blur widens what moves
 _NEAR = 3  # px of the images that are compared, between what moves and the tip of it
 

@@ -22,7 +22,7 @@ _NORMAL = 1.2816  # that quantile of a normal distribution
 # Median of these lengths over those at rest. In the reference runs, 0 to 8 m/s and 30 to 651 markers: 1.00 to 1.03.
 _SHORT, _LONG, _TOO_LONG = 0.95, 1.05, 1.08
 _UNEVEN = 0.08  # the same along u and along v differ by less than 0.05 there
-_TORN = 1.5  # a marker that is further than that from most of its neighbours is not where it is said to be
+_TORN = 1.5  # a marker that is further than that from most of its neighbours is not where the file places it
 _HOLE = 0.35  # of the cloth's size: a part that is further from any marker is not observed
 _UNITS = {
     "mm for m": 1000.0, "cm for m": 100.0, "mm for cm": 10.0, "inches for m": 39.3701, "inches for cm": 2.54,

@@ -8,9 +8,9 @@ import torch
 from numpy.typing import NDArray
 
 from measure.gate.checks import CHECKS
+from measure.gate.clip_statistics import ClipStatistics
 from measure.gate.distortions import DISTORTIONS
 from measure.gate.gate import Gate
-from measure.gate.seen import Seen
 from models.crops import Cropping
 from models.estimator import Estimator
 from models.frontend import FrontEnd
@@ -50,7 +50,7 @@ def film(
 
 def value(name: str, frames: NDArray[np.uint8]) -> float:
     """One statistic of a clip."""
-    return CHECKS[name].measure(Seen.of(frames))
+    return CHECKS[name].measure(ClipStatistics.of(frames))
 
 
 def small_model(seed: int = 0) -> Estimator:

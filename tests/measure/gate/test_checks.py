@@ -7,7 +7,7 @@ import pytest
 from scipy import ndimage
 
 from flagdata.errors import InputError
-from measure.gate.seen import SIDE, Seen
+from measure.gate.clip_statistics import SIDE, ClipStatistics
 from tests.measure.gate.made import FRAMES, SIZE, background, film, value
 
 
@@ -101,11 +101,11 @@ def test_a_picture_of_another_size_has_the_same_statistics() -> None:
 
 def test_the_square_about_the_middle_is_looked_at() -> None:
     wide = np.concatenate([film()] * 3, axis=2)
-    np.testing.assert_array_equal(Seen.of(wide).gray, Seen.of(film()).gray)
-    assert Seen.of(wide).gray.shape == (FRAMES, SIDE, SIDE)
+    np.testing.assert_array_equal(ClipStatistics.of(wide).gray, ClipStatistics.of(film()).gray)
+    assert ClipStatistics.of(wide).gray.shape == (FRAMES, SIDE, SIDE)
 
 
 @pytest.mark.parametrize("shape", [(2, 64, 64), (10, 8, 64), (64, 64)])
 def test_unfit_frames_are_errors(shape: tuple[int, ...]) -> None:
     with pytest.raises(InputError, match="give uint8"):
-        Seen.of(np.zeros(shape, dtype=np.uint8))
+        ClipStatistics.of(np.zeros(shape, dtype=np.uint8))

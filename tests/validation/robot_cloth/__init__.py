@@ -47,7 +47,7 @@ def page(found: HeldCloth) -> str:
         "nodes in mm; in brackets the least and the largest of single recordings."
     )
     compared = (
-        f"{found.apart.hits} of {found.apart.count} pairs are told apart at {LEVEL:g} "
+        f"{found.apart.hits} of {found.apart.count} pairs differ at {LEVEL:g} "
         f"(90 % bounds {found.apart.low:.2f}–{found.apart.high:.2f}, too narrow since pairs share recordings). As many "
         f"or more are by chance with p = {found.p_pairs:.2f}, by {SHUFFLES} shuffles of the repeats' segments. "
         f"With the stamps of one of them moved by {1e3 * MOVED:.0f} ms {moved.hits} of {moved.count} are."
@@ -108,7 +108,7 @@ def _lacking(found: HeldCloth) -> list[str]:
         told = (
             f"The camera's map A, by rows (across, in depth, up): {rows}. Its first column is of places across the "
             "swing, where the tool hardly moves: there the map and the nodes' offsets take each other's place, and "
-            "it tells nothing."
+            "it carries no information."
         )
         lines += [told, ""]
     if (own := found.late) is not None:

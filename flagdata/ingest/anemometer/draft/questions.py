@@ -15,7 +15,7 @@ class Open:
     Attributes:
         key: the option that answers it.
         question: in words.
-        example: what stands behind the option; never an answer, but for the key of a doubt.
+        example: the text behind the option; never an answer, but for the key of a check.
         lines: to be added to a recipe, where only a recipe answers it.
     """
 

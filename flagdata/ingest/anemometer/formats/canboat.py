@@ -13,8 +13,8 @@ PDU format and PDU specific, which make the number of the message, and the sende
 "File formats", wiki "analyzer", and its table of PGNs: 130306 Wind Data is SID, speed (uint16, 0.01 m/s), angle
 (uint16, 0.0001 rad), reference (3 bits: 0 over ground from true north, 1 from magnetic north, 2 apparent, 3 boat-
 referenced, 4 water-referenced); 129026 COG & SOG holds the speed over ground (uint16 in bytes 4 and 5, 0.01 m/s); the
-three largest numbers of a field stand for no value. References 3 and 4 are winds computed as if the platform stood
-still (theoretical). JSON says by "units" in its first line whether angles are rad ("si") or deg.
+three largest numbers of a field mean no value. References 3 and 4 are winds computed as if the platform were
+at rest (theoretical). JSON says by "units" in its first line whether angles are rad ("si") or deg.
 """
 
 from __future__ import annotations

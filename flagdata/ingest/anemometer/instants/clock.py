@@ -241,7 +241,7 @@ def report(
     time: Instants, jumps: Sequence[Jump], line: NDArray[np.int64], choice: ClockChoice | None, *, kept: bool = False,
     sortable: bool = False,
 ) -> tuple[Finding, ...]:  # fmt: skip
-    """Finding on clocks that were set anew and continued: the jump, its line, and what remains in doubt.
+    """Finding on clocks that were set anew and continued: the jump, its line, and what remains uncertain.
 
     Args:
         time: (n,) as the clock showed it.

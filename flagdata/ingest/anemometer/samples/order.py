@@ -8,7 +8,7 @@ Rules, in order:
 3. Few rows whose stamps leave the log's time and come back to it are left out.
 4. Where time runs back and stays there, the clock was set back (`clock`): the rows are kept and continue the clock of
    those before, or those before are made to fit the ones after, as the user says; without a word of the user it is
-   reported as a doubt, and the rows that were shifted are flagged TIME_UNSURE. Where the clock may have been set on,
+   reported as a warning, and the rows that were shifted are flagged TIME_UNSURE. Where the clock may have been set on,
    nothing is changed without a word of the user. Refused: rows that sorting would put in their place, and time that
    runs back again and again, or by no whole hour to where the log never was.
 5. Rows less than `JITTER` late are sorted in and flagged TIME_UNSURE, unless all that follow stay late: then 4 holds.

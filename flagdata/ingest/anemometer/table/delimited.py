@@ -86,11 +86,11 @@ def drafted(source: TextFile, options: WindOptions) -> Draft | None:
     """The draft of a file; `None` where it holds no table.
 
     Raises:
-        UnknownNameError: an answer to a doubt that there is not.
+        UnknownNameError: an answer to a check that does not exist.
     """
     for key in options.expect:
         if key not in KEYS:
-            raise UnknownNameError.of("doubt", key, KEYS, where="--expect")
+            raise UnknownNameError.of("check", key, KEYS, where="--expect")
     return draft(source.head(HEAD_LINES), options)
 
 

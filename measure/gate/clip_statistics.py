@@ -27,8 +27,8 @@ _MEDIAN = 0.6745
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Seen:
-    """The central square of a clip.
+class ClipStatistics:
+    """Statistics of the central square of a clip, the input of all checks.
 
     Attributes:
         gray: (n, SIDE, SIDE) float32 gray levels, 0 to 255.
@@ -37,7 +37,7 @@ class Seen:
     gray: NDArray[np.float32]
 
     @classmethod
-    def of(cls, frames: NDArray[np.uint8]) -> Seen:
+    def of(cls, frames: NDArray[np.uint8]) -> ClipStatistics:
         """Reduce frames (n, height, width).
 
         Raises:
