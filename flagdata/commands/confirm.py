@@ -95,7 +95,7 @@ def with_answers(read: Callable[[Answers], T], *, asks: bool) -> T:
             answers[name] = (*before, answer) if isinstance(before, tuple) else (answer,) if name in _LISTS else answer
 
 
-_DOUBT = "(yes; no; or a number that stands for no value)"
+_DOUBT = "(yes; no; or a number that means no value)"
 _LISTS = frozenset({"missing", "expect"})
 
 

@@ -102,7 +102,7 @@ from flagdata.errors import UsageError
     "measured has its unit in brackets. A name that is not known is refused with the list of all.",
 )  # fmt: skip
 @click.option(
-    "--missing", multiple=True, metavar="TEXT", help="Wind: a cell that stands for no value, such as -99.9; repeatable."
+    "--missing", multiple=True, metavar="TEXT", help="Wind: a cell that means no value, such as -99.9; repeatable."
 )
 @click.option(
     "--expect", multiple=True, metavar="KEY",

@@ -219,7 +219,7 @@ def data_start(chunk: ChunkIndex) -> int:
 
 
 def read_messages(file: int, summary: Summary, topic: str, *, where: str) -> Messages:
-    """Where each message of `topic` lies; every head is read and held against the index. None if the topic is absent.
+    """Where each message of `topic` lies; every head is read and compared with the index. None if the topic is absent.
 
     Raises:
         CorruptError: an index that does not fit the messages, or heads that have changed since they were written.

@@ -1,6 +1,6 @@
 """Reads a record: frames straight from their place in the file, wind, parameters, metadata and attachments.
 
-Nothing is given out that has changed since it was written: frames, channels and metadata are held against the record's
+Nothing is given out that has changed since it was written: frames, channels and metadata are compared with the record's
 checksums; in a record without any, whole chunks against MCAP's own, once each.
 """
 

@@ -56,7 +56,7 @@ class Series:
                 f"{compared.rmse:.1f} m/s [{low:.1f}, {high:.1f}] 90 %, "
                 f"n = {compared.count - compared.bounded} windows){_together(self.beside)}."
             )
-        unlike = f"{strange} of {count} windows are unlike what the model was trained on"
+        unlike = f"{strange} of {count} windows are unlike what the network was trained on"
         if verdict.refused:
             return (
                 f"{known} {unlike}, as a drawn flag should be: `flagdata measure` refuses the film, and what is shown "

@@ -1,7 +1,7 @@
 """A field recording as a user would bring it: an H.264 file at 60 fps, and an anemometer's CSV on another clock.
 
 The two share one gusty wind. What a user does not know (the offset of the two clocks) is drawn from the seed and
-written nowhere but into the returned `Field`, so that the tool can be held against it.
+written nowhere but into the returned `Field`, so that results can be compared with it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A tracked flag as a user would bring it: a table of markers from three winds, and a recipe that says what is known.
 
 What acts on the cloth beside the base model is drawn here and written nowhere but into the returned `Tracks`, so that
-closing the loop can be held against it. Mesh, step and method are none of those that the fit uses.
+closing the loop can be compared with it. Mesh, step and method are none of those that the fit uses.
 """
 
 from __future__ import annotations

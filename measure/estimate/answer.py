@@ -85,7 +85,7 @@ class Quantity:
     @property
     def _beyond(self) -> str:
         what, end = ("ends", self.assumed[1]) if self.span.bound is Bound.LEAST else ("begins", self.assumed[0])
-        return f"the model's range {what} at {self._number(end)}{self._suffix}"
+        return f"the network's range {what} at {self._number(end)}{self._suffix}"
 
     @property
     def _digits(self) -> int:

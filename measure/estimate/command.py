@@ -94,7 +94,7 @@ def measure(
     """Measure wind and area weight from a film of a flag, with intervals.
 
     SOURCE is a video file, a folder of images, or a recording, clip or camera of --lake by its name or id. A gate looks
-    first: a film unlike those the model was trained on is refused with the reason, exit code 3, and nothing estimated
+    first: a film unlike those the network was trained on is refused with the reason, exit code 3, and nothing estimated
     is shown. With --lake the measurement becomes an artifact; the same one again adds nothing.
 
     \b
@@ -315,7 +315,7 @@ def _several(job: _Job, found: Sequence[Subject], *, as_json: bool) -> None:
             click.echo(f"{source}  {answer}")
     if not shown:
         raise RefusedError(
-            f"all {len(done)} clips are unlike what the model was trained on", where="--query",
+            f"all {len(done)} clips are unlike what the network was trained on", where="--query",
             fix="look at one with --report, or at all with --anyway",
         )  # fmt: skip
 

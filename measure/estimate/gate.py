@@ -169,8 +169,8 @@ class Verdict:
             what = self.reasons[0].what
             return f"there is nothing to measure, so that no number is given, not even with --anyway: {what}"
         if self.refused:
-            return f"this is not like what the model was trained on: {self.reasons[0].what}; {windows} ({rate})"
-        return f"like what the model was trained on; {windows} ({rate})"
+            return f"this is not like what the network was trained on: {self.reasons[0].what}; {windows} ({rate})"
+        return f"like what the network was trained on; {windows} ({rate})"
 
     def as_dict(self) -> Mapping[str, Any]:
         """JSON values."""

@@ -50,7 +50,7 @@ class LongFilm:
 def simulated(model: Estimator, *, count: int, windows: int, seed: int) -> Iterator[LongFilm]:
     """Films of so many windows of a model's length.
 
-    The data sets that the model was trained on share the films as they share its training simulations. A cloth that
+    The data sets that the network was trained on share the films as they share its training simulations. A cloth that
     cannot be simulated to the end is left out.
 
     Args:

@@ -27,7 +27,7 @@ from models.restriction import MORE, Known, restricted
 DRAWS = 400
 """How many draws there are of each window's posterior, for each size of flag."""
 CONTRADICTION = 0.002
-"""Share of the model's draws within the area weight that was stated, below which a warning is due: of 400 not one."""
+"""Share of the network's draws within the area weight that was stated, below which a warning is due: of 400 not one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +74,7 @@ class Options:
         }  # fmt: skip
 
     def known(self, sizes: Sizes, model: Estimator) -> Known | None:
-        """The given range of the cloth, at each size considered, as that of a flag of the model's own size."""
+        """The given range of the cloth, at each size considered, as that of a flag of the network's own size."""
         if self.area_weight is None:
             return None
         target = next((target for target in model.targets if target.name == "density"), None)
@@ -194,7 +194,7 @@ class Measurement:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Seen:
     """A window as the model sees it at each size: logits (i, n, target), its first network's summaries (i, dimension),
-    reasons, and the share of the model's draws that lay where the area weight is known to lie (1 if nothing is
+    reasons, and the share of the network's draws that lay where the area weight is known to lie (1 if nothing is
     known)."""
 
     start: float
@@ -336,7 +336,7 @@ def _about_windows(
         found.append(
             Finding(
                 kind="strange-windows", severity=Severity.WARNING, count=strange,
-                what=f"{strange} of {len(seen)} windows are unlike what the model was trained on, p at most "
+                what=f"{strange} of {len(seen)} windows are unlike what the network was trained on, p at most "
                 f"{judged.level:.2g}, and were left out of the answer; {judged.refusing} would refuse the film",
                 fix="choose a part of the film without them by --start and --end",
             )
@@ -383,7 +383,7 @@ class _Answer:
 
     def joint(self, seen: Sequence[_Seen], dependence: Dependence) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(n, target) draws of all windows together, the wind their mean, and (m, target) places of the windows' own in
-        the model's range."""
+        the network's range."""
         own = [place for place, name in enumerate(self.names) if name in OWN]
         cloth = [place for place, name in enumerate(self.names) if name not in OWN]
         parts, places = [], []
@@ -423,7 +423,7 @@ class _Answer:
         )  # fmt: skip
 
     def _places(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, target) of values (…, target) in the model's range, 0 to 1: the range moves with the flag's size."""
+        """(m, target) of values (…, target) in the network's range, 0 to 1: the range moves with the flag's size."""
         low, high = self._ends
         return ((values - low) / (high - low)).reshape(-1, len(self.names))
 

@@ -42,7 +42,7 @@ class Context:
         provenance: rows of a table, in order.
         known: what a simulated film states of itself; empty for a real one.
         neighbours, compared: the nearest simulated clips, of so many; none where no lake was given.
-        rate: of the model's frames [Hz].
+        rate: of the network's frames [Hz].
     """
 
     provenance: Mapping[str, str]

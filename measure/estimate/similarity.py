@@ -149,7 +149,7 @@ STRATA = 3
 LEAST_SHARE = 0.5
 """Share of the prior that the frame rate must admit."""
 RATE_SLACK = 0.95
-"""A film may be this much slower than the model's frames: one frame in twenty is then shown twice. It admits films of
+"""A film may be this much slower than the network's frames: one frame in twenty is then shown twice. It admits films of
 24 frames a second for a model of 25."""
 
 
@@ -179,7 +179,7 @@ class Sizes:
             kind="sizes-left-out", severity=Severity.WARNING, count=len(left_out),
             what=f"{len(left_out)} of {len(self.scale)} sizes of flag were left out of the answer: as that of a flag "
             + " or ".join(f"{self.scale[place]:.2f}" for place in left_out)
-            + " times as long as those of the training the film is unlike what the model was trained on",
+            + " times as long as those of the training the film is unlike what the network was trained on",
             fix="give --flag-size LENGTHxHEIGHT",
         )  # fmt: skip
         return replace(self, scale=self.scale[chosen], draws=self.draws[chosen], findings=(*self.findings, finding))
@@ -198,7 +198,7 @@ def sizes(
     Args:
         given: None if unknown.
         rate: of the film [Hz].
-        frames_rate: of the model's frames [Hz].
+        frames_rate: of the network's frames [Hz].
         draws: for each stratum.
         generator: for the lengths within the strata.
         prior: of the length; by default about the length of those of the training.

@@ -1,4 +1,4 @@
-"""A film cut into windows of the model's length, once for each size of flag that is considered.
+"""A film cut into windows of the network's length, once for each size of flag that is considered.
 
 The frame of an instant is the nearest in time, which at an even rate is at most half a native period away: a frame
 stays one exposure, and what the camera did not see is not made up. Uneven stamps may lie half of that further away; a
@@ -188,7 +188,7 @@ def findings_of(layout: Layout, *, found: int, worst: float, repeats: int, rate:
             Finding(
                 kind="frames-repeated", severity=Severity.NOTE, count=repeats,
                 what=f"{repeats} frames of the windows show the same picture as the one before: the film is a little "
-                "slower than the model's frames",
+                "slower than the network's frames",
             )
         )  # fmt: skip
     return tuple(notes)

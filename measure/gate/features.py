@@ -27,7 +27,7 @@ class Features:
     Attributes:
         checks: (len(CHECKS),) of `measure.gate.checks`.
         handmade: (len(FEATURES),) of `models.handmade`.
-        summary: (d,) of the model's first learner.
+        summary: (d,) of the network's first learner.
         distance: of the summary to the training clips' (`models.outliers`).
         moved: (len(MOVES),) whitened distances that the summary moves by.
     """
@@ -51,7 +51,7 @@ def features_of(model: Estimator, frames: NDArray[np.uint8], summary: NDArray[np
     Args:
         model: with a cloud of training summaries.
         frames: (n, height, width) gray, n and their rate the model's.
-        summary: (d,) the model's first learner's of them, where it is known already.
+        summary: (d,) the network's first learner's of them, where it is known already.
 
     Raises:
         InputError: frames that do not fit the model, a clip without contrast, or a model without a cloud.

@@ -77,8 +77,8 @@ class Judgement:
         """The verdict as one sentence."""
         rate = f"p = {self.p:.2g}, refused from {self.level:.2g}: at most {self.false_alarm:.0%} false alarms"
         if self.familiar:
-            return f"The clip is like those that the model was trained on ({rate})."
-        return f"The clip is unlike those that the model was trained on ({rate}): {self.reasons[0].sentence}."
+            return f"The clip is like those that the network was trained on ({rate})."
+        return f"The clip is unlike those that the network was trained on ({rate}): {self.reasons[0].sentence}."
 
     def findings(self) -> tuple[Finding, ...]:
         """The reasons as findings."""

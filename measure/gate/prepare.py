@@ -133,7 +133,7 @@ def data_of(model: Estimator) -> DataSpec:
 @click.command()
 @click.argument("model", type=LocalPath(), default=SHIPPED / "flow")
 @click.option("--lake", "lake_path", type=LocalPath(exists=True), required=True,
-              help="Where the films are that the model was trained on and validated by.")  # fmt: skip
+              help="Where the films are that the network was trained on and validated by.")  # fmt: skip
 @click.option("--dataset", "datasets", multiple=True,
               help="Name of the films' data set; by default all that it was trained on.")  # fmt: skip
 @click.option("--at", metavar="REF", help="Version of the lake; by default its head.")

@@ -1,9 +1,10 @@
-"""The words of messages, help and docstrings, and of the names of tests: none that only this project uses so."""
+"""The words of messages, help, docstrings, names of tests, pages and catalogs: none that only this project uses so."""
 
 from __future__ import annotations
 
 import ast
 import re
+from pathlib import Path
 
 from tests.contract.imports import ROOT, modules, statements, tree
 
@@ -34,6 +35,11 @@ def strings(source: ast.Module) -> list[tuple[int, str]]:
     ]
 
 
+def comments(text: str) -> list[tuple[int, str]]:
+    """(line, text) of what follows a `#` and a blank."""
+    return [(number, line.split("# ", 1)[1]) for number, line in lines(text) if "# " in line]
+
+
 def laws(source: ast.Module) -> list[tuple[int, str]]:
     """(line, text) of what a module of tests says of itself: its docstrings, and the names of its tests as words."""
     found = [(1, ast.get_docstring(source) or "")]
@@ -43,6 +49,20 @@ def laws(source: ast.Module) -> list[tuple[int, str]]:
             if node.name.startswith("test_"):
                 found.append((node.lineno, node.name.replace("_", " ")))
     return found
+
+
+def written() -> list[Path]:
+    """The pages of the documentation, templates and catalogs."""
+    return sorted(
+        [ROOT / "README.md", ROOT / "ARCHITECTURE.md", *(ROOT / "docs").rglob("*.md")]
+        + [path for folder in (*PRODUCT, "tests") for path in (ROOT / folder).rglob("*.j2")]
+        + list((ROOT / "catalogs").rglob("*.toml"))
+    )
+
+
+def lines(text: str) -> list[tuple[int, str]]:
+    """(number from 1, text) of each line."""
+    return list(enumerate(text.splitlines(), 1))
 
 
 def offences(texts: list[tuple[int, str]]) -> list[str]:
@@ -55,8 +75,17 @@ def offences(texts: list[tuple[int, str]]) -> list[str]:
     ]
 
 
-def test_strings_of_the_product_use_plain_words() -> None:
-    found = [f"{path.relative_to(ROOT)}:{line}" for path in modules(*PRODUCT) for line in offences(strings(tree(path)))]
+def test_strings_and_comments_of_the_product_use_plain_words() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for path in modules(*PRODUCT)
+        for line in offences([*strings(tree(path)), *comments(path.read_text())])
+    ]
+    assert found == []
+
+
+def test_pages_templates_and_catalogs_use_plain_words() -> None:
+    found = [f"{path.relative_to(ROOT)}:{line}" for path in written() for line in offences(lines(path.read_text()))]
     assert found == []
 
 
@@ -73,4 +102,6 @@ def test_docstrings_and_parts_of_f_strings_count_and_other_names_do_not() -> Non
     assert len(offences(strings(ast.parse('"""What is told."""\nx = f"it {y} tells"\n')))) == 2
     assert offences(strings(ast.parse("told = file.tell()\n"))) == []
     assert offences(laws(ast.parse('def tell() -> None:\n    print("told")\n'))) == []
+    assert len(offences(lines("a wind\nWhoever reads it\nit tells"))) == 2
+    assert len(offences(comments("told = 1  # as told\ntold = 2"))) == 1
     assert len(offences(laws(ast.parse('def test_rooms_of() -> None:\n    """Strangers."""\n')))) == 2

@@ -39,7 +39,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     """The sheet, as JSON and as `validate-gate.md`."""
     path = os.environ.get(LAKE)
     if path is None:
-        return {"left_out": f"no lake; set {LAKE} to one with the data sets that the model was trained on"}
+        return {"left_out": f"no lake; set {LAKE} to one with the data sets that the network was trained on"}
     torch.set_num_threads(1)
     model = shipped()
     gate = gate_of(model, Path(path), seed=seed)

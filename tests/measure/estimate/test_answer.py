@@ -52,7 +52,7 @@ def test_a_quantity_without_information_is_reported_with_its_prior_range() -> No
 
 def test_a_wind_at_the_end_of_what_the_model_knows_is_bounded_on_one_side_with_the_reason() -> None:
     assert sentence([STRONG, WEIGHT]) == (
-        "wind at least 9.4 m/s, 95 % (the model's range ends at 10.0 m/s), "
+        "wind at least 9.4 m/s, 95 % (the network's range ends at 10.0 m/s), "
         "area weight 0.13 kg/m² [0.11, 0.16] 90 %"
     )  # fmt: skip
     assert sentence([CALM, UNCONSTRAINED]).startswith("wind at most 0.5 m/s, 95 %; area weight: not constrained")

@@ -131,7 +131,7 @@ def test_a_refused_film_ends_with_3_and_shows_no_estimate(strange: Path, tmp_pat
     page = tmp_path / "report.html"
     done = run(strange, *SIZED, "--report", page, code=3)
     assert "m/s" not in done.stdout + page.read_text()
-    assert "not like what the model was trained on" in done.stderr
+    assert "not like what the network was trained on" in done.stderr
     assert "Refused" in page.read_text()
     told = json.loads(run(strange, *SIZED, "--json", code=3).stdout)
     assert told["kind"] == "refused"

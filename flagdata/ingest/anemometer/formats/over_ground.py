@@ -43,7 +43,7 @@ def settled(
     elif options.platform in ("moving", "corrected"):
         known = "a moving platform, as given"
     else:
-        known, fix = "a platform of unknown motion", "if the sensor stands on a mast, say so: --platform fixed"
+        known, fix = "a platform of unknown motion", "if the sensor is on a mast, give --platform fixed"
     if "wind_speed" not in channels:
         what = f"wind relative to {known}: no ground truth"
         kind = "apparent-wind-only"

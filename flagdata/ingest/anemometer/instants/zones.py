@@ -3,9 +3,9 @@
 A wall time in the hour that daylight saving repeats is settled only by the log itself: its rows run through the hour
 twice, or follow without a gap from before it, or lead without a gap to after it. Otherwise the log is refused.
 
-What lines above the rows say of the clock ("UTC Offset,+2", "Timezone=UTC") is a hint, not the stamps' own word: a
-logger's setting may be one thing and its export another. It is named where a zone is missing, and held against the zone
-that the user gives.
+What lines above the rows say of the clock ("UTC Offset,+2", "Timezone=UTC") is a hint, not a property of the stamps: a
+logger's setting may be one thing and its export another. It is named where a zone is missing, and compared with the
+zone that the user gives.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the anemometer stands on: on a mast the air past it is the wind, on a boat or vehicle it is not.
+"""What the anemometer is mounted on: on a mast the air past it is the wind, on a boat or vehicle it is not.
 
 Formats that know nothing of platforms deliver `wind_speed` for whatever the sensor read. Where the user says that the
 platform moves, or its own speed or position says so, that becomes `apparent_wind_speed`, which is no ground truth,
@@ -158,7 +158,7 @@ def _of_unknown(reading: Reading) -> Reading:
     if "wind_speed" in has or has.isdisjoint({"theoretical_wind_speed", "apparent_wind_speed"}):
         return reading
     text = "wind relative to a platform of unknown motion"
-    fix = "if the sensor stands on a mast, say so: --platform fixed"
+    fix = "if the sensor is on a mast, give --platform fixed"
     if "theoretical_wind_speed" in has:
         text = "wind that is computed as if its platform did not move (true wind, TWS)"
         fix = "if it is wind over ground, computed with the platform's speed and heading, say so: --platform corrected"
