@@ -176,7 +176,7 @@ def kept_jobs(kept: str) -> None:
 
     def done(client: object, jobs: Iterable[Job], *, say: Callable[[str], None]) -> Iterator[Any]:
         for number, (function, arguments) in enumerate(jobs):
-            path = Path(kept) / f"{function.__name__}-{number}-{_told(arguments)}"
+            path = Path(kept) / f"{function.__name__}-{number}-{_name(arguments)}"
             if not path.exists():
                 path.write_bytes(pickle.dumps(function(*arguments)))
             yield pickle.loads(path.read_bytes())
@@ -185,11 +185,11 @@ def kept_jobs(kept: str) -> None:
     sim.datasets.cluster.connected = lambda *_, **__: nullcontext()  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def _told(arguments: Sequence[object]) -> str:
+def _name(arguments: Sequence[object]) -> str:
     """Of a job: members that are simulated, or the film."""
-    told = [getattr(argument, "name", argument) for argument in arguments if isinstance(argument, list | int | str)]
+    names = [getattr(argument, "name", argument) for argument in arguments if isinstance(argument, list | int | str)]
     films = [getattr(argument, "index", "") for argument in arguments]
-    return "".join(letter if letter.isalnum() else "-" for letter in f"{told}{films}")
+    return "".join(letter if letter.isalnum() else "-" for letter in f"{names}{films}")
 
 
 @cache

@@ -37,7 +37,7 @@ def warped(along_x: NDArray[np.float64], along_y: NDArray[np.float64], *, grain:
     return standardised(torch.from_numpy(np.stack(frames)))
 
 
-def told(maps: torch.Tensor, name: str) -> torch.Tensor:
+def channel(maps: torch.Tensor, name: str) -> torch.Tensor:
     return maps[CHANNELS.index(name)][INNER]
 
 
@@ -85,12 +85,12 @@ def test_a_travelling_wave_has_its_frequency_and_its_phase_gradient(bin_: int) -
     across = np.broadcast_to(course[:, None], (FRAMES, SIZE, SIZE))
     maps = flow_maps(warped(across, np.zeros_like(across)))
     for scale in ("fine", "coarse"):
-        centre = told(maps, f"{scale}: centre x")
+        centre = channel(maps, f"{scale}: centre x")
         assert float(centre.median()) == pytest.approx(2 * bin_ / (FRAMES - 1), abs=0.03)
-        gradient = told(maps, f"{scale}: phase gradient along x")
+        gradient = channel(maps, f"{scale}: phase gradient along x")
         assert -4 * wavenumber - 0.02 < float(gradient.median()) < -0.8 * 4 * wavenumber
-        assert float(told(maps, f"{scale}: coherence along x").median()) > 0.9
-        assert abs(float(told(maps, f"{scale}: phase gradient along y").median())) < 0.05
+        assert float(channel(maps, f"{scale}: coherence along x").median()) > 0.9
+        assert abs(float(channel(maps, f"{scale}: phase gradient along y").median())) < 0.05
 
 
 def test_powers_are_those_of_the_displacement_in_each_scales_pixels() -> None:
@@ -98,11 +98,11 @@ def test_powers_are_those_of_the_displacement_in_each_scales_pixels() -> None:
     down = np.broadcast_to(np.arange(FRAMES, dtype=float)[:, None, None], (FRAMES, SIZE, SIZE))
     maps = flow_maps(warped(np.zeros_like(down), down, grain=6.0))
     for scale, size in (("fine", 2), ("coarse", 4)):
-        assert float(told(maps, f"{scale}: mean y").median()) == pytest.approx(1 / size, rel=0.1)
+        assert float(channel(maps, f"{scale}: mean y").median()) == pytest.approx(1 / size, rel=0.1)
         expected = math.log1p(1 / size**2 / 0.02**2)
-        assert float(told(maps, f"{scale}: log power y").median()) == pytest.approx(expected, abs=0.2)
-        assert float(told(maps, f"{scale}: log power x").median()) < expected - 3
-        assert float(told(maps, f"{scale}: log variance y").median()) < expected - 2
+        assert float(channel(maps, f"{scale}: log power y").median()) == pytest.approx(expected, abs=0.2)
+        assert float(channel(maps, f"{scale}: log power x").median()) < expected - 3
+        assert float(channel(maps, f"{scale}: log variance y").median()) < expected - 2
 
 
 def test_the_two_coarser_of_three_scales_are_those_of_a_clip_of_half_the_size() -> None:
@@ -117,8 +117,8 @@ def test_the_finest_scale_resolves_a_tenth_of_a_pixel_of_the_clip() -> None:
     """A steady 0.1 px of the clip is 0.05 of the finest scale's."""
     across = np.broadcast_to(0.1 * np.arange(FRAMES)[:, None, None], (FRAMES, SIZE, SIZE))
     maps = flow_maps(warped(across, np.zeros_like(across), grain=6.0), scales=3)
-    told = maps[CHANNELS_OF_THREE.index("finest: mean x")][2:-2, 2:-2]
-    assert float(told.median()) == pytest.approx(0.05, rel=0.1)
+    mean = maps[CHANNELS_OF_THREE.index("finest: mean x")][2:-2, 2:-2]
+    assert float(mean.median()) == pytest.approx(0.05, rel=0.1)
     power = maps[CHANNELS_OF_THREE.index("finest: log power x")][2:-2, 2:-2]
     assert float(power.median()) == pytest.approx(math.log1p(0.05**2 / 0.02**2), abs=0.2)
 

@@ -73,7 +73,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     if runs is None or not (runs / "jittered").is_dir():
         return dict(ABSENT)
     experiments = {known: {name: _experiment(runs / "jittered", name, known) for name in CASES} for known in KNOWN}
-    told: dict[str, Any] = {"criteria": CRITERIA.as_dict()}
+    results: dict[str, Any] = {"criteria": CRITERIA.as_dict()}
     for draw in DRAWS:
         place = out / f"arcsim-jittered-{seed}-{draw}"
         setting = Setting.of(next(iter(experiments.values()))["null"])
@@ -82,9 +82,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     for known, group in experiments.items():
         for draw in DRAWS:
             place = out / f"arcsim-jittered-{seed}-{draw}"
-            told[_heading(draw, known)] = {name: _once(place, name, own, seed) for name, own in group.items()}
-    (out / "validate-arcsim-jittered.md").write_text(_page(told), encoding="utf-8")
-    return told
+            results[_heading(draw, known)] = {name: _once(place, name, own, seed) for name, own in group.items()}
+    (out / "validate-arcsim-jittered.md").write_text(_page(results), encoding="utf-8")
+    return results
 
 
 def _heading(draw: int, known: float) -> str:
@@ -95,8 +95,8 @@ def _once(place: Path, name: str, experiment: Experiment, seed: int) -> dict[str
     """A verdict as the page reports it, from its file where it was made before."""
     kept = place / f"{name}-{experiment.specimen.density_uncertainty:g}.json"
     if not kept.exists():
-        told = _told(close_loop(experiment, Options(bank=place / "nulls", seed=seed)), CASES[name])
-        kept.write_text(json.dumps(told, allow_nan=False), encoding="utf-8")
+        record = _record(close_loop(experiment, Options(bank=place / "nulls", seed=seed)), CASES[name])
+        kept.write_text(json.dumps(record, allow_nan=False), encoding="utf-8")
     return json.loads(kept.read_text(encoding="utf-8"))
 
 
@@ -114,7 +114,7 @@ def _recording(path: Path, wind: int) -> Observation:
     )  # fmt: skip
 
 
-def _told(verdict: Verdict, truth: Truth) -> dict[str, Any]:
+def _record(verdict: Verdict, truth: Truth) -> dict[str, Any]:
     wanted = {"density": 1.0, "bending": 1.0} | dict(truth.parameters)
     shown = {p.name: p.before if p.after is None else p.after for p in verdict.parameters}
     return {
@@ -151,13 +151,13 @@ def _interval(found: Estimate, true: float | None) -> dict[str, Any]:
     return {"low": found.low, "value": found.value, "high": found.high, "covers": covers}
 
 
-def _page(told: Mapping[str, Any]) -> str:
+def _page(results: Mapping[str, Any]) -> str:
     """The verdicts as a page."""
     lines = ["# The loop on four experiments of ArcSim", ""]
     for known in KNOWN:
         for draw in DRAWS:
             heading = _heading(draw, known)
-            lines += _table(f"Nulls of {heading}", told[heading])
+            lines += _table(f"Nulls of {heading}", results[heading])
     return "\n".join(lines)
 
 
@@ -198,5 +198,5 @@ def _table(heading: str, verdicts: Mapping[str, Any]) -> list[str]:
 
 
 def _span(found: Mapping[str, Any], unit: float = 1.0) -> str:
-    told = f"{unit * found['value']:.3g} [{unit * found['low']:.3g}, {unit * found['high']:.3g}]"
-    return f"{told}, misses" if found["covers"] is False else told
+    interval = f"{unit * found['value']:.3g} [{unit * found['low']:.3g}, {unit * found['high']:.3g}]"
+    return f"{interval}, misses" if found["covers"] is False else interval

@@ -117,7 +117,7 @@ def _real(model: Estimator, gate: Gate) -> dict[str, Any]:
 
 def _window(window: NDArray[np.uint8], model: Estimator, gate: Gate) -> dict[str, Any]:
     one = judge(window, model, gate)
-    return {"familiar": one.familiar, "p": one.p, "reasons": [told.sentence for told in one.reasons]}
+    return {"familiar": one.familiar, "p": one.p, "reasons": [reason.sentence for reason in one.reasons]}
 
 
 def _page(result: dict[str, Any]) -> str:

@@ -317,14 +317,14 @@ def _wind(speed: float, rng: np.random.Generator, *, turbulent: bool) -> Floats:
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Of each stressor how many were rejected and refused, what was named, and how often intervals hold."""
-    told: dict[str, Any] = {}
+    results: dict[str, Any] = {}
     for name in dict.fromkeys(row["stressor"] for row in rows):
         own = [row for row in rows if row["stressor"] == name]
         judged = [row for row in own if "refused" not in row]
         wrong = [row for row in judged if row["rejected"]]
         covered = [held for row in judged for held in row["covered"].values()]
         share = Share.of((row["rejected"] for row in judged), level=0.9)
-        told[name] = {
+        results[name] = {
             "judged": len(judged), "refused": len(own) - len(judged), "rejected": len(wrong),
             "bound_95": share.high,
             "gusts": sum(row["named"] == ["gusts"] for row in wrong),
@@ -333,7 +333,7 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
             "covered": sum(covered), "intervals": len(covered),
             "seconds": float(np.median([row["seconds"] for row in judged])) if judged else None,
         }  # fmt: skip
-    return told
+    return results
 
 
 def page(found: Mapping[str, Any]) -> str:

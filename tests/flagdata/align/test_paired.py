@@ -97,8 +97,8 @@ def test_a_few_seconds_leave_the_drift_to_its_prior() -> None:
 def test_the_delay_of_the_fastest_sample_is_taken_off_and_its_uncertainty_added() -> None:
     device, host = clocks(6)
     bare = pair_clocks(device, host, least_delay_sigma=0.0)
-    told = pair_clocks(device, host, least_delay=0.03, least_delay_sigma=0.01)
-    (a,), (b,) = bare.model.segments, told.model.segments
+    delayed = pair_clocks(device, host, least_delay=0.03, least_delay_sigma=0.01)
+    (a,), (b,) = bare.model.segments, delayed.model.segments
     assert b.offset == pytest.approx(a.offset - 0.03, abs=1e-12)
     assert b.sigma_offset == pytest.approx(np.hypot(a.sigma_offset, 0.01))
 

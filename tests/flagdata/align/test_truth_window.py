@@ -67,13 +67,13 @@ def invoke(*arguments: str) -> tuple[dict[str, object], str]:
 STAMPS = ("--by", "stamps", "--offset-sigma", "0.01")
 
 
-@pytest.mark.parametrize(("told", "window"), [("10s", 10.0), ("2min", 120.0), ("800000ms", 800.0), (None, 60.0)])
-def test_the_window_reaches_the_clips_and_their_recipe(tmp_path: Path, told: str | None, window: float) -> None:
+@pytest.mark.parametrize(("given", "window"), [("10s", 10.0), ("2min", 120.0), ("800000ms", 800.0), (None, 60.0)])
+def test_the_window_reaches_the_clips_and_their_recipe(tmp_path: Path, given: str | None, window: float) -> None:
     lake, camera, wind = scene(tmp_path / "lake")
-    option = ("--window", told) if told else ()
+    option = ("--window", given) if given else ()
     said, _ = invoke("align", camera, wind, *STAMPS, *option, "--lake", str(lake.path))
     recording = lake.artifact(str(said["recording"]))
-    assert recording.recipe.get("truth") == ({"window": window} if told else None)
+    assert recording.recipe.get("truth") == ({"window": window} if given else None)
     clips = [Artifact.from_row(row) for row in lake.rows("kind = 'clip'").to_pylist()]
     assert len(clips) == FRAMES // 30
     for clip in clips:

@@ -116,9 +116,9 @@ def test_times_in_text_are_utc_unless_they_name_a_zone() -> None:
 
 
 def test_columns_of_the_catalog_carry_their_unit_and_free_sql_does_not() -> None:
-    told = select(HandWritten(), columns=["wind", "duration"]).schema
-    assert (told.field("wind").metadata or {})[b"unit"] == b"m/s"
-    assert (told.field("duration").metadata or {})[b"unit"] == b"s"
+    schema = select(HandWritten(), columns=["wind", "duration"]).schema
+    assert (schema.field("wind").metadata or {})[b"unit"] == b"m/s"
+    assert (schema.field("duration").metadata or {})[b"unit"] == b"s"
     assert select(HandWritten(), sql="select wind * 3.6 as wind from catalog").schema.field("wind").metadata is None
 
 

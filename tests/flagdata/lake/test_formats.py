@@ -133,9 +133,9 @@ def test_the_error_of_a_damaged_log_entry_names_it(lake: Lake, put_text: Put) ->
     entry = lake.path / "catalog" / "_delta_log" / "00000000000000000001.json"
     entry.write_text(entry.read_text()[:100])
     fresh = Lake.open(lake.path)
-    with pytest.raises(CorruptError) as told:
+    with pytest.raises(CorruptError) as caught:
         fresh.rows()
-    assert told.value.as_dict() == {
+    assert caught.value.as_dict() == {
         "kind": "corrupt", "what": f"the log entry {entry.name} is damaged", "where": str(entry),
         "fix": "restore it from a copy",
     }  # fmt: skip
@@ -155,9 +155,9 @@ def test_an_emptied_or_altered_log_entry_stops_collection(lake: Lake, put_text: 
         entry.write_bytes(damaged)
         fresh = Lake.open(lake.path)
         assert any(f.where == str(entry) and f.severity is Severity.ERROR for f in verify_catalog(fresh))
-        with pytest.raises(CorruptError) as told:
+        with pytest.raises(CorruptError) as caught:
             collect(fresh, grace=timedelta(0))
-        assert told.value.where == str(entry)
+        assert caught.value.where == str(entry)
     entry.write_bytes(b"")
     with pytest.raises(CorruptError, match=entry.name):
         Lake.open(lake.path).rows()
@@ -171,9 +171,9 @@ def test_an_empty_entry_that_a_power_cut_left_before_it_was_acknowledged_may_be_
     put_text(lake, "a")
     entry = lake.path / "catalog" / "_delta_log" / f"{2:020d}.json"
     entry.touch()
-    with pytest.raises(CorruptError) as told:
+    with pytest.raises(CorruptError) as caught:
         Lake.open(lake.path).rows()
-    assert "delete it" in told.value.fix
+    assert "delete it" in caught.value.fix
     entry.unlink()
     put_text(lake, "b")
     assert lake.rows()["name"].to_pylist() == ["a", "b"]

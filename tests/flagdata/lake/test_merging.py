@@ -104,12 +104,12 @@ def test_a_row_whose_parent_the_other_side_withdrew_is_a_conflict_that_names_bot
     lake.branch("b")
     put_text(lake, "made of one", branch="b", parents=(one.id,))
     lake.withdraw([one.id], "wrong")
-    with pytest.raises(ConflictError, match="made of one") as told:
+    with pytest.raises(ConflictError, match="made of one") as caught:
         lake.merge("b", "no")
-    assert f"flagdata withdraw {one.id} --with-descendants --branch b" in told.value.fix
+    assert f"flagdata withdraw {one.id} --with-descendants --branch b" in caught.value.fix
     lake.withdraw([two.id], "wrong", branch="b")
     put_text(lake, "made of two", parents=(two.id,))
-    with pytest.raises(ConflictError, match="made of two") as told:
+    with pytest.raises(ConflictError, match="made of two") as caught:
         lake.merge("main", "no", into="b")
     before = lake.catalog.head()
     with pytest.raises(ConflictError):
@@ -181,9 +181,9 @@ def test_what_cannot_be_deleted_is_an_error(lake: Lake) -> None:
     lake.branch("b")
     with pytest.raises(UsageError, match="main"):
         lake.delete_branch("main", discard=True)
-    with pytest.raises(NotFoundError, match="no tag 'v2'") as told:
+    with pytest.raises(NotFoundError, match="no tag 'v2'") as caught:
         lake.delete_tag("v2")
-    assert "v1" in told.value.fix
+    assert "v1" in caught.value.fix
     with pytest.raises(NotFoundError, match="no branch 'v1'"):
         lake.delete_branch("v1")
     with pytest.raises(NotFoundError, match="no tag 'b'"):
@@ -222,10 +222,10 @@ def test_versions_whose_data_gc_deleted_are_named_by_doctor_and_by_what_needs_th
     assert (finding.kind, finding.severity, finding.count) == ("withdrawn-collected", Severity.NOTE, 1)
     assert finding.where == "versions before 3"
     for use in (lake.object_path, lake.whole_object, lambda _: prepare(lake, request).write(tmp_path / "out")):
-        with pytest.raises(NotFoundError, match=r"withdrawn by version 3 \(faces of people in it\).*gc") as told:
+        with pytest.raises(NotFoundError, match=r"withdrawn by version 3 \(faces of people in it\).*gc") as caught:
             use(str(gone.object))
-        assert "from 3 on" in told.value.fix
-        assert "doctor" not in told.value.fix
+        assert "from 3 on" in caught.value.fix
+        assert "doctor" not in caught.value.fix
     lake.object_path(str(kept.object)).unlink()  # nobody withdrew this one
     with pytest.raises(NotFoundError, match="run flagdata doctor"):
         lake.object_path(str(kept.object))

@@ -131,9 +131,9 @@ def test_every_reader_reports_a_lost_log_entry_and_nothing_is_collected(lake: La
     entry.unlink()
     fresh = Lake.open(lake.path)
     for refused in (fresh.rows, fresh.catalog.history, lambda: put_text(fresh, "d")):
-        with pytest.raises(CorruptError, match=entry.name) as told:
+        with pytest.raises(CorruptError, match=entry.name) as caught:
             refused()
-        assert (told.value.kind, told.value.where) == ("log-gap", str(entry))
+        assert (caught.value.kind, caught.value.where) == ("log-gap", str(entry))
     assert [(f.kind, f.severity, f.where) for f in doctor(fresh, grace=NOW)] == [
         ("log-gap", Severity.ERROR, str(entry))
     ]

@@ -44,10 +44,10 @@ def test_another_table_is_no_history(tmp_path: Path) -> None:
 
 def test_the_results_say_whether_the_newest_challenge_was_judged_by_todays_criteria() -> None:
     newest = history.rows(RESULTS / "challenge-history.csv")[-1]
-    told = (RESULTS / "README.md").read_text(encoding="utf-8")
+    text = (RESULTS / "README.md").read_text(encoding="utf-8")
     today = newest["criteria"] == CRITERIA.hash
-    assert ("The newest challenge was judged by today's criteria." in told) is today
-    assert ("The newest challenge was judged by other criteria than today's." in told) is not today
+    assert ("The newest challenge was judged by today's criteria." in text) is today
+    assert ("The newest challenge was judged by other criteria than today's." in text) is not today
 
 
 def test_the_sheets_that_are_kept_are_those_of_the_first_and_the_newest_challenge() -> None:

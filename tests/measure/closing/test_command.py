@@ -72,23 +72,23 @@ def said(arguments: Sequence[str], capsys: pytest.CaptureFixture[str]) -> tuple[
 def test_what_makes_no_sense_is_refused(
     arguments: Sequence[str], code: int, what: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    ended, changed = said(arguments, capsys)
+    ended, error = said(arguments, capsys)
     assert ended == code
-    assert what in changed["what"]
-    assert changed["fix"]
+    assert what in error["what"]
+    assert error["fix"]
 
 
 def test_winds_are_one_for_all_or_one_each(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, changed = said([str(table), "--rate", str(RATE), *["--wind", "4"] * 3], capsys)
-    assert (code, changed["what"]) == (2, "3 winds for 2 recordings")
+    code, error = said([str(table), "--rate", str(RATE), *["--wind", "4"] * 3], capsys)
+    assert (code, error["what"]) == (2, "3 winds for 2 recordings")
 
 
 @pytest.mark.parametrize("option", ["--offset=2", "--sensor=generic-csv", "--zone=+02:00"])
 def test_options_of_a_log_are_not_ignored_where_there_is_none(
     table: Path, option: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code, changed = said([str(table), "--rate", str(RATE), "--wind", "4", option], capsys)
-    assert (code, changed["where"]) == (2, option.partition("=")[0])
+    code, error = said([str(table), "--rate", str(RATE), "--wind", "4", option], capsys)
+    assert (code, error["where"]) == (2, option.partition("=")[0])
 
 
 def test_a_log_is_read_as_its_sensor_and_zone_say(table: Path, tmp_path: Path) -> None:
@@ -132,10 +132,10 @@ def test_beside_a_recipe_with_recordings_no_option_is_ignored(
 ) -> None:
     recipe = tmp_path / "flag.toml"
     recipe.write_text(f'[[recording]]\nsource = "{table}"\ntake = "calm"\n')
-    code, changed = said(["--recipe", str(recipe), option], capsys)
-    assert (code, changed["where"]) == (2, option.partition("=")[0])
-    code, changed = said([str(table), "--recipe", str(recipe)], capsys)
-    assert (code, changed["where"]) == (2, "SOURCE")
+    code, error = said(["--recipe", str(recipe), option], capsys)
+    assert (code, error["where"]) == (2, option.partition("=")[0])
+    code, error = said([str(table), "--recipe", str(recipe)], capsys)
+    assert (code, error["where"]) == (2, "SOURCE")
 
 
 @pytest.mark.parametrize(("line", "what"), [("nuls = 64", "did you mean 'nulls'"), ("nulls = 0.5", "whole number")])
@@ -144,18 +144,18 @@ def test_a_recipe_says_what_the_test_is_and_no_more(
 ) -> None:
     recipe = tmp_path / "flag.toml"
     recipe.write_text(f"[test]\n{line}\n")
-    code, changed = said(["tracks.csv", "--recipe", str(recipe)], capsys)
+    code, error = said(["tracks.csv", "--recipe", str(recipe)], capsys)
     assert code in (1, 2)
-    assert what in changed["fix"]
+    assert what in error["fix"]
 
 
 def test_data_that_are_no_cloth_end_it_with_the_reason(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Markers in millimetres that are taken for metres."""
-    code, changed = said(
+    code, error = said(
         [str(table), "--rate", str(RATE), "--wind", "4", "--size", f"{1e3 * WIDTH}x{1e3 * HEIGHT}", "--pins", "hoist",
          "--material", "camel-ponte-roma"], capsys,
     )  # fmt: skip
-    assert (code, changed["kind"]) == (1, "bad-input")
+    assert (code, error["kind"]) == (1, "bad-input")
 
 
 def test_each_recording_of_a_table_has_its_wind(table: Path) -> None:

@@ -64,9 +64,9 @@ def test_a_wind_at_the_end_of_what_the_model_knows_is_bounded_on_one_side_with_t
 
 
 def test_an_end_that_nothing_bounds_is_null_in_json_and_no_value_is_given() -> None:
-    told = json.loads(json.dumps(STRONG.as_dict(), allow_nan=False))
-    assert (told["value"], told["sigma"], told["interval"]) == (None, None, [9.4, None])
-    assert (told["bound"], told["level"]) == ("at-least", 0.95)
+    document = json.loads(json.dumps(STRONG.as_dict(), allow_nan=False))
+    assert (document["value"], document["sigma"], document["interval"]) == (None, None, [9.4, None])
+    assert (document["bound"], document["level"]) == ("at-least", 0.95)
     assert (WIND.as_dict()["bound"], WIND.as_dict()["level"]) == (None, 0.9)
 
 

@@ -61,9 +61,9 @@ def test_windows_that_err_alike_are_worth_one() -> None:
 
 def test_an_uninformative_window_changes_nothing() -> None:
     rng = stream(4, "nothing")
-    told = posterior(1.0, 0.5, 40_000, rng)
-    wide = rng.normal(0.0, 1.3, size=told.shape)  # wider than the prior
-    alone, both = cloth_of(np.stack([told, told]), 0.0), cloth_of(np.stack([told, told, wide]), 0.0)
+    narrow = posterior(1.0, 0.5, 40_000, rng)
+    wide = rng.normal(0.0, 1.3, size=narrow.shape)  # wider than the prior
+    alone, both = cloth_of(np.stack([narrow, narrow]), 0.0), cloth_of(np.stack([narrow, narrow, wide]), 0.0)
     assert both.mean() == pytest.approx(alone.mean(), abs=0.02)
     assert both.var() == pytest.approx(alone.var(), rel=0.05)
 

@@ -133,8 +133,8 @@ def test_a_refused_film_ends_with_3_and_shows_no_estimate(strange: Path, tmp_pat
     assert "m/s" not in done.stdout + page.read_text()
     assert "not like what the network was trained on" in done.stderr
     assert "Refused" in page.read_text()
-    told = json.loads(run(strange, *SIZED, "--json", code=3).stdout)
-    assert told["kind"] == "refused"
+    error = json.loads(run(strange, *SIZED, "--json", code=3).stdout)
+    assert error["kind"] == "refused"
     marked = run(strange, *SIZED, "--anyway")
     assert marked.stdout.startswith("refused by the gate, not to be relied on: ")
 

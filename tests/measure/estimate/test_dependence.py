@@ -58,8 +58,8 @@ def test_a_model_without_an_entry_has_windows_that_count_as_one(model: Estimator
 def test_the_cards_entry_is_what_was_measured(model: Estimator) -> None:
     found = simulated(0.5, noise=1.0)
     entry = card_entry(found)
-    told = of_model(replace(model, card={**model.card, CARD_KEY: entry}))
-    assert told == found.dependence()
-    assert told.cloth >= entry["targets"]["density"]["correlation"]
+    stored = of_model(replace(model, card={**model.card, CARD_KEY: entry}))
+    assert stored == found.dependence()
+    assert stored.cloth >= entry["targets"]["density"]["correlation"]
     with pytest.raises(CorruptError, match="measure it anew"):
         of_model(replace(model, card={**model.card, CARD_KEY: {"wind": 3}}))

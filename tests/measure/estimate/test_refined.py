@@ -54,8 +54,8 @@ def test_a_bound_scales_and_stays_one(found: Refinement) -> None:
     strong = replace(found.intervals[0], median=None, span=least)
     larger = scaled(replace(found, intervals=(strong, *found.intervals[1:])), 4.0)
     assert larger.intervals[0].span == replace(least, low=18.8)
-    told = larger.intervals[0].as_dict()
-    assert (told["median"], told["low"], told["high"], told["bound"]) == (None, 18.8, None, "at-least")
+    interval = larger.intervals[0].as_dict()
+    assert (interval["median"], interval["low"], interval["high"], interval["bound"]) == (None, 18.8, None, "at-least")
     assert larger.intervals[0].phrase(2, " m/s") == "at least 18.80 m/s"
 
 

@@ -66,10 +66,10 @@ def test_bias_and_rmse_are_those_that_were_put_in(model: Estimator) -> None:
     wind = gusts(100)
     found = beside(saying(model, wind + 0.3, step=1.0), start=START, wind=None)
     assert found.logged is None
-    told = agreement(found, wind, seed=0)
-    assert told is not None
-    assert (told.bias, told.rmse) == (pytest.approx(0.3), pytest.approx(0.3))
-    assert told.covered == 1
+    agreed = agreement(found, wind, seed=0)
+    assert agreed is not None
+    assert (agreed.bias, agreed.rmse) == (pytest.approx(0.3), pytest.approx(0.3))
+    assert agreed.covered == 1
     shifted = agreement(found, wind - 1, seed=0)
     assert shifted is not None
     assert shifted.covered == 0
@@ -81,11 +81,11 @@ def test_windows_with_a_bound_count_where_intervals_are_compared_and_among_no_er
     high."""
     wind = np.where(np.arange(100) % 2, 12.0, gusts(100))
     series = beside(saying(model, np.where(wind == 12.0, np.nan, wind + 0.3), step=1.0), start=START, wind=None)
-    told = agreement(series, wind, seed=0)
-    assert told is not None
-    assert (told.count, told.bounded, told.covered) == (100, 50, 1.0)
-    assert (told.bias, told.rmse) == (pytest.approx(0.3), pytest.approx(0.3))
-    assert "50 give a bound and no value" in told.sentence
+    agreed = agreement(series, wind, seed=0)
+    assert agreed is not None
+    assert (agreed.count, agreed.bounded, agreed.covered) == (100, 50, 1.0)
+    assert (agreed.bias, agreed.rmse) == (pytest.approx(0.3), pytest.approx(0.3))
+    assert "50 give a bound and no value" in agreed.sentence
     weak = agreement(series, np.minimum(wind, 9.0), seed=0)
     assert weak is not None
     assert weak.covered == 0.5

@@ -49,9 +49,9 @@ def cloth(*, density: float, bending: float, scale: float = 1.0) -> Material:
 
 def test_values_scaled_back_make_half_a_flag_move_like_the_whole() -> None:
     # The simulator knows nothing of similarity: air and gravity are the same for both.
-    told = np.array([4.0, 0.12, np.log10(3e-5)])
+    values = np.array([4.0, 0.12, np.log10(3e-5)])
     names = ("wind_speed", "density", "bending_scale")
-    wind, density, bending = scaled_back(told, names, 0.5)
+    wind, density, bending = scaled_back(values, names, 0.5)
     whole = flight(1.0, wind=4.0, material=cloth(density=0.12, bending=3e-5))
     half = flight(0.5, wind=wind, material=cloth(density=density, bending=10**bending, scale=0.5))
     moved = np.abs(whole - whole[0]).max()

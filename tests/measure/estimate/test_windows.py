@@ -47,8 +47,8 @@ def test_uneven_stamps_are_no_gap_and_a_missing_frame_is() -> None:
     assert len(list(cut(numbered(uneven), layout))) == layout.count == 4
     windows = list(cut(numbered(np.delete(times, 14)), layout))
     assert [window.index for window in windows] == [0, 2, 3]
-    told = findings_of(layout, found=3, worst=0.0, repeats=0, rate=25.0)
-    assert {finding.kind: finding.count for finding in told}["windows-left-out"] == 1
+    findings = findings_of(layout, found=3, worst=0.0, repeats=0, rate=25.0)
+    assert {finding.kind: finding.count for finding in findings}["windows-left-out"] == 1
 
 
 def test_frames_that_are_shown_twice_are_counted() -> None:

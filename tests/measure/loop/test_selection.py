@@ -329,9 +329,9 @@ def test_a_strength_that_an_effect_cannot_have_is_not_named(null: NullModel, ref
 def test_the_interval_of_a_strength_is_a_factor_to_either_side(null: float, coefficient: float) -> None:
     """Without an error of its own 90 % of a log-normal factor with a standard deviation of 0.5: e^(1.645 · 0.5) = 2.28;
     with one that is far larger, a normal interval."""
-    told = strength(null, coefficient, 0.0, "1")
-    near, far = sorted(abs(end - null) for end in (told.low, told.high))
-    assert told.value == null + coefficient
+    fitted = strength(null, coefficient, 0.0, "1")
+    near, far = sorted(abs(end - null) for end in (fitted.low, fitted.high))
+    assert fitted.value == null + coefficient
     assert (near, far) == pytest.approx((2.0 / 2.2758, 2.0 * 2.2758), rel=1e-3)
     wide = strength(null, coefficient, 100.0, "1")
     assert (wide.low, wide.high) == pytest.approx((-164.5, 164.5), abs=4)

@@ -78,14 +78,14 @@ def test_the_wind_that_a_vane_shows_goes_with_the_rate_and_not_with_the_wind_it_
     assert shown == pytest.approx(rate / wind, rel=0.06)
 
 
-@pytest.mark.parametrize(("factor", "told"), [(1.0, False), (2.0, True), (0.5, True)])
-def test_a_swinging_plate_gains_what_its_height_loses_times_the_squared_error_of_the_rate(pendulum, factor, told):
+@pytest.mark.parametrize(("factor", "reported"), [(1.0, False), (2.0, True), (0.5, True)])
+def test_a_swinging_plate_gains_what_its_height_loses_times_the_squared_error_of_the_rate(pendulum, factor, reported):
     """To 5 %, as the vane's."""
     recording, specimen = pendulum
     recording = replace(recording, rate=factor * RATE)
     assert swing(recording, specimen) == pytest.approx(factor**2, rel=0.05)
     found = check_inertia(recording, specimen)
-    assert [f.kind for f in found] == ["inertia-does-not-fit"] * told
+    assert [f.kind for f in found] == ["inertia-does-not-fit"] * reported
 
 
 def test_the_rate_or_wind_that_would_fit_is_reported(vane) -> None:

@@ -94,7 +94,7 @@ def test_wrong_pins_wind_and_scale_of_real_runs_are_refused(reference_data: Path
         observe([replace(seen, positions=10.0 * seen.positions)])
 
 
-def doubted(seen: Observation) -> bool:
+def misfits(seen: Observation) -> bool:
     """Whether a recording is refused, or reported as one that inertia does not fit."""
     try:
         observed = observe([seen])
@@ -107,16 +107,16 @@ def doubted(seen: Observation) -> bool:
 def test_a_rate_off_by_two_and_a_wind_in_another_unit_do_not_pass(reference_data: Path, name: str):
     seen = run(reference_data, name, slice(20, 140))  # twice as fast they are as long as a recording must be
     speed = float(name[1])
-    assert not doubted(seen)
+    assert not misfits(seen)
     for rate in (2.0, 0.5):
-        assert doubted(replace(seen, times=seen.times / rate))
+        assert misfits(replace(seen, times=seen.times / rate))
     for factor in (3.6, 1 / 3.6):
-        assert doubted(replace(seen, wind=WindTrack.constant((factor * speed, 0.0, 0.0))))
+        assert misfits(replace(seen, wind=WindTrack.constant((factor * speed, 0.0, 0.0))))
 
 
 def test_in_calm_air_a_rate_off_by_two_shows_while_the_cloth_swings(reference_data: Path):
     """Released from flat, the reference run swings for its first seconds."""
     seen = run(reference_data, "w0_dt05", slice(0, 110))
-    assert not doubted(seen)
-    assert doubted(replace(seen, times=seen.times / 2))
-    assert doubted(replace(seen, times=seen.times * 2))
+    assert not misfits(seen)
+    assert misfits(replace(seen, times=seen.times / 2))
+    assert misfits(replace(seen, times=seen.times * 2))

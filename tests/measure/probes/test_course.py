@@ -131,8 +131,8 @@ def test_a_gauge_recovers_the_course_of_a_wind_that_was_not_logged(forecaster: F
     scale = torch.ones(base.shape[1], base.shape[3], dtype=base.dtype)
     changes = [forecaster.sensitivity(wind, segments, nominal, base) for wind in winds()]
     gauge = Gauge.of(changes, scale, period=segments.period)
-    told = gauge.course(base.permute(3, 0, 1, 2).flatten(2))
-    value = np.linalg.solve(told.curvature, told.score[..., None])[..., 0]
+    gauged = gauge.course(base.permute(3, 0, 1, 2).flatten(2))
+    value = np.linalg.solve(gauged.curvature, gauged.score[..., None])[..., 0]
     starts = np.array([item.start for item in segments.items]) + segments.first * segments.period
     middles = starts[:, None] + (np.arange(value.shape[1]) + 0.5) * gauge.window * segments.period
     phase = OMEGA * middles.ravel()

@@ -32,10 +32,10 @@ def test_with_many_evaluations_it_is_the_exact_posterior(recipe: Recipe) -> None
     weight = np.exp(weight - weight.max())
     middle = weight @ drawn / weight.sum()
     spread = np.sqrt(weight @ np.square(drawn - middle) / weight.sum())
-    told = space.reported(found.points)
+    reported = space.reported(found.points)
     # 4,000 draws know a mean to 0.016 standard deviations, and the model's slopes are known to a few percent
-    assert (np.abs(told.mean(axis=0) - middle) < 0.12 * spread).all()
-    np.testing.assert_allclose(told.std(axis=0), spread, rtol=0.08)
+    assert (np.abs(reported.mean(axis=0) - middle) < 0.12 * spread).all()
+    np.testing.assert_allclose(reported.std(axis=0), spread, rtol=0.08)
 
 
 def test_intervals_cover_as_often_as_they_say_after_few_evaluations(recipe: Recipe) -> None:
@@ -77,9 +77,9 @@ def test_what_says_nothing_leaves_the_prior(recipe: Recipe) -> None:
     points, _ = _rows(space, rng, 2000)
     model = Metamodel.fit(regressors(space.reported(points), space), rng.normal(size=(2000, 2)), np.arange(2000))
     found = posterior(space, [model], [np.zeros(2)], seed=3)
-    told = space.reported(found.points)
+    reported = space.reported(found.points)
     prior = space.reported(space.prior(rng, 4000))
-    np.testing.assert_allclose(told.std(axis=0), prior.std(axis=0), rtol=0.1)
+    np.testing.assert_allclose(reported.std(axis=0), prior.std(axis=0), rtol=0.1)
     assert found.effective > 0.75 * CLOTHS
 
 
@@ -89,7 +89,7 @@ def test_a_wind_that_the_network_gives_along_a_curve_is_found_from_few_evaluatio
     noise over its slope, by the delta method."""
     space, rng = Space.of(recipe), np.random.default_rng(11)
 
-    def told(points: np.ndarray) -> np.ndarray:
+    def response(points: np.ndarray) -> np.ndarray:
         share = (points[:, 16] + 1) / 2
         return (1 / (1 + np.exp(-6 * (share - 0.45))))[:, None] + rng.normal(0, 0.04, (len(points), 1))
 
@@ -100,8 +100,8 @@ def test_a_wind_that_the_network_gives_along_a_curve_is_found_from_few_evaluatio
         points = np.repeat(space.prior(rng, 24), 2, axis=0)
         points[:, 16] = 2 * np.clip(share + np.repeat(rng.normal(0, 0.12, 24), 2), 0, 1) - 1
         known = regressors(space.reported(points), space)
-        model = Metamodel.fit(known, told(points), np.repeat(np.arange(24), 2))
-        found = posterior(space, [model], [told(truth)[0]], seed=trial, cloths=300, winds=61, draws=1000)
+        model = Metamodel.fit(known, response(points), np.repeat(np.arange(24), 2))
+        found = posterior(space, [model], [response(truth)[0]], seed=trial, cloths=300, winds=61, draws=1000)
         slope = 6 * np.exp(-6 * (share - 0.45)) / (1 + np.exp(-6 * (share - 0.45))) ** 2
         low, middle, high = np.quantile(found.winds[:, 0], [0.05, 0.5, 0.95])
         span = space.wind.high - space.wind.low

@@ -46,13 +46,13 @@ def test_combinations_of_bending_follow_their_definitions(recipe: Recipe) -> Non
     table[0] *= 4  # along the warp
     table[:, 3:] *= 3  # at the two largest curvatures
     point = space.unit(np.array([[*table.ravel(), 0.12, 3.0]]))
-    told = dict(zip((q.name for q in QUANTITIES), space.reported(point)[0], strict=True))
+    reported = dict(zip((q.name for q in QUANTITIES), space.reported(point)[0], strict=True))
     inside = space.values(point)[0, :15].reshape(3, 5)
     np.testing.assert_allclose(inside, table)  # within the box, so that nothing was moved to its edge
-    assert told["anisotropy"] == pytest.approx(np.log10(4))
-    assert told["nonlinearity"] == pytest.approx(np.log10(3))
-    assert told["bending_scale"] == pytest.approx(-5 + np.log10(4) / 3 + np.log10(3) * 2 / 5)
-    assert (told["wind_speed"], told["density"]) == (pytest.approx(3.0), pytest.approx(0.12))
+    assert reported["anisotropy"] == pytest.approx(np.log10(4))
+    assert reported["nonlinearity"] == pytest.approx(np.log10(3))
+    assert reported["bending_scale"] == pytest.approx(-5 + np.log10(4) / 3 + np.log10(3) * 2 / 5)
+    assert (reported["wind_speed"], reported["density"]) == (pytest.approx(3.0), pytest.approx(0.12))
 
 
 def test_a_common_factor_widens_the_box_and_moves_all_coefficients_together() -> None:

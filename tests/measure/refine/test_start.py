@@ -18,10 +18,10 @@ from sim.run.recipe import Recipe
 
 def test_completed_points_have_the_given_wind_and_area_weight(recipe: Recipe) -> None:
     space = Space.of(recipe)
-    told = np.array([[3.0, 0.12, -4.0, 0.1], [7.5, 0.165, -3.9, -0.2]])
-    values = space.values(start.completed(space, told, seed=0))
-    np.testing.assert_allclose(values[:, WIND], told[:, 0])
-    np.testing.assert_allclose(values[:, DENSITY], told[:, 1])
+    given = np.array([[3.0, 0.12, -4.0, 0.1], [7.5, 0.165, -3.9, -0.2]])
+    values = space.values(start.completed(space, given, seed=0))
+    np.testing.assert_allclose(values[:, WIND], given[:, 0])
+    np.testing.assert_allclose(values[:, DENSITY], given[:, 1])
 
 
 def test_an_area_weight_that_is_known_is_what_the_refinement_starts_from(estimator: Estimator, recipe: Recipe) -> None:
@@ -38,16 +38,16 @@ def test_summaries_are_the_networks_own_estimates_as_shares_of_their_ranges(esti
     clips = stream(0, "clips").integers(0, 255, (5, 8, 48, 48), dtype=np.uint8)
     embedded = estimator.embeddings(estimator.inputs(clips))
     rows = np.concatenate([torch.cat(embedded, dim=1).double().numpy(), np.full((1, 6), np.nan)])
-    told = start.summaries(estimator, rows)
-    assert told.shape == (6, 2)
-    assert np.isnan(told[-1]).all()
+    summaries = start.summaries(estimator, rows)
+    assert summaries.shape == (6, 2)
+    assert np.isnan(summaries[-1]).all()
     drawn = estimator.logits(embedded, seed=1, draws=20_000).mean(dim=1).sigmoid().double().numpy()
     assert [target.name for target in estimator.targets][:2] == list(start.SUMMARISED)
-    np.testing.assert_allclose(told[:-1], drawn[:, :2], atol=0.01)
+    np.testing.assert_allclose(summaries[:-1], drawn[:, :2], atol=0.01)
 
 
 def test_widening_by_one_changes_nothing(recipe: Recipe) -> None:
     space = Space.of(recipe)
-    told = space.reported(space.prior(np.random.default_rng(3), 50))[:, :4]
-    told[:, :2] = np.clip(told[:, :2], [0.2, 0.101], [9.8, 0.169])
-    assert start.widened(told, 1.0, space) == pytest.approx(told)
+    reported = space.reported(space.prior(np.random.default_rng(3), 50))[:, :4]
+    reported[:, :2] = np.clip(reported[:, :2], [0.2, 0.101], [9.8, 0.169])
+    assert start.widened(reported, 1.0, space) == pytest.approx(reported)

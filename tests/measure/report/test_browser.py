@@ -60,10 +60,10 @@ const look = () => {
     frame: Number(document.querySelector('[data-control="frame"]').value),
     button: document.querySelector('[data-control="play"]').textContent,
   };
-  const told = document.createElement("pre");
-  told.id = "probe";
-  told.textContent = JSON.stringify(found);
-  document.body.append(told);
+  const probe = document.createElement("pre");
+  probe.id = "probe";
+  probe.textContent = JSON.stringify(found);
+  document.body.append(probe);
 };
 const wait = (left) => requestAnimationFrame(() => left > 1 ? wait(left - 1) : look());
 wait(56);
@@ -82,9 +82,9 @@ def seen(html: str, folder: Path, *options: str) -> dict[str, object]:
          "--virtual-time-budget=20000", f"--user-data-dir={folder / 'profile'}", *options, "--dump-dom", file.as_uri()],
         capture_output=True, text=True, check=True, timeout=300,
     )  # fmt: skip
-    told = re.search(r'<pre id="probe">(.*?)</pre>', done.stdout, re.DOTALL)
-    assert told, done.stderr
-    text = told[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&")
+    match = re.search(r'<pre id="probe">(.*?)</pre>', done.stdout, re.DOTALL)
+    assert match, done.stderr
+    text = match[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&")
     return {**json.loads(text), "console": [line for line in done.stderr.splitlines() if "CONSOLE" in line]}
 
 

@@ -133,10 +133,10 @@ def test_charts_tables_and_controls_have_labels_for_screen_readers(whole: Verdic
 
 def test_the_page_says_the_verdicts_words_assumptions_and_remarks(whole: Verdict, html: str) -> None:
     text = re.sub(r"\s+", " ", parsed(html).all("body")[0].text)
-    told = [whole.words, whole.separating, whole.proposal, whole.test.nulls, *whole.assumptions]
-    told += [c.why_not for c in whole.ranking if c.effect not in whole.named]
-    told += [part for finding in whole.findings for part in finding]
-    for sentence in filter(None, told):
+    sentences = [whole.words, whole.separating, whole.proposal, whole.test.nulls, *whole.assumptions]
+    sentences += [c.why_not for c in whole.ranking if c.effect not in whole.named]
+    sentences += [part for finding in whole.findings for part in finding]
+    for sentence in filter(None, sentences):
         assert sentence in text
 
 

@@ -26,10 +26,10 @@ def test_too_few_nulls_for_the_level_are_called_so() -> None:
 def test_the_test_is_reported_with_its_interval_and_the_nulls_that_reach_it() -> None:
     whole = verdict(Conclusion.SUFFICIENT)
     reached = sum(v >= whole.test.statistic for v in whole.test.null)
-    told = sentences.test_sentence(whole.test)
-    assert told.startswith("The base model is not rejected: p = ")
-    assert f" {reached} of 199 groups of nulls reach the observed statistic 1.13" in told
-    assert "90 % at level 0.01" in told
+    sentence = sentences.test_sentence(whole.test)
+    assert sentence.startswith("The base model is not rejected: p = ")
+    assert f" {reached} of 199 groups of nulls reach the observed statistic 1.13" in sentence
+    assert "90 % at level 0.01" in sentence
     assert sentences.test_remark(verdict(Conclusion.EFFECT).test) == ""
 
 

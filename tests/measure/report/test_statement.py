@@ -55,17 +55,17 @@ def test_a_line_is_reported_as_a_cylinders_vortex_shedding() -> None:
 
 def test_a_course_that_is_not_turbulence_is_given_in_percent_of_the_wind() -> None:
     said = blowing(Variation(whole=np.array([0.0169, -0.0001, 0.03]), fast=np.array([0.0144, 0.0, 0.02])))
-    told = "varies by 13 % of its mean along its own direction, by 12 % within two seconds, and by 0 % across it"
-    assert told in said
+    expected = "varies by 13 % of its mean along its own direction, by 12 % within two seconds, and by 0 % across it"
+    assert expected in said
 
 
 @pytest.mark.parametrize(
-    ("damping", "told"), [(2.5e-3, ""), (60e-3, ""), (5.0, "in damping: its interval says no more")]
+    ("damping", "expected"), [(2.5e-3, ""), (60e-3, ""), (5.0, "in damping: its interval says no more")]
 )
-def test_a_fit_that_ends_at_a_bound_says_so(damping: float, told: str) -> None:
+def test_a_fit_that_ends_at_a_bound_says_so(damping: float, expected: str) -> None:
     ended = Calibration().moved((0.0, 0.0, float(np.log(damping / 2.5e-3))))
     said = " ".join(bounds(ended.at_bounds))
-    assert (told in said) if told else said == ""
+    assert (expected in said) if expected else said == ""
 
 
 def test_a_level_that_cannot_be_tested_says_what_is_needed() -> None:
@@ -77,8 +77,8 @@ def test_a_level_that_cannot_be_tested_says_what_is_needed() -> None:
 def test_a_test_that_another_draw_could_decide_otherwise_says_so_and_what_would_settle_it() -> None:
     test = replace(verdict(Conclusion.EFFECT).test, level=0.05, open=True, settling=59)
     test = replace(test, p_value=replace(test.p_value, value=0.024, low=0.0, high=0.072))
-    (told,) = by_draw(test)
-    assert told == (
+    (remark,) = by_draw(test)
+    assert remark == (
         "Another draw of nulls could decide otherwise: the interval of p, [0, 0.072] 90 %, holds the level of 0.05; "
         "59 kinds of numerics would settle it, if the same share of them is as far."
     )
@@ -128,17 +128,17 @@ def test_an_outcome_with_an_answer_proposes_nothing(outcome: Outcome) -> None:
 
 
 @pytest.mark.parametrize(
-    ("known", "told", "weigh"),
+    ("known", "expected", "weigh"),
     [(0.3, "known to 30 %", True), (0.1, "known to 10 %", True), (0.02, "known to 2 %", False)],
 )
 def test_how_well_the_cloth_was_weighed_is_an_assumption(
-    outcome: Outcome, known: float, told: str, weigh: bool
+    outcome: Outcome, known: float, expected: str, weigh: bool
 ) -> None:
     specimen = replace(outcome.experiment.specimen, density_uncertainty=known)
     (said,) = (
         text for text in assumptions(replace(outcome.experiment, specimen=specimen)) if "density is known" in text
     )
-    assert told in said
+    assert expected in said
     assert ("density-uncertainty" in said) == weigh
 
 

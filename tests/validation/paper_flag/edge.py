@@ -137,8 +137,8 @@ def line_in(
     seen[(seen == Seen.LINE) & ~sheet] = Seen.APART
     slope = _slope(np.where(seen == Seen.LINE, height, np.nan))
     seen[(seen == Seen.LINE) & (width > options.widest * np.sqrt(1 + slope**2))] = Seen.SMEARED
-    told = seen == Seen.LINE
-    return np.where(told, height, np.nan), np.where(told, width, np.nan), seen
+    located = seen == Seen.LINE
+    return np.where(located, height, np.nan), np.where(located, width, np.nan), seen
 
 
 def _run_around(counted: NDArray[np.bool_], middle: int) -> NDArray[np.bool_]:

@@ -123,8 +123,8 @@ def _mean(values: np.ndarray[Any, Any]) -> str:
     none = int((values == NEVER).sum())
     if none == len(values):
         return "no flutter"
-    told = f"{100 * (math.exp(float(np.abs(values[values != NEVER]).mean())) - 1):.0f} %"
-    return f"{told}, {none} without" if none else told
+    error = f"{100 * (math.exp(float(np.abs(values[values != NEVER]).mean())) - 1):.0f} %"
+    return f"{error}, {none} without" if none else error
 
 
 def _model_row(o: Outcome) -> dict[str, Any]:
@@ -164,8 +164,8 @@ def _declared_row(cell: Cell) -> list[str]:
     def ratio(values: np.ndarray[Any, Any]) -> str:
         if (values == NEVER).all():
             return "no flutter"
-        told = np.exp(values[values != NEVER])
-        return f"{told.min():.2f} to {told.max():.2f}"
+        ratios = np.exp(values[values != NEVER])
+        return f"{ratios.min():.2f} to {ratios.max():.2f}"
 
     tips = [tip for tip in cell.tips.values() if math.isfinite(tip)]
     lost = len(cell.tips) - len(tips)

@@ -31,11 +31,11 @@ def verdict_words(seen: Observations, study: Study, verdict: Verdict) -> list[st
         f"tunnel's speed: {_kinds(best)}."
     )
     fitted, every = _names(verdict.remaining_fitted), _names(verdict.remaining)
-    told = (
+    remark = (
         f"By frequencies and stop speeds alone, what remains within two standard errors of the best: {fitted}. With "
         f"the speed of the wave along the sheet and the amplitude, to which nothing was fitted: {every}."
     )
-    words = [found, closest, told]
+    words = [found, closest, remark]
     if verdict.insufficient:
         misses = "; ".join(
             f"{kind.value} by {_percent(size)} (measurement and mesh leave {_percent(verdict.tolerance[kind])} open)"

@@ -33,8 +33,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     torch.set_num_threads(1)
     found = study(folder, named(MATERIAL), fitted=FITTED, held_out=HELD_OUT, seed=seed)
     (out / "validate-robot-cloth.md").write_text(page(found), encoding="utf-8")
-    told = {"nominal": MATERIAL, "level": LEVEL, "moved": MOVED}
-    return {**told, **asdict(found), "apart": found.apart.as_dict(), "apart_moved": found.apart_moved.as_dict()}
+    settings = {"nominal": MATERIAL, "level": LEVEL, "moved": MOVED}
+    return {**settings, **asdict(found), "apart": found.apart.as_dict(), "apart_moved": found.apart_moved.as_dict()}
 
 
 def page(found: HeldCloth) -> str:
@@ -50,7 +50,7 @@ def page(found: HeldCloth) -> str:
         f"{found.apart.hits} of {found.apart.count} pairs differ at {LEVEL:g} "
         f"(90 % bounds {found.apart.low:.2f}–{found.apart.high:.2f}, too narrow since pairs share recordings). As many "
         f"or more are by chance with p = {found.p_pairs:.2f}, by {SHUFFLES} shuffles of the repeats' segments. "
-        f"With the stamps of one of them moved by {1e3 * MOVED:.0f} ms {moved.hits} of {moved.count} are."
+        f"With the stamps of one of them moved by {1e3 * MOVED:.0f} ms {moved.hits} of {moved.count} do."
     )
     extents = " and ".join(f"{1e3 * w:.0f} × {1e3 * h:.0f} mm {name}" for name, (w, h) in found.extents.items())
     at_bound = (
@@ -105,29 +105,29 @@ def _lacking(found: HeldCloth) -> list[str]:
     ]  # fmt: skip
     if any(value for row in found.camera for value in row):
         rows = "; ".join(", ".join(f"{value:+.3f}" for value in row) for row in found.camera)
-        told = (
+        remark = (
             f"The camera's map A, by rows (across, in depth, up): {rows}. Its first column is of places across the "
             "swing, where the tool hardly moves: there the map and the nodes' offsets take each other's place, and "
             "it carries no information."
         )
-        lines += [told, ""]
+        lines += [remark, ""]
     if (own := found.late) is not None:
-        told = (
+        remark = (
             f"Latencies have a standard deviation of {1e3 * own.deviation:.0f} ms. Their rank correlation with the "
             "interval of stamps before the frame, which the fit knows nothing of, is "
             f"{own.rank_correlation:.2f} (p = {own.p:.3f} by shuffles). The lower halves err by "
             f"{_root(own.without)} mm without latencies, by {_root(own.with_)} mm with them, and by "
             f"{_root(own.control)} mm with as free a vertical shift of each frame instead."
         )
-        lines += [told, ""]
+        lines += [remark, ""]
     return lines
 
 
 def _chosen(own: Round) -> str:
     """What a round added, and the next best three."""
-    told = {gain.name: f"{gain.name} {_squares(gain.value, gain.error)}" for gain in own.gains}
-    added = told.pop(own.added, "nothing")
-    return f"{added} | {', '.join(list(told.values())[:3])}"
+    gains = {gain.name: f"{gain.name} {_squares(gain.value, gain.error)}" for gain in own.gains}
+    added = gains.pop(own.added, "nothing")
+    return f"{added} | {', '.join(list(gains.values())[:3])}"
 
 
 def _squares(value: float, error: float) -> str:

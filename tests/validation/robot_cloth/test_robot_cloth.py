@@ -180,9 +180,9 @@ def _followed(swing: Swing, cloth: Cloth, truth: Truth, *, seed: int) -> tuple[S
     places = run(np.clip(swing.times, 0.0, swing.tool_times[-1]))
     offsets = truth.offsets * np.random.default_rng(99).standard_normal((SIDE**2, 3))
     about = swing.positions.reshape(-1, 3).mean(axis=0)
-    told = places + offsets + (places - about) @ np.array(truth.camera).T
-    told += 1e-3 * rng.standard_normal(places.shape)
-    return replace(swing, positions=told, times=swing.times + lates), lates
+    measured = places + offsets + (places - about) @ np.array(truth.camera).T
+    measured += 1e-3 * rng.standard_normal(places.shape)
+    return replace(swing, positions=measured, times=swing.times + lates), lates
 
 
 def _programmes(truth: Truth) -> tuple[Cloth, dict[str, list[Swing]], dict[str, Floats]]:
@@ -193,12 +193,12 @@ def _programmes(truth: Truth) -> tuple[Cloth, dict[str, list[Swing]], dict[str, 
         for k in range(2)
     }
     cloth = Cloth.seen(list(plain.values()), CAMEL)
-    told: dict[str, list[Swing]] = {"slow": [], "fast": []}
+    tracked: dict[str, list[Swing]] = {"slow": [], "fast": []}
     lates: dict[str, Floats] = {}
     for seed, ((programme, _), swing) in enumerate(plain.items()):
         seen, lates[swing.name] = _followed(swing, cloth, truth, seed=seed)
-        told[programme].append(seen)
-    return cloth, told, lates
+        tracked[programme].append(seen)
+    return cloth, tracked, lates
 
 
 @pytest.mark.parametrize(
@@ -209,9 +209,9 @@ def _programmes(truth: Truth) -> tuple[Cloth, dict[str, list[Swing]], dict[str, 
     ],
 )  # fmt: skip
 def test_what_acts_is_named_first_and_leaves_next_to_nothing_to_others(truth: Truth, named: str) -> None:
-    cloth, told, _ = _programmes(truth)
-    start = Fit.start([swing for own in told.values() for swing in own], Parameters())
-    rounds = sought(cloth, told, start, candidates=(*TRACKER, "tangential-linear-drag"))
+    cloth, tracked, _ = _programmes(truth)
+    start = Fit.start([swing for own in tracked.values() for swing in own], Parameters())
+    rounds = sought(cloth, tracked, start, candidates=(*TRACKER, "tangential-linear-drag"))
     assert rounds[0].added == named
     assert rounds[-1].added == ""
     largest = rounds[0].gains[0].value
@@ -221,8 +221,8 @@ def test_what_acts_is_named_first_and_leaves_next_to_nothing_to_others(truth: Tr
 
 
 def test_latencies_are_found_where_the_cloth_moves_and_separated_from_another_freedom() -> None:
-    cloth, told, lates = _programmes(Truth(delay=0.04))
-    known, unseen = told["slow"], told["fast"]
+    cloth, tracked, lates = _programmes(Truth(delay=0.04))
+    known, unseen = tracked["slow"], tracked["fast"]
     start = Fit.start(known, Parameters())
     fit = calibrated(cloth, known, start.with_effect(LATENCY))
     runs = predicted(cloth, unseen, [fit.parameters] * 2)
@@ -240,8 +240,8 @@ def test_latencies_are_found_where_the_cloth_moves_and_separated_from_another_fr
 
 def test_offsets_and_the_cameras_map_are_those_of_the_tracker() -> None:
     """The map is found up to what the cloth never shows; where it swings in depth alone, that is the depth's column."""
-    cloth, told, _ = _programmes(Truth(camera=TURNED))
-    known = [swing for own in told.values() for swing in own]
+    cloth, tracked, _ = _programmes(Truth(camera=TURNED))
+    known = [swing for own in tracked.values() for swing in own]
     fit = calibrated(cloth, known, Fit.start(known, Parameters()).with_effect(OFFSETS).with_effect(CAMERA))
     # Swings of 0.2 m and 1 mm of noise over some hundred frames of nine nodes give it to 1e-4; what the cloth's fit
     # shares with the map is more.

@@ -78,8 +78,8 @@ def errors(swing: Swing, run: CubicSpline, tracker: Tracker, lag: float, late: F
     """
     own = swing.times - lag - (0.0 if late is None else late)
     within = (own >= 0) & (own <= swing.tool_times[-1])
-    told = tracker.seen(run(instants(swing, lag, late)))
-    return np.where(within[:, None, None], swing.positions - told, np.nan)
+    predicted = tracker.seen(run(instants(swing, lag, late)))
+    return np.where(within[:, None, None], swing.positions - predicted, np.nan)
 
 
 def instants(swing: Swing, lag: float, late: Floats | float | None = None) -> Floats:

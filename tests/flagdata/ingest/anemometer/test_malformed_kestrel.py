@@ -36,7 +36,7 @@ REFUSED = [
     case("date-order-unknowable", content=kestrel(kestrel_day(5)), error=TimeError, says="dmy or mdy", options=UTC),
     case("date-orders-mixed", content=kestrel(kestrel_day(13), "6/14/2026 10:00;300;2;20;1010"), error=TimeError,
          says="mixes", options=UTC),
-    case("date-order-told-wrong", content=kestrel(kestrel_day(13)), error=TimeError, says="it is dmy",
+    case("date-order-given-wrong", content=kestrel(kestrel_day(13)), error=TimeError, says="it is dmy",
          options={"date_order": "mdy", **UTC}),
     case("beaufort", content=kestrel(kestrel_day(13), head=KESTREL_HEAD.replace("m/s", "Bft")), error=InputError,
          where="line 5", says="Beaufort", options=UTC),

@@ -37,9 +37,9 @@ def bodies(form: str) -> list[str]:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_each_fixed_telegram_is_read_behind_a_stamp(read: Read, form: str) -> None:
-    told = read(log(bodies(form)), zone="UTC", unit=None if form == "V4DT" else "m/s")
-    assert "malformed-lines" not in {finding.kind for finding in told.findings}
-    found = told.series.channels
+    parsed = read(log(bodies(form)), zone="UTC", unit=None if form == "V4DT" else "m/s")
+    assert "malformed-lines" not in {finding.kind for finding in parsed.findings}
+    found = parsed.series.channels
     scale = 3.6 if form == "V4DT" else 1
     np.testing.assert_allclose(found["wind_speed"] * scale, SPEEDS)
     np.testing.assert_allclose(np.rad2deg(found["wind_direction"]), 200 + np.arange(30))
@@ -54,8 +54,8 @@ def test_frames_that_were_lost_or_written_out_are_not_needed(read: Read) -> None
 
 
 def test_a_wrong_checksum_is_left_out_and_no_value_is_none(read: Read) -> None:
-    told = [*bodies("VDT")[:9], "FF.F FFF +FF.F 01", *bodies("VDT")[10:]]
-    found = read(log(told).replace(" 204 ", " 304 "), zone="UTC", unit="m/s")
+    telegrams = [*bodies("VDT")[:9], "FF.F FFF +FF.F 01", *bodies("VDT")[10:]]
+    found = read(log(telegrams).replace(" 204 ", " 304 "), zone="UTC", unit="m/s")
     assert len(found.series) == 29
     assert np.flatnonzero(np.isnan(found.series.channels["wind_speed"])).tolist() == [8]
     assert {"checksum-errors", "missing-values"} <= {finding.kind for finding in found.findings}

@@ -11,7 +11,7 @@ from flagdata.signals import WindLog
 Read = Callable[..., WindLog]
 
 
-def told(log: WindLog, kind: str) -> list[str]:
+def reported(log: WindLog, kind: str) -> list[str]:
     return [finding.what for finding in log.findings if finding.kind == kind]
 
 
@@ -23,5 +23,5 @@ def test_a_receiver_whose_time_differs_is_reported(read: Read, receiver: str, sa
         f"2024-09-02T12:41:3{at}.200+00:00 $IIRMC,{int(receiver) + at},A,5928.094,N,02449.269,E,00.1,036,{day},00,E,A\n"
         for at in range(6)
     )
-    found = told(read(lines), "receiver-clock-off")
+    found = reported(read(lines), "receiver-clock-off")
     assert [said in what for what in found] == ([True] if said else [])

@@ -148,8 +148,8 @@ def test_a_crop_that_cuts_through_what_moves_is_reported_with_the_edges(
         assert len(list(stream)) == 60
     assert len(found) == bool(edges)
     for finding in found:
-        told = {edge: int(pixels) for pixels, edge in re.findall(r"(\d+) px at the (\w+)", finding.what)}
-        assert told == {edge: pytest.approx(pixels, abs=8) for edge, pixels in edges.items()}
+        reported = {edge: int(pixels) for pixels, edge in re.findall(r"(\d+) px at the (\w+)", finding.what)}
+        assert reported == {edge: pytest.approx(pixels, abs=8) for edge, pixels in edges.items()}
         given = re.search(r"--crop (\S+)", finding.fix or "")
         assert given is not None
         box = parse_crop(given[1])

@@ -162,8 +162,8 @@ def test_the_packages_docstring_lists_every_kind_of_finding() -> None:
         kind for text in sources for kind in re.findall(r'(?:kind=|^ +)"([a-z]+(?:-[a-z]+)+)"[,:]', text, re.MULTILINE)
     }
     assert {"frames-missing", "clock-reset", "start-unsure"} <= kinds
-    told = set(re.findall(r"[a-z]+(?:-[a-z]+)+", camera.__doc__ or ""))
-    assert kinds - told == set()
+    listed = set(re.findall(r"[a-z]+(?:-[a-z]+)+", camera.__doc__ or ""))
+    assert kinds - listed == set()
 
 
 def test_ticks_become_nanoseconds_without_accumulating_error() -> None:
