@@ -4,7 +4,7 @@ Each line on standard input is a JSON object: `prepare`, a "module:function" tha
 `arguments` of the command, `call` that fails (negative for none), `error`
 (errno), `stays` (whether later calls fail too), `kinds` that are counted, `traced` (whether calls are noted), `folder`
 whose files are counted and which is worked in. The answer is one too: exit `code`, `calls` that there were, `trace` (a
-line for each: number, function, path), and what the command said on `stdout` and `stderr`.
+line for each: number, function, path), and what the command printed on `stdout` and `stderr`.
 """
 
 from __future__ import annotations

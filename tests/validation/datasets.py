@@ -76,7 +76,7 @@ def build(lake: Path, *, kills: Sequence[float]) -> Built:
     begun = time.perf_counter()
     process = _start(lake)
     if process.wait() != 0:
-        raise RuntimeError(f"the build of {RECIPE} failed: look at what it said above")
+        raise RuntimeError(f"the build of {RECIPE} failed: read its messages above")
     return Built(lake=lake, seconds=time.perf_counter() - begun, kills=tuple(found))
 
 

@@ -74,7 +74,7 @@ def test_who_knows_the_truth_scores_everything() -> None:
     assert [result.shares[name].value for name in bad] == [0.0] * len(bad)
 
 
-def test_who_says_nothing_is_never_wrong_on_nulls_and_finds_nothing() -> None:
+def test_a_fitter_that_names_nothing_is_never_wrong_on_nulls_and_finds_nothing() -> None:
     result = sheet(lambda k: verdict(Conclusion.SUFFICIENT))
     assert result.false_positives.value == 0
     assert result.outside_recall.value == 0

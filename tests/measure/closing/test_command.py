@@ -177,7 +177,7 @@ def test_markers_of_a_lake_and_of_a_file_are_the_same(table: Path, tmp_path: Pat
     for one, other, result in zip(from_file, from_lake, kept, strict=True):
         np.testing.assert_array_equal(one.positions, other.positions)
         assert one.wind is not None
-        np.testing.assert_array_equal(one.wind.velocity, [[4, 0, 0]])  # said with z up, whatever the recording's axes
+        np.testing.assert_array_equal(one.wind.velocity, [[4, 0, 0]])  # given with z up, whatever the recording's axes
         assert (one.source, other.source) == ("", result.artifact.id)
 
 

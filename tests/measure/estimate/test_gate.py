@@ -94,7 +94,7 @@ def test_a_summary_far_from_the_training_clips_has_a_small_p() -> None:
 @pytest.mark.parametrize(
     ("frames", "kind"), [(np.zeros((4, 32, 32), dtype=np.uint8), "too-dark"), (pictures(1).repeat(4, 0), "no-motion")]
 )
-def test_of_a_film_in_which_nothing_is_seen_or_moves_there_is_nothing_to_measure(frames: np.ndarray, kind: str) -> None:
+def test_a_blank_or_still_film_has_nothing_to_measure(frames: np.ndarray, kind: str) -> None:
     rng = stream(2, "cloud")
     gate = FamiliarityGate(cloud=Familiarity.of(rng.normal(size=(300, 3)), rng.normal(size=(199, 3))))
     (found,) = gate.judge(frames, np.zeros(3))
@@ -112,7 +112,7 @@ def test_a_gate_of_too_few_clips_for_the_rate_is_refused_and_lets_nothing_pass()
         verdict([[reason(0.5)]], false_alarm=0.05, level=gate.level)
 
 
-def test_a_gate_that_says_nothing_is_no_gate() -> None:
+def test_a_verdict_without_reasons_or_a_false_alarm_rate_is_an_error() -> None:
     with pytest.raises(InputError, match="without a reason"):
         verdict([[[]]], false_alarm=0.05, level=exact)
     with pytest.raises(InputError, match="false-alarm"):

@@ -66,7 +66,7 @@ def test_what_has_no_size_stays(found: Refinement) -> None:
         assert after[name] == before[name]
 
 
-def test_rounds_and_what_the_network_said_before_scale_alike(found: Refinement) -> None:
+def test_rounds_and_the_networks_first_estimate_scale_alike(found: Refinement) -> None:
     larger = scaled(found, 4.0)
     assert larger.amortised == larger.intervals[:4]
     assert larger.rounds == (replace(found.rounds[0], intervals=larger.intervals[:2]),)

@@ -93,7 +93,7 @@ def test_an_unknown_size_is_drawn_from_its_stated_prior() -> None:
     assert prior.share_above(1.5) == pytest.approx(0.5)
 
 
-def test_sizes_that_the_frame_rate_cannot_show_are_left_out_and_said() -> None:
+def test_sizes_that_the_frame_rate_cannot_show_are_left_out_and_reported() -> None:
     found = sizes(None, rate=25.0, frames_rate=25.0, draws=500, generator=stream(0, "sizes"))
     assert found.draws.min() >= 0.95**2 - 1e-9
     assert "small-sizes-left-out" in {f.kind for f in found.findings}

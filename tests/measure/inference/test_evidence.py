@@ -236,7 +236,7 @@ def test_drops_are_those_of_fits(world: World, null: NullModel) -> None:
     assert evidence.drops([4])[5] == pytest.approx(beside, rel=1e-6)
 
 
-def test_a_column_of_which_nothing_is_seen_says_nothing() -> None:
+def test_an_unobserved_column_carries_no_information() -> None:
     """An effect without a moment, among moments: neither it nor the others are disturbed."""
     world = World(5)
     nulls, unseen = world.nulls(), 7

@@ -26,5 +26,5 @@ def test_of_one_strength_it_is_uniform() -> None:
     assert kstest(found, uniform.cdf).pvalue > 0.01
 
 
-def test_one_recording_says_nothing() -> None:
+def test_one_recording_gives_no_heterogeneity() -> None:
     assert heterogeneity([estimate(0.5, 0.1, "rad")]) is None

@@ -211,7 +211,7 @@ def test_pins_of_two_recordings_must_be_in_one_place(seen: Observation):
         observe([seen, other], SETUP)
 
 
-def test_what_nobody_says_is_asked_for(seen: Observation):
+def test_what_is_not_given_is_asked_for(seen: Observation):
     for setup, what in (
         (replace(SETUP, material=None), "material is not known"),
         (replace(SETUP, pins=None), "where the cloth is held is not known"),

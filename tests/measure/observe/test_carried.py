@@ -82,7 +82,7 @@ def test_predictions_follow_attachments_that_move(swung: Observation) -> None:
     assert _errors(aligned(experiment)) == pytest.approx(_errors(experiment), rel=0.02)
 
 
-def test_pins_that_move_without_being_said_to_are_refused(swung: Observation) -> None:
+def test_pins_that_move_without_being_declared_are_refused(swung: Observation) -> None:
     with pytest.raises(InputError, match="not held there"):
         observe([swung], replace(SETUP, carried=False))
 

@@ -101,7 +101,7 @@ def test_the_rate_or_wind_that_would_fit_is_reported(vane) -> None:
     assert "0.28 m/s" in (found.fix or "")
 
 
-def test_pins_that_are_on_no_line_and_motion_that_no_wind_explains_say_nothing(vane) -> None:
+def test_pins_on_no_line_and_motion_that_no_wind_explains_show_no_wind(vane) -> None:
     recording, specimen = vane
     held = (*specimen.held, specimen.mesh.vertex_count - 1)
     three = replace(specimen, held=held, anchors=specimen.mesh.rest[list(held)] @ np.array([[1.0, 0, 0], [0, 0, 1]]))

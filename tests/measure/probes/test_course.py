@@ -118,7 +118,7 @@ def test_errors_that_are_larger_all_over_swing_no_more() -> None:
 
 @pytest.fixture(scope="module")
 def gusty(own_recording: Trajectory) -> Segments:
-    """The cloth in a steady wind, said to be in one that was weaker by a share c: errors as of gusts c."""
+    """The cloth in a steady wind, declared weaker by a share c: errors as of gusts c."""
     times = np.arange(120) / own_recording.rate
     logged = np.stack([4.0 * (1 - SWAY * np.sin(OMEGA * times)), 0 * times, 0 * times], axis=1)
     return Segments.of([replace(own_recording, wind=WindTrack(times=times, velocity=logged))])

@@ -72,7 +72,7 @@ def test_two_clips_of_one_cloth_constrain_it_more_than_one(recipe: Recipe) -> No
     assert (np.diff(np.median(all_.winds, axis=0)) > 0).mean() > 0.8
 
 
-def test_what_says_nothing_leaves_the_prior(recipe: Recipe) -> None:
+def test_uninformative_data_leave_the_prior(recipe: Recipe) -> None:
     space, rng = Space.of(recipe), np.random.default_rng(7)
     points, _ = _rows(space, rng, 2000)
     model = Metamodel.fit(regressors(space.reported(points), space), rng.normal(size=(2000, 2)), np.arange(2000))

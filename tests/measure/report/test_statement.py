@@ -142,6 +142,6 @@ def test_how_well_the_cloth_was_weighed_is_an_assumption(
     assert ("density-uncertainty" in said) == weigh
 
 
-def test_a_cloth_that_nobody_weighed_is_not_said_to_be_known(outcome: Outcome) -> None:
+def test_an_unweighed_cloths_density_is_not_listed_as_known(outcome: Outcome) -> None:
     specimen = replace(outcome.experiment.specimen, mass_known=False)
     assert not any("density is known" in t for t in assumptions(replace(outcome.experiment, specimen=specimen)))

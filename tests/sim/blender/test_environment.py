@@ -141,7 +141,7 @@ def test_the_command_makes_an_environment_that_is_then_found(tmp_path: Path, mon
     assert str(environment.default_folder()) in ran.stdout
 
 
-def test_a_step_that_fails_says_what_pip_said(tmp_path: Path) -> None:
+def test_a_step_that_fails_reports_pips_message(tmp_path: Path) -> None:
     pip = interpreter(tmp_path / "pip", err="ERROR: No matching distribution found for bpy==4.5.15\n", code=1)
     base = tmp_path / "python"
     base.write_text(f'#!/bin/sh\n[ "$2" = venv ] && mkdir -p "$3/bin" && cp {pip} "$3/bin/python"\necho 3 11\n')

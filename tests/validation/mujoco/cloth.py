@@ -176,4 +176,4 @@ def _run(command: Sequence[str]) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         said = done.stderr.strip().splitlines()
-        raise MujocoError(said[-1] if said else "the worker said nothing", where="MuJoCo", fix="take smaller steps")
+        raise MujocoError(said[-1] if said else "the worker printed nothing", where="MuJoCo", fix="take smaller steps")

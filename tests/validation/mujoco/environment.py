@@ -66,7 +66,7 @@ def create(folder: Path) -> None:
             said = (done.stdout + done.stderr).strip()[-2000:]
             raise MujocoError(
                 f"{' '.join(command[1:4])} failed: {said}", where=str(folder),
-                fix=f"see what it said: the package index must offer {REQUIREMENTS[0]} for this Python",
+                fix=f"read its messages: the package index must offer {REQUIREMENTS[0]} for this Python",
             )  # fmt: skip
 
 

@@ -20,9 +20,7 @@ pytestmark = pytest.mark.reference
 @pytest.mark.parametrize(
     ("name", "expected"), [("fullVeloc_7.64", 10.4), ("fullVeloc_8.09", 11.7), ("fullVeloc_9.30", 14.5)]
 )
-def test_the_clips_flutter_as_fast_as_their_column_centroids_said(
-    reference_data: Path, name: str, expected: float
-) -> None:
+def test_the_clips_flutter_at_the_quoted_frequencies(reference_data: Path, name: str, expected: float) -> None:
     case = load_case()
     path = reference_data / case.folder / f"{name}{case.suffix}"
     track = track_edge(path, true_rate=case.true_rate, rate=125.0)  # six times the third harmonic's need

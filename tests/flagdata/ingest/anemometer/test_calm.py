@@ -1,4 +1,4 @@
-"""Words for calm air in the place of a speed: a wind of 0 from nowhere, said once, and no missing value."""
+"""Words for calm air in the place of a speed: a wind of 0 without direction, reported once, and no missing value."""
 
 from __future__ import annotations
 

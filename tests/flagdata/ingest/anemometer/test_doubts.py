@@ -100,7 +100,7 @@ def test_devices_that_follow_one_another_are_asked_about(log_file: Write) -> Non
         read_log(log_file("\n".join(["time,pod,wind_speed (m/s)", *made]) + "\n"))
 
 
-def test_a_usual_log_is_not_doubted(log_file: Write) -> None:
+def test_a_usual_log_needs_no_confirmation(log_file: Write) -> None:
     assert read_log(log_file(table(usual, vane))).stated
 
 

@@ -129,7 +129,7 @@ def test_tag_blocks_carry_whole_instants(read: Read) -> None:
     assert [iso(t) for t in log.series.time.tolist()] == [f"2026-05-01T12:00:0{i}Z" for i in range(5)]
 
 
-def test_a_tag_block_with_a_wrong_checksum_says_nothing() -> None:
+def test_a_tag_block_with_a_wrong_checksum_is_ignored() -> None:
     assert tag_time("\\c:1777636800*00\\") is None
 
 
@@ -200,7 +200,7 @@ def test_an_azimuth_beside_wind_over_ground_is_refused(read: Read) -> None:
         read(times("WIMWD,090.0,T,087.0,M,10.0,N,5.1,M", "WIMWV,1,R,6,M,A"), platform="fixed", azimuth=0.5)
 
 
-def test_a_platform_said_to_move_is_believed(read: Read) -> None:
+def test_a_platform_given_as_moving_is_taken_as_moving(read: Read) -> None:
     log = read(times("WIMWV,1,R,5,M,A", "WIMWV,1,R,6,M,A"), platform="moving")
     assert next(f for f in log.findings if f.kind == "apparent-wind-only").fix is None
 

@@ -120,7 +120,7 @@ def test_the_users_zone_goes_before_the_recipes(tmp_path: Path) -> None:
     assert iso(int(by_recipe(tmp_path, recipe, text, zone="UTC").series.time[0])) == "2026-07-01T12:00:00Z"
 
 
-def test_a_zero_offset_of_the_recipe_is_subtracted_and_said(tmp_path: Path) -> None:
+def test_a_zero_offset_of_the_recipe_is_subtracted_and_reported(tmp_path: Path) -> None:
     recipe = PLAIN + "[quality]\nzero-offset = -0.35\n"
     log = by_recipe(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,-0.35\n2026-05-01T12:00:01Z,4.65\n")
     assert log.series.channels["wind_speed"] == pytest.approx([0.0, 5.0])

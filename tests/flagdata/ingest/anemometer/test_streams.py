@@ -110,7 +110,7 @@ def track(metres: float, n: int = 120) -> str:
     )
 
 
-def test_a_table_from_a_platform_said_to_move_holds_apparent_wind(read: Read) -> None:
+def test_a_table_from_a_platform_given_as_moving_holds_apparent_wind(read: Read) -> None:
     found = read("time,wind_speed\n2026-05-01T12:00:00Z,3\n2026-05-01T12:00:01Z,4\n", platform="moving")
     assert found.series.channels["apparent_wind_speed"].tolist() == [3.0, 4.0]
     assert "wind_speed" not in found.series.channels
@@ -129,7 +129,7 @@ def test_positions_that_only_scatter_are_those_of_a_mast(read: Read) -> None:
     assert "wind_speed" in read(track(20)).series.channels
 
 
-def test_a_platform_said_to_be_fixed_may_not_move(read: Read) -> None:
+def test_a_platform_given_as_fixed_may_not_move(read: Read) -> None:
     assert "fixed-platform" in [f.kind for f in read(track(20), platform="fixed").findings]
     with pytest.raises(InputError, match="--platform moving"):
         read(track(2000), platform="fixed")

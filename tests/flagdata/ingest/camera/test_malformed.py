@@ -255,7 +255,7 @@ def test_an_animated_picture_of_absurd_size_is_refused(tmp_path: Path, plain: Ca
     assert isinstance(kept_or_refused(path, plain), LimitError)
 
 
-def test_an_mp4_that_lies_about_its_frame_count_or_duration_costs_nothing(
+def test_an_mp4_with_a_wrong_frame_count_or_duration_costs_nothing(
     bases: dict[str, bytes], tmp_path: Path, plain: CameraOptions
 ) -> None:
     data = bases["faststart"]
