@@ -2,8 +2,8 @@
 
 A network knows no value outside of the range that it learned from. A film of a stronger wind looks to it like one of
 the strongest it knows, so that the draws pile up at the end of the range, and their central interval ends there: of
-nine films of winds from 10.9 to 17.4 m/s that a network of 0 to 10 m/s accepted, no interval held the wind. Such draws
-bound the quantity on one side only:
+nine films of winds from 10.9 to 17.4 m/s that a network of 0 to 10 m/s accepted, no interval contained the wind. Such
+draws bound the quantity on one side only:
 
 - *at least*: they pile up at the upper end; beyond it nothing is known, and no value is given;
 - *at most*: the same at the lower end;

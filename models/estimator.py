@@ -55,7 +55,7 @@ class Estimates:
         return self.draws.mean(axis=1, dtype=np.float64)
 
     def interval(self, share: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The ends of the central interval that holds this share of each distribution: two of (n, target).
+        """The ends of the central interval with this share of each distribution: two of (n, target).
 
         Raises:
             InputError: a share that is not between 0 and 1.

@@ -1,4 +1,4 @@
-"""Anchors that move one by one along tracks: a cloth held by hands or by a robot."""
+"""Anchors that move one by one along tracks: a cloth carried by hands or by a robot."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ TRUTH = (
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """One catalog row and the part of its record that it stands for.
+    """One catalog row and the part of its record that it describes.
 
     Attributes:
         row: the catalog row, column → value.

@@ -1,4 +1,4 @@
-"""Draws the keys of a challenge: what each set holds, from named streams of one seed."""
+"""Draws the keys of a challenge: the contents of each set, from named streams of one seed."""
 
 from __future__ import annotations
 

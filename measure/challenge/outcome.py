@@ -14,7 +14,7 @@ from measure.challenge.recipe import Kind
 from measure.verdict.record import Conclusion
 
 FIELD = "corrective-field"
-"""Name of the candidate that stands for what is not in the library: it names no effect."""
+"""Name of the candidate for forces outside the library: it names no effect."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,7 +29,7 @@ class Power:
     Attributes:
         slope: a.
         half: group → s½ and its 90 % bounds (Laplace approximation), in the strength's unit.
-        overall: the same of a group that was not seen.
+        overall: the same for a group outside those graded.
     """
 
     slope: float

@@ -5,7 +5,7 @@ Definitions, in the words of the sheet:
 - *False positive*: a null whose base model was not found sufficient. A refusal of the data counts as one.
 - *Half-detection strength*: the impact (see `AnswerKey.impact`) at which half are detected, of a class of effects (see
   `rates.Power`). Identification is graded on sets of one effect at twice that or more; effects from outside the
-  library are called strong by twice that of a class that was not seen.
+  library are called strong by twice that of any other class.
 - *Top-1*: the effect named, or the best ranked of those named, acted; *class-level*: one of its class did.
 - *False discovery*: a claim that an effect of some class acts where none does. "One of" makes a single claim.
 - *None of the library*: the verdict says so, or that the library explains only a part.
@@ -124,7 +124,7 @@ class Sheet:
     @property
     def strong_outside(self) -> list[Outcome]:
         """Outcomes of sets with an effect from outside the library, at twice the half-detection strength of a class of
-        effects that was not seen, or more."""
+        effects outside those graded, or more."""
         power = self.power
         if power is None:
             return []

@@ -34,7 +34,7 @@ _HEAD = "flagdata_measurement"
 
 @dataclass(frozen=True, kw_only=True)
 class Kept:
-    """What a commit holds: ids of the measurement and of its models, and whether they were there already."""
+    """The contents of a commit: ids of the measurement and of its models, and whether they were there already."""
 
     measurement: str
     models: tuple[str, ...]

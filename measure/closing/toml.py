@@ -1,4 +1,4 @@
-"""What a recipe holds as TOML text: numbers, texts, truth values, lists and tables of them."""
+"""The contents of a recipe as TOML text: numbers, texts, truth values, lists and tables of them."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class CheckedGate:
     def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
         found = judge(frames, self.model, self.calibrated, false_alarm=self.false_alarm, summary=summary)
         if not found.reasons:
-            return [Reason(kind="familiar", what=f"nothing stands out, p = {found.p:.3f} over all checks", p=found.p)]
+            return [Reason(kind="familiar", what=f"no check is unusual, p = {found.p:.3f} over all checks", p=found.p)]
         # The first speaks for all checks together.
         return [
             Reason(

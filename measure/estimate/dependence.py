@@ -5,7 +5,7 @@ mean m and variance v. Correlations are those of all pairs of windows of a film,
 
 - Of the wind, of which each window has its own posterior: of the errors (m − z)/√v.
 - Of the cloth, of which likelihoods are multiplied: of the scores s = m/v − (1/v − 1) z, the derivatives at the truth
-  of the logarithms of the Gaussian likelihoods that the posteriors stand for. A window without information has a score
+  of the logarithms of the Gaussian likelihoods that the posteriors represent. A window without information has a score
   of 0, whereas its error is that of the prior, the same in both. Tempering by the correlation of scores adjusts the
   magnitude of a composite likelihood (Ribatet, Cooley and Davison, Statistica Sinica 22, 2012).
 

@@ -109,7 +109,7 @@ def gate_of(model: Estimator) -> Gate:
     """
     if model.cloud is None:
         raise InputError(
-            "the model holds no data on its training clips, so it cannot be checked whether it applies to this film",
+            "the network has no data on its training clips, so it cannot be checked whether it applies to this film",
             where=f"model {model.name!r}", fix="ship it by python -m models.shipping, which stores its training clips",
         )  # fmt: skip
     return FamiliarityGate(cloud=model.cloud)

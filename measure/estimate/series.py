@@ -55,7 +55,7 @@ class Agreement:
         bias: mean difference of the others [m/s]; None where there are none.
         rmse: root mean square of the same [m/s], likewise.
         interval: 90 % of the RMSE, by resampling blocks of ten windows [m/s], likewise.
-        covered: share of all windows compared whose interval holds the reference.
+        covered: share of all windows compared whose interval contains the reference.
     """
 
     count: int
@@ -68,7 +68,7 @@ class Agreement:
     @property
     def sentence(self) -> str:
         """In words."""
-        found = f"the intervals hold {self.covered:.0%} of it, n = {self.count} windows"
+        found = f"the intervals contain {self.covered:.0%} of it, n = {self.count} windows"
         if self.bounded:
             found += f", of which {self.bounded} give a bound and no value"
         if self.bias is None or self.rmse is None or self.interval is None:

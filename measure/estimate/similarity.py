@@ -99,7 +99,7 @@ class FlagSize:
             Finding(
                 kind="aspect-ratio", severity=Severity.WARNING, value=aspect,
                 what=f"the {trained.noun} is {aspect:.2f} times as long as it is high, those of the training "
-                f"{trained.aspect:.2f} times: similarity holds for cloths of one shape, so that intervals may be too "
+                f"{trained.aspect:.2f} times: similarity is exact for one shape only, so that intervals may be too "
                 "narrow",
             ),
         )  # fmt: skip

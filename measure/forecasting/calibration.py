@@ -45,7 +45,7 @@ class Calibration:
 
     @property
     def at_bounds(self) -> tuple[str, ...]:
-        """Names of the parameters that are as small or as large as the model holds: their data want to go beyond."""
+        """Names of the parameters at a bound of the model: the data would take them beyond."""
         bounds = {"density": _DENSITY, "bending": _BENDING, "damping": _DAMPING}
         return tuple(name for name, span in bounds.items() if not span[0] < getattr(self, name) < span[1])
 

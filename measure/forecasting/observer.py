@@ -45,7 +45,7 @@ WIDEST = 400
 segments take 34 s by 72 members at a time, 20 s by 400 (with 486 vertices 54 and 41 s)."""
 
 _JOINT = 200
-"""Members of a joint batch, half as many, so that two workers have one each where one batch would hold all."""
+"""Members of a joint batch, half as many, so that two workers have one each where one batch would have all."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,7 +27,7 @@ class Distortion:
     """A change that makes a clip unlike the simulated ones.
 
     Attributes:
-        reason: kind of `measure.gate.reasons` that it stands for.
+        reason: kind of `measure.gate.reasons` that it represents.
         apply: makes it.
     """
 

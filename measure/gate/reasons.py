@@ -32,7 +32,7 @@ REASONS: dict[str, Reason] = {
         sentence="the camera moves: the background shifts", fix="film from a tripod, or stabilise the film first"
     ),
     "repeated-frames": Reason(
-        sentence="frames are repeated: the clip loops or stands still for a part of it",
+        sentence="frames are repeated: the clip loops or stops for a part of it",
         fix="give a film whose frames are all different",
     ),
     "too-few-frames": Reason(sentence="there are too few frames", fix="give a longer film"),
@@ -52,7 +52,7 @@ REASONS: dict[str, Reason] = {
     ),
     "unlike-cloth": Reason(
         sentence="the motion is unlike that of simulated cloth",
-        fix="make sure that the crop holds a flag on a pole and little else that moves",
+        fix="make sure that the crop shows a flag on a pole and little else that moves",
         of_motion=True,
     ),
 }

@@ -1,4 +1,4 @@
-"""Frames in time: held or repeated ones, loops, and a motion that stops."""
+"""Frames in time: repeated ones, loops, and a motion that stops."""
 
 from __future__ import annotations
 

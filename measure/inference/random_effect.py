@@ -190,7 +190,7 @@ def _by_cloth(
 
 
 def _principal(means: Floats, covariance: Floats) -> Floats:
-    """Directions that hold most of what the means vary by, in units of the covariance: (shift, column)."""
+    """Directions with most of the variance of the means, in units of the covariance: (shift, column)."""
     factor = np.linalg.cholesky(covariance)
     whitened = np.linalg.solve(factor, (means - means.mean(axis=0)).T)
     left, size, _ = np.linalg.svd(whitened, full_matrices=False)

@@ -1,8 +1,8 @@
-"""The cloth's calibrated parameters as a reader knows them, with intervals that hold what simulators differ by.
+"""The cloth's calibrated parameters in a reader's units, with intervals that include the scatter between simulators.
 
 Nulls of our own code show what noise and discretisation leave open: how well the same simulator would find a parameter
 again. Another code's elements are another model of the same cloth, and its truths are off by more. Both are given, as a
-laboratory gives repeatability and reproducibility (ISO 5725-1): the interval holds both, the standard error of the
+laboratory gives repeatability and reproducibility (ISO 5725-1): the interval includes both, the standard error of the
 logarithm is the former alone.
 """
 

@@ -230,7 +230,7 @@ def root(squared: Floats) -> Estimate:
 
 
 def paired(before: Floats, after: Floats) -> Estimate:
-    """Difference of roots of means, paired by segment: linear in the squares, for which Student's interval holds."""
+    """Difference of roots of means, paired by segment: linear in the squares, for which Student's interval is valid."""
     slope = 1 / (math.sqrt(float(before.mean())) + math.sqrt(float(after.mean())))
     value, reach = slope * float((before - after).mean()), slope * _reach(before - after)
     return Estimate(value=value, low=value - reach, high=value + reach, unit="m", level=CRITERIA.interval)

@@ -163,7 +163,7 @@ def _file(folder: Path, index: int) -> Path:
 
 
 def _content(path: Path) -> Mapping[str, np.ndarray]:
-    """What a file of a bank holds, each of the batch's segments in all its arrays."""
+    """The contents of a file of a bank, each of the batch's segments in all its arrays."""
     rebuild = "delete it and build the bank again"
     try:
         with zipfile.ZipFile(path) as archive:

@@ -6,7 +6,7 @@ frame both leave a known multiple, so their product does. Each pair of orders gi
 noise plus what is left of the motion; the smallest is taken. The same noise is supposed at all markers, so those that
 move least (near the pins) say most: of the markers' variances the lower decile is taken, over that decile of a χ².
 
-Noise that neighbours or frames share (a camera that shakes, a smoothing tracker) is not seen as noise.
+Noise that neighbours or frames share (a camera that shakes, a smoothing tracker) is not counted as noise.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The refinement's section of a report: a fragment of HTML that stands in any page of `flagdata.pages`."""
+"""The refinement's section of a report: a fragment of HTML for any page of `flagdata.pages`."""
 
 from __future__ import annotations
 

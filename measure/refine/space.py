@@ -123,7 +123,7 @@ class Space:
             if weight <= 0 or not inner:
                 raise InputError(
                     f"a part of the prior with the weight {weight:g}" + ("" if inner else " reaches out of the box"),
-                    fix="give positive weights, and as the box a scene whose ranges hold those of all others",
+                    fix="give positive weights, and as the box a scene whose ranges include those of all others",
                 )
         return replace(self, parts=tuple(parts))
 

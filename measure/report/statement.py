@@ -116,16 +116,16 @@ def by_draw(test: NullTest) -> tuple[str, ...]:
     )
     sentence = (
         f"Another draw of nulls could decide otherwise: the interval of p, [{probability(p.low)}, "
-        f"{probability(p.high)}] {level_text(p.level)}, holds the level of {test.level:g}; {more}."
+        f"{probability(p.high)}] {level_text(p.level)}, includes the level of {test.level:g}; {more}."
     )
     return (sentence,)
 
 
 def bounds(ended: Sequence[str]) -> tuple[str, ...]:
-    """Which calibrated parameters are as small or large as the model holds; nothing where none is."""
+    """Which calibrated parameters are at a bound of the model; nothing where none is."""
     if not ended:
         return ()
-    return (f"The fit ends at the bound of what the model holds in {' and '.join(ended)}: its interval says no more.",)
+    return (f"The fit ends at the bound of {' and '.join(ended)}: its interval is not reliable.",)
 
 
 def ratios(experiment: Experiment) -> tuple[str, ...]:
@@ -163,7 +163,7 @@ def proposal(modes: Sequence[Mode], *, whole: bool = True) -> str:
     """What the corrective field looks like: the most significant modes.
 
     Args:
-        whole: whether it stands for all that the base model lacks, or for what a named effect leaves.
+        whole: whether it is all that the base model lacks, or what a named effect leaves.
     """
     largest = sorted(modes, key=lambda mode: -abs(mode.value / mode.error))[:3]
     terms = [f"{_where(mode.column)} ({with_error(mode.value, mode.error)}) m/s²" for mode in largest]
@@ -228,7 +228,7 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
     held = "rigidly" if math.isinf(specimen.stiffness) else f"by springs of {number(specimen.stiffness)} N/m"
     places = "" if specimen.anchors_given else ", tied at their mean observed places"
     between = (
-        "intervals of these hold what simulators of other authors differ by, "
+        "intervals of these include the scatter between simulators of other authors, "
         f"{100 * CRITERIA.density_between:.0f} % in density, a factor of {math.exp(CRITERIA.bending_between):.1f} in "
         f"bending and {number(1e3 * CRITERIA.damping_between, digits=2)} ms in damping, and for the damping a factor "
         f"of {math.exp(CRITERIA.damping_factor):.0f} by which its fit may end elsewhere, each one standard deviation"

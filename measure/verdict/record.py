@@ -34,7 +34,7 @@ class Candidate:
     """An effect that was weighed.
 
     Attributes:
-        effect: its name in the library, or "corrective-field" for the smooth field that stands for what is not in it.
+        effect: its name in the library, or "corrective-field" for the smooth field of forces outside it.
         parameter: of the effect.
         strength: as fitted, with the effect's own unit.
         null: the strength at which the effect is not there.
@@ -152,9 +152,9 @@ class NullTest:
         level: at which it was judged.
         critical: the statistic beyond which the base model is rejected; None where there are too few kinds for any.
         nulls: how they were made, in words: how many, from which parameters, with which numerics.
-        open: whether the interval of p holds the level, so that another draw of nulls could decide otherwise; None in
-            documents without it.
-        settling: kinds of numerics whose interval would not hold it, if the same share of them is as far; None where
+        open: whether the interval of p includes the level, so that another draw of nulls could decide otherwise;
+            None in documents without it.
+        settling: kinds of numerics whose interval would exclude it, if the same share of them is as far; None where
             the test is not open, or 1,000 would not do.
     """
 
@@ -175,7 +175,7 @@ class Parameter:
 
     Attributes:
         name: "density", "bending" or "damping".
-        before, after: of the base model, and with the effect; their intervals hold what simulators differ by.
+        before, after: of the base model, and with the effect; their intervals include the scatter between simulators.
         shift: from one to the other, in standard errors.
         within: standard error of its logarithm by noise and by the discretisations of one simulator alone; None where
             it was not recorded.

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cells:
-    """Where the truth stands among the draws: `low`, `high` (n,) between 0 and 1, low < high."""
+    """The rank of the truth among the draws: `low`, `high` (n,) between 0 and 1, low < high."""
 
     low: Array
     high: Array
@@ -55,7 +55,7 @@ class Cells:
 
 @dataclass(frozen=True, kw_only=True)
 class Coverage:
-    """Share of truths that intervals of a nominal level held."""
+    """Share of truths within intervals of a nominal level."""
 
     level: float
     share: Estimate
@@ -105,7 +105,7 @@ def _draws(predictions: Predictions) -> NDArray[np.float32]:
 
 
 def coverage_values(predictions: Predictions, target: str, level: float, resamples: Resamples) -> Array:
-    """(1 + draws,): share of clips whose central interval of a level holds the truth, in the data and in each draw."""
+    """(1 + draws,): share of clips whose central interval of a level has the truth, in the data and in each draw."""
     return _mean(cells(predictions, target).central(level), resamples)
 
 
@@ -177,7 +177,7 @@ def tarp(
 
 
 def _ball(predictions: Predictions, reference: Array) -> Cells:
-    """Where the truth's distance from the reference (n, t) stands among the draws'."""
+    """The rank of the truth's distance from the reference (n, t) among the draws'."""
     draws = _draws(predictions).astype(np.float64)
     low, high = predictions.truth.min(axis=0), predictions.truth.max(axis=0)
     if not (high > low).all():

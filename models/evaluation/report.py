@@ -252,7 +252,7 @@ def _pictures(found: Evaluation) -> list[Picture]:
                 title="Error against wind",
                 svg=figures.error_against_wind(found.wind_errors),
                 caption="Clips by true wind in bins of 1 m/s; means over runs. Shaded: intervals over sequences, none "
-                "where a bin holds one sequence only.",
+                "where a bin has one sequence only.",
             )
         )
     if found.calibrations:

@@ -1,4 +1,4 @@
-"""One table of all models on the same clips: what each row holds, and how its cells are written."""
+"""One table of all models on the same clips: the contents of each row, and how its cells are written."""
 
 from __future__ import annotations
 

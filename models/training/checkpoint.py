@@ -68,7 +68,7 @@ def check_folder(folder: Path) -> None:
     for path in sorted(folder.rglob("*")):
         if path.relative_to(folder) not in known or path.is_symlink():
             raise ConflictError(
-                "the run folder holds what no training wrote", where=str(path),
+                "the run folder has files that no training wrote", where=str(path),
                 fix="give a new or empty folder by --run",
             )  # fmt: skip
 

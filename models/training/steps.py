@@ -112,7 +112,7 @@ class Training:
 
     @cached_property
     def batches(self) -> Batches:
-        """This process's part of all batches; its state says where the training stands."""
+        """This process's part of all batches; its state is the progress of the training."""
         together = self.recipe.loss.name is Loss.CONTRASTIVE
         return Batches(
             prepared=self.train, size=self.recipe.optimiser.batch, seed=self.recipe.seed, together=together,

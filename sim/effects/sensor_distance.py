@@ -1,4 +1,4 @@
-"""An anemometer that stands upstream or downstream of the flag."""
+"""An anemometer upstream or downstream of the flag."""
 
 from __future__ import annotations
 

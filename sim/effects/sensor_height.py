@@ -1,4 +1,4 @@
-"""An anemometer that stands higher or lower than the flag."""
+"""An anemometer higher or lower than the flag."""
 
 from __future__ import annotations
 

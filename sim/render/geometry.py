@@ -1,4 +1,4 @@
-"""Everything that stands in the world at one instant of every frame, in the arrays a rasteriser reads."""
+"""The world at one instant of every frame, in the arrays a rasteriser reads."""
 
 from __future__ import annotations
 

@@ -26,8 +26,8 @@ class RenderPrior:
         quantities: parameter → fixed value or range, in the parameter's own unit; the others keep their default.
         sources: parameter → where its range is from.
         textures, backgrounds: kinds of which each draw takes one with equal chance, then one of that kind.
-        least_angle: between the heading and the camera's axis, taken as lines [rad]; draws below it are drawn again. A
-            flag's surface is not seen from upwind or downwind.
+        least_angle: between the heading and the camera's axis, taken as lines [rad]; draws below it are drawn again.
+            The camera does not look from upwind or downwind.
 
     Raises:
         InputError: a range outside of what is admissible, camera angles that all break the rule, no kinds.

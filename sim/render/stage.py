@@ -1,4 +1,4 @@
-"""Where everything stands in the world for given meshes and ζ: camera, sun, cloth and pole."""
+"""Places in the world for given meshes and ζ: camera, sun, cloth and pole."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Models of a lake as recipes: a row of kind "model" holds in its parameters what a recipe's TOML holds."""
+"""Models of a lake as recipes: the parameters of a row of kind "model" are those of a recipe's TOML."""
 
 from __future__ import annotations
 

@@ -21,6 +21,8 @@ FORBIDDEN = {
     r"\b(is|are|was|were) doubted\b": "is reported with a warning",
     r"\b(is|are|was|were) said\b": "is reported, is given",
     r"\bwhoever\b": "the user, the caller",
+    r"\bheld against\b": "compared with",
+    r"\bintervals? (of [^.;,]{1,30} )?(that )?(hold|holds|held)\b": "contain, include, cover",
 }
 """Pattern → what a colleague from another laboratory would say."""
 ANY = re.compile("|".join(FORBIDDEN), re.IGNORECASE)

@@ -77,7 +77,7 @@ class Score:
     Attributes:
         method: its name; with " at equal seconds" where it had as long as the project's own.
         wind_error, density_error: absolute [m/s, kg/m²].
-        wind_inside, density_inside: whether the interval holds the truth; None for methods without intervals.
+        wind_inside, density_inside: whether the interval contains the truth; None for methods without intervals.
         evaluations: clips that were simulated.
         seconds: from start to end, with the optimiser's own.
     """

@@ -316,7 +316,7 @@ def _wind(speed: float, rng: np.random.Generator, *, turbulent: bool) -> Floats:
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Of each stressor how many were rejected and refused, what was named, and how often intervals hold."""
+    """Of each stressor how many were rejected and refused, what was named, and how often intervals cover."""
     results: dict[str, Any] = {}
     for name in dict.fromkeys(row["stressor"] for row in rows):
         own = [row for row in rows if row["stressor"] == name]
@@ -345,7 +345,7 @@ def page(found: Mapping[str, Any]) -> str:
     )
     heads = (
         "what is worse", "judged", "refused", "rejected (upper bound of 95 %)", "of them gusts", "named",
-        "p, deciles 1, 5 and 9", "intervals of 90 % that hold", "s",
+        "p, deciles 1, 5 and 9", "intervals of 90 % that cover", "s",
     )  # fmt: skip
     lines = ["# Nulls as a field brings them", "", said, "", _line(heads), _line(["---"] * len(heads))]
     for name, own in found["stressors"].items():

@@ -1,7 +1,7 @@
 """Inertia against wind and gravity: whether frame rate, wind, unit and density are those of one and the same cloth.
 
 Reactions at pins on a line have no moment about it, nor have internal forces at all, so that the cloth's moment of
-momentum changes by what the air and gravity give. All but the wind's speed is seen, or is nominal: the speed at which
+momentum changes by what the air and gravity give. All but the wind's speed is observed or nominal: the speed at which
 the balance holds is the wind that the motion shows. A rate that is twice the true one doubles it, a wind of 3.6 times
 the true one divides it by 3.6 in terms of the wind that is given.
 

@@ -109,7 +109,7 @@ def test_a_posterior_equal_to_the_prior_gives_no_value_and_a_narrow_one_does() -
     assert found(rng.normal(0.13, 0.01, size=(400, 1)), prior, "density", assumed=(0.1, 0.17)).constrained
 
 
-def test_the_interval_holds_its_share_of_the_draws() -> None:
+def test_the_interval_contains_its_share_of_the_draws() -> None:
     draws = np.linspace(0, 1, 1001)[:, None]
     own = found(draws, draws, "wind_speed", assumed=(0.0, 1.0), level=0.8).span
     assert (own.low, own.high) == (pytest.approx(0.1), pytest.approx(0.9))

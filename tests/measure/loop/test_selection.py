@@ -390,7 +390,7 @@ def test_a_level_that_the_kinds_cannot_test_is_not_tested(null: NullModel, refer
     assert (untested.conclusion, untested.named) == (Conclusion.UNTESTED, ())
 
 
-def test_intervals_of_the_calibrated_parameters_hold_those_of_new_kinds() -> None:
+def test_intervals_of_the_calibrated_parameters_contain_those_of_new_kinds() -> None:
     """Of 90 %: by ten banks, 20 experiments each of their own kind, whose numerics move all directions."""
     held = []
     for seed in range(10):

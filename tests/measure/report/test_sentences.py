@@ -87,7 +87,7 @@ def test_the_control_over_all_that_was_left_out_is_summed_up(half: float, compar
     assert sentences.control_summary(verdict(Conclusion.EFFECT)) == ""
 
 
-def test_a_reduction_whose_interval_holds_zero_is_pointed_out() -> None:
+def test_a_reduction_whose_interval_contains_zero_is_pointed_out() -> None:
     whole = verdict(Conclusion.EFFECT)
     weak = replace(whole.comparisons[0], reduction=about(0.0001, 0.0002))
     (warning,) = sentences.reduction_warnings(replace(whole, comparisons=(weak, *whole.comparisons[1:])))

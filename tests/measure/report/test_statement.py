@@ -60,7 +60,7 @@ def test_a_course_that_is_not_turbulence_is_given_in_percent_of_the_wind() -> No
 
 
 @pytest.mark.parametrize(
-    ("damping", "expected"), [(2.5e-3, ""), (60e-3, ""), (5.0, "in damping: its interval says no more")]
+    ("damping", "expected"), [(2.5e-3, ""), (60e-3, ""), (5.0, "bound of damping: its interval is not reliable")]
 )
 def test_a_fit_that_ends_at_a_bound_says_so(damping: float, expected: str) -> None:
     ended = Calibration().moved((0.0, 0.0, float(np.log(damping / 2.5e-3))))
@@ -79,7 +79,7 @@ def test_a_test_that_another_draw_could_decide_otherwise_says_so_and_what_would_
     test = replace(test, p_value=replace(test.p_value, value=0.024, low=0.0, high=0.072))
     (remark,) = by_draw(test)
     assert remark == (
-        "Another draw of nulls could decide otherwise: the interval of p, [0, 0.072] 90 %, holds the level of 0.05; "
+        "Another draw of nulls could decide otherwise: the interval of p, [0, 0.072] 90 %, includes the level of 0.05; "
         "59 kinds of numerics would settle it, if the same share of them is as far."
     )
     assert "more than 1000 kinds" in by_draw(replace(test, settling=None))[0]
@@ -109,7 +109,7 @@ def test_an_outcome_without_an_answer_is_stated_with_its_line_its_course_and_its
 ) -> None:
     said = stated(outcome)
     assert said.words.startswith(sentence(outcome.verdict))
-    assert "bound of what the model holds in damping" in said.words
+    assert "at the bound of damping" in said.words
     assert said.proposal.index("as vortices") < said.proposal.index("a wind that varies") < said.proposal.index("force")
     assert "that fits the errors best" in said.proposal
     assert said.assumptions[-1].endswith("was moved: first by 0.50 s")

@@ -1,4 +1,4 @@
-"""Frequency, amplitude and speed of drawn waves, and whether the intervals hold what they claim."""
+"""Frequency, amplitude and speed of drawn waves, and whether the intervals have their nominal coverage."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_a_wave_towards_the_clamp_has_a_negative_speed() -> None:
     assert waves(TIME, X, travelling(12.0, -3.0)).speed.value == pytest.approx(-3.0, rel=0.02)
 
 
-def test_the_interval_of_the_frequency_holds_it_as_often_as_it_says() -> None:
+def test_the_interval_of_the_frequency_covers_it_as_often_as_it_says() -> None:
     # The phase does a random walk, as a real flutter's does: each cycle lasts 3 % longer or shorter than the mean.
     draws, held = 60, 0
     x = X[::5]

@@ -58,7 +58,7 @@ def page(found: HeldCloth) -> str:
         f"{', '.join(at_bounds(last)) or 'none'}."
     )
     lines = [
-        "# A cloth held by a robot", "", split, "",
+        "# A cloth carried by a robot", "", split, "",
         "| model | fitted programmes | held-out programmes |", "|---|---|---|",
         *(
             f"| {name} | {_mm(found.of_fitted[name])} | {_mm(found.of_held_out[name])} |"

@@ -22,7 +22,7 @@ _SILENT = 10
 _LEAST = 10 * NANOSECONDS
 """Distance of marks [ns] below which lines come as a stream."""
 _MARKS, _SHARE = 3, 0.9
-"""Marks from which bursts are recognised, and the share of their intervals that hold each kind of wind once at most."""
+"""Marks from which bursts are recognised, and the share of times between them with each wind once at most."""
 _ORDER = 1_000_000
 """What gives the order of the winds of one burst [ns]: they have one mark."""
 
