@@ -103,7 +103,7 @@ def test_the_section_shows_the_answer_the_steps_and_both_in_motion(whole: Refine
 
 
 def test_a_budget_too_small_for_an_interval_is_refused() -> None:
-    with pytest.raises(InputError, match="no interval"):
+    with pytest.raises(InputError, match="too few for an interval"):
         Settings(budget=19)
     with pytest.raises(InputError, match="noise floor"):
         Settings(replicates=1)
@@ -114,7 +114,7 @@ def test_a_model_without_the_targets_is_refused(recipe: Recipe, estimator: Estim
         targets = ()
 
     blind = Blind(**{name: getattr(estimator, name) for name in estimator.__dataclass_fields__})
-    with pytest.raises(InputError, match="starts from wind_speed"):
+    with pytest.raises(InputError, match="a refinement needs wind_speed"):
         refine(target, blind, recipe, settings=SETTINGS)
 
 
