@@ -73,7 +73,7 @@ def test_a_commands_own_file_is_replaced_and_any_other_is_left_alone(name: str, 
         assert whole(tmp_path) == {name: changed}
 
 
-def test_sealed_files_say_what_they_said_before(tmp_path: Path) -> None:
+def test_a_seal_leaves_the_content_of_a_file_as_it_was(tmp_path: Path) -> None:
     for name, content in CONTENTS.items():
         write_file(tmp_path / name, content, command="measure")
     assert json.loads((tmp_path / "verdict.json").read_text())["a"] == 1

@@ -47,7 +47,7 @@ def forbidden(lake: Lake, put_text: Callable[..., Artifact]) -> Path:
 
 
 def as_nobody(commands: Sequence[list[str]]) -> dict[str, tuple[int, str]]:
-    """Command → its exit code and all it said."""
+    """Command → its exit code and all it printed."""
     code = _AS_NOBODY.format(nobody=NOBODY)
     ended = subprocess.run(
         [sys.executable, "-c", code, json.dumps(commands)], capture_output=True, text=True, timeout=120, check=True

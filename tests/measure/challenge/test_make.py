@@ -66,7 +66,7 @@ def test_data_that_were_changed_are_refused(tiny: ChallengeFolder) -> None:
         tiny.experiment("set-002")
 
 
-def test_a_set_says_nothing_of_what_acts_in_it(tiny: ChallengeFolder) -> None:
+def test_a_set_does_not_state_what_acts_in_it(tiny: ChallengeFolder) -> None:
     """No word of the keys, the same files, sizes by frame rate alone, one time of change."""
     public = "".join((tiny.data(name) / "set.json").read_text() for name in tiny.names()) + tiny.public.read_text()
     for word in ("lift", "shear", "tether", "null", "pair", "outside", "only", "seed", "damping", "impact"):

@@ -236,7 +236,7 @@ def test_a_part_in_which_nothing_moves_is_no_part_of_the_answer_even_anyway(mode
     np.testing.assert_array_equal(found.clip, images[2 * FRAMES : 3 * FRAMES])
 
 
-def test_what_was_refused_says_nothing_unless_asked_to(model: Estimator) -> None:
+def test_a_refused_film_gives_no_estimate_unless_asked_for(model: Estimator) -> None:
     film = even(4 * FRAMES)
     found = measure(film, model, gate=Listed(0.001, 0.002, 0.003, 0.01), dependence=APART, options=Options(size=WHOLE))
     assert found.verdict.refused

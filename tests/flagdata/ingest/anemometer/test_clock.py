@@ -1,4 +1,4 @@
-"""A logger's clock that is set anew: every row is kept, on one clock, and the doubt is named."""
+"""A logger's clock that is set anew: every row is kept, on one clock, and the step is reported."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_a_clock_set_back_by_a_second_shows_through_unsteady_stamps(made: Made) 
 
 
 @pytest.mark.parametrize(("choice", "shift"), CHOICES)
-def test_an_interval_of_whole_hours_is_a_doubt_that_changes_nothing_without_a_word_of_the_user(
+def test_an_interval_of_whole_hours_is_reported_and_changes_nothing_unless_the_user_says_so(
     choice: ClockChoice, shift: int, made: Made
 ) -> None:
     log = made(jumped(9000, 4000, 3600))

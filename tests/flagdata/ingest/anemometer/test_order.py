@@ -195,7 +195,7 @@ def test_rows_out_of_order_are_asked_about_and_sorted_where_the_user_says_so(nam
     assert finding.count == N - len(longest_rise(order))
 
 
-def test_rows_that_come_unevenly_may_be_out_of_order_and_the_doubt_says_how_to_sort_them(made: Made) -> None:
+def test_rows_that_come_unevenly_may_be_out_of_order_and_the_message_says_how_to_sort_them(made: Made) -> None:
     plain = made(UNSTEADY)
     moved = np.r_[0:100, 140:200, 100:140, 200:N]
     try:
