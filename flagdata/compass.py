@@ -130,7 +130,7 @@ STILL = frozenset(
         "静穏", "静风", "靜風", "無風", "无风", "静稳",
     }
 )  # fmt: skip
-"""Words for calm air, which stand for a speed of 0 and for no direction."""
+"""Words for calm air: a speed of 0 and no direction."""
 CALM = STILL | {
     "none", "variable", "vrb", "var", "cvr", "cv", "cal", "umlaufend", "variabel", "風向不定", "风向不定", "不定",
     "переменное направление", "ветер переменного направления", "variable wind direction",

@@ -63,12 +63,12 @@ def off_centre(clip: ClipStatistics) -> float:
 
 
 def width(clip: ClipStatistics) -> float:
-    """Width that holds 90 % of the motion, in sides of the picture."""
+    """Width with 90 % of the motion, in sides of the picture."""
     return _extent(np.sqrt(clip.excess).sum(axis=0))
 
 
 def height(clip: ClipStatistics) -> float:
-    """Height that holds 90 % of the motion, in sides of the picture."""
+    """Height with 90 % of the motion, in sides of the picture."""
     return _extent(np.sqrt(clip.excess).sum(axis=1))
 
 

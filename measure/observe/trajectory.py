@@ -33,7 +33,7 @@ class WindTrack:
 
     Attributes:
         times: (n,) since the recording's first frame [s], increasing.
-        velocity: (n, 3) where the air goes to [m/s]. One sample stands for a constant wind.
+        velocity: (n, 3) where the air goes to [m/s]. One sample means a constant wind.
         gain: standard deviation of the share by which the wind is stronger than logged.
         direction: the same of the angle by which it is turned about the vertical [rad].
         clock: the same of the time by which the log lags behind the recording [s].

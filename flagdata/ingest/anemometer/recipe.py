@@ -342,7 +342,7 @@ def _opened(data: Mapping[str, Any], *, where: str) -> OpenRecipe:
 
 
 def _without_facts(table: Mapping[str, Any]) -> dict[str, Any]:
-    """The keys whose texts stand for nothing that is in the file; a name counts as it is."""
+    """The keys whose texts occur nowhere in the file; a name counts as it is."""
     return {
         key: value for key, value in table.items() if key == "name" or not (isinstance(value, str) and "{" in value)
     }

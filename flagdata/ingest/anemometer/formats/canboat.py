@@ -231,7 +231,7 @@ class _Network:
 
 
 def _word(data: bytes, at: int, scale: float) -> float:
-    """An unsigned 16-bit field; NaN for the three numbers that stand for no value."""
+    """An unsigned 16-bit field; NaN for the three numbers that mean no value."""
     number = int.from_bytes(data[at : at + 2], "little")
     return number * scale if number < 0xFFFD else math.nan
 

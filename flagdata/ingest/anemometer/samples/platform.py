@@ -129,7 +129,7 @@ def settle(
     text = f"wind relative to {known}: no ground truth"
     text += "; what the file calls wind speed is kept as apparent_wind_speed" if "wind_speed" in names else ""
     text += ", its direction as one from the bow" if "wind_direction" in names else ""
-    fix = None if given else "if the log's wind is over ground all the same, say so: --platform corrected"
+    fix = None if given else "if the log's wind is over ground all the same, give --platform corrected"
     return _renamed(reading, names, "apparent-wind-only", text, value=shown.speed if shown else None, fix=fix)
 
 
@@ -161,5 +161,5 @@ def _of_unknown(reading: Reading) -> Reading:
     fix = "if the sensor is on a mast, give --platform fixed"
     if "theoretical_wind_speed" in has:
         text = "wind that is computed as if its platform did not move (true wind, TWS)"
-        fix = "if it is wind over ground, computed with the platform's speed and heading, say so: --platform corrected"
+        fix = "if it is wind over ground, computed with the platform's speed and heading, give --platform corrected"
     return _renamed(reading, {}, "apparent-wind-only", f"{text}: no ground truth", fix=fix)

@@ -63,7 +63,7 @@ def numbers(
         decimal: "." or ","; with "," a cell holding a point is unreadable, never a thousand times off.
         missing: spellings of "no value" beside `MISSING`, lower-case; numeric ones are compared by value.
         suffix: what stands behind each number, such as its unit; a number without it is unreadable.
-        zeros: words that stand for 0, lower-case; those of `missing` go before them.
+        zeros: words that mean 0, lower-case; those of `missing` go before them.
         below: whether "<0.3" is a value below the instrument's threshold, 0 within 0.3; else it is unreadable.
     """
     text = pc.utf8_trim_whitespace(cells if isinstance(cells, pa.StringArray) else pa.array(cells, pa.string()))
