@@ -11,13 +11,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.errors import UsageError
+from flagdata.errors import FlagdataError, InputError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
 from measure.estimate.answer import Quantity, quantities, sentence
 from measure.estimate.combine import OWN, Dependence, combined
 from measure.estimate.film import Film
 from measure.estimate.gate import Gate, Reason, Verdict, verdict
+from measure.estimate.repeats import Distinct
 from measure.estimate.similarity import POWERS, TRAINED, FlagSize, Sizes, scaled_back, sizes, spacing
 from measure.estimate.windows import Layout, Window, cut, findings_of, lay_out
 from models.estimator import Estimator
@@ -229,8 +230,8 @@ def measure(
         advance: called after each window with how many there are and 1.
 
     Raises:
-        UsageError: a model without distributions, or a part that the film does not have.
-        InputError: a film that is too short or too slow, or of which no window is whole.
+        UsageError: a model without distributions, a part that the film does not have, or gaps in every window.
+        InputError: a film that is too short or too slow, or whose frames repeat too often.
     """
     if model.learners[0].objective is not Loss.POSTERIOR:
         raise UsageError(
@@ -248,21 +249,19 @@ def measure(
     )  # fmt: skip
     seen: list[_Seen] = []
     clips: NDArray[np.uint8] | None = None  # of the first window, or of the first with something to measure
-    worst, repeats = 0.0, 0
-    margin = layout.tolerance
-    for window in cut(film.frames(layout.first - margin, layout.last + margin), layout):
+    interpolated = 0
+    margin = 2 * layout.period
+    distinct = Distinct(film.frames(layout.first - margin, layout.last + margin))
+    for window in cut(distinct, layout):
         one = _look(window, model, gate, seed=options.seed, known=known)
         if clips is None or (all(before.blank for before in seen) and not one.blank):
             clips = window.clips
         seen.append(one)
-        worst, repeats = max(worst, window.worst), repeats + window.repeats
+        interpolated += window.interpolated
         if advance is not None:
             advance(layout.count, 1)
     if clips is None:
-        raise UsageError(
-            f"none of {layout.count} windows has all its frames", where=film.name,
-            fix="the film's stamps have gaps: choose another part by --start and --end",
-        )  # fmt: skip
+        raise _without_windows(film, layout, distinct)
     judged = verdict([one.reasons for one in seen], false_alarm=options.false_alarm, level=gate.level)
     kept = considered.only(judged.sizes)
     answer = _Answer(model=model, sizes=kept, options=options)
@@ -270,7 +269,9 @@ def measure(
     used = _used(whole, judged, layout)
     draws, places = answer.joint([whole[k] for k in used], dependence)
     middle = seen[int(np.argsort(judged.window_p, kind="stable")[len(seen) // 2])]
-    found = findings_of(layout, found=len(seen), worst=worst, repeats=repeats, rate=film.rate)
+    found = findings_of(
+        layout, found=len(seen), interpolated=interpolated, frames=distinct.frames, repeated=distinct.repeated
+    )
     windows = tuple(
         answer.window(one, layout, p)
         for one, p, blank in zip(whole, judged.window_p, judged.blank, strict=True)
@@ -303,6 +304,20 @@ def _look(window: Window, model: Estimator, gate: Gate, *, seed: int, known: Kno
     )
 
 
+def _without_windows(film: Film, layout: Layout, distinct: Distinct) -> FlagdataError:
+    """Why no window of a film is whole."""
+    if distinct.repeated:
+        return InputError(
+            f"{distinct.share:.0%} of {distinct.frames} frames repeat the one before, so that the camera took "
+            f"{(1 - distinct.share) * film.rate:.3g} pictures a second; none of {layout.count} windows has enough",
+            where=film.name, fix="film with light enough for at least 25 pictures a second",
+        )  # fmt: skip
+    return UsageError(
+        f"none of {layout.count} windows has all its frames", where=film.name,
+        fix="the film's stamps have gaps: choose another part by --start and --end",
+    )  # fmt: skip
+
+
 def _used(seen: Sequence[_Seen], judged: Verdict, layout: Layout) -> list[int]:
     """Windows that the answer rests on: none that overlap, none without anything to measure where others have it; of a
     familiar recording none that are strange."""
@@ -312,7 +327,7 @@ def _used(seen: Sequence[_Seen], judged: Verdict, layout: Layout) -> list[int]:
         left_out |= judged.strange
     chosen: list[int] = []
     for k in np.flatnonzero(~left_out).tolist():
-        if not chosen or seen[k].start - seen[chosen[-1]].start >= apart - layout.tolerance:
+        if not chosen or seen[k].start - seen[chosen[-1]].start >= apart - layout.period:
             chosen.append(k)
     return chosen
 

@@ -1,8 +1,8 @@
 """A film cut into windows of the network's length, once for each size of flag that is considered.
 
-The frame of an instant is the nearest in time, which at an even rate is at most half a native period away: a frame
-stays one exposure, and what the camera did not see is not made up. Uneven stamps may lie half of that further away; a
-frame that is missing leaves its window out.
+A window starts on a frame. Where no frame is near an instant of the network, its picture is interpolated between the
+two frames about it (`measure.estimate.instants`); frames that repeat the one before are left out first. A window in
+which frames are missing is left out.
 """
 
 from __future__ import annotations
@@ -16,9 +16,22 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
+from measure.estimate.instants import Interpolator
+from measure.estimate.repeats import TimedFrame
 
-_REACH = 0.75
-"""Share of a native period: half, and half of that for uneven stamps. A missing frame is a whole period away."""
+_NEAR = 0.25
+"""Share of the time between two frames within which an instant is shown by the nearer one. A nearest frame makes the
+motion uneven, an interpolated one smooths it, and the wind that the network reads moves down with the one and up with
+the other; at this share films of 25, 30 and 60 frames a second agree (decision 035)."""
+_NEAR_OF_SLOW = 0.4
+"""The same of a film slower than the network's frames, between which more of the motion is lost."""
+_BEYOND = 0.05
+"""The same beyond the film's last frame: stamps are rounded to milliseconds."""
+_FEWEST = 0.8
+"""Share of the network's frames that a window must have of its own, so that most of its pictures were taken."""
+_LONGEST = 1.75
+"""Longest time between two frames that is interpolated, in periods of the film or of the network's frames at the
+largest size considered, whichever is longer: a repeated frame at 30 Hz, but none that is missing at 25 Hz."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,14 +42,14 @@ class Layout:
         frames: of a window.
         spacings: (i,) time between their frames, one for each size of flag [s].
         step: from one window's start to the next [s].
-        tolerance: how far a frame may be from its instant [s].
+        period: of the film [s].
         first, last: the part of the film that is used [s from its first frame].
     """
 
     frames: int
     spacings: tuple[float, ...]
     step: float
-    tolerance: float
+    period: float
     first: float
     last: float
 
@@ -48,7 +61,7 @@ class Layout:
     @property
     def count(self) -> int:
         """How many windows there are."""
-        return int(np.floor((self.last - self.first - self.length + self.tolerance) / self.step + 1e-9)) + 1
+        return int(np.floor((self.last - self.first - self.length + 0.5 * self.period) / self.step + 1e-9)) + 1
 
     def start(self, index: int) -> float:
         """Start of window `index` [s from the film's first frame]."""
@@ -63,15 +76,13 @@ class Window:
         index: its number.
         start: of its first frame [s from the film's first].
         clips: (i, frames, height, width) gray, one for each size of flag.
-        worst: farthest frame from its instant [s].
-        repeats: frames that show the same source frame as the one before, of all clips.
+        interpolated: pictures between two frames, of all clips.
     """
 
     index: int
     start: float
     clips: NDArray[np.uint8]
-    worst: float
-    repeats: int
+    interpolated: int
 
 
 def lay_out(
@@ -100,7 +111,7 @@ def lay_out(
         raise UsageError(f"a window every {step:g} s", where="--windows", fix="give a time above 0, as in 1.2s")
     longest = frames * max(spacings)
     layout = Layout(
-        frames=frames, spacings=spacings, step=step if step is not None else longest, tolerance=_REACH / rate,
+        frames=frames, spacings=spacings, step=step if step is not None else longest, period=1 / rate,
         first=begin, last=min(end, duration),
     )  # fmt: skip
     if layout.count < 1:
@@ -111,69 +122,83 @@ def lay_out(
     return layout
 
 
-def cut(frames: Iterable[tuple[float, NDArray[np.uint8]]], layout: Layout) -> Iterator[Window]:
-    """The windows of a film, in order; one that lacks a frame within the tolerance is left out.
+def cut(frames: Iterable[TimedFrame], layout: Layout) -> Iterator[Window]:
+    """The windows of a film, in order; one in which frames are missing is left out.
 
     Args:
         frames: (time from the film's first frame [s], picture), in order; at most a window of them is held.
     """
-    held: deque[tuple[float, NDArray[np.uint8]]] = deque()
-    source = iter(frames)
+    held: deque[TimedFrame] = deque()
+    source, interpolator = iter(frames), Interpolator()
+    margin = 2 * layout.period
     ended = False
     for index in range(layout.count):
         start = layout.start(index)
-        while held and held[0][0] < start - layout.tolerance:
+        while len(held) > 1 and held[1][0] < start - margin:
             held.popleft()
-        while not ended and (not held or held[-1][0] < start + layout.length + layout.tolerance):
+        while not ended and (not held or held[-1][0] < start + layout.length + margin):
             following = next(source, None)
             if following is None:
                 ended = True
-            elif following[0] >= start - layout.tolerance:
+            else:
                 held.append(following)
-        window = _window(held, layout, index)
+        window = _window(held, layout, index, interpolator)
         if window is not None:
             yield window
 
 
-def _window(held: deque[tuple[float, NDArray[np.uint8]]], layout: Layout, index: int) -> Window | None:
-    if not held:
+def _window(
+    held: deque[TimedFrame], layout: Layout, index: int, interpolator: Interpolator
+) -> Window | None:  # fmt: skip
+    if len(held) < 2:
         return None
     times = np.array([time for time, _ in held])
-    start = layout.start(index)
-    chosen = []
-    worst, repeats = 0.0, 0
+    start = float(times[np.abs(times - layout.start(index)).argmin()])
+    if abs(start - layout.start(index)) > _LONGEST * layout.period:
+        return None
+    clips, interpolated = [], 0
     for spacing in layout.spacings:
         instants = start + spacing * np.arange(layout.frames)
-        after = np.searchsorted(times, instants).clip(1, max(len(times) - 1, 1))
-        before = after - 1
-        after = np.minimum(after, len(times) - 1)
-        nearest = np.where(instants - times[before] <= times[after] - instants, before, after)
-        away = float(np.abs(times[nearest] - instants).max())
-        if away > layout.tolerance:
+        before = np.searchsorted(times, instants, side="right").clip(1, len(times) - 1) - 1
+        gaps = times[before + 1] - times[before]
+        place = (instants - times[before]) / gaps
+        if place.max() > 1 + _BEYOND or gaps.max() > _LONGEST * max(*layout.spacings, layout.period):
             return None
-        worst = max(worst, away)
-        repeats += int(np.count_nonzero(np.diff(nearest) == 0))
-        chosen.append(nearest)
-    clips = np.stack([np.stack([held[int(place)][1] for place in places]) for places in chosen])
-    return Window(index=index, start=start, clips=clips, worst=worst, repeats=repeats)
+        within = np.count_nonzero((times >= start - 1e-6) & (times < instants[-1]))
+        if within < _FEWEST * (layout.frames - 1):
+            return None
+        near = _NEAR if layout.period <= spacing else _NEAR_OF_SLOW
+        clip = []
+        for k, instant, at in zip(before.tolist(), instants.tolist(), place.tolist(), strict=True):
+            nearest = min(round(at), 1)
+            if abs(at - nearest) <= near:
+                clip.append(held[k + nearest][1])
+            else:
+                clip.append(interpolator.between(held[k], held[k + 1], instant))
+                interpolated += 1
+        clips.append(np.stack(clip))
+    return Window(index=index, start=start, clips=np.stack(clips), interpolated=interpolated)
 
 
-def findings_of(layout: Layout, *, found: int, worst: float, repeats: int, rate: float) -> tuple[Finding, ...]:
-    """What the cutting left out or had to show twice.
+def findings_of(
+    layout: Layout, *, found: int, interpolated: int, frames: int, repeated: int
+) -> tuple[Finding, ...]:  # fmt: skip
+    """What the cutting left out or made between frames.
 
     Args:
         found: windows that were whole.
-        worst: farthest frame from its instant [s].
-        repeats: frames that were shown twice, of all windows and sizes.
-        rate: of the film [Hz].
+        interpolated: pictures between two frames, of all windows and sizes.
+        frames: of the film that were read.
+        repeated: of these, that repeat the one before.
     """
+    shown = found * layout.frames * len(layout.spacings)
     notes = [
         Finding(
-            kind="resampled", severity=Severity.NOTE, value=worst,
+            kind="resampled", severity=Severity.NOTE, value=interpolated / max(shown, 1), count=interpolated,
             what=f"windows of {layout.frames} frames, "
             + " or ".join(f"{spacing * 1e3:.1f}" for spacing in layout.spacings)
-            + f" ms apart, out of a film of {rate:.4g} frames a second; a frame is at most {worst * 1e3:.1f} ms from "
-            "its instant",
+            + f" ms apart, out of a film of {1 / layout.period:.4g} frames a second; {interpolated} of {shown} lie "
+            "between two frames and were interpolated by the motion of the picture",
         )
     ]  # fmt: skip
     if found < layout.count:
@@ -183,12 +208,12 @@ def findings_of(layout: Layout, *, found: int, worst: float, repeats: int, rate:
                 what=f"{layout.count - found} of {layout.count} windows lack frames and were left out",
             )
         )  # fmt: skip
-    if repeats:
+    if repeated:
         notes.append(
             Finding(
-                kind="frames-repeated", severity=Severity.NOTE, count=repeats,
-                what=f"{repeats} frames of the windows show the same picture as the one before: the film is a little "
-                "slower than the network's frames",
+                kind="frames-repeated", severity=Severity.WARNING, count=repeated, value=repeated / frames,
+                what=f"{repeated} of {frames} frames ({repeated / frames:.0%}) repeat the one before and were left "
+                f"out: the camera took {(1 - repeated / frames) / layout.period:.3g} pictures a second",
             )
         )  # fmt: skip
     return tuple(notes)

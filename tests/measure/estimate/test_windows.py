@@ -7,12 +7,14 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
+from measure.estimate.instants import Interpolator
+from measure.estimate.repeats import Distinct
 from measure.estimate.windows import cut, findings_of, lay_out
 
 
 def numbered(times: NDArray[np.float64]) -> list[tuple[float, NDArray[np.uint8]]]:
     """Frames whose gray is their number."""
-    return [(float(time), np.full((2, 2), k, dtype=np.uint8)) for k, time in enumerate(times)]
+    return [(float(time), np.full((16, 16), k, dtype=np.uint8)) for k, time in enumerate(times)]
 
 
 def shown(window: NDArray[np.uint8]) -> list[int]:
@@ -32,12 +34,68 @@ def test_each_size_of_flag_has_its_own_spacing_from_the_same_start() -> None:
     assert shown(first.clips[1]) == [0, 4, 8, 12, 16]
 
 
-def test_a_frame_is_the_nearest_in_time() -> None:
-    layout = lay_out(frames=4, spacings=(0.05,), rate=30.0, duration=1.0, step=None)
-    first = next(cut(numbered(np.arange(31) / 30), layout))
-    expected = [int(np.argmin(np.abs(np.arange(31) / 30 - instant))) for instant in 0.05 * np.arange(4)]
-    assert shown(first.clips[0]) == expected
-    assert first.worst <= 0.5 / 30 + 1e-12
+def test_a_frame_near_an_instant_shows_it_and_elsewhere_the_picture_is_interpolated() -> None:
+    """At 30 Hz every fifth instant of 25 Hz is a frame, those beside it are 6.7 ms from one, the others 13.3 ms."""
+    layout = lay_out(frames=6, spacings=(0.04,), rate=30.0, duration=1.0, step=None)
+    ramp = [(k / 30, np.full((32, 32), 5 * k, dtype=np.uint8)) for k in range(31)]
+    first = next(cut(ramp, layout))
+    assert shown(first.clips[0]) == [0, 5, 12, 18, 25, 30]  # instants are frames 0, 1.2, 2.4, 3.6, 4.8 and 6
+    assert first.interpolated == 2
+
+
+def test_a_moving_edge_is_interpolated_where_it_is_and_not_blended() -> None:
+    """A bright square that moves by 8 px from frame to frame is 4 px further half way, as bright as it is."""
+    pictures = np.full((2, 64, 64), 40, dtype=np.uint8)
+    rows, columns = np.mgrid[0:24, 0:24]
+    cloth = (120 + 60 * np.sin(rows / 3) * np.cos(columns / 4)).astype(np.uint8)
+    pictures[0, 20:44, 16:40] = pictures[1, 20:44, 24:48] = cloth
+    half = Interpolator().between((0.0, pictures[0]), (1.0, pictures[1]), 0.5)
+    assert np.abs(half[22:42, 22:42].astype(int) - cloth[2:22, 2:22]).mean() < 6
+    blended = pictures.mean(axis=0)
+    assert np.abs(blended[22:42, 22:42] - cloth[2:22, 2:22]).mean() > 12
+
+
+def test_of_a_film_slower_than_the_network_only_the_middle_fifth_between_frames_is_interpolated() -> None:
+    layout = lay_out(frames=26, spacings=(0.04,), rate=24.0, duration=1.1, step=None)
+    window = next(cut(numbered(np.arange(28) / 24), layout))
+    places = 0.04 * 24 * np.arange(26)  # in frames of the film
+    between = np.abs(places % 1 - 0.5) < 0.099
+    assert window.interpolated == np.count_nonzero(between) > 0
+    own = np.array(shown(window.clips[0]))
+    assert own[~between].tolist() == np.round(places[~between]).astype(int).tolist()
+
+
+def test_frames_that_repeat_the_one_before_are_left_out_and_counted() -> None:
+    """A camera of 15 pictures a second in a file of 60: three of four frames repeat, but for noise of the coding."""
+    rng = np.random.default_rng(5)
+    own = rng.uniform(0, 255, (10, 16, 16))
+    film = [(k / 60, (own[k // 4] + rng.uniform(-0.5, 0.5, (16, 16))).clip(0, 255).astype(np.uint8)) for k in range(40)]
+    distinct = Distinct(film)
+    kept = [time for time, _ in distinct]
+    ends = [1, 2, 3, 37, 38, 39]  # there the picture changes on one side only
+    assert kept == sorted(k / 60 for k in [*range(0, 40, 4), *ends])
+    assert (distinct.frames, distinct.repeated) == (40, 24)
+
+
+def test_a_still_film_and_ones_that_start_or_come_to_rest_have_no_repeated_frames() -> None:
+    rng = np.random.default_rng(6)
+    texture = rng.uniform(0, 255, (16, 16))
+    still = [(k / 25, texture.astype(np.uint8)) for k in range(20)]
+    slowing = [(k / 25, np.roll(texture, 1, 0) * np.exp(-k / 8) + 100) for k in range(40)]
+    starting = [(time + 1.0, texture.astype(np.uint8)) for time, _ in still]
+    starting += [(2.0 + k / 25, np.roll(texture, k + 1, 0).astype(np.uint8)) for k in range(20)]
+    for film in (still, starting, [(time, picture.astype(np.uint8)) for time, picture in slowing]):
+        distinct = Distinct(film)
+        assert len(list(distinct)) == distinct.frames
+        assert distinct.repeated == 0
+
+
+def test_a_window_of_too_few_pictures_is_left_out() -> None:
+    """15 pictures a second lie no further apart than some that are interpolated, but most would be made."""
+    layout = lay_out(frames=20, spacings=(0.04,), rate=60.0, duration=2.0, step=None)
+    assert not list(cut(numbered(np.arange(31) / 15), layout))
+    gap = np.delete(np.arange(61) / 30, [20])  # one frame of 30 Hz is missing
+    assert len(list(cut(numbered(gap), lay_out(frames=20, spacings=(0.04,), rate=30.0, duration=2.0, step=None)))) == 2
 
 
 def test_uneven_stamps_are_no_gap_and_a_missing_frame_is() -> None:
@@ -47,14 +105,8 @@ def test_uneven_stamps_are_no_gap_and_a_missing_frame_is() -> None:
     assert len(list(cut(numbered(uneven), layout))) == layout.count == 4
     windows = list(cut(numbered(np.delete(times, 14)), layout))
     assert [window.index for window in windows] == [0, 2, 3]
-    findings = findings_of(layout, found=3, worst=0.0, repeats=0, rate=25.0)
+    findings = findings_of(layout, found=3, interpolated=0, frames=40, repeated=0)
     assert {finding.kind: finding.count for finding in findings}["windows-left-out"] == 1
-
-
-def test_frames_that_are_shown_twice_are_counted() -> None:
-    layout = lay_out(frames=26, spacings=(0.04,), rate=24.0, duration=1.1, step=None)
-    window = next(cut(numbered(np.arange(28) / 24), layout))
-    assert window.repeats == 1
 
 
 def test_a_part_of_the_film_begins_and_ends_as_given() -> None:

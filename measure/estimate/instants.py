@@ -1,0 +1,69 @@
+"""Pictures at instants between the frames of a film, by motion-compensated interpolation.
+
+Between frames A at 0 and B at 1 the optical flows F (A to B) and G (B to A) are found by dense inverse search (Kroeger
+et al., Fast Optical Flow using Dense Inverse Search, ECCV 2016). The flows from the instant t back to both frames
+follow from motion along straight lines (Jiang et al., Super SloMo, CVPR 2018, equation 4),
+
+    F_{t→0} = −(1 − t) t F + t² G,        F_{t→1} = (1 − t)² F − t (1 − t) G,
+
+and the picture is (1 − t) A(x + F_{t→0}) + t B(x + F_{t→1}). Where nothing moves this is the mean of both frames.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+_FLOWS = 8
+"""Pairs of frames whose flows are kept: windows at several sizes of flag meet the same pairs again."""
+
+
+class Interpolator:
+    """Pictures between frames of one film. Flows of the last pairs are kept."""
+
+    def __init__(self) -> None:
+        cv2.setNumThreads(
+            1
+        )  # the search divides the picture among threads, and its result depends on how many there are
+        self._search = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
+        self._flows: dict[tuple[float, float], tuple[NDArray[np.float32], NDArray[np.float32]]] = {}
+
+    def between(
+        self, first: tuple[float, NDArray[np.uint8]], second: tuple[float, NDArray[np.uint8]], instant: float
+    ) -> NDArray[np.uint8]:
+        """(height, width) gray at an instant from the first frame's to the second's.
+
+        Args:
+            first, second: (time [s], (height, width) gray) of frames that follow each other.
+            instant: [s].
+        """
+        (begin, a), (end, b) = first, second
+        t = (instant - begin) / (end - begin)
+        forward, backward = self._flow(first, second)
+        rows, columns = np.indices(a.shape, dtype=np.float32)
+        to_first = t * t * backward - (1 - t) * t * forward
+        to_second = (1 - t) ** 2 * forward - t * (1 - t) * backward
+        from_first, from_second = (
+            cv2.remap(
+                picture, columns + flow[..., 0], rows + flow[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+            )
+            for picture, flow in ((a, to_first), (b, to_second))
+        )  # fmt: skip
+        return cv2.addWeighted(from_first, 1 - t, from_second, t, 0.0).astype(np.uint8)
+
+    def _flow(
+        self, first: tuple[float, NDArray[np.uint8]], second: tuple[float, NDArray[np.uint8]]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """(height, width, 2) flows from the first frame to the second and back [px, x then y]."""
+        key = (first[0], second[0])
+        if key not in self._flows:
+            while len(self._flows) >= _FLOWS:
+                self._flows.pop(next(iter(self._flows)))
+            there, back = ((first[1], second[1]), (second[1], first[1]))
+            self._flows[key] = (self._calculated(*there), self._calculated(*back))
+        return self._flows[key]
+
+    def _calculated(self, a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.float32]:
+        start = np.zeros((*a.shape, 2), dtype=np.float32)
+        return np.asarray(self._search.calc(np.ascontiguousarray(a), np.ascontiguousarray(b), start), np.float32)
