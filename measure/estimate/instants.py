@@ -23,9 +23,8 @@ class Interpolator:
     """Pictures between frames of one film. Flows of the last pairs are kept."""
 
     def __init__(self) -> None:
-        cv2.setNumThreads(
-            1
-        )  # the search divides the picture among threads, and its result depends on how many there are
+        # The search divides the picture among threads, and its result depends on how many there are.
+        cv2.setNumThreads(1)
         self._search = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
         self._flows: dict[tuple[float, float], tuple[NDArray[np.float32], NDArray[np.float32]]] = {}
 
@@ -60,8 +59,7 @@ class Interpolator:
         if key not in self._flows:
             while len(self._flows) >= _FLOWS:
                 self._flows.pop(next(iter(self._flows)))
-            there, back = ((first[1], second[1]), (second[1], first[1]))
-            self._flows[key] = (self._calculated(*there), self._calculated(*back))
+            self._flows[key] = (self._calculated(first[1], second[1]), self._calculated(second[1], first[1]))
         return self._flows[key]
 
     def _calculated(self, a: NDArray[np.uint8], b: NDArray[np.uint8]) -> NDArray[np.float32]:

@@ -147,9 +147,7 @@ def cut(frames: Iterable[TimedFrame], layout: Layout) -> Iterator[Window]:
             yield window
 
 
-def _window(
-    held: deque[TimedFrame], layout: Layout, index: int, interpolator: Interpolator
-) -> Window | None:  # fmt: skip
+def _window(held: deque[TimedFrame], layout: Layout, index: int, interpolator: Interpolator) -> Window | None:
     if len(held) < 2:
         return None
     times = np.array([time for time, _ in held])
@@ -180,9 +178,7 @@ def _window(
     return Window(index=index, start=start, clips=np.stack(clips), interpolated=interpolated)
 
 
-def findings_of(
-    layout: Layout, *, found: int, interpolated: int, frames: int, repeated: int
-) -> tuple[Finding, ...]:  # fmt: skip
+def findings_of(layout: Layout, *, found: int, interpolated: int, frames: int, repeated: int) -> tuple[Finding, ...]:
     """What the cutting left out or made between frames.
 
     Args:
