@@ -17,6 +17,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tests.evidence import circumstances
 from tests.failing import slow
 from tests.failing.commands import COMMANDS, Scene, made_scene
@@ -29,9 +31,10 @@ _ABOUT = (
     "alone or with all later calls, or the command is killed before it. Calls are alike where they are the same "
     "function on files of one role (numbers, hashes and identities of a path aside) after a publication of one role. "
     "Of each such kind the first call, the last one and every so many are tried, and every call after the last "
-    "publication; with 1 every call is. Threads make their calls in another order each time: counted is what did "
-    "fail, and a kind whose every call was made at another place is untried. The JSON file beside this page states of "
-    "each kind how many calls there are and how many failed. A report is right where exit code 0 means that all is "
+    "publication; with 1 every call is. Where `drawn_of` is given, the trials were drawn at random from so many. "
+    "Threads make their calls in another order each time: counted is what did fail, and a kind whose every call was "
+    "made at another place is untried. The JSON file beside this page states of each kind how many calls there are "
+    "and how many failed. A report is right where exit code 0 means that all is "
     "published, and exit code 1, with a fix, that it is not. Of every fourth failure the command is given once more, "
     "of every kill always, and must end as an undisturbed one. After each trial the lake is examined (doctor, "
     "verify). For close-loop, propose and build the computing was done once and its result taken; their reads and "
@@ -47,14 +50,17 @@ SCENES: Mapping[str, tuple[Callable[[Path], Scene], Mapping[str, Command]]] = {
 
 
 def tried(
-    command: Command, scene: Scene, injector: Injector, scratch: Path, *, every: int, stays: bool, first: int = 0
-) -> dict[str, Any]:
+    command: Command, scene: Scene, injector: Injector, scratch: Path, *, every: int, stays: bool, first: int = 0,
+    at_most: int | None = None, seed: int = 0,
+) -> dict[str, Any]:  # fmt: skip
     """Faults of a command, and what was wrong with any.
 
     Args:
         every: of calls that are alike every so many before the publication; after it all fail.
         stays: whether trials in which all later calls fail are made too.
         first: call that the first trial is of.
+        at_most: trials; of more so many are drawn at random. None makes all.
+        seed: of the draw.
     """
     begun = time.monotonic()
     trials = Trials(command, scene.folder, scene.ids, injector, scratch)
@@ -62,6 +68,10 @@ def tried(
     groups = grouped(trials.whole.done.trace, every=every, last=published)
     calls = sorted(n for group in groups.values() for n in group.tried if n >= first)
     faults = [Fault(call=n, stays=held) for n in calls for held in ((False, True) if stays else (False,))]
+    planned = len(faults)
+    if at_most is not None and planned > at_most:
+        drawn = np.random.default_rng(seed).choice(planned, at_most, replace=False)
+        faults = [faults[place] for place in sorted(drawn)]
     wrong = []
     for number, fault in enumerate(faults):
         if (found := trials.wrong(fault, repeated=number % REPEATED == 0)) is not None:
@@ -71,6 +81,7 @@ def tried(
         "calls": total, "after_publication": total - 1 - published, "trials": len(faults), "every": every,
         "alike": len(groups), "untried": len(groups.keys() - trials.failed.keys()), "wrong": len(wrong),
         "kinds": _counted(wrong), "seconds": round(time.monotonic() - begun),
+        **({"drawn_of": planned} if planned > len(faults) else {}),
         "groups": {
             kind: [len(groups[kind].calls) if kind in groups else 0, trials.failed[kind]]
             for kind in (*groups, *(trials.failed.keys() - groups.keys()))
@@ -101,14 +112,14 @@ def _counted(wrong: Sequence[Mapping[str, Any]]) -> dict[str, int]:
 
 def campaign(
     names: Sequence[str], results: Path, *, seed: int, scenes: Path | None = None, every: int = 1,
-    stays: bool = True, first: int = 0, kills: int | None = None, real: bool = False,
+    stays: bool = True, first: int = 0, at_most: int | None = None, kills: int | None = None, real: bool = False,
 ) -> dict[str, Any]:  # fmt: skip
     """Try commands, note the results of each in a JSON file, and return all that the file holds.
 
     Args:
         names: of the commands; none names all.
         scenes: folder in which scenes are kept for a later campaign; None makes them anew.
-        every, stays, first: as of `tried`.
+        every, stays, first, at_most: as of `tried`.
         kills: points at which commands are killed; None lets calls fail.
         real: whether nothing stands in for computing.
     """
@@ -131,7 +142,10 @@ def campaign(
                     title, found = f"{name}, killed", killed(command, scene, injector, place, points=kills)
                 else:
                     title = f"{name}, alone" if not stays else name
-                    found = tried(command, scene, injector, place, every=every, stays=stays, first=first)
+                    found = tried(
+                        command, scene, injector, place,
+                        every=every, stays=stays, first=first, at_most=at_most, seed=seed,
+                    )  # fmt: skip
                 title = f"computing all: {title}" if real and commands[name].stand_in else title
                 known[title] = {**found, "circumstances": circumstances(seed)}
                 print(title, {name: value for name, value in found.items() if name != "groups"}, flush=True)  # noqa: T201
@@ -150,6 +164,7 @@ def page(known: Mapping[str, Any]) -> str:
             "untried",
             "every",
             "trials",
+            "drawn_of",
             "wrong",
             "unhealthy",
             "unforeseen",
@@ -194,11 +209,12 @@ if __name__ == "__main__":
     parser.add_argument("--scenes", type=Path, help="folder that scenes are kept in; some take minutes to make")
     parser.add_argument("--every", type=int, default=1, help="of calls that are alike try every so many")
     parser.add_argument("--first", type=int, default=0, help="first call to try")
+    parser.add_argument("--at-most", type=int, metavar="N", help="of more trials make so many, drawn at random")
     parser.add_argument("--alone", action="store_true", help="only calls that fail alone")
     parser.add_argument("--kill", type=int, metavar="N", help="kill commands at so many calls instead")
     parser.add_argument("--real", action="store_true", help="let nothing stand in for computing")
     given = parser.parse_args()
     campaign(
         given.names, given.out, seed=0, scenes=given.scenes, every=given.every, stays=not given.alone,
-        first=given.first, kills=given.kill, real=given.real,
+        first=given.first, at_most=given.at_most, kills=given.kill, real=given.real,
     )  # fmt: skip
