@@ -158,12 +158,11 @@ class Build:
 
     def _film(self, rolls: Iterable[Roll]) -> list[Film]:
         films = self.films(rolls)
-        frames = self.recipe.simulation.time.frames
         self._refuse_other_names(films)
-        own = {film.artifact(frames=frames).id for film in films}
+        own = {film.artifact().id for film in films}
         self._refuse_mixture(own)
         known = self._known()
-        missing = [film for film in films if film.artifact(frames=frames).id not in known]
+        missing = [film for film in films if film.artifact().id not in known]
         clips = self.lake.rows({"kind": Kind.CLIP}, at=self.branch, columns=["recording"])["recording"].to_pylist()
         self._clips = sum(recording in own for recording in clips)
         with self.bars(len(films), f"{self.recipe.name}: render", "film") as advance:
@@ -193,8 +192,7 @@ class Build:
 
     def _refuse_other_names(self, films: Sequence[Film]) -> None:
         """Make sure that no film of this recipe is there under another data set's name, where it would stay."""
-        frames = self.recipe.simulation.time.frames
-        own = [film.artifact(frames=frames).id for film in films]
+        own = [film.artifact().id for film in films]
         columns = ["artifact", "dataset"]
         there = self.lake.rows({"artifact": own}, at=self.branch, columns=columns)["dataset"].to_pylist()
         others = sorted({str(dataset) for dataset in there} - {self.recipe.name})
@@ -234,6 +232,6 @@ def _recording(done: Filmed, record: Record, *, stored: str) -> Artifact:
     times = record.frame_times
     rate = (len(times) - 1) * NANOSECONDS / (done.end - done.start) if len(times) > 1 else None
     return replace(
-        done.film.artifact(frames=len(times)), object=stored, start=done.start, end=done.end, rate=rate,
+        done.film.artifact(), object=stored, start=done.start, end=done.end, rate=rate,
         parameters=done.parameters,
     )  # fmt: skip

@@ -22,6 +22,7 @@ from flagdata.provenance import canonical, code_version
 from flagdata.record import Record
 from flagdata.rng import stream
 from flagdata.schema import Kind
+from sim.datasets.cast import casts
 from sim.datasets.recipe import DatasetRecipe
 
 _COMMAND = "build"
@@ -73,7 +74,7 @@ def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path:
     values = {
         "recipe": recipe, "sides": sides, "version": code_version(), "branch": branch,
         "sheet": _sheet(lake, recipe, rows), "size": sum(row["object_bytes"] for row in rows),
-        "frames": recipe.simulation.time.frames, "rate": recipe.simulation.time.rate, "bar": _BAR,
+        "frames": _frames(recipe), "bar": _BAR,
         "theta": distributions(parameters, rendered=False), "zeta": distributions(parameters, rendered=True),
         "names": _names(parameters), "recipe_text": json.dumps(json.loads(canonical(recipe.identity())), indent=1),
         "dataset": json.dumps(recipe.name, ensure_ascii=False),
@@ -85,6 +86,12 @@ def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path:
     target = lake.path / "cards" / f"{recipe.name}-{recipe.hash[:12]}.html"
     rewrite(target, text)
     return target
+
+
+def _frames(recipe: DatasetRecipe) -> str:
+    """How many frames a film has, at each rate."""
+    times = sorted({(cast.simulation.time.rate, cast.simulation.time.frames) for cast in casts(recipe)})
+    return "; ".join(f"{frames} frames at {rate:g} Hz" for rate, frames in times)
 
 
 def _sides(lake: Lake, recipe: DatasetRecipe, branch: str) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:

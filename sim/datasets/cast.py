@@ -1,15 +1,15 @@
-"""Who is simulated: the recipe of each side's sequences, or of each of its sessions."""
+"""Who is simulated: the recipe of each side's sequences, or of each of its sessions or groups."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from flagdata.errors import RefusedError
-from flagdata.rng import child_seed
+from flagdata.rng import child_seed, stream
 from flagdata.tables import Range
-from sim.datasets.recipe import DatasetRecipe, SessionSpec, Side
+from sim.datasets.recipe import DatasetRecipe, GroupSpec, SessionSpec, Side
 from sim.run.members import Crew
 from sim.run.publish import member_artifact
 from sim.run.recipe import MaterialSpec
@@ -24,17 +24,22 @@ class Cast:
         side: they belong to.
         session: number of their session on that side; None where each stands alone.
         simulation: its `count` is how many are wanted.
+        stated: what was drawn for all of them, name → value, SI; it goes into the ground truth of their films.
     """
 
     side: Side
     session: int | None
     simulation: Simulation
+    stated: Mapping[str, float] = field(default_factory=dict)
 
 
 def casts(recipe: DatasetRecipe) -> Iterator[Cast]:
-    """All sequences of a data set, side by side, session by session. No seed is on two sides."""
+    """All sequences of a data set, side by side, session by session or group by group. No seed is on two sides."""
     for side in recipe.sides:
         root = replace(recipe.simulation, name=f"{recipe.name}-{side.name}", title=recipe.title)
+        if recipe.groups is not None:
+            yield from _groups(recipe, recipe.groups, side, root)
+            continue
         if recipe.sessions is None or not side.sessions:
             seed = child_seed(recipe.seed, "sequences", side.name)
             yield Cast(side=side, session=None, simulation=replace(root, seed=seed, count=side.sequences))
@@ -44,6 +49,37 @@ def casts(recipe: DatasetRecipe) -> Iterator[Cast]:
             count = len(range(session, side.sequences, side.sessions))
             own = _of_session(replace(root, seed=seed, count=count), recipe.sessions)
             yield Cast(side=side, session=session, simulation=replace(own, name=f"{root.name}-{session:02d}"))
+
+
+def _groups(recipe: DatasetRecipe, groups: GroupSpec, side: Side, root: Simulation) -> Iterator[Cast]:
+    """The sequences of a side, a batch at a time."""
+    for number, first in enumerate(range(0, side.sequences, root.batch)):
+        simulation = of_group(root, groups, seed=child_seed(recipe.seed, "sequences", side.name, number))
+        count = min(root.batch, side.sequences - first)
+        scene = simulation.scene
+        yield Cast(
+            side=side, session=None, simulation=replace(simulation, name=f"{root.name}-{number:03d}", count=count),
+            stated={"width": scene.width, "height": scene.height},
+        )  # fmt: skip
+
+
+def of_group(simulation: Simulation, groups: GroupSpec, *, seed: int) -> Simulation:
+    """A scene with the height, the attachment and the rate that a group of this seed draws, as long as before [s]."""
+
+    def drawn(name: str) -> float:
+        return stream(seed, "group", name).random()
+
+    height, time = groups.height, simulation.time
+    rate = groups.rates[int(drawn("rate") * len(groups.rates))]
+    return replace(
+        simulation, seed=seed,
+        scene=replace(
+            simulation.scene,
+            height=height.at(drawn("height")) if isinstance(height, Range) else height,
+            attachment=groups.attachments[int(drawn("attachment") * len(groups.attachments))],
+        ),
+        time=replace(time, rate=rate, frames=max(1, round(time.frames / time.rate * rate))),
+    )  # fmt: skip
 
 
 def _of_session(simulation: Simulation, spec: SessionSpec) -> Simulation:

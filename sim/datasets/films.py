@@ -55,11 +55,12 @@ class Film:
         session = self.cast.session
         return None if session is None else f"{self.cast.simulation.name}"
 
-    def artifact(self, *, frames: int) -> Artifact:
+    def artifact(self) -> Artifact:
         """The recording's row without its result; its identity is complete."""
         return Artifact(
             kind=Kind.RECORDING, name=self.name, parents=(self.sequence,), seed=self.sequence_seed,
-            session=self.session, dataset=self.dataset, side=self.cast.side.name, frame_count=frames,
+            session=self.session, dataset=self.dataset, side=self.cast.side.name,
+            frame_count=self.cast.simulation.time.frames,
             recipe={**self.filming, "seed": self.seed, "look": self.look, "begin": self.begin},
         )  # fmt: skip
 

@@ -89,7 +89,9 @@ def film(recipe: DatasetRecipe, job: Film, sequence: MeshSequence, device: str) 
     drawn = picture.settings(recipe.camera, seed=job.look)
     seen = shot(recipe, job, sequence, zeta, assets, device=device).cpu().numpy()
     frames = picture.coded(seen, drawn, recipe.camera, seed=job.seed)
-    parameters = parameters_of(member, zeta, {**reading.parameters, **drawn}, recipe.anemometer.truth)
+    parameters = parameters_of(
+        member, zeta, {**job.cast.stated, **reading.parameters, **drawn}, recipe.anemometer.truth
+    )  # fmt: skip
     times = job.begin + sequence.time
     content = Content(
         film=job, times=times, wind=reading.series, parameters=parameters, zeta=zeta, camera=recipe.camera,

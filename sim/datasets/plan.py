@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -96,20 +96,29 @@ def plan(recipe: DatasetRecipe, lake: Lake | None, *, workers: int, branch: str 
     if lake is not None:
         known = set(lake.rows(at=branch, columns=["artifact"])["artifact"].to_pylist())
     rolls = [Roll(cast=cast) for cast in casts(recipe)]
-    frames = recipe.simulation.time.frames
     films = 0
+    frames: dict[str, list[int]] = {side.name: [] for side in recipe.sides}
     for side in recipe.sides:
         own = [roll for roll in rolls if roll.cast.side.name == side.name]
         members = tuple((roll.cast, index, roll.id(index)) for roll in own for index in roll.chosen)
         every = Sequences(recipe=recipe, side=side.name, members=members).films()
-        films += sum(film.artifact(frames=frames).id not in known for film in every)
+        for film in every:
+            films += film.artifact().id not in known
+            frames[side.name].append(film.cast.simulation.time.frames)
     return Plan(
         recipe=recipe, sequences={side.name: side.sequences for side in recipe.sides},
         films={side.name: side.renders for side in recipe.sides},
-        clips={side.name: side.renders * (frames // CLIP_FRAMES) for side in recipe.sides},
+        clips={side: sum(count // CLIP_FRAMES for count in counts) for side, counts in frames.items()},
         missing_sequences=sum(len(roll.pending(known)) for roll in rolls), missing_films=films,
-        rates=measure(recipe, rolls[0].cast, device=device), workers=workers,
+        rates=measure(recipe, _typical(rolls), device=device), workers=workers,
     )  # fmt: skip
+
+
+def _typical(rolls: Sequence[Roll]) -> Cast:
+    """Of all sequences those whose number of frames is nearest to the mean."""
+    frames = [roll.cast.simulation.time.frames for roll in rolls]
+    mean = sum(frames) / len(frames)
+    return min(rolls, key=lambda roll: abs(roll.cast.simulation.time.frames - mean)).cast
 
 
 def measure(recipe: DatasetRecipe, cast: Cast, *, device: str = "cpu") -> Rates:

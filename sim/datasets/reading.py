@@ -9,6 +9,8 @@ recording draws its own value.
                   prior's own width, height [px], raster-samples, cycles-samples
     [sides.NAME]  sequences, renders; sessions, where sequences are dealt to set-ups
     [sessions]    spread: of the winds of one session about its mean, as a share
+    [groups]      what each batch of the scene draws: height [m], a quantity; of the lists rates [Hz] and attachments
+                  one entry
     [camera]      coding = "jpeg" | "h264"; jpeg-quality or rate-factor, read-noise, shot-noise: quantities;
                   frame-slot [B]
     [anemometer]  truth = "stated" | "measured"; rate [Hz], before [s], noise (a quantity), resolution, accuracy [m/s]
@@ -26,7 +28,7 @@ from flagdata.recipes import Shelf, parsed
 from flagdata.record.writer import Coding
 from flagdata.schema import TRUTH_WINDOW
 from flagdata.tables import COUNT, NOT_NEGATIVE, POSITIVE, SEED_LIMIT, Bounds, Quantity, Table
-from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, SessionSpec, Side, Truth
+from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, GroupSpec, SessionSpec, Side, Truth
 from sim.effects import EFFECTS, SENSOR_EFFECTS
 from sim.effects.effect import FlowEffect, WindEffect
 from sim.effects.sensor import AnemometerEffect
@@ -35,11 +37,14 @@ from sim.render import prior as priors
 from sim.render.prior import RenderPrior
 from sim.run import Recipe as Simulation
 from sim.run import load as load_simulation
+from sim.run.recipe import Attachment, Shape
 
 DATASETS = Shelf(folder="datasets", noun="data set")
 SIDES = ("train", "validation", "test")
 _SIZE_LIMIT = 16_384
 """Most pixels of a side, and samples of a pixel."""
+_RATE_LIMIT = 1000.0
+"""Most frames a second that a group's films have."""
 SAMPLES_LIMIT = 10_000_000
 """Most samples of a recording's anemometer."""
 _SIZES = ("width", "height", "raster_samples", "cycles_samples")
@@ -67,15 +72,18 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
         UnknownNameError, InputError, UsageError: as `load`.
     """
     top = Table(parsed(text, where=where), where=where)
+    if "sessions" in top and "groups" in top:
+        raise UsageError("both sessions and groups", where=where, fix="keep one of the tables")
     render = top.table("render")
     renderer = render.named("renderer", "raster", RENDERERS, noun="renderer")
     photos = render.text("photos", None)
     sessions = top.table("sessions").record(SessionSpec, spread=NOT_NEGATIVE) if "sessions" in top else None
+    simulation = _simulation(top.table("simulation"), folder)
+    groups = _groups(top.table("groups"), simulation) if "groups" in top else None
     recipe = DatasetRecipe(
         name=name, title=top.text("title", name) or name, licence=top.text("licence", None) or "",
         seed=top.whole("seed", 0, least=0, most=SEED_LIMIT), renderer=renderer,
-        simulation=_simulation(top.table("simulation"), folder),
-        prior=_prior(render), sessions=sessions,
+        simulation=simulation, prior=_prior(render), sessions=sessions, groups=groups,
         photos=None if photos is None else folder / local_path(photos), sides=_sides(top.table("sides"), sessions),
         camera=_camera(top.table("camera")), anemometer=_anemometer(top.table("anemometer")),
     )  # fmt: skip
@@ -103,6 +111,26 @@ def _simulation(table: Table, folder: Path) -> Simulation:
     if scene is None:
         raise InputError("no scene is named", where=table.where, fix='add scene = "flag-search-space", or a .toml file')
     return load_simulation(str(folder / local_path(scene)) if scene.endswith(".toml") else scene)
+
+
+def _groups(table: Table, simulation: Simulation) -> GroupSpec:
+    scene, time = simulation.scene, simulation.time
+    if scene.shape is not Shape.FLAG:
+        raise UsageError(f"groups of a {scene.shape.value}", where=table.where, fix="give them to a flag's scene")
+    rates, attachments = table.numbers("rates") or (time.rate,), table.texts("attachments") or (scene.attachment,)
+    wrong = next((rate for rate in rates if not 1.0 <= rate <= _RATE_LIMIT), None)
+    if wrong is not None:
+        raise InputError(f"a rate of {wrong:g} Hz", where=table.where, fix=f"give rates of 1 to {_RATE_LIMIT:g} Hz")
+    known = [attachment.value for attachment in Attachment]
+    for name in attachments:
+        if name not in known:
+            raise UnknownNameError.of("attachment", name, known, where=table.where)
+    spec = GroupSpec(
+        height=table.quantity("height", scene.height, above=0.0), rates=rates,
+        attachments=tuple(Attachment(name) for name in attachments),
+    )  # fmt: skip
+    table.done()
+    return spec
 
 
 def _prior(table: Table) -> RenderPrior:

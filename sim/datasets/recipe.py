@@ -14,6 +14,7 @@ from flagdata.record.writer import Coding
 from flagdata.tables import Quantity, plain
 from sim.assets.photos import Photos
 from sim.render.prior import RenderPrior
+from sim.run.recipe import Attachment
 from sim.run.recipe import Recipe as Simulation
 
 RECIPE_VERSION = 2
@@ -103,6 +104,24 @@ class SessionSpec:
 
 
 @dataclass(frozen=True, kw_only=True)
+class GroupSpec:
+    """What sequences that are simulated in one batch have in common, drawn for each batch of a side.
+
+    A batch has one mesh and one rate, so these cannot differ from member to member. All else differs.
+
+    Attributes:
+        height: of the cloth [m].
+        rates: of frames [Hz], of which each group takes one with equal chance; a rate that is listed twice is twice as
+            likely. Films of all rates are as long as the scene's [s].
+        attachments: where a flag is held, of which each group takes one with equal chance.
+    """
+
+    height: Quantity
+    rates: tuple[float, ...]
+    attachments: tuple[Attachment, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class DatasetRecipe:
     """A data set.
 
@@ -116,6 +135,7 @@ class DatasetRecipe:
         prior: of ζ.
         photos: a folder of photographs in place of procedural backgrounds.
         sessions: None where sequences stand alone.
+        groups: None where all sequences have the scene's height, rate and attachment.
     """
 
     name: str
@@ -130,6 +150,7 @@ class DatasetRecipe:
     anemometer: AnemometerSpec
     photos: Path | None = None
     sessions: SessionSpec | None = None
+    groups: GroupSpec | None = None
 
     def side(self, name: str) -> Side:
         """The side of that name."""
@@ -164,13 +185,25 @@ class DatasetRecipe:
             "dataset": RECIPE_VERSION, "name": self.name, "seed": self.seed,
             "simulation": self.simulation.identity(), "filming": self.filming(),
             "sessions": None if self.sessions is None else vars(self.sessions).copy(),
-            "sides": [vars(side).copy() for side in self.sides],
+            "sides": [vars(side).copy() for side in self.sides], **_grouped(self.groups, self.simulation.batch),
         }  # fmt: skip
 
     @cached_property
     def hash(self) -> str:
         """SHA-256 of the identity."""
         return recipe_hash(self.identity())
+
+
+def _grouped(groups: GroupSpec | None, batch: int) -> dict[str, Any]:
+    """What is drawn by batches, and their size, where anything is."""
+    if groups is None:
+        return {}
+    return {
+        "groups": {
+            "size": batch, "height": plain(groups.height), "rates": list(groups.rates),
+            "attachments": [attachment.value for attachment in groups.attachments],
+        }
+    }  # fmt: skip
 
 
 def _coding(camera: CameraSpec) -> dict[str, Any]:

@@ -57,7 +57,7 @@ def record_bytes(content: Content) -> bytes:
 
 def _write(path: Path, content: Content, *, fill: int) -> None:
     film, zeta, times = content.film, content.zeta, content.times
-    row = film.artifact(frames=len(times))
+    row = film.artifact()
     start, end = int(times[0]), int(times[-1])
     rate = (len(times) - 1) * NANOSECONDS / (end - start) if len(times) > 1 else film.cast.simulation.time.rate
     camera = CameraInfo(

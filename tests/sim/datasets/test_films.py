@@ -32,7 +32,7 @@ def test_sequences_are_filmed_equally_often_or_once_more() -> None:
 
 def test_seeds_and_identities_are_all_different() -> None:
     every = films(load("flagsim-small"), "train")
-    for distinct in ([f.seed for f in every], [f.name for f in every], [f.artifact(frames=60).id for f in every]):
+    for distinct in ([f.seed for f in every], [f.name for f in every], [f.artifact().id for f in every]):
         assert len(set(distinct)) == len(every)
 
 
@@ -47,7 +47,7 @@ def test_another_image_size_changes_no_seed(make: Callable[..., DatasetRecipe]) 
     small, large = films(make(), "train"), films(make({"width = 32": "width = 64"}), "train")
     assert [f.seed for f in small] == [f.seed for f in large]
     assert [f.sequence for f in small] == [f.sequence for f in large]
-    assert not {f.artifact(frames=30).id for f in small} & {f.artifact(frames=30).id for f in large}
+    assert not {f.artifact().id for f in small} & {f.artifact().id for f in large}
 
 
 def test_sessions_keep_camera_and_day_and_no_day_is_on_two_sides() -> None:
@@ -78,3 +78,35 @@ def test_a_sequence_that_fails_is_replaced_by_the_next_index(make: Callable[...,
     assert roll.pending({roll.id(0), roll.id(2)}) == [3]
     other = Roll(cast=replace(roll.cast, simulation=replace(roll.cast.simulation, count=2)))
     assert other.id(0) == roll.id(0)  # how many are wanted changes no sequence
+
+
+GROUPS = '[groups]\nheight = { low = 0.2, high = 0.4 }\nrates = [20.0, 40.0]\nattachments = ["corners", "hoist"]\n'
+
+
+def test_batches_draw_height_rate_and_attachment_and_their_films_are_equally_long(
+    make: Callable[..., DatasetRecipe],
+) -> None:
+    recipe = make({"[sides.train]\nsequences = 3\nrenders = 7": GROUPS + "[sides.train]\nsequences = 40\nrenders = 40"})
+    own = [cast for cast in casts(recipe) if cast.side.name == "train"]
+    batch, scene, time = recipe.simulation.batch, recipe.simulation.scene, recipe.simulation.time
+    assert [cast.simulation.count for cast in own] == [batch] * (40 // batch) + [40 % batch] * bool(40 % batch)
+    heights = [cast.simulation.scene.height for cast in own]
+    assert len(set(heights)) == len(own)
+    assert min(heights) >= 0.2
+    assert max(heights) <= 0.4
+    assert {cast.simulation.time.rate for cast in own} == {20.0, 40.0}
+    assert {cast.simulation.scene.attachment.value for cast in own} == {"corners", "hoist"}
+    for cast in own:
+        drawn = cast.simulation.time
+        assert abs(drawn.frames / drawn.rate - time.frames / time.rate) <= 0.5 / drawn.rate
+        assert cast.stated == {"width": scene.width, "height": cast.simulation.scene.height}
+    every = films(recipe, "train")
+    assert {film.artifact().frame_count for film in every} == {cast.simulation.time.frames for cast in own}
+    assert len({film.artifact().id for film in every}) == 40
+
+
+def test_groups_leave_the_identity_of_data_sets_without_them_alone(make: Callable[..., DatasetRecipe]) -> None:
+    assert "groups" not in make().identity()
+    base = make({"[sides.train]": GROUPS + "[sides.train]"})
+    for old, new in (("[20.0, 40.0]", "[20.0, 20.0, 40.0]"), ("high = 0.4", "high = 0.5"), (', "hoist"]', "]")):
+        assert make({"[sides.train]": GROUPS.replace(old, new) + "[sides.train]"}).hash != base.hash

@@ -43,7 +43,7 @@ def sequence_of(film: Film) -> Artifact:
 
 def test_films_are_of_their_data_set_and_side(make: Make, tmp_path: Path) -> None:
     recipe = replace(make(), name="o'brien")
-    rows = [film.artifact(frames=30) for film in films(Lake.create(tmp_path / "lake"), recipe)]
+    rows = [film.artifact() for film in films(Lake.create(tmp_path / "lake"), recipe)]
     assert {row.dataset for row in rows} == {"o'brien"}
     assert [sum(row.side == side for row in rows) for side in ("train", "test")] == [7, 3]
 
@@ -60,7 +60,7 @@ def test_a_recipe_whose_films_are_there_under_another_name_is_refused_before_any
     film = films(lake, make())[0]
     with lake.transaction("the sequence and one film") as transaction:
         transaction.add(sequence_of(film))
-        transaction.add(film.artifact(frames=30))
+        transaction.add(film.artifact())
     with pytest.raises(ConflictError, match="there already, in the data set 'tiny'"):
         build_of(lake, replace(make(), name="other")).run()
 

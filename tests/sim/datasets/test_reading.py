@@ -87,6 +87,10 @@ def test_what_makes_no_data_set_is_refused(make: Make) -> None:
         ('scene = "scene.toml"', 'scene = "absent.toml"', NotFoundError, "no such recipe file"),
         ("noise = 0.1", 'noise = 0.1\ntruth = "measured"\nbefore = 30.0', UsageError, "30 s of wind"),
         ("width = 32", 'width = 32\nrenderer = "povray"', UnknownNameError, "renderer"),
+        ("[camera]", "[groups]\nrates = [0.0]\n[camera]", InputError, "a rate of 0 Hz"),
+        ("[camera]", '[groups]\nattachments = ["hoists"]\n[camera]', UnknownNameError, "did you mean 'hoist'"),
+        ("[camera]", "[groups]\nheigth = 1.0\n[camera]", UnknownNameError, "did you mean 'height'"),
+        ("[camera]", "[sessions]\n[groups]\n[camera]", UsageError, "both sessions and groups"),
     ]  # fmt: skip
     assert not unrefused(lambda old, new: make({old: new}), cases)
 
