@@ -90,8 +90,22 @@ _OF_FLAGS_OF_ANY_FABRIC = {
 bending coefficients together, which moves the bending scale's mean from -4.8 to -3.3; the ranges reach 4 of its
 standard deviations beyond either."""
 
+ASPECT = "log_aspect"
+"""The natural logarithm of a flag's length over its height."""
+
+_OF_FLAGS_OUTDOORS = {
+    "outdoor_wind": Target(name="wind_speed", unit="m/s", low=0.0, high=16.0, about="wind speed"),
+    "aspect": Target(
+        name=ASPECT, unit="1", low=-0.05, high=0.75, about="natural logarithm of the length over the height"
+    ),
+}  # fmt: skip
+"""Flags of the scenes `flag-outdoor` and `flag-outdoor-damped`: winds of up to 16 m/s, and lengths of 1 to 2 heights,
+with a margin on either side so that a flag of 1:1 or 2:1 lies well within. Who knows a flag's size conditions on it."""
+
 _BENDING = 15
 _ROW = 5
+_STATED = {"wind_speed": ("wind_speed",), "density": ("density",), ASPECT: ("width", "height")}
+"""What quantities are made of that are not made of the bending coefficients."""
 
 _OF_HANGING_CLOTH = {
     "cloth_wind": Target(name="wind_speed", unit="m/s", low=0.0, high=6.0, about="wind speed", cloth=Cloth.HANGING),
@@ -107,7 +121,7 @@ _OF_HANGING_CLOTH = {
 0.113 to 0.324 kg/m² times 0.7 to 1.4, bending scales of -4.76 to -3.78 and 0.30 either way. Its anisotropy is the
 material's own, one of ten values, and no target."""
 
-TARGETS = {**_OF_FLAGS, **_OF_FLAGS_OF_ANY_FABRIC, **_OF_HANGING_CLOTH}
+TARGETS = {**_OF_FLAGS, **_OF_FLAGS_OF_ANY_FABRIC, **_OF_FLAGS_OUTDOORS, **_OF_HANGING_CLOTH}
 """By the names that recipes know them by."""
 
 
@@ -115,7 +129,8 @@ def truth(parameters: Mapping[str, NDArray[np.float64]], names: Sequence[str]) -
     """The targets of clips from their parameters: (n, target), NaN where a clip does not know them.
 
     Args:
-        parameters: name → (n,) values, as simulated records state them ("wind_speed", "density", "bending.0" …).
+        parameters: name → (n,) values, as simulated records state them ("wind_speed", "density", "bending.0" …; "width"
+            and "height" of the cloth [m]).
         names: keys of `TARGETS`.
 
     Raises:
@@ -129,7 +144,7 @@ def _one(parameters: Mapping[str, NDArray[np.float64]], name: str) -> NDArray[np
     if name not in TARGETS:
         raise UnknownNameError.of("target", name, TARGETS)
     quantity = TARGETS[name].name
-    needed = [quantity] if quantity in ("wind_speed", "density") else [f"bending.{index}" for index in range(_BENDING)]
+    needed = list(_STATED.get(quantity, [f"bending.{index}" for index in range(_BENDING)]))
     missing = [key for key in needed if key not in parameters or not np.isfinite(parameters[key]).any()]
     if missing:
         raise InputError(
@@ -138,6 +153,8 @@ def _one(parameters: Mapping[str, NDArray[np.float64]], name: str) -> NDArray[np
         )  # fmt: skip
     if len(needed) == 1:
         return np.asarray(parameters[quantity], dtype=np.float64)
+    if quantity == ASPECT:
+        return np.log(parameters["width"]) - np.log(parameters["height"])
     logs = np.log10(np.stack([parameters[key] for key in needed]))
     if quantity == "bending_scale":
         return logs.mean(axis=0)

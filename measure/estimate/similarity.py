@@ -64,8 +64,8 @@ _SIZE = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*[x×]\s*(\d+(?:\.\d*)?|\.\d+)\s*
 
 POWERS: dict[str, float] = {"wind_speed": 0.5, "density": 1.0}
 """Powers of s by which quantities grow."""
-LOGARITHMS: dict[str, float] = {"bending_scale": 4.0, "anisotropy": 0.0}
-"""The same of quantities that are known by their logarithm, base 10."""
+LOGARITHMS: dict[str, float] = {"bending_scale": 4.0, "anisotropy": 0.0, "log_aspect": 0.0}
+"""The same of quantities known by their logarithm, base 10 (an aspect, which does not scale, by the natural one)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from flagdata.errors import InputError
-from models.restriction import FEWEST, Known, restricted
+from models.restriction import ASPECT_SLACK, FEWEST, Known, restricted
 from models.targets import Scaling
 from tests.refusals import unrefused
 
@@ -71,3 +71,23 @@ def test_a_range_that_the_model_cannot_use_is_refused() -> None:
 def test_a_range_whose_ends_are_not_in_order_is_refused() -> None:
     with pytest.raises(InputError, match="in order"):
         Known.everywhere("density", 0.2, 0.1, count=1)
+
+
+BOTH = Scaling(names=("outdoor_wind", "fabric_density", "aspect"))
+
+
+def test_of_a_flag_that_was_measured_and_weighed_both_restrict_the_wind() -> None:
+    """U = 2 + 20 ρ + 3 a + 0.1 N(0, 1) m/s of even ρ and a: at ρ = 0.2 and a = ln 1.5 it is 6 + 3 · 0.405 m/s."""
+    generator = np.random.default_rng(3)
+    density, aspect = generator.uniform(0.05, 0.40, 200_000), generator.uniform(0.0, 0.693, 200_000)
+    wind = 2 + 20 * density + 3 * aspect + 0.1 * generator.standard_normal(200_000)
+    logits = BOTH.learned(torch.from_numpy(np.stack([wind, density, aspect], axis=1)))[None]
+    weighed, measured = Known.everywhere("density", 0.19, 0.21, count=1), Known.of_aspect(3.0, 2.0, count=1)
+    found, share = restricted(logits, BOTH, weighed, measured, draws=800)
+    values = BOTH.values(found.double())[0].numpy()
+    assert share == pytest.approx([0.02 / 0.35 * 2 * ASPECT_SLACK / 0.693], rel=0.06)
+    assert values[:, 0].mean() == pytest.approx(6 + 3 * np.log(1.5), abs=0.03)
+    assert np.abs(values[:, 1] - 0.2).max() <= 0.01 + 1e-6
+    assert np.abs(values[:, 2] - np.log(1.5)).max() <= ASPECT_SLACK + 1e-6
+    one, _ = restricted(logits, BOTH, weighed, draws=800)
+    assert BOTH.values(one.double())[0, :, 0].numpy().std() > 3 * values[:, 0].std()
