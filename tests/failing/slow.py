@@ -175,8 +175,8 @@ def kept_jobs(kept: str) -> None:
     import sim.datasets.cluster
 
     def done(client: object, jobs: Iterable[Job], *, say: Callable[[str], None]) -> Iterator[Any]:
-        for number, (function, arguments) in enumerate(jobs):
-            path = Path(kept) / f"{function.__name__}-{number}-{_name(arguments)}"
+        for function, arguments in jobs:
+            path = Path(kept) / f"{function.__name__}-{_name(arguments)}"
             if not path.exists():
                 path.write_bytes(pickle.dumps(function(*arguments)))
             yield pickle.loads(path.read_bytes())
@@ -186,10 +186,9 @@ def kept_jobs(kept: str) -> None:
 
 
 def _name(arguments: Sequence[object]) -> str:
-    """Of a job: members that are simulated, or the film."""
-    names = [getattr(argument, "name", argument) for argument in arguments if isinstance(argument, list | int | str)]
-    films = [getattr(argument, "index", "") for argument in arguments]
-    return "".join(letter if letter.isalnum() else "-" for letter in f"{names}{films}")
+    """Of a job: names of the recipe and the film, and the members that are simulated."""
+    named = [one if isinstance(one, list | int | str) else getattr(one, "name", "") for one in arguments]
+    return "".join(letter if letter.isalnum() else "-" for letter in str(named))
 
 
 @cache
