@@ -13,6 +13,7 @@ import numpy as np
 
 from flagdata.lake import Artifact
 from measure.estimate import pictures
+from measure.estimate.conditioned import ConditionedFilm
 from measure.estimate.dependence import of_model
 from measure.estimate.film import RecordFilm
 from measure.estimate.gate import gate_of
@@ -91,7 +92,7 @@ def read(path: Path, recording: Artifact) -> Series:
         InputError: a film that is too short or too slow.
     """
     model = estimator.shipped()
-    film = RecordFilm(path, name=recording.name)
+    film = ConditionedFilm(RecordFilm(path, name=recording.name))
     measured = measure(
         film, model, gate=gate_of(model), dependence=of_model(model), options=Options(size=SIZE, step=STEP)
     )

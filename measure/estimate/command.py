@@ -35,7 +35,9 @@ if TYPE_CHECKING:
               help="Range in which the area weight is known to lie [kg/m²], as in 0.12:0.15.")  # fmt: skip
 @click.option("--windows", "--window", "step", type=DURATION, metavar="TIME",
               help="A wind series, one window every so often, as in 1.2s.")  # fmt: skip
-@click.option("--crop", metavar="X,Y,W,H", help="Region of the flag [px]; by default the largest centred square.")
+@click.option("--crop", metavar="X,Y,W,H", help="Region in which the flag is [px]; by default the whole picture.")
+@click.option("--flag", type=click.IntRange(min=1), metavar="N",
+              help="Which moving cloth, as numbered on the page; by default the one that moves most.")  # fmt: skip
 @click.option("--start", "first", type=DURATION, metavar="TIME", help="Where to begin in the film, as in 12s.")
 @click.option("--end", "last", type=DURATION, metavar="TIME", help="Where to end.")
 @click.option("--true-fps", type=float, metavar="HZ", help="Rate at which a high-speed camera really ran.")
@@ -71,6 +73,7 @@ def measure(
     area_weight: tuple[float, float] | None,
     step: float | None,
     crop: str | None,
+    flag: int | None,
     first: float | None,
     last: float | None,
     true_fps: float | None,
@@ -120,7 +123,7 @@ def measure(
     box = None if crop is None else parse_crop(crop)
     if not (box is None or isinstance(box, CropBox)):
         raise UsageError(f"the crop {crop!r} is not a box", where="--crop", fix="give x,y,width,height in pixels")
-    reading = Reading(crop=box, true_fps=true_fps, sequence_fps=sequence_fps)
+    reading = Reading(crop=box, flag=flag, true_fps=true_fps, sequence_fps=sequence_fps)
     options = Options(
         size=None if flag_size is None else parse_size(flag_size), step=step, first=first, last=last, level=level,
         false_alarm=false_alarm, seed=seed, refine=refine, area_weight=area_weight,
@@ -166,6 +169,7 @@ class _Done:
             **self.measured.as_dict(anyway=anyway), "series": self.series.as_dict() if shown else None,
             "source": None if self.subject.artifact is None else self.subject.artifact.id, "artifact": self.artifact,
             "refinement": None if self.refinement is None else self.refinement.as_dict(),
+            "conditioning": self.subject.film.as_dict(),
             "simulated_with": {name: known[name] for name in self.measured.names if name in known} or None,
         }  # fmt: skip
 
@@ -211,7 +215,7 @@ class _Job:
         refinement = None
         if self.options.refine is not None and shown:
             refinement = refined(
-                measured, subject, estimator, budget=self.options.refine, cropped=self.reading.crop is not None,
+                measured, subject, estimator, budget=self.options.refine, cropped=subject.film.moved,
                 cache=self.cache,
             )  # fmt: skip
             _warn(refinement.findings)

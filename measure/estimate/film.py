@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import InputError
 from flagdata.findings import Finding
-from flagdata.ingest.camera import CameraOptions, CropBox, open_camera, probe
-from flagdata.ingest.camera.options import Crop
+from flagdata.ingest.camera import CameraOptions, open_camera, probe
 from flagdata.record import Record
-from flagdata.schema import FRAME_SIZE
 from flagdata.timebase import NANOSECONDS
 
 _AT_ONCE = 64  # frames read from a record together
 _NO_START = 0  # a file's own clock begins with its first frame
+_LONGEST = 1920
+"""Longer side [px] to which frames of files are averaged down: a flag of a tenth of it fills a network's picture."""
+_OF_PADDING = frozenset({"letterboxed"})
+"""Findings on the padding about an oblong picture, which is left away."""
 
 
 class Film(Protocol):
@@ -54,30 +57,26 @@ class Film(Protocol):
 
 
 class CameraFilm:
-    """A video file or a folder of images.
+    """A video file or a folder of images: the whole picture.
 
     Args:
         path: of it.
-        crop: the region of the flag, a box of the upright picture in pixels; it is widened to a square. None is the
-            largest centred square.
         true_fps: rate at which a high-speed camera really ran [Hz].
         sequence_fps: rate of images without stamps [Hz].
+
+    Attributes:
+        width, height: of the upright picture in the file [px]; frames may be smaller.
 
     Raises:
         FlagdataError: see `flagdata.ingest.camera.open_camera`.
     """
 
-    def __init__(
-        self, path: Path, *, crop: CropBox | None = None, true_fps: float | None = None,
-        sequence_fps: float | None = None,
-    ) -> None:  # fmt: skip
+    def __init__(self, path: Path, *, true_fps: float | None = None, sequence_fps: float | None = None) -> None:
         self.path = path
         options = CameraOptions(start=_NO_START, rate="native", true_fps=true_fps, sequence_fps=sequence_fps)
         facts = probe(path, options)
-        chosen: Crop = "square" if crop is None else squared(crop, width=facts.width, height=facts.height)
-        self._options = CameraOptions(
-            start=_NO_START, rate="native", true_fps=true_fps, sequence_fps=sequence_fps, crop=chosen, size=FRAME_SIZE
-        )
+        self.width, self.height = facts.width, facts.height
+        self._options = replace(options, crop="whole", size=min(_LONGEST, max(8, facts.width, facts.height)))
         slower = 1.0 if true_fps is None else facts.rate / true_fps
         self._rate = facts.rate / slower
         self._duration = facts.duration * slower
@@ -107,9 +106,9 @@ class CameraFilm:
                     if time > last:
                         break
                     if time >= first:
-                        yield time, frame.image
+                        yield time, stream.unpadded(frame.image)
             finally:
-                self._findings = stream.findings
+                self._findings = tuple(found for found in stream.findings if found.kind not in _OF_PADDING)
 
     def findings(self) -> tuple[Finding, ...]:
         return self._findings
@@ -122,16 +121,16 @@ class RecordFilm:
         path: of the record's object.
         name: of the artifact.
         first, count: the frames that belong to it; all by default.
-        crop: the region of the flag in pixels of the stored frames.
+
+    Attributes:
+        width, height: of its frames [px].
 
     Raises:
-        InputError: fewer than two frames, or a crop beyond the picture.
+        InputError: fewer than two frames.
         NotFoundError, CorruptError: see `flagdata.record.Record`.
     """
 
-    def __init__(
-        self, path: Path, *, name: str, first: int = 0, count: int | None = None, crop: CropBox | None = None
-    ) -> None:
+    def __init__(self, path: Path, *, name: str, first: int = 0, count: int | None = None) -> None:
         self.record = Record.open(path)
         self._name, self._first = name, first
         times = self.record.frame_times[first : None if count is None else first + count]
@@ -139,8 +138,7 @@ class RecordFilm:
             raise InputError(f"{len(times)} frames", where=name, fix="name a recording or clip with frames")
         self.times = times
         self._seconds = (times - times[0]) / NANOSECONDS
-        height, width = self.record.frames(first, 1).shape[1:]
-        self._box = None if crop is None else squared(crop, width=width, height=height)
+        self.height, self.width = self.record.frames(first, 1).shape[1:]
 
     @property
     def name(self) -> str:
@@ -164,27 +162,7 @@ class RecordFilm:
         for begin in range(low, high, _AT_ONCE):
             some = min(_AT_ONCE, high - begin)
             pictures = self.record.frames(self._first + begin, some)
-            if self._box is not None:
-                x, y, width, height = self._box.as_tuple()
-                pictures = pictures[:, y : y + height, x : x + width]
             yield from zip(self._seconds[begin : begin + some].tolist(), pictures, strict=True)
 
     def findings(self) -> tuple[Finding, ...]:
         return ()
-
-
-def squared(box: CropBox, *, width: int, height: int) -> CropBox:
-    """The square about a box that lies in a picture of width × height: as wide as its longer side, where there is room.
-
-    Raises:
-        UsageError: a box beyond the picture.
-    """
-    if box.x + box.width > width or box.y + box.height > height:
-        raise UsageError(
-            f"the crop {box} reaches beyond the picture of {width} × {height} px", where="--crop",
-            fix="give x,y,width,height of a region inside it",
-        )  # fmt: skip
-    side = min(max(box.width, box.height), width, height)
-    x = min(max(box.x + box.width // 2 - side // 2, 0), width - side)
-    y = min(max(box.y + box.height // 2 - side // 2, 0), height - side)
-    return CropBox(x=x, y=y, width=side, height=side)

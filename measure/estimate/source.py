@@ -17,7 +17,8 @@ from flagdata.provenance import digest, file_hash
 from flagdata.record import Record
 from flagdata.schema import Kind
 from measure.estimate.checked import CheckedGate
-from measure.estimate.film import CameraFilm, Film, RecordFilm
+from measure.estimate.conditioned import ConditionedFilm
+from measure.estimate.film import CameraFilm, RecordFilm
 from measure.estimate.gate import Gate, gate_of
 from measure.gate import storage
 from models import estimator
@@ -34,19 +35,21 @@ class Reading:
     """How a source is read.
 
     Attributes:
-        crop: region of the flag; None for the largest centred square.
+        crop: region in which the flag is; None for the whole picture.
+        flag: its number among the moving cloths, from 1; None for the first.
         true_fps: rate at which a high-speed camera really ran [Hz]; of files only.
         sequence_fps: rate of images without stamps [Hz]; of files only.
     """
 
     crop: CropBox | None = None
+    flag: int | None = None
     true_fps: float | None = None
     sequence_fps: float | None = None
 
     def recipe(self) -> dict[str, Any]:
         """JSON values."""
         crop = None if self.crop is None else str(self.crop)
-        return {"crop": crop, "true_fps": self.true_fps, "sequence_fps": self.sequence_fps}
+        return {"crop": crop, "flag": self.flag, "true_fps": self.true_fps, "sequence_fps": self.sequence_fps}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,13 +57,13 @@ class Subject:
     """A film and where it is from.
 
     Attributes:
-        film: its frames.
+        film: its frames, made fit.
         artifact: of the lake; None of a plain file.
         path: of the plain file or folder; None of an artifact.
         record: the artifact's record, which may hold wind and truth.
     """
 
-    film: Film
+    film: ConditionedFilm
     artifact: Artifact | None = None
     path: Path | None = None
     record: Record | None = None
@@ -107,8 +110,8 @@ def subjects(
         raise UsageError("name a film or give a query over clips, one of them", fix="see flagdata measure --help")
     path = None if source is None else local_path(source)
     if path is not None and path.exists():
-        film = CameraFilm(path, crop=reading.crop, true_fps=reading.true_fps, sequence_fps=reading.sequence_fps)
-        return [Subject(film=film, path=path)]
+        film = CameraFilm(path, true_fps=reading.true_fps, sequence_fps=reading.sequence_fps)
+        return [Subject(film=ConditionedFilm(film, crop=reading.crop, flag=reading.flag), path=path)]
     if lake is None:
         what = "a query needs a lake" if source is None else f"there is no file {source!r}, and no lake was named"
         raise NotFoundError(what, fix="correct the path, or name the lake by --lake")
@@ -143,10 +146,12 @@ def _stored(lake: Lake, artifact: Artifact, reading: Reading) -> Subject:
         raise InputError(f"the {artifact.kind} has no frames of its own", where=artifact.name, fix="name its recording")
     clip = artifact.kind is Kind.CLIP
     film = RecordFilm(
-        lake.object_path(artifact.object), name=artifact.name, crop=reading.crop,
+        lake.object_path(artifact.object), name=artifact.name,
         first=(artifact.frame_first or 0) if clip else 0, count=artifact.frame_count if clip else None,
     )  # fmt: skip
-    return Subject(film=film, artifact=artifact, record=film.record)
+    return Subject(
+        film=ConditionedFilm(film, crop=reading.crop, flag=reading.flag), artifact=artifact, record=film.record
+    )
 
 
 def gate_beside(found: Network, *, false_alarm: float) -> Gate:

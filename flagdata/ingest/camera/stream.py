@@ -8,6 +8,9 @@ from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
 
+import numpy as np
+from numpy.typing import NDArray
+
 from flagdata.addresses import local_path
 from flagdata.errors import LimitError, RefusedError, UsageError
 from flagdata.files import is_folder
@@ -143,6 +146,11 @@ class CameraStream:
 
     def close(self) -> None:
         self._source.close()
+
+    def unpadded(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """The crop in a frame's image (size, size), without the padding about it; (height, width) uint8."""
+        top, left, high, wide = self._geometry.placement
+        return image[top : top + high, left : left + wide]
 
     def __iter__(self) -> Iterator[Frame]:
         if self._started:

@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.errors import InputError, UsageError
-from flagdata.ingest.camera import CropBox
+from flagdata.errors import InputError
 from flagdata.record import Record, RecordWriter
 from flagdata.timebase import NANOSECONDS
-from measure.estimate.film import CameraFilm, RecordFilm, squared
+from measure.estimate.film import CameraFilm, RecordFilm
 from tests.measure.estimate.conftest import pictures, write_video
 
 START = 1_700_000_000 * NANOSECONDS
@@ -64,19 +63,9 @@ def test_a_clip_begins_at_its_own_first_frame(recorded: Path) -> None:
         RecordFilm(recorded, name="clip", first=30, count=1)
 
 
-def test_a_crop_of_a_record_is_that_part_of_its_frames(recorded: Path) -> None:
-    film = RecordFilm(recorded, name="film", crop=CropBox(x=4, y=6, width=16, height=16))
-    _, image = next(film.frames(0.0, 1.0))
-    np.testing.assert_array_equal(image, Record.open(recorded).frames(0, 1)[0][6:22, 4:20])
-
-
-def test_a_box_is_widened_to_a_square_that_stays_in_the_picture() -> None:
-    assert squared(CropBox(x=10, y=20, width=40, height=20), width=100, height=80) == CropBox(
-        x=10, y=10, width=40, height=40
-    )
-    assert squared(CropBox(x=0, y=70, width=30, height=10), width=100, height=80) == CropBox(
-        x=0, y=50, width=30, height=30
-    )
-    assert squared(CropBox(x=0, y=0, width=100, height=40), width=100, height=80).as_tuple()[2:] == (80, 80)
-    with pytest.raises(UsageError, match="beyond the picture"):
-        squared(CropBox(x=90, y=0, width=20, height=20), width=100, height=80)
+def test_a_video_of_any_shape_is_the_whole_picture_as_it_is_stored(tmp_path: Path) -> None:
+    images = pictures(4, height=30, width=44)
+    film = CameraFilm(write_video(tmp_path / "film.mkv", images))
+    assert (film.width, film.height) == (44, 30)
+    np.testing.assert_array_equal(np.stack([image for _, image in film.frames(0, 1)]), images)
+    assert "letterboxed" not in {finding.kind for finding in film.findings()}

@@ -1,0 +1,219 @@
+"""A film that is made fit while it is read: steadied, cropped to its flag, all else frozen (`models.conditioning`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera import CropBox
+from flagdata.schema import FRAME_SIZE
+from measure.estimate.film import Film
+from measure.estimate.repeats import TimedFrame
+from models.conditioning import Conditioning, Follower, conditioning_of
+from models.conditioning.conditioning import LEAST, SAMPLE
+
+_HELD = 200_000_000
+"""Bytes of frames that are held, so that a short film is decoded once."""
+_LOST = 0.05
+"""Share of frames without the background's features from which on a warning is due."""
+_ENLARGED = 2.0
+
+
+class WholeFilm(Film, Protocol):
+    """A film of the whole picture."""
+
+    @property
+    def width(self) -> int:
+        """Of the picture in which a crop is given [px]."""
+        ...
+
+    @property
+    def height(self) -> int:
+        """Of the picture in which a crop is given [px]."""
+        ...
+
+
+class ConditionedFilm:
+    """A film made fit. Camera and flag are sought in the part that is read, anew for each reading.
+
+    Args:
+        film: that is made fit.
+        crop: the region in which the flag is; None for the whole picture.
+        flag: number of the flag, from 1; None for the one that is most like a flag.
+
+    Attributes:
+        found: what the last reading found; None before the first, and of fewer frames than a search takes.
+        reference: (height, width) the frame that all others are registered to; None likewise.
+
+    Raises:
+        UsageError: a crop beyond the picture.
+    """
+
+    def __init__(self, film: WholeFilm, *, crop: CropBox | None = None, flag: int | None = None) -> None:
+        if crop is not None and (crop.x + crop.width > film.width or crop.y + crop.height > film.height):
+            raise UsageError(
+                f"the crop {crop} reaches beyond the picture of {film.width} × {film.height} px", where="--crop",
+                fix="give x,y,width,height of a region inside it",
+            )  # fmt: skip
+        self._film, self._crop, self._flag = film, crop, flag
+        self._follower: Follower | None = None
+        self.found: Conditioning | None = None
+        self.reference: NDArray[np.uint8] | None = None
+
+    @property
+    def name(self) -> str:
+        return self._film.name
+
+    @property
+    def rate(self) -> float:
+        return self._film.rate
+
+    @property
+    def duration(self) -> float:
+        return self._film.duration
+
+    @property
+    def start(self) -> int | None:
+        return self._film.start
+
+    @property
+    def moved(self) -> bool:
+        """Whether the pictures are another view than the film's largest centred square."""
+        if self.found is None or self.reference is None:
+            return False
+        height, width = self.reference.shape
+        return self.found.camera.moves or not self.found.square.central(width, height)
+
+    def frames(self, first: float, last: float) -> Iterator[TimedFrame]:
+        held: list[TimedFrame] | None = []
+        sample: list[NDArray[np.uint8]] = []
+        every = max(1, int(np.ceil((min(last, self.duration) - max(first, 0.0)) * self.rate / SAMPLE)))
+        bytes_held = 0
+        for k, (time, picture) in enumerate(self._film.frames(first, last)):
+            if k % every == 0:
+                sample.append(picture)
+            bytes_held += picture.nbytes
+            if held is not None:
+                held.append((time, picture))
+            if bytes_held > _HELD:
+                held = None
+        source = held if held is not None else self._film.frames(first, last)
+        if len(sample) < LEAST:
+            yield from source
+            return
+        self.found = conditioning_of(sample, size=FRAME_SIZE, flag=self._flag, within=self._within(sample[0].shape))
+        self.reference = sample[len(sample) // 2]
+        del sample
+        self._follower = follower = Follower(self.found)
+        for time, picture in source:
+            yield time, follower.show(picture)
+
+    def _within(self, shape: tuple[int, ...]) -> tuple[int, int, int, int] | None:
+        """The crop in pixels of frames of this shape."""
+        if self._crop is None:
+            return None
+        scale = shape[1] / self._film.width
+        x, y, width, height = (round(value * scale) for value in self._crop.as_tuple())
+        return x, y, width, height
+
+    def findings(self) -> tuple[Finding, ...]:
+        found, follower = self.found, self._follower
+        if found is None or follower is None:
+            return self._film.findings()
+        return (*self._film.findings(), *_of_camera(found, follower), *_of_flag(found, self.reference))
+
+    def as_dict(self) -> dict[str, Any] | None:
+        """JSON values of what was found; None before a reading."""
+        if self.found is None or self._follower is None:
+            return None
+        found, follower = self.found, self._follower
+        return {
+            "camera": {
+                "moves": found.camera.moves, "features": len(found.camera.corners), **follower.motion(),
+                "lost": follower.lost,
+            },
+            "flags": [
+                {
+                    "box": [edge / found.scale for edge in region.box], "share": region.share, "hoist": region.hoist,
+                    "aspect": region.aspect,
+                }
+                for region in found.regions
+            ],
+            "chosen": found.chosen + 1 if found.regions else None,
+            "square": [found.square.x, found.square.y, found.square.side],
+        }  # fmt: skip
+
+
+def _of_camera(found: Conditioning, follower: Follower) -> list[Finding]:
+    if not len(found.camera.corners):
+        return [
+            Finding(
+                kind="camera-unknown", severity=Severity.NOTE,
+                what="no feature of the background shows the camera's motion; no frame was moved",
+            )
+        ]  # fmt: skip
+    if not found.camera.moves:
+        return [
+            Finding(
+                kind="camera-still", severity=Severity.NOTE, count=len(found.camera.corners),
+                what=f"the camera is still: {len(found.camera.corners)} features of the background stay in place",
+            )
+        ]  # fmt: skip
+    motion = follower.motion()
+    notes = [
+        Finding(
+            kind="camera-moves", severity=Severity.NOTE, value=motion["drift"], count=len(found.camera.corners),
+            what=f"the camera drifts {motion['drift']:.1f} px and shakes {motion['shake']:.2f} px from frame to frame, "
+            f"by {len(found.camera.corners)} features of the background; the frames were moved back",
+        )
+    ]  # fmt: skip
+    total = len(follower.path)
+    if follower.lost > _LOST * total:
+        notes.append(
+            Finding(
+                kind="camera-lost", severity=Severity.WARNING, count=follower.lost, value=follower.lost / total,
+                what=f"in {follower.lost} of {total} frames the background's features were not found, and the place of "
+                "the frame before was used",
+                fix="choose a part of the film without cuts by --start and --end",
+            )
+        )  # fmt: skip
+    return notes
+
+
+def _of_flag(found: Conditioning, reference: NDArray[np.uint8] | None) -> list[Finding]:
+    if found.region is None or reference is None:
+        return []
+    height, width = reference.shape
+    left, top, right, bottom = (round(edge / found.scale) for edge in found.region.box)
+    square, beyond = found.square, found.square.beyond(width, height)
+    notes = [
+        Finding(
+            kind="flag-found", severity=Severity.NOTE, count=len(found.regions), value=found.region.share,
+            what=f"{len(found.regions)} moving {'cloths' if len(found.regions) > 1 else 'cloth'}; number "
+            f"{found.chosen + 1} visits {right - left} × {bottom - top} px and is shown in a square of {square.side} px"
+            + (f", {beyond:.0%} of which lie beyond the picture and were padded" if beyond > 0 else ""),
+        )
+    ]  # fmt: skip
+    if len(found.regions) > 1:
+        notes.append(
+            Finding(
+                kind="several-flags-found", severity=Severity.WARNING, count=len(found.regions),
+                what=f"{len(found.regions)} regions move like cloth; number {found.chosen + 1} was measured, with "
+                f"{found.region.share:.0%} of the motion",
+                fix="choose another by --flag, as numbered on the page of --report",
+            )
+        )  # fmt: skip
+    if found.size > _ENLARGED * square.side:
+        notes.append(
+            Finding(
+                kind="enlarged", severity=Severity.WARNING, value=found.size / square.side,
+                what=f"the flag's square of {square.side} px is smaller than the {found.size} px that are judged: it "
+                f"was enlarged {found.size / square.side:.3g}-fold",
+            )
+        )  # fmt: skip
+    return notes

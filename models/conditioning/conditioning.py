@@ -1,0 +1,312 @@
+"""A film made fit before anything is judged: camera, flag, crop and freezing, in this order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, UsageError
+from models.conditioning import framing
+from models.conditioning.camera import STILL, WORK, Camera, Transform, camera_of, path
+from models.conditioning.framing import Square
+from models.conditioning.regions import Region, regions_of
+
+SAMPLE = 96
+"""Frames of a film that are looked at to find camera and flag."""
+LEAST = 3
+"""Frames without which neither can be found."""
+_LEAST_MOTION = 0.15
+"""Root mean square motion of the camera [px of the square that is judged] below which no frame is moved: resampling
+would blur more than it steadies."""
+_AROUND = 0.08
+"""Width of the band about the places that the cloth visits, within which nothing is frozen, in sizes of the region."""
+_FEATHER = 0.04
+"""Width over which freezing sets in, in sizes of the region."""
+_BACKGROUND = 48
+"""Frames of the sample whose median is the frozen background."""
+_NOISES = 3.0
+"""Deviations of the camera's noise that are left where the film is frozen: a picture without any would be unlike all
+that networks are trained on."""
+_ROUNDING = 2.0
+"""Gray levels that are left at least: what rounding and coding change."""
+_DRIFT = 10
+"""Frames over which the camera's place is smoothed for its drift."""
+_AHEAD = 0.1
+"""Width of the band about cloth in which no feature of the background is sought, in sizes of the region."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Conditioning:
+    """What was found in a film, and how each of its frames becomes a square picture of the flag.
+
+    Attributes:
+        size: of the pictures [px].
+        scale: of the pictures in which features and regions are sought, over the film's.
+        camera: its background features.
+        regions: of moving cloth, the first the most like a flag; none where nothing moves.
+        chosen: place of the flag among them.
+        square: that is judged, in the reference picture [px of the film].
+        weight: (size, size) float32, 1 where the film is shown, 0 where it is frozen.
+        background: (size, size) what is shown there, the median in time.
+        noise: from which a frame differs by this much at most where it is frozen [gray levels].
+        path: (n, 2) of the square's centre over the sample [px of the film].
+        looked: frames of the sample.
+    """
+
+    size: int
+    scale: float
+    camera: Camera
+    regions: tuple[Region, ...]
+    chosen: int
+    square: Square
+    weight: NDArray[np.float32]
+    background: NDArray[np.uint8]
+    noise: float
+    path: NDArray[np.float64]
+    looked: int
+
+    @property
+    def region(self) -> Region | None:
+        """The flag's; None where nothing moves."""
+        return self.regions[self.chosen] if self.regions else None
+
+    def follow(self, frame: NDArray[np.uint8], guess: Transform) -> Transform | None:
+        """Where the reference picture is in a frame; None where the background's features are not found.
+
+        Args:
+            frame: (height, width) of the film.
+            guess: transform of a frame nearby, as this gives it.
+        """
+        return self.camera.follow(shrunk(frame, self.scale), guess) if self.camera.moves else STILL
+
+    def show(self, frame: NDArray[np.uint8], transform: Transform) -> NDArray[np.uint8]:
+        """(size, size) picture of the flag: registered, cropped, scaled, all else frozen."""
+        drawn = _framed(frame, self.square, self.size, transform, scale=self.scale, moves=self.camera.moves)
+        away = drawn - self._still
+        kept = np.clip(away, -self.noise, self.noise)
+        return np.rint(self._still + kept + self.weight * (away - kept)).astype(np.uint8)
+
+    @cached_property
+    def _still(self) -> NDArray[np.float32]:
+        return self.background.astype(np.float32)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Conditioned:
+    """A film that was made fit.
+
+    Attributes:
+        frames: (n, size, size) gray.
+        found: what was found in it.
+        path: (n, 2) of the square's centre in each frame [px of the film].
+        lost: frames in which the background's features were not found; the transform of the frame before is used.
+    """
+
+    frames: NDArray[np.uint8]
+    found: Conditioning
+    path: NDArray[np.float64]
+    lost: int
+
+
+def conditioned(
+    frames: NDArray[np.uint8], times: NDArray[np.float64], *, size: int = 300, flag: int | None = None
+) -> Conditioned:
+    """A short film in memory, made fit.
+
+    Args:
+        frames: (n, height, width) gray.
+        times: (n,) of them, ascending [s].
+        size: of the pictures that come out [px].
+        flag: number of the flag, from 1, the first the most like one; None for the first.
+
+    Raises:
+        InputError: fewer than three frames, or times that do not fit them.
+        UsageError: a flag of a number that the film does not have.
+    """
+    if len(frames) < LEAST or len(times) != len(frames):
+        raise InputError(f"{len(frames)} frames at {len(times)} instants", fix="give three frames or more, each a time")
+    found = conditioning_of(frames[:: -(-len(frames) // SAMPLE)], size=size, flag=flag)
+    follower = Follower(found)
+    shown = np.stack([follower.show(frame) for frame in frames])
+    return Conditioned(frames=shown, found=found, path=follower.path, lost=follower.lost)
+
+
+class Follower:
+    """Shows the frames of a film in order, each from the transform of the one before.
+
+    Attributes:
+        lost: frames in which the background's features were not found.
+    """
+
+    def __init__(self, found: Conditioning) -> None:
+        self._found, self._last = found, STILL
+        self._path: list[NDArray[np.float64]] = []
+        self.lost = 0
+
+    @property
+    def path(self) -> NDArray[np.float64]:
+        """(n, 2) of the square's centre in each frame so far [px of the film]."""
+        return np.array(self._path).reshape(-1, 2)
+
+    def motion(self) -> dict[str, float]:
+        """Drift, the largest distance between places of the square's centre, smoothed over `_DRIFT` frames, and shake,
+        the root mean square of its steps from frame to frame [px of the film]."""
+        at = self.path
+        if len(at) < 2:
+            return {"drift": 0.0, "shake": 0.0}
+        ones = np.ones(min(_DRIFT, len(at)))
+        smooth = np.stack([np.convolve(axis, ones / len(ones), mode="valid") for axis in at.T], axis=1)
+        steps = np.diff(at, axis=0)
+        return {
+            "drift": float(np.hypot(*np.ptp(smooth, axis=0))),
+            "shake": float(np.sqrt(np.square(steps).sum(axis=1).mean())),
+        }
+
+    def show(self, frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """(size, size) picture of the next frame (height, width)."""
+        found = self._found
+        transform = found.follow(frame, self._last)
+        if transform is None:
+            self.lost += 1
+        else:
+            self._last = transform
+        self._path.append(_centre(found.square, self._last, found.scale))
+        return found.show(frame, self._last)
+
+
+def conditioning_of(
+    sample: Sequence[NDArray[np.uint8]] | NDArray[np.uint8], *, size: int, flag: int | None = None,
+    within: tuple[int, int, int, int] | None = None,
+) -> Conditioning:  # fmt: skip
+    """What a sample of a film's frames shows.
+
+    Args:
+        sample: (height, width) gray, spread over the film, in order; three or more.
+        size: of the pictures that are to come out [px].
+        flag: number of the flag, from 1; None for the first.
+        within: x, y, width and height of the part of the middle frame in which the flag is [px]; None for all.
+
+    Raises:
+        UsageError: a flag of a number that the film does not have.
+    """
+    cv2.setNumThreads(1)
+    height, width = sample[0].shape
+    scale = min(1.0, WORK / max(height, width))
+    small = [shrunk(frame, scale) for frame in sample]
+    inside = None if within is None else _inside(within, small[0].shape, scale)
+    camera, transforms, regions = _camera_and_regions(small, inside, scale * max(width, height) / size)
+    if flag is not None and not 1 <= flag <= len(regions):
+        raise UsageError(
+            f"flag {flag} of a film in which {len(regions)} regions move like cloth", where="--flag",
+            fix="give a number from the page's picture" if regions else "give --crop around the flag",
+        )  # fmt: skip
+    chosen = 0 if flag is None else flag - 1
+    box = (0.0, 0.0, float(width), float(height))
+    if regions:
+        left, top, right, bottom = regions[chosen].box
+        box = (left / scale, top / scale, right / scale, bottom / scale)
+    square = framing.square_about(box, width=width, height=height, whole=not camera.moves or not regions)
+    step = -(-len(sample) // _BACKGROUND)
+    framed = [
+        _framed(frame, square, size, transform, scale=scale, moves=camera.moves)
+        for frame, transform in zip(sample[::step], transforms[::step], strict=True)
+    ]
+    weight = np.ones((size, size), np.float32)
+    if regions:
+        weight = _weight(regions[chosen].mask, square, size, scale)
+    stack = np.stack(framed)
+    frozen = weight == 0
+    spread = float(np.median(stack[:, frozen].std(axis=0))) if frozen.any() else 0.0
+    return Conditioning(
+        size=size, scale=scale, camera=camera, regions=regions, chosen=chosen, square=square, weight=weight,
+        background=np.median(stack, axis=0).astype(np.uint8), noise=max(_NOISES * spread, _ROUNDING),
+        path=np.stack([_centre(square, transform, scale) for transform in transforms]), looked=len(sample),
+    )  # fmt: skip
+
+
+def shrunk(frame: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
+    """A frame (height, width) averaged down."""
+    if scale >= 1:
+        return np.ascontiguousarray(frame)
+    size = (max(1, round(frame.shape[1] * scale)), max(1, round(frame.shape[0] * scale)))
+    return np.asarray(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def _camera_and_regions(
+    small: list[NDArray[np.uint8]], inside: NDArray[np.bool_] | None, unit: float
+) -> tuple[Camera, list[Transform], tuple[Region, ...]]:
+    """Camera and cloth, each found again with the other known.
+
+    Args:
+        unit: pixels of `small` in one of the pictures that come out, of a film that is shown whole.
+    """
+    least = _LEAST_MOTION * unit
+    camera, transforms = camera_of(small, least=least)
+    regions = regions_of(_registered(small, transforms), within=inside)
+    if not regions:
+        return camera, transforms, regions
+    outside = np.ones(small[0].shape, bool)
+    for region in regions:
+        outside &= ~_widened(region.mask, _AHEAD).astype(bool)
+    again, moved = camera_of(small, outside=outside, least=least)
+    if not len(again.corners):
+        return camera, transforms, regions
+    return again, moved, regions_of(_registered(small, moved), within=inside)
+
+
+def _registered(small: list[NDArray[np.uint8]], transforms: list[Transform]) -> NDArray[np.uint8]:
+    height, width = small[0].shape
+    moved = [
+        picture if transform is STILL else cv2.warpAffine(
+            picture, transform, (width, height), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+        for picture, transform in zip(small, transforms, strict=True)
+    ]  # fmt: skip
+    return np.stack(moved).astype(np.uint8)
+
+
+def _framed(
+    frame: NDArray[np.uint8], square: Square, size: int, transform: Transform, *, scale: float, moves: bool
+) -> NDArray[np.uint8]:
+    if not moves:
+        return framing.cut(frame, square, size)
+    return framing.warp(frame, square, size, framing.scaled(transform, scale))
+
+
+def _centre(square: Square, transform: Transform, scale: float) -> NDArray[np.float64]:
+    middle = (square.x + square.side / 2, square.y + square.side / 2)
+    return path([framing.scaled(transform, scale)], middle)[0]
+
+
+def _widened(mask: NDArray[np.bool_], share: float) -> NDArray[np.uint8]:
+    """The mask widened by a share of its size."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    radius = max(1, round(share * max(np.ptp(rows), np.ptp(columns))))
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+    return np.asarray(cv2.dilate(mask.astype(np.uint8), disc), dtype=np.uint8)
+
+
+def _weight(mask: NDArray[np.bool_], square: Square, size: int, scale: float) -> NDArray[np.float32]:
+    """(size, size) 1 on and about the cloth, falling to 0 across the feather."""
+    extent = max(np.ptp(np.flatnonzero(mask.any(axis=1))), np.ptp(np.flatnonzero(mask.any(axis=0)))) + 1
+    near = _widened(mask, _AROUND + _FEATHER)
+    step = square.side / size
+    place = np.array([[step, 0.0, square.x + step / 2 - 0.5], [0.0, step, square.y + step / 2 - 0.5]])
+    place = np.column_stack([place[:, :2] * scale, (place[:, 2] + 0.5) * scale - 0.5])
+    out = cv2.warpAffine(near, place, (size, size), flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP)
+    feather = max(_FEATHER * extent / scale / step, 1.0)
+    away = cv2.distanceTransform(np.asarray(out, dtype=np.uint8), cv2.DIST_L2, 5)
+    return np.clip(away / feather, 0.0, 1.0).astype(np.float32)
+
+
+def _inside(within: tuple[int, int, int, int], shape: tuple[int, ...], scale: float) -> NDArray[np.bool_]:
+    x, y, width, height = (round(value * scale) for value in within)
+    inside = np.zeros(shape[:2], bool)
+    inside[max(y, 0) : y + height, max(x, 0) : x + width] = True
+    return inside

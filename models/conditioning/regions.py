@@ -1,0 +1,169 @@
+"""Where cloth moves: regions of registered pictures, the most like a flag first.
+
+A flag changes the picture at the scale of its folds, leaves and water at that of their texture. So regions are sought
+in differences of strongly shrunk frames, in which a fine texture averages out, and each is then outlined in the
+pictures themselves by all places that it visits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Side = Literal["left", "right", "top"]
+_COARSE = 120
+"""Longer side [px] of the shrunk frames."""
+_SEED = 0.15
+"""Share of the strongest change from which on a region is sought."""
+_FAINTEST = 0.5
+"""Gray levels of change that shrunk noise and coding leave at most."""
+_BRIDGE = 0.02
+"""Gap between parts of one cloth, as a share of the longer side."""
+_NUMBERED = 0.1
+"""Share of the first region's motion that another has to have to be numbered."""
+_MOST = 6
+_VISITED = 0.06
+"""Share of the region's strongest deviation from which on a place counts as visited, beyond the noise."""
+_NOISES = 5.0
+_REACH = 0.35
+"""How far a cloth may reach beyond the region of its strong motion, in sizes of the region."""
+_CLOSED = 0.08
+"""Width of folds and plain parts that are closed to an outline, in sizes of the region."""
+
+_THIN = 0.05
+"""Half the width of a pole at most, in sizes of the region."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Region:
+    """A part of the picture in which cloth moves.
+
+    Attributes:
+        mask: (height, width) all places that it visits, in pictures of `camera.WORK` px.
+        share: of the motion of all regions, 0 to 1.
+        hoist: the side at which it hangs: where it moves least.
+        aspect: width over height of the outline across the hoist, for a flag that flies to the side.
+    """
+
+    mask: NDArray[np.bool_]
+    share: float
+    hoist: Side
+    aspect: float
+
+    @property
+    def box(self) -> tuple[int, int, int, int]:
+        """Left, top, right and bottom of the places [px], the last two beyond them."""
+        rows, columns = np.flatnonzero(self.mask.any(axis=1)), np.flatnonzero(self.mask.any(axis=0))
+        return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+
+
+def regions_of(pictures: NDArray[np.uint8], *, within: NDArray[np.bool_] | None = None) -> tuple[Region, ...]:
+    """The regions of a film, the strongest motion first; none where nothing moves.
+
+    Args:
+        pictures: (n, height, width) gray, registered, in order; n of 3 or more.
+        within: (height, width) where to look; everywhere by default.
+    """
+    height, width = pictures.shape[1:]
+    coarse = _shrunk(pictures)
+    change = np.abs(np.diff(coarse, axis=0)).mean(axis=0)
+    change = cv2.GaussianBlur(change, (0, 0), 1.0)
+    floor = float(np.median(change))
+    change = np.maximum(change - floor, 0.0)
+    change = np.asarray(cv2.resize(change, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
+    if within is not None:
+        change[~within] = 0.0
+    peak = float(np.quantile(change, 0.998)) if within is None else float(change.max())
+    if peak < _FAINTEST:
+        return ()
+    seeds = (change > max(_SEED * peak, _FAINTEST / 2)).astype(np.uint8)
+    joined = cv2.morphologyEx(seeds, cv2.MORPH_CLOSE, _disc(_BRIDGE * max(height, width)))
+    count, labels = cv2.connectedComponents(joined)
+    weights = np.bincount(labels.ravel(), weights=np.square(change.ravel()) * seeds.ravel(), minlength=count)[1:]
+    if not weights.any():
+        return ()
+    order = [int(k) for k in np.argsort(-weights, kind="stable")[:_MOST] if weights[k] >= _NUMBERED * weights.max()]
+    deviation = _deviation(pictures)
+    others = np.isin(labels, [k + 1 for k in order])
+    found = []
+    for k in order:
+        own = labels == k + 1
+        mask = _outline(own, others & ~own, deviation, within)
+        hoist, aspect = _hoist(mask, change)
+        found.append(Region(mask=mask, share=float(weights[k] / weights.sum()), hoist=hoist, aspect=aspect))
+    return tuple(found)
+
+
+def _shrunk(pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
+    height, width = pictures.shape[1:]
+    scale = min(1.0, _COARSE / max(height, width))
+    size = (max(1, round(width * scale)), max(1, round(height * scale)))
+    shrunk = [cv2.resize(picture.astype(np.float32), size, interpolation=cv2.INTER_AREA) for picture in pictures]
+    return np.stack(shrunk).astype(np.float32)
+
+
+def _deviation(pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """(height, width) 95 % quantile of the distance from the median in time: a rare visit counts."""
+    middle = np.median(pictures, axis=0).astype(np.int16)
+    away = np.sort(np.abs(pictures.astype(np.int16) - middle), axis=0)
+    rank = min(len(away) - 1, int(np.ceil(0.95 * len(away))))
+    return np.asarray(cv2.GaussianBlur(away[rank].astype(np.float32), (0, 0), 1.0), np.float32)
+
+
+def _outline(
+    own: NDArray[np.bool_], others: NDArray[np.bool_], deviation: NDArray[np.float32],
+    within: NDArray[np.bool_] | None,
+) -> NDArray[np.bool_]:  # fmt: skip
+    """All places that the cloth visits, its plain parts and the gaps between folds filled."""
+    size = _size(own)
+    noise = float(np.median(deviation))
+    moving = deviation > max(_NOISES * noise, _VISITED * float(np.quantile(deviation[own], 0.99)), 2.0)
+    near = cv2.dilate(own.astype(np.uint8), _disc(_REACH * size)).astype(bool) & ~others
+    if within is not None:
+        near &= within
+    moving = (moving & near) | own
+    moving = cv2.morphologyEx(moving.astype(np.uint8), cv2.MORPH_OPEN, _disc(1.5)).astype(bool) | own
+    _, labels = cv2.connectedComponents(moving.astype(np.uint8))
+    connected = np.isin(labels, np.unique(labels[own])) & moving
+    pad = int(np.ceil(_CLOSED * size)) + 1
+    padded = np.pad(connected.astype(np.uint8), pad)
+    closed = cv2.morphologyEx(padded, cv2.MORPH_CLOSE, _disc(_CLOSED * size))[pad:-pad, pad:-pad]
+    contours, _ = cv2.findContours(np.ascontiguousarray(closed), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    filled = np.zeros_like(closed)
+    cv2.drawContours(filled, contours, -1, 1, thickness=cv2.FILLED)
+    return _without_pole(np.asarray(filled, dtype=np.uint8), size).astype(bool)
+
+
+def _without_pole(mask: NDArray[np.uint8], size: float) -> NDArray[np.uint8]:
+    """The mask without long strips as thin as a pole that sways; a tip stays, as it is short."""
+    body = cv2.morphologyEx(mask, cv2.MORPH_OPEN, _disc(_THIN * size))
+    return mask & np.asarray(cv2.dilate(body, _disc(2 * _THIN * size)), np.uint8) if body.any() else mask
+
+
+def _hoist(mask: NDArray[np.bool_], change: NDArray[np.float32]) -> tuple[Side, float]:
+    rows, columns = np.nonzero(mask)
+    weight = change[rows, columns]
+    left, right, top, bottom = columns.min(), columns.max(), rows.min(), rows.max()
+    wide, high = right - left + 1, bottom - top + 1
+    total = max(float(weight.sum()), 1e-9)
+    across = float((columns * weight).sum() / total - (left + right) / 2) / wide
+    down = float((rows * weight).sum() / total - (top + bottom) / 2) / high
+    if down > 2 * abs(across) and high > 0.8 * wide:
+        return "top", float(wide / high)
+    at_hoist = columns < left + 0.25 * wide if across >= 0 else columns > right - 0.25 * wide
+    spans = np.ptp(rows[at_hoist]) + 1 if at_hoist.any() else high
+    return ("left" if across >= 0 else "right"), float(wide / spans)
+
+
+def _size(mask: NDArray[np.bool_]) -> float:
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    return float(max(rows[-1] - rows[0], columns[-1] - columns[0]) + 1)
+
+
+def _disc(radius: float) -> NDArray[np.uint8]:
+    side = 2 * max(1, round(radius)) + 1
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)).astype(np.uint8)
