@@ -7,6 +7,7 @@ estimate carries a p-value of the distance of its summary to the training clips'
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,8 +22,9 @@ from flagdata.rng import torch_generator
 from models.crops import Cropping
 from models.frontend import FrontEnd
 from models.learner import Learner, Loss, build
+from models.mixture import Mixture
 from models.outliers import Familiarity
-from models.restriction import MORE, Known, restricted
+from models.restriction import Conditioned, Known, conditioned
 from models.storage import WEIGHTS, check_model, read_card, read_tensors
 from models.targets import Cloth, Target
 
@@ -134,20 +136,20 @@ class Estimator:
 
     @torch.no_grad()
     def estimate(
-        self, inputs: Tensor, *, seed: int = 0, draws: int = DRAWS, known: Known | None = None
+        self, inputs: Tensor, *, seed: int = 0, draws: int = DRAWS, known: Sequence[Known] = ()
     ) -> Estimates:  # fmt: skip
         """Estimates for inputs (n, *shape), see `inputs`.
 
         Args:
             seed: of the draws; the same inputs and seed give the same draws.
             draws: of each clip's distribution, shared among the learners.
-            known: the range that a quantity of each clip is known to lie in; None if nothing is known.
+            known: what is known of quantities of each clip.
         """
         embeddings = self.embeddings(inputs)
-        if known is None:
-            logits = self.logits(embeddings, seed=seed, draws=draws)
+        if known:
+            logits = self.given(self.posterior(embeddings), known, seed=seed, draws=draws).logits
         else:
-            logits, _ = self.logits_within(embeddings, known, seed=seed, draws=draws)
+            logits = self.logits(embeddings, seed=seed, draws=draws)
         values = self.learners[0].scaling.values(logits)
         summary = embeddings[0].cpu().numpy().astype(np.float32)
         return Estimates(
@@ -182,16 +184,45 @@ class Estimator:
         centre = logits.mean(dim=1, keepdim=True)
         return centre + (logits - centre) * self.widening.to(logits)
 
-    def logits_within(
-        self, embeddings: Sequence[Tensor], known: Known, *, seed: int, draws: int
-    ) -> tuple[Tensor, NDArray[np.float64]]:  # fmt: skip
-        """As `logits`, where a quantity is known, and (n,) the share of the distribution that lies there.
+    @torch.no_grad()
+    def posterior(self, embeddings: Sequence[Tensor]) -> Mixture:
+        """The distributions that `logits` draws from, in closed form: float64, the learners' components side by side.
 
         Raises:
-            InputError: see `models.restriction.restricted`.
+            InputError: a model without distributions.
         """
-        many = self.logits(embeddings, seed=seed, draws=draws * MORE)
-        return restricted(many, self.learners[0].scaling, known, draws=draws)
+        parts = [
+            learner.mixture(embedding).double().rescaled(scale=learner.spread.double(), shift=learner.centre.double())
+            for learner, embedding in zip(self.learners, embeddings, strict=True)
+        ]
+        together = Mixture(
+            log_weight=torch.cat([part.log_weight for part in parts], dim=1) - math.log(len(parts)),
+            location=torch.cat([part.location for part in parts], dim=1),
+            factor=torch.cat([part.factor for part in parts], dim=1),
+        )
+        widening = self.widening.to(together.location)
+        return together.rescaled(scale=widening, shift=(together.mean() * (1 - widening))[:, None])
+
+    @torch.no_grad()
+    def given(self, posterior: Mixture, known: Sequence[Known], *, seed: int, draws: int) -> Conditioned:
+        """Draws from distributions of `posterior` given what is known.
+
+        Raises:
+            InputError: see `models.restriction.conditioned`.
+        """
+        generator = torch_generator(seed, "known", device=posterior.location.device)
+        return conditioned(posterior, self.learners[0].scaling, known, draws=draws, generator=generator)
+
+    def prior(self, count: int) -> Mixture:
+        """What the training set's targets are like: `count` times the Gaussian of their logits' means and standard
+        deviations, as one component, float64."""
+        learner = self.learners[0]
+        size = len(self.targets)
+        centre, spread = learner.centre.double(), learner.spread.double()
+        return Mixture(
+            log_weight=torch.zeros((count, 1)).to(centre), location=centre.expand(count, 1, size),
+            factor=torch.diag(spread).expand(count, 1, size, size),
+        )  # fmt: skip
 
 
 def load(folder: Path) -> Estimator:

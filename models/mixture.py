@@ -6,6 +6,7 @@ Bishop, Mixture Density Networks, 1994; full covariances by Cholesky factors aft
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -48,12 +49,61 @@ class Mixture:
     def log_prob(self, y: Tensor) -> Tensor:
         """Logarithm of the density at y (n, t): (n,)."""
         self._require(y)
-        offset = (y[:, None] - self.location).unsqueeze(-1)
-        whitened = torch.linalg.solve_triangular(self.factor, offset, upper=False).squeeze(-1)
+        return self.log_density(y[:, None])[:, 0]
+
+    def log_density(self, y: Tensor) -> Tensor:
+        """Logarithm of the density at p points of each clip, y (n, p, t): (n, p)."""
+        return torch.logsumexp(self._log_joint(y), dim=1)
+
+    def _log_joint(self, y: Tensor) -> Tensor:
+        """Logarithms of each component's weight times its density at y (n, p, t): (n, K, p)."""
+        offset = (y[:, None] - self.location[:, :, None]).mT
+        whitened = torch.linalg.solve_triangular(self.factor, offset, upper=False)
         log_volume = self.factor.diagonal(dim1=-2, dim2=-1).log().sum(dim=-1)
-        constant = 0.5 * y.shape[1] * math.log(2 * math.pi)
-        component = -0.5 * whitened.square().sum(dim=-1) - log_volume - constant
-        return torch.logsumexp(self.log_weight + component, dim=1)
+        constant = 0.5 * y.shape[2] * math.log(2 * math.pi)
+        component = -0.5 * whitened.square().sum(dim=-2) - log_volume[..., None] - constant
+        return self.log_weight[..., None] + component
+
+    def marginal(self, columns: Sequence[int]) -> Mixture:
+        """The mixture of some targets, in the order that is given."""
+        chosen = list(columns)
+        factor = self.factor[..., chosen, :]
+        return Mixture(
+            log_weight=self.log_weight, location=self.location[..., chosen],
+            factor=torch.linalg.cholesky(factor @ factor.mT),
+        )  # fmt: skip
+
+    def sample_given(self, columns: Sequence[int], values: Tensor, generator: torch.Generator) -> Tensor:
+        """Draw from the distribution of all targets given some of them: (n, p, t).
+
+        With the given targets first, a component's covariance has the Cholesky factor [[A, 0], [B, C]]; given y of
+        them, the others have the mean m + B A⁻¹ (y − m_y) and the covariance C Cᵀ, and the component's weight is
+        proportional to its density at y.
+
+        Args:
+            columns: of the targets that are given.
+            values: (n, p, given) of them, one draw for each.
+            generator: on the device of the tensors.
+        """
+        rest = [column for column in range(self.location.shape[2]) if column not in columns]
+        order = [*columns, *rest]
+        given = len(columns)
+        own = self.marginal(order)
+        first = Mixture(
+            log_weight=own.log_weight, location=own.location[..., :given], factor=own.factor[..., :given, :given]
+        )
+        share = first._log_joint(values).softmax(dim=1).mT
+        component = torch.multinomial(share.flatten(0, 1), 1, generator=generator).reshape(values.shape[:2])
+        row = torch.arange(len(values), device=values.device)[:, None]
+        location, factor = own.location[row, component], own.factor[row, component]
+        offset = (values - location[..., :given]).unsqueeze(-1)
+        whitened = torch.linalg.solve_triangular(factor[..., :given, :given], offset, upper=False)
+        noise = torch.randn(
+            (*values.shape[:2], len(rest), 1), generator=generator, dtype=values.dtype, device=values.device
+        )
+        others = factor[..., given:, :given] @ whitened + factor[..., given:, given:] @ noise
+        drawn = torch.cat([values, location[..., given:] + others.squeeze(-1)], dim=-1)
+        return drawn[..., torch.tensor(order).argsort()]
 
     def mean(self) -> Tensor:
         """Mean of each target: (n, t)."""
@@ -88,11 +138,24 @@ class Mixture:
         return location + (factor @ noise.unsqueeze(-1)).squeeze(-1)
 
     def rescaled(self, *, scale: Tensor, shift: Tensor) -> Mixture:
-        """Return the mixture of scale · y + shift, scale (t,) above 0 and shift (t,)."""
+        """Return the mixture of scale · y + shift, scale (t,) above 0 and shift (t,), or (n, 1, t) for each clip."""
         return Mixture(
             log_weight=self.log_weight,
             location=self.location * scale + shift,
             factor=self.factor * scale[:, None],
+        )
+
+    def rows(self, places: Sequence[int]) -> Mixture:
+        """The mixtures of some of the clips."""
+        chosen = list(places)
+        return Mixture(
+            log_weight=self.log_weight[chosen], location=self.location[chosen], factor=self.factor[chosen]
+        )  # fmt: skip
+
+    def double(self) -> Mixture:
+        """The same in float64."""
+        return Mixture(
+            log_weight=self.log_weight.double(), location=self.location.double(), factor=self.factor.double()
         )
 
     def _require(self, y: Tensor) -> None:

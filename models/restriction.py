@@ -1,14 +1,26 @@
-"""What a model says of clips of which something is known: its posterior, restricted to where the known quantities lie.
+"""What a model says of clips of which something is known besides their pictures: a weighed cloth, a measured shape.
 
-Of a joint posterior p(θ | x) under a prior π, the posterior under the prior that is π within a range and 0 outside
-is p(θ | x) restricted to that range (Bayes' rule). With a weighed flag the wind is that of a flag of that weight.
-Draws outside are discarded; as only some are left, many more are drawn than are returned. Of a flag that was measured
-and weighed, two quantities are known, `Known.of_aspect` and its area weight: the posterior is restricted to both.
+A network gives p(θ | x) = p(x | θ) π(θ) / p(x) under the prior π that it learned. A statement about some of the
+quantities κ of θ is of one of three kinds, and acts by its likelihood L(κ):
+
+- *exact*: L is a delta function; p(θ | x, κ) is the conditional distribution, on which π(κ) has no influence at all;
+- *with a standard deviation*: L(κ) = N(value; κ, σ²), that of a measurement which is independent of the film given θ;
+- *a range*: L(κ) is 1 within it and 0 outside.
+
+By Bayes' rule p(θ | x, L) = p(θ | x) L(κ) / Z with Z = ∫ p(κ | x) L(κ) dκ. So within a range, and within σ, the prior
+that the network learned stays; outside, the statement replaces it. Nothing is approximated: p(θ | x) is a mixture of
+Gaussians in the targets' logits, of which p(κ | x) is a marginal, in closed form. κ is drawn from p(κ | x) L(κ) by
+cells of a fine grid, and the rest from the mixture's conditional given κ, in closed form too. A value far from what the
+network believes is answered as exactly as one that it expects, as far as the mixture's tails can be relied on.
+
+Z over the same integral under the prior, Z_π = ∫ π(κ) L(κ) dκ, is the Bayes factor p(x | L)/p(x): how much more, or
+less, probable the statement makes the film.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,36 +29,47 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import InputError
+from flagdata.stated import Stated
+from models.mixture import Mixture
 from models.targets import ASPECT, Scaling
 
-MORE = 32
-"""Draws that are made for each one that is returned."""
-FEWEST = 16
-"""Draws that have to lie in the ranges; of a clip with fewer, those nearest to them are taken."""
+CELLS = {1: 1024, 2: 96}
+"""Cells of the grid along each axis, by how many quantities are stated inexactly; more than two are refused."""
 ASPECT_SLACK = 0.04
 """Half the width of the range that a stated length over height stands for, relative: a hem, a rounded size."""
+REACH = 8.0
+"""Standard deviations either way that the grid of a value with an uncertainty covers."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Known:
-    """A quantity that is known to lie in a range, clip by clip.
+    """What is known of a quantity, clip by clip, or draw by draw.
 
     Attributes:
         name: of the quantity, as "density".
-        low, high: (n,) ends of the range for each clip, in the quantity's unit.
+        low, high: (n, m) ends of its range in the quantity's unit, equal where a value is stated; m is 1, or the number
+            of draws that are asked for, each of which then has its own.
+        sigma: (n, m) standard deviations of values; 0 of exact ones and of ranges.
 
     Raises:
-        InputError: ends that are not in order.
+        InputError: shapes that differ, ends that are not in order, or several kinds of statement.
     """
 
     name: str
     low: NDArray[np.float64]
     high: NDArray[np.float64]
+    sigma: NDArray[np.float64]
 
     @classmethod
-    def everywhere(cls, name: str, low: float, high: float, *, count: int) -> Known:
-        """The same range for all of `count` clips."""
-        return cls(name=name, low=np.full(count, low), high=np.full(count, high))
+    def stated(cls, name: str, stated: Stated, *, scale: NDArray[np.float64]) -> Known:
+        """A statement about a quantity that is `scale` (n, m) times the one of the network."""
+        low, high, sigma = (np.asarray(end / scale) for end in (stated.low, stated.high, stated.sigma))
+        return cls(name=name, low=low, high=high, sigma=sigma)
+
+    @classmethod
+    def everywhere(cls, name: str, stated: Stated, *, count: int) -> Known:
+        """The same statement for all of `count` clips."""
+        return cls.stated(name, stated, scale=np.ones((count, 1)))
 
     @classmethod
     def of_aspect(cls, length: float, height: float, *, count: int) -> Known:
@@ -55,58 +78,189 @@ class Known:
         Args:
             length, height: of the flag, in one unit.
         """
-        middle = math.log(length / height)
-        return cls.everywhere(ASPECT, middle - ASPECT_SLACK, middle + ASPECT_SLACK, count=count)
+        return cls.everywhere(ASPECT, stated_aspect(length, height), count=count)
 
     def __post_init__(self) -> None:
-        if self.low.shape != self.high.shape or not (self.low < self.high).all():
+        shape = self.low.shape
+        if self.low.ndim != 2 or self.high.shape != shape or self.sigma.shape != shape:
+            raise InputError(
+                f"ends of the {self.name} of shapes {shape}, {self.high.shape}, {self.sigma.shape}", fix="give (n, m)"
+            )
+        if (self.low > self.high).any() or (self.sigma < 0).any():
             raise InputError(f"a range of the {self.name} whose ends are not in order", fix="give the lower end first")
+        wide, blurred = self.high > self.low, self.sigma > 0
+        if wide.any() != wide.all() or blurred.any() != blurred.all() or (wide & blurred).any():
+            raise InputError(
+                f"the {self.name} is stated in several ways", fix="give values, values with deviations, or ranges"
+            )
+
+    @property
+    def exact(self) -> bool:
+        """Whether values are stated, without uncertainty."""
+        return bool((self.low == self.high).all() and not self.sigma.any())
+
+    def reach(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n, m) ends of where the quantity can lie."""
+        return self.low - REACH * self.sigma, self.high + REACH * self.sigma
 
 
-def restricted(logits: Tensor, scaling: Scaling, *known: Known, draws: int) -> tuple[Tensor, NDArray[np.float64]]:
-    """Draws within the known ranges.
+def stated_aspect(length: float, height: float) -> Stated:
+    """What a flag's size states of the logarithm of its length over its height."""
+    middle = math.log(length / height)
+    return Stated(low=middle - ASPECT_SLACK, high=middle + ASPECT_SLACK)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Conditioned:
+    """A posterior given what is known.
+
+    Attributes:
+        logits: (n, draw, target) draws, on the targets' logits.
+        log_mass: (n, draw) log Z of the statement that each draw was made under, −∞ of one that is impossible within
+            the network's ranges; its draw means nothing then. It has the unit of L: compare it with that of a prior.
+    """
+
+    logits: Tensor
+    log_mass: Tensor
+
+
+def conditioned(
+    mixture: Mixture, scaling: Scaling, known: Sequence[Known], *, draws: int, generator: torch.Generator
+) -> Conditioned:  # fmt: skip
+    """Draw from mixtures given what is known of some of their quantities.
 
     Args:
-        logits: (n, m, target) draws as networks know them, m well above `draws`.
+        mixture: n of them, over the targets' logits, float64.
         scaling: between these and the targets.
-        known: quantities, each with one range a clip; one or more.
-        draws: how many are returned of each clip; fewer that lie within are repeated in turn.
-
-    Returns:
-        (n, draws, target) logits, and (n,) the share of draws within all of the ranges: what the model gave them.
+        known: of different quantities; at most two of them inexact.
+        draws: from each mixture.
+        generator: on the device of the mixture.
 
     Raises:
-        InputError: a quantity that the model does not estimate, or a range that leaves the model's.
+        InputError: a quantity that the model does not estimate or that is named twice, a statement that leaves the
+            model's range for all draws, or more than two that are inexact.
     """
-    values = scaling.values(logits.double())
-    outside = sum((_outside(values, scaling, one) for one in known), torch.zeros_like(values[..., 0]))
-    order = outside.argsort(dim=1, stable=True)
-    within = (outside == 0).sum(dim=1)
-    kept = within.clamp(min=FEWEST)
-    place = torch.arange(draws, device=logits.device)[None, :] % kept[:, None]
-    chosen = torch.gather(order, 1, place)
-    picked = torch.gather(logits, 1, chosen[..., None].expand(-1, -1, logits.shape[2]))
-    return picked, (within.double() / logits.shape[1]).cpu().numpy()
-
-
-def _outside(values: Tensor, scaling: Scaling, known: Known) -> Tensor:
-    """(n, m) how far draws (n, m, target) lie outside of what is known, in widths of the quantity's whole range.
-
-    Raises:
-        InputError: as `restricted`.
-    """
-    column = _column(scaling, known.name)
-    target = scaling.targets[column]
-    width = target.high - target.low
-    if (known.low < target.low - 1e-9 * width).any() or (known.high > target.high + 1e-9 * width).any():
+    order = sorted(known, key=lambda one: one.exact)
+    columns = [_column(scaling, one.name) for one in order]
+    soft = sum(not one.exact for one in order)
+    if not order or len(set(columns)) < len(columns) or soft > max(CELLS):
         raise InputError(
-            f"a {target.about} of {known.low.min():.4g} to {known.high.max():.4g} {target.unit}; the model was trained "
-            f"on {target.low:g} to {target.high:g}",
-            fix="give a range within that",
-        )  # fmt: skip
-    own = values[..., column]
-    low, high = (torch.from_numpy(end).to(own)[:, None] for end in (known.low, known.high))
-    return (torch.clamp(low - own, min=0) + torch.clamp(own - high, min=0)) / width
+            f"{len(order)} statements about {', '.join(one.name for one in order) or 'nothing'}",
+            fix=f"state each quantity once, at most {max(CELLS)} of them inexactly",
+        )
+    for one, column in zip(order, columns, strict=True):
+        _check(one, scaling, column)
+    ends = _Ends.of(scaling, columns, like=mixture.location)
+    own = mixture.marginal(columns)
+    exact = [ends.tensor(one.low) for one in order[soft:]]
+    if soft:
+        values, log_mass = _drawn(own, ends, order[:soft], exact, draws=draws, generator=generator)
+    else:
+        values = torch.stack(torch.broadcast_tensors(*exact), dim=-1)
+        log_mass = own.log_density(ends.logits(values)) + ends.log_slope(values)
+        log_mass = torch.where(ends.inside(values), log_mass, -torch.inf)
+    values = values.expand(-1, draws, -1)
+    logits = mixture.sample_given(columns, ends.logits(values), generator)
+    return Conditioned(logits=logits, log_mass=log_mass.expand(-1, draws))
+
+
+def _drawn(
+    own: Mixture, ends: _Ends, soft: Sequence[Known], exact: Sequence[Tensor], *, draws: int,
+    generator: torch.Generator,
+) -> tuple[Tensor, Tensor]:  # fmt: skip
+    """(n, draw, s) values of what is stated, the inexact first, from p(κ | x) L(κ), and (n, m) log Z."""
+    cells = CELLS[len(soft)]
+    at = torch.cartesian_prod(*[torch.arange(cells)] * len(soft)).reshape(-1, len(soft)).to(own.location.device)
+    log_likelihood = torch.zeros(1).to(own.location)
+    below, above, points = [], [], []
+    for place, one in enumerate(soft):
+        reach = [ends.tensor(end).clamp(ends.least[place], ends.most[place]) for end in one.reach()]
+        first, last = reach[0].amin(dim=1, keepdim=True), reach[1].amax(dim=1, keepdim=True)
+        edges = first + (last - first) * torch.linspace(0, 1, cells + 1).to(first)
+        lower, upper = edges[:, None, :-1], edges[:, None, 1:]
+        middle = (lower + upper) / 2
+        low, high, sigma = (ends.tensor(end)[..., None] for end in (one.low, one.high, one.sigma))
+        if one.sigma.any():
+            likelihood = (upper - lower).log() - 0.5 * ((middle - low) / sigma).square()
+        else:
+            lower, upper = torch.maximum(lower, low), torch.minimum(upper, high)
+            likelihood = (upper - lower).clamp(min=0).log()
+        log_likelihood = log_likelihood + likelihood[..., at[:, place]]
+        points.append(middle[..., at[:, place]])
+        below.append(lower[..., at[:, place]])
+        above.append(upper[..., at[:, place]])
+    points += [value[..., None].expand(-1, -1, len(at)) for value in exact]
+    centre = torch.stack(torch.broadcast_tensors(*points), dim=-1)
+    density = own.log_density(ends.logits(centre).flatten(1, 2)).reshape(centre.shape[:-1]) + ends.log_slope(centre)
+    weight = torch.where(ends.inside(centre), density, -torch.inf) + log_likelihood
+    log_mass = torch.logsumexp(weight, dim=-1)
+    share = torch.where(log_mass[..., None] > -torch.inf, weight, 0.0).softmax(dim=-1)
+    count = draws if share.shape[1] == 1 else 1
+    cell = torch.multinomial(share.flatten(0, 1), count, replacement=True, generator=generator)
+    cell = cell.reshape(len(share), draws, 1)
+    values = []
+    for lower, upper in zip(below, above, strict=True):
+        low, high = (end.expand(-1, draws, -1).gather(2, cell).squeeze(2) for end in (lower, upper))
+        values.append(
+            low + (high - low) * torch.rand(low.shape, generator=generator, dtype=low.dtype, device=low.device)
+        )
+    return torch.stack(torch.broadcast_tensors(*values, *exact), dim=-1), log_mass
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Ends:
+    """(s,) ranges of stated quantities: the network's, and the wider ones that logits are of."""
+
+    least: Tensor
+    most: Tensor
+    low: Tensor
+    high: Tensor
+
+    @classmethod
+    def of(cls, scaling: Scaling, columns: Sequence[int], *, like: Tensor) -> _Ends:
+        low, high = (bound.to(like)[list(columns)] for bound in scaling.bounds)
+        targets = [scaling.targets[column] for column in columns]
+        least, most = torch.tensor([[t.low, t.high] for t in targets], dtype=torch.float64).to(like).T
+        return cls(least=least, most=most, low=low, high=high)
+
+    def tensor(self, values: NDArray[np.float64]) -> Tensor:
+        return torch.from_numpy(values).to(self.low)
+
+    def inside(self, values: Tensor) -> Tensor:
+        """(…,) whether values (…, s) lie in the network's ranges, but for rounding."""
+        slack = _SLACK * (self.most - self.least)
+        return ((values >= self.least - slack) & (values <= self.most + slack)).all(dim=-1)
+
+    def logits(self, values: Tensor) -> Tensor:
+        """(…, s) of values (…, s); one beyond the network's range is taken at its end."""
+        return torch.logit(self._share(values))
+
+    def log_slope(self, values: Tensor) -> Tensor:
+        """(…,) logarithm of the logits' density over that of the values."""
+        share = self._share(values)
+        return -(share.log() + (-share).log1p() + (self.high - self.low).log()).sum(dim=-1)
+
+    def _share(self, values: Tensor) -> Tensor:
+        return (torch.minimum(torch.maximum(values, self.least), self.most) - self.low) / (self.high - self.low)
+
+
+_SLACK = 1e-9
+
+
+def _check(known: Known, scaling: Scaling, column: int) -> None:
+    """Raises:
+    InputError: a statement that leaves the model's range everywhere.
+    """
+    target = scaling.targets[column]
+    slack = _SLACK * (target.high - target.low)
+    inside = (known.low >= target.low - slack) & (known.high <= target.high + slack)
+    if not inside.any():
+        low, high = known.low.min(), known.high.max()
+        given = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+        raise InputError(
+            f"a {target.about} of {given} {target.unit}; the model was trained on {target.low:g} to {target.high:g}",
+            fix="give one within that",
+        )
 
 
 def _column(scaling: Scaling, name: str) -> int:

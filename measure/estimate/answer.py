@@ -36,7 +36,7 @@ class Quantity:
             quantity's own.
         sigma: its standard deviation, likewise.
         span: central interval of the measurement's level, or a bound on one side (`measure.ends`).
-        assumed: the range that the simulations covered, for this size of flag.
+        assumed: the range that the simulations covered, for this size of flag, or what was stated.
         information: what the film added to that, see `LEAST_INFORMATION` [nat].
     """
 
@@ -53,6 +53,11 @@ class Quantity:
         """Whether the film adds information to the prior."""
         return self.information >= LEAST_INFORMATION and self.span.bound is not Bound.NOTHING
 
+    @property
+    def given(self) -> bool:
+        """Whether its value was stated, so that the film has nothing to add."""
+        return self.assumed[0] == self.assumed[1]
+
     def phrase(self, *, first: bool) -> str:
         """In words, without a full stop.
 
@@ -60,6 +65,8 @@ class Quantity:
             first: whether the level of an interval is stated; that of a bound always is.
         """
         short, bound = SHORT[self.name], self.span.bound
+        if self.given:
+            return f"{short} {self.value:g}{self._suffix}, as given"
         if not self.constrained:
             low, high = (self._number(end) for end in self.assumed)
             return f"{short}: not constrained by this clip (prior range {low} to {high}{self._suffix})"
@@ -132,6 +139,9 @@ def quantities(
     for k, name in enumerate(names):
         ends = float(assumed[k, 0]), float(assumed[k, 1])
         limits = stated.get(name, limits_of(name))
+        if ends[0] == ends[1]:
+            found.append(_given(name, ends[0], level=level))
+            continue
         own = span(draws[:, k], places[:, k], level=level, limits=limits, assumed=ends)
         found.append(
             Quantity(
@@ -141,6 +151,14 @@ def quantities(
             )
         )  # fmt: skip
     return tuple(found)
+
+
+def _given(name: str, value: float, *, level: float) -> Quantity:
+    """A quantity whose value was stated."""
+    own = Span(low=value, high=value, level=level, bound=None, estimated=True)
+    return Quantity(
+        name=name, unit=TARGETS[name].unit, value=value, sigma=0.0, span=own, assumed=(value, value), information=0.0
+    )
 
 
 def information(posterior: NDArray[np.float64], prior: NDArray[np.float64]) -> float:

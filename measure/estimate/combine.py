@@ -73,7 +73,7 @@ def effective(count: int, correlation: float) -> float:
 
 def combined(
     logits: NDArray[np.floating], *, names: Sequence[str], centre: NDArray[np.float64], spread: NDArray[np.float64],
-    dependence: Dependence, generator: np.random.Generator,
+    dependence: Dependence, generator: np.random.Generator, given: Sequence[str] = (),
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # fmt: skip
     """One posterior of all windows.
 
@@ -82,6 +82,7 @@ def combined(
         names: of the targets.
         centre, spread: (target,) mean and standard deviation of the prior's logits.
         generator: for the draws.
+        given: targets of the cloth whose values were stated, draw by draw the same in all windows.
 
     Returns:
         (k, n, own) logits of the targets that each window has its own of, draw by draw in the given correlation, and
@@ -97,9 +98,12 @@ def combined(
     cloth = [place for place, name in enumerate(names) if name not in OWN]
     if len(draws) == 1:
         return draws[:, :, own], draws[0][:, cloth]
-    shared = centre[cloth] + spread[cloth] * _cloth(
-        (draws[:, :, cloth] - centre[cloth]) / spread[cloth], dependence.cloth
+    free = [place for place in cloth if names[place] not in given]
+    every = draws[0].copy()
+    every[:, free] = centre[free] + spread[free] * _cloth(
+        (draws[:, :, free] - centre[free]) / spread[free], dependence.cloth
     )
+    shared = every[:, cloth]
     winds = _winds(draws[:, :, own], draws[:, :, cloth], shared, dependence.wind, generator)
     return winds, shared
 

@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flagdata.commands.durations import DURATION
-from flagdata.commands.ranges import RANGE
+from flagdata.commands.statements import STATED
 from flagdata.console import LocalPath, document, following, json_option, progress, say
 from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
+    from flagdata.stated import Stated
     from measure.estimate.measuring import Measurement, Options
     from measure.estimate.series import Beside
     from measure.estimate.source import Network, Reading, Subject
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 @click.option("--query", metavar="EXPR", help='SQL condition over clips, instead of SOURCE: "wind between 3 and 6".')
 @click.option("--flag-size", metavar="LxH", help="Length along the wind and height along the pole [m], as in 1.5x1.0; "
               "of a hanging cloth its width and height.")  # fmt: skip
-@click.option("--area-weight", type=RANGE, metavar="LOW:HIGH",
-              help="Range in which the area weight is known to lie [kg/m²], as in 0.12:0.15.")  # fmt: skip
+@click.option("--area-weight", type=STATED, metavar="VALUE",
+              help="Area weight of the cloth [kg/m²]: 0.284, 0.284±0.01 (deviation) or 0.27:0.30.")  # fmt: skip
 @click.option("--windows", "--window", "step", type=DURATION, metavar="TIME",
               help="A wind series, one window every so often, as in 1.2s.")  # fmt: skip
 @click.option("--crop", metavar="X,Y,W,H", help="Region in which the flag is [px]; by default the whole picture.")
@@ -70,7 +71,7 @@ def measure(
     source: str | None,
     query: str | None,
     flag_size: str | None,
-    area_weight: tuple[float, float] | None,
+    area_weight: Stated | None,
     step: float | None,
     crop: str | None,
     flag: int | None,

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,111 +13,22 @@ from numpy.typing import NDArray
 from flagdata.errors import FlagdataError, InputError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
-from measure.estimate.answer import Quantity, quantities, sentence
-from measure.estimate.combine import OWN, Dependence, combined
+from measure.estimate.answer import Quantity, sentence
+from measure.estimate.combine import OWN, Dependence
 from measure.estimate.film import Film
-from measure.estimate.gate import Gate, Reason, Verdict, verdict
+from measure.estimate.gate import Gate, Verdict, verdict
+from measure.estimate.joint import DRAWS, Joint, Look, WindowAnswer, given_alone
+from measure.estimate.options import Options
 from measure.estimate.repeats import Distinct
-from measure.estimate.similarity import POWERS, TRAINED, FlagSize, Sizes, scaled_back, sizes, spacing
+from measure.estimate.similarity import TRAINED, Sizes, sizes, spacing
 from measure.estimate.windows import Layout, Window, cut, findings_of, lay_out
 from models.estimator import Estimator
 from models.learner import Loss
-from models.restriction import MORE, Known, restricted
+from models.restriction import Conditioned, Known
 
-DRAWS = 400
-"""How many draws there are of each window's posterior, for each size of flag."""
-CONTRADICTION = 0.002
-"""Share of the network's draws within the area weight that was stated, below which a warning is due: of 400 not one."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Options:
-    """How a film is measured.
-
-    Attributes:
-        size: of the flag; None if unknown.
-        step: from one window to the next [s]; None for windows that follow each other.
-        first, last: the part of the film [s]; None for its ends.
-        level: of the intervals.
-        false_alarm: rate of the gate.
-        seed: of all draws.
-        refine: simulated clips of a refinement; None for none.
-        area_weight: range in which the cloth's area weight is known to lie [kg/m²]; None if it is unknown.
-
-    Raises:
-        UsageError: a refinement of a flag whose size is not known.
-    """
-
-    size: FlagSize | None = None
-    step: float | None = None
-    first: float | None = None
-    last: float | None = None
-    level: float = 0.9
-    false_alarm: float = 0.05
-    seed: int = 0
-    refine: int | None = None
-    area_weight: tuple[float, float] | None = None
-
-    def __post_init__(self) -> None:
-        if self.refine is not None and self.size is None:
-            raise UsageError(
-                "a refinement simulates the flag, whose size is not known",
-                fix="give --flag-size, length along the wind times height, as in 1.5x1.0",
-            )
-
-    def recipe(self) -> dict[str, Any]:
-        """JSON values."""
-        return {
-            "flag_size": None if self.size is None else [self.size.length, self.size.height], "step": self.step,
-            "first": self.first, "last": self.last, "level": self.level, "false_alarm": self.false_alarm,
-            "refine": self.refine, "area_weight": None if self.area_weight is None else list(self.area_weight),
-        }  # fmt: skip
-
-    def known(self, sizes: Sizes, model: Estimator) -> Known | None:
-        """The given range of the cloth, at each size considered, as that of a flag of the network's own size."""
-        if self.area_weight is None:
-            return None
-        target = next((target for target in model.targets if target.name == "density"), None)
-        if target is None:
-            raise UsageError(
-                f"the model {model.name!r} does not estimate an area weight", where="--area-weight", fix="leave it out"
-            )
-        least, most = target.low * float(sizes.scale.max()), target.high * float(sizes.scale.min())
-        if not least * (1 - 1e-9) <= self.area_weight[0] < self.area_weight[1] <= most * (1 + 1e-9):
-            raise UsageError(
-                f"an area weight of {self.area_weight[0]:g} to {self.area_weight[1]:g} kg/m²; of a flag of this size "
-                f"the model knows {least:.3g} to {most:.3g}",
-                where="--area-weight", fix="give a range within that" + ("" if sizes.given else ", and --flag-size"),
-            )  # fmt: skip
-        low, high = (np.full(len(sizes.scale), end) / sizes.scale ** POWERS["density"] for end in self.area_weight)
-        return Known(name="density", low=low, high=high)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class WindowAnswer:
-    """What one window said by itself.
-
-    Attributes:
-        start, end: of its frames, at the smallest and largest size considered [s from the film's first frame].
-        quantities: with their intervals.
-        p: that a familiar clip is at least as strange.
-    """
-
-    start: float
-    end: float
-    quantities: tuple[Quantity, ...]
-    p: float
-
-    def quantity(self, name: str) -> Quantity:
-        """The one of that name."""
-        return next(quantity for quantity in self.quantities if quantity.name == name)
-
-    def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
-        return {
-            "start": self.start, "end": self.end, "p": self.p,
-            "quantities": {quantity.name: quantity.as_dict() for quantity in self.quantities},
-        }  # fmt: skip
+CONTRADICTION = 1 / 150
+"""Bayes factor of the area weight that was stated, below which a warning is due: very strong evidence against it (Kass
+and Raftery, Journal of the American Statistical Association 90, 1995, section 3.2)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -192,32 +102,6 @@ class Measurement:
         }  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Seen:
-    """A window as the model sees it at each size: logits (i, n, target), its first network's summaries (i, dimension),
-    reasons, and the share of the network's draws that lay where the area weight is known to lie (1 if nothing is
-    known)."""
-
-    start: float
-    logits: NDArray[np.float64]
-    summaries: NDArray[np.float32]
-    reasons: tuple[list[Reason], ...]
-    within: float
-
-    @property
-    def blank(self) -> bool:
-        """Whether there is nothing to measure, at any size."""
-        return all(reasons[0].blank for reasons in self.reasons)
-
-    def only(self, places: Sequence[int]) -> _Seen:
-        """The same at some of the sizes."""
-        chosen = list(places)
-        return replace(
-            self, logits=self.logits[chosen], summaries=self.summaries[chosen],
-            reasons=tuple(self.reasons[place] for place in chosen),
-        )  # fmt: skip
-
-
 def measure(
     film: Film, model: Estimator, *, gate: Gate, dependence: Dependence, options: Options,
     advance: Callable[[int, int], None] | None = None,
@@ -243,18 +127,19 @@ def measure(
         generator=stream(options.seed, "sizes"), trained=TRAINED[model.cloth],
     )  # fmt: skip
     known = options.known(considered, model)
+    before = given_alone(model, known, seed=options.seed, sizes=len(considered.scale)) if known else None
     layout = lay_out(
         frames=model.front_end.frames, rate=film.rate, duration=film.duration, step=options.step, first=options.first,
         last=options.last, spacings=tuple(spacing(s, rate=model.front_end.rate) for s in considered.scale.tolist()),
     )  # fmt: skip
-    seen: list[_Seen] = []
+    seen: list[Look] = []
     clips: NDArray[np.uint8] | None = None  # of the first window, or of the first with something to measure
     interpolated = 0
     margin = 2 * layout.period
     distinct = Distinct(film.frames(layout.first - margin, layout.last + margin))
     for window in cut(distinct, layout):
-        one = _look(window, model, gate, seed=options.seed, known=known)
-        if clips is None or (all(before.blank for before in seen) and not one.blank):
+        one = _look(window, model, gate, seed=options.seed, known=known, before=before)
+        if clips is None or (all(earlier.blank for earlier in seen) and not one.blank):
             clips = window.clips
         seen.append(one)
         interpolated += window.interpolated
@@ -264,7 +149,7 @@ def measure(
         raise _without_windows(film, layout, distinct)
     judged = verdict([one.reasons for one in seen], false_alarm=options.false_alarm, level=gate.level)
     kept = considered.only(judged.sizes)
-    answer = _Answer(model=model, sizes=kept, options=options)
+    answer = Joint(model=model, sizes=kept, options=options)
     whole = [one.only(judged.sizes) for one in seen]
     used = _used(whole, judged, layout)
     draws, places = answer.joint([whole[k] for k in used], dependence)
@@ -289,19 +174,24 @@ def measure(
 
 
 @torch.no_grad()
-def _look(window: Window, model: Estimator, gate: Gate, *, seed: int, known: Known | None) -> _Seen:
+def _look(
+    window: Window, model: Estimator, gate: Gate, *, seed: int, known: Sequence[Known], before: Conditioned | None
+) -> Look:
     embeddings = model.embeddings(model.inputs(window.clips))
-    own, within = child_seed(seed, "window", window.index), 1.0
-    if known is None:
+    posterior = model.posterior(embeddings)
+    own, log_factor = child_seed(seed, "window", window.index), np.zeros((len(window.clips), DRAWS))
+    if before is None:
         logits = model.logits(embeddings, seed=own, draws=DRAWS)[:, :DRAWS]
     else:
-        logits, shares = model.logits_within(embeddings, known, seed=own, draws=DRAWS)
-        within = float(shares.mean())
+        found = model.given(posterior, known, seed=own, draws=DRAWS)
+        logits, possible = found.logits, found.log_mass > -torch.inf
+        log_factor = torch.where(possible, found.log_mass - before.log_mass, -torch.inf).cpu().numpy()
     summaries = embeddings[0].cpu().numpy().astype(np.float32)
     reasons = tuple(gate.judge(clip, summary) for clip, summary in zip(window.clips, summaries, strict=True))
-    return _Seen(
-        start=window.start, logits=logits.double().cpu().numpy(), summaries=summaries, reasons=reasons, within=within
-    )
+    return Look(
+        start=window.start, posterior=posterior, logits=logits.double().cpu().numpy(), summaries=summaries,
+        reasons=reasons, log_factor=log_factor,
+    )  # fmt: skip
 
 
 def _without_windows(film: Film, layout: Layout, distinct: Distinct) -> FlagdataError:
@@ -318,7 +208,7 @@ def _without_windows(film: Film, layout: Layout, distinct: Distinct) -> Flagdata
     )  # fmt: skip
 
 
-def _used(seen: Sequence[_Seen], judged: Verdict, layout: Layout) -> list[int]:
+def _used(seen: Sequence[Look], judged: Verdict, layout: Layout) -> list[int]:
     """Windows that the answer rests on: none that overlap, none without anything to measure where others have it; of a
     familiar recording none that are strange."""
     apart = layout.frames * max(layout.spacings)
@@ -332,17 +222,15 @@ def _used(seen: Sequence[_Seen], judged: Verdict, layout: Layout) -> list[int]:
     return chosen
 
 
-def _about_windows(
-    seen: Sequence[_Seen], judged: Verdict, used: Sequence[int], dependence: Dependence
-) -> list[Finding]:
+def _about_windows(seen: Sequence[Look], judged: Verdict, used: Sequence[int], dependence: Dependence) -> list[Finding]:
     found = []
-    within = float(np.median([one.within for one in seen]))
-    if within < CONTRADICTION:
+    factor = float(np.median([np.exp(one.log_factor).mean() for one in seen]))
+    if factor < CONTRADICTION:
         found.append(
             Finding(
-                kind="area-weight-contradicted", severity=Severity.WARNING, value=within,
-                what=f"the model gave the area weight that was stated a probability of {within:.2g} only: either it is "
-                "wrong, or the flag's size is, or the model errs on this film",
+                kind="area-weight-contradicted", severity=Severity.WARNING, value=factor,
+                what=f"the area weight that was given makes the film much less probable (Bayes factor {factor:.2g}): "
+                "either it is wrong, or the flag's size is, or the model errs on this film",
                 fix="check --area-weight and --flag-size",
             )
         )  # fmt: skip
@@ -382,103 +270,3 @@ def _at_ends(found: Sequence[Quantity], windows: Sequence[WindowAnswer]) -> list
             )
         )  # fmt: skip
     return own
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Answer:
-    """Turns logits at the sizes considered into quantities of the flag itself."""
-
-    model: Estimator
-    sizes: Sizes
-    options: Options
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.model.learners[0].scaling.quantities
-
-    def joint(self, seen: Sequence[_Seen], dependence: Dependence) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(n, target) draws of all windows together, the wind their mean, and (m, target) places of the windows' own in
-        the network's range."""
-        own = [place for place, name in enumerate(self.names) if name in OWN]
-        cloth = [place for place, name in enumerate(self.names) if name not in OWN]
-        parts, places = [], []
-        for stratum in range(len(self.sizes.scale)):
-            prior = self.prior_logits[stratum]
-            winds, shared = combined(
-                np.stack([one.logits[stratum] for one in seen]), names=self.names, centre=prior.mean(axis=0),
-                spread=prior.std(axis=0), dependence=dependence,
-                generator=stream(self.options.seed, "combine", stratum),
-            )  # fmt: skip
-            logits = np.empty((*winds.shape[:2], len(self.names)))
-            logits[..., own] = winds
-            logits[..., cloth] = shared
-            values = self._values(logits)
-            parts.append(scaled_back(values.mean(axis=0), self.names, self.sizes.draws[stratum]))
-            places.append(self._places(values))
-        draws = np.concatenate(parts)
-        if self.options.area_weight is not None:  # combining windows moves draws a little, some out of the range
-            column = self.names.index("density")
-            draws[:, column] = np.clip(draws[:, column], *self.options.area_weight)
-        return draws, np.concatenate(places)
-
-    def window(self, one: _Seen, layout: Layout, p: float) -> WindowAnswer:
-        values = [self._values(logits) for logits in one.logits]
-        draws = [scaled_back(v, self.names, s) for v, s in zip(values, self.sizes.draws, strict=True)]
-        places = np.concatenate([self._places(v) for v in values])
-        return WindowAnswer(
-            start=one.start, end=one.start + layout.length,
-            quantities=self.quantities(np.concatenate(draws), places), p=p,
-        )  # fmt: skip
-
-    def quantities(self, draws: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[Quantity, ...]:
-        weight = self.options.area_weight
-        return quantities(
-            draws, self.prior, self.names, level=self.options.level, assumed=self.assumed, places=places,
-            stated={} if weight is None else {"density": weight},
-        )  # fmt: skip
-
-    def _places(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, target) of values (…, target) in the network's range, 0 to 1: the range moves with the flag's size."""
-        low, high = self._ends
-        return ((values - low) / (high - low)).reshape(-1, len(self.names))
-
-    @property
-    def _ends(self) -> NDArray[np.float64]:
-        """(2, target) of the range that the model learned."""
-        return np.array([[t.low for t in self.model.targets], [t.high for t in self.model.targets]])
-
-    @cached_property
-    def prior(self) -> NDArray[np.float64]:
-        """(n, target) draws of what is assumed of a flag of these sizes."""
-        logits = self.prior_logits
-        return scaled_back(
-            self._values(logits.reshape(-1, len(self.names))), self.names, self.sizes.draws.ravel()
-        )  # fmt: skip
-
-    @cached_property
-    def prior_logits(self) -> NDArray[np.float64]:
-        """(i, n, target) draws of the same as the model knows them, for each size of flag."""
-        learner, shape = self.model.learners[0], self.sizes.draws.shape
-        known = self.options.known(self.sizes, self.model)
-        more = 1 if known is None else MORE
-        generator = stream(self.options.seed, "prior")
-        normal = generator.standard_normal((shape[0], shape[1] * more, len(self.names)))
-        logits = learner.centre.double().cpu().numpy() + learner.spread.double().cpu().numpy() * normal
-        if known is None:
-            return logits
-        return restricted(torch.from_numpy(logits), learner.scaling, known, draws=shape[1])[0].numpy()
-
-    @cached_property
-    def assumed(self) -> NDArray[np.float64]:
-        """(target, 2) range that was simulated, at these sizes; of what was not simulated evenly 90 % of it."""
-        ends = self._ends
-        smallest, largest = np.quantile(self.sizes.draws, [0.05, 0.95])
-        low, high = scaled_back(ends[0], self.names, smallest), scaled_back(ends[1], self.names, largest)
-        even = np.array([name in POWERS for name in self.names])[:, None]
-        found = np.where(even, np.stack([low, high], axis=1), np.quantile(self.prior, [0.05, 0.95], axis=0).T)
-        if self.options.area_weight is not None:
-            found[self.names.index("density")] = self.options.area_weight
-        return found
-
-    def _values(self, logits: NDArray[np.float64]) -> NDArray[np.float64]:
-        return self.model.learners[0].scaling.values(torch.from_numpy(logits)).numpy()

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from flagdata.errors import UsageError
+from flagdata.stated import Stated
 from measure.estimate.measuring import Measurement
 from measure.estimate.similarity import LOGARITHMS, POWERS
 from measure.estimate.source import Subject
@@ -46,9 +47,17 @@ def refined(
     known = options.area_weight
     found = run(
         [clip], model, budget=budget, seed=options.seed, level=options.level, cache=cache,
-        area_weight=None if known is None else (known[0] / s, known[1] / s),
+        area_weight=None if known is None else _searched(known, s),
     )  # fmt: skip
     return scaled(found, s)
+
+
+def _searched(known: Stated, s: float) -> tuple[float, float]:
+    """The range of area weights that is searched for a flag of s times the size [kg/m²]: that was stated, two standard
+    deviations either way, or 1 % either way of an exact value, since a search needs a width."""
+    low, high = known.within(2.0)
+    slack = 0.01 * low if low == high else 0.0
+    return (low - slack) / s, (high + slack) / s
 
 
 def scaled(found: Refinement, s: float) -> Refinement:

@@ -15,6 +15,7 @@ from torch import Tensor
 
 from flagdata.errors import InputError
 from flagdata.rng import stream
+from flagdata.stated import Stated
 from measure.refine.space import DENSITY, DIMENSION, WIND, Space
 from models.estimator import Estimator
 from models.restriction import Known
@@ -72,9 +73,8 @@ def amortised(
     weights are fewer than the network's, they stand for the clip."""
     target = next(target for target in estimator.targets if target.name == "density")
     low, high = max(space.density.low, target.low), min(space.density.high, target.high)
-    known = None
-    if low > target.low or high < target.high:
-        known = Known.everywhere("density", low, high, count=1)
+    fewer = low > target.low or high < target.high
+    known = [Known.everywhere("density", Stated(low=low, high=high), count=1)] if fewer else []
     found = estimator.estimate(estimator.inputs(clip[None]), seed=seed, draws=draws, known=known)
     names = [target.name for target in found.targets]
     return found.draws[0][:, [names.index(name) for name in TARGETS]].astype(np.float64)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flagdata.commands.ranges import RANGE
+from flagdata.commands.statements import STATED
 from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
 from flagdata.errors import InputError
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from flagdata.dataset import Pairs, Source
     from flagdata.lake import Artifact
+    from flagdata.stated import Stated
     from models.crops import Cropping
     from models.estimator import Estimator
     from models.evaluation.curves import FramesPoint, LearningPoint
@@ -45,8 +46,8 @@ _BEFORE: dict[str, tuple[str, ...]] = {"train": (), "validation": ("train",), "t
               help="Where prepared inputs are kept; by default beside the lake, LAKE.inputs.")  # fmt: skip
 @click.option("--reference", metavar="LABEL", help="Model that the others are compared with; by default the best.")
 @click.option("--tsne", metavar="LABEL", help="Model whose embedding is drawn by t-SNE.")
-@click.option("--area-weight", type=RANGE, metavar="LOW:HIGH",
-              help="Range of all clips' area weight, if it is known [kg/m²]; the paper's is 0.10:0.17.")  # fmt: skip
+@click.option("--area-weight", type=STATED, metavar="VALUE",
+              help="Area weight of all clips, if it is known [kg/m²]: 0.284, 0.284±0.01 or 0.10:0.17.")  # fmt: skip
 @click.option("--handmade", is_flag=True, help="Add ridge and gradient boosting on hand-made features.")
 @click.option(
     "--frames",
@@ -72,7 +73,7 @@ def evaluate(
     cache: Path | None,
     reference: str | None,
     tsne: str | None,
-    area_weight: tuple[float, float] | None,
+    area_weight: Stated | None,
     handmade: bool,
     frames: Sequence[int],
     linear: bool,
@@ -137,10 +138,10 @@ class _Desk:
 
     def __init__(
         self, source: Source, dataset: str, at: str | None, cache: Path, workers: int, seed: int,
-        area_weight: tuple[float, float] | None,
+        area_weight: Stated | None,
     ) -> None:  # fmt: skip
         self._source, self._dataset, self._at = source, dataset, at
-        self._known = None if area_weight is None else ("density", *area_weight)
+        self._known = {} if area_weight is None else {"density": area_weight}
         self._cache, self._workers, self._seed = cache, workers, seed
         self._pairs: dict[str, Pairs] = {}
         self._prepared: dict[tuple[str, str], Prepared] = {}
@@ -266,11 +267,11 @@ class _Desk:
 
     @property
     def _stated(self) -> str:
-        """The given range of all clips, in words."""
-        if self._known is None:
-            return ""
-        _, low, high = self._known
-        return f", area weight known to lie in {low:g} to {high:g} kg/m² (which only distributions use)"
+        """What is known of all clips, in words."""
+        return "".join(
+            f", area weight given as {stated.text} kg/m² (which only distributions use)"
+            for stated in self._known.values()
+        )
 
     def _sequences(self, data: DataSpec) -> int:
         """How many a model of these data sets was trained on."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import torch
@@ -12,6 +12,7 @@ from torch import Tensor
 
 from flagdata.dataset.pairs import Pairs
 from flagdata.rng import child_seed
+from flagdata.stated import Stated
 from models.estimator import Estimator
 from models.evaluation.predictions import Predictions
 from models.learner import Learner, Loss
@@ -28,13 +29,13 @@ READ_FROM = ("wind_speed", "density", "bending_scale", "anisotropy")
 
 def predict(
     estimator: Estimator, prepared: Prepared, *, label: str, note: str, milliseconds: float, seed: int,
-    fitted_on: Prepared | None = None, known: tuple[str, float, float] | None = None,
+    fitted_on: Prepared | None = None, known: Mapping[str, Stated] | None = None,
 ) -> Predictions:  # fmt: skip
     """Predictions of a model for prepared clips.
 
     Args:
         note: what tables say beside the model; clips whose truth lies beyond the model's ranges are added to it.
-        known: name and range of a quantity of all clips that is known; it restricts what has a distribution.
+        known: what is known of quantities of all clips, by name; only distributions use it.
         fitted_on: clips of the training side, needed by a model without a head, whose embeddings are then read by ridge
             regression.
     """
@@ -59,15 +60,15 @@ def predict(
 
 
 def _predicted(
-    estimator: Estimator, prepared: Prepared, *, seed: int, known: tuple[str, float, float] | None
+    estimator: Estimator, prepared: Prepared, *, seed: int, known: Mapping[str, Stated] | None
 ) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
     learner = estimator.learners[0]
     draws, means, embeddings = [], [], []
     for first in range(0, len(prepared), _TOGETHER):
         inputs = _batch(prepared, first).to(estimator.device)
         if learner.objective is Loss.POSTERIOR:
-            within = None if known is None else Known.everywhere(known[0], known[1], known[2], count=len(inputs))
-            found = estimator.estimate(inputs, seed=child_seed(seed, "clips", first), draws=DRAWS, known=within)
+            given = [Known.everywhere(name, stated, count=len(inputs)) for name, stated in (known or {}).items()]
+            found = estimator.estimate(inputs, seed=child_seed(seed, "clips", first), draws=DRAWS, known=given)
             draws.append(found.draws)
             means.append(found.mean)
             embeddings.append(found.summary)

@@ -167,3 +167,20 @@ def test_shapes_that_do_not_fit_are_errors() -> None:
         MixtureHead(dimension=3, targets=0, components=1)
     with pytest.raises(InputError, match=r"\(n, K, t, t\)"):
         Mixture(log_weight=torch.zeros(1, 2), location=torch.zeros(1, 2, 3), factor=torch.zeros(1, 2, 3))
+
+
+def test_marginals_are_those_of_the_whole_in_any_order() -> None:
+    mixture, columns = made(), [2, 0]
+    some = mixture.marginal(columns)
+    np.testing.assert_allclose(some.mean().numpy(), mixture.mean()[:, columns].numpy(), rtol=1e-9)
+    np.testing.assert_allclose(
+        some.covariance().numpy(), mixture.covariance()[:, columns][:, :, columns].numpy(), rtol=1e-9, atol=1e-9
+    )
+    np.testing.assert_allclose(some.cdf(points()[:, columns]).numpy(), mixture.cdf(points())[:, columns].numpy())
+
+
+def test_the_density_at_several_points_is_that_at_each() -> None:
+    mixture = made()
+    many = torch.stack([points(), points() + 0.5], dim=1)
+    for place in range(2):
+        np.testing.assert_allclose(mixture.log_density(many)[:, place], mixture.log_prob(many[:, place]), rtol=1e-12)

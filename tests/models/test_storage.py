@@ -45,6 +45,18 @@ def test_every_model_that_comes_with_the_package_states_its_checksums(name: str)
     check_model(SHIPPED / name)
 
 
+@pytest.mark.parametrize("name", ["flow", "wave", "wave-cloth"])
+def test_a_models_distribution_in_closed_form_is_the_one_that_it_draws_from(name: str) -> None:
+    model = estimator.shipped(name)
+    generator = torch.Generator().manual_seed(0)
+    embeddings = [torch.randn((3, 32), generator=generator) for _ in model.learners]
+    drawn, posterior = model.logits(embeddings, seed=1, draws=100_000).double(), model.posterior(embeddings)
+    spread = posterior.covariance().diagonal(dim1=-2, dim2=-1).sqrt()
+    difference = (drawn.mean(dim=1) - posterior.mean()) / spread
+    assert float(difference.abs().max()) < 4 / 100_000**0.5
+    assert float((drawn.std(dim=1) / spread - 1).abs().max()) < 0.02
+
+
 def test_a_model_of_a_lake_is_held_to_the_hash_in_its_name(shipped: Path) -> None:
     """As lakes hold models that were trained before models had checksums of their own."""
     (shipped / SUMS).unlink()

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from flagdata.lake.meshes import MeshSequence
 from flagdata.record import Record
 from flagdata.rng import child_seed, stream
+from flagdata.stated import Stated
 from flagdata.tables import Range
 from measure.refine.view import DrawnView
 from models import estimator
@@ -202,7 +203,8 @@ def _scores(
 ) -> dict[str, Any]:  # fmt: skip
     count = model.front_end.frames
     inputs = torch.cat([model.inputs(frames[None, :count]) for frames, _, _ in clips])
-    within = None if known is None else Known.everywhere("density", *known, count=len(clips))
+    given = [] if known is None else [Stated(low=known[0], high=known[1])]
+    within = [Known.everywhere("density", stated, count=len(clips)) for stated in given]
     found = model.estimate(inputs, seed=seed, known=within)
     names = [target.name for target in found.targets]
     low, high = found.interval(LEVEL)

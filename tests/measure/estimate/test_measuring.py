@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Severity
 from flagdata.rng import child_seed
+from flagdata.stated import parse
 from measure.ends import Bound
 from measure.estimate.combine import Dependence
 from measure.estimate.gate import Reason, gate_of
@@ -19,6 +22,7 @@ from measure.estimate.measuring import Measurement, Options, measure
 from measure.estimate.similarity import FlagSize
 from models.estimator import Estimator
 from models.learner import Loss
+from models.mixture import Mixture
 from tests.measure.estimate.conftest import FRAMES, RATE, Pictures, even, pictures
 
 APART = Dependence(wind=0.2, cloth=0.2, source="given")
@@ -97,7 +101,7 @@ def test_an_unknown_size_widens_the_interval_of_the_wind(model: Estimator) -> No
 
 def test_an_area_weight_that_is_known_restricts_the_answer_to_it(model: Estimator) -> None:
     film = even(4 * FRAMES)
-    free, known = measured(film, model), measured(film, model, area_weight=(0.12, 0.13))
+    free, known = measured(film, model), measured(film, model, area_weight=parse("0.12:0.13"))
     density = known.quantities[1]
     assert density.assumed == (0.12, 0.13)
     assert 0.12 <= density.span.low < density.span.high <= 0.13
@@ -108,19 +112,90 @@ def test_an_area_weight_that_is_known_restricts_the_answer_to_it(model: Estimato
         assert 0.12 - 1e-6 <= own.low < own.high <= 0.13 + 1e-6
 
 
+@pytest.mark.parametrize("windows", [1, 4])
+def test_an_area_weight_is_a_value_or_has_a_deviation_and_the_wind_is_that_of_a_narrow_range(
+    model: Estimator, windows: int
+) -> None:
+    film = even(windows * FRAMES)
+    found = {text: measured(film, model, area_weight=parse(text)) for text in ("0.16", "0.16±0.0001", "0.1599:0.1601")}
+    narrow = found["0.1599:0.1601"].quantities
+    for text, one in found.items():
+        wind, density, bending, _ = one.quantities
+        for own, other in ((wind, narrow[0]), (bending, narrow[2])):  # of 400 draws each: four standard errors
+            assert own.value is not None
+            assert other.value is not None
+            assert other.sigma is not None
+            assert own.value == pytest.approx(other.value, abs=4 * 1.5 * other.sigma / 20), text
+            assert own.sigma == pytest.approx(other.sigma, rel=0.2), text
+        assert density.value == pytest.approx(0.16, abs=1e-4)
+    exact = found["0.16"].quantities[1]
+    assert (exact.given, exact.sigma, exact.span.ends()) == (True, 0.0, [0.16, 0.16])
+    assert found["0.16"].sentence.endswith("area weight 0.16 kg/m², as given")
+    assert found["0.16±0.0001"].options.recipe()["area_weight"] == {"value": 0.16, "sigma": 0.0001}
+
+
+class Believing(Estimator):
+    """The same model, which says of every clip at every size that the wind is 4 m/s and the cloth weighs 0.12 kg/m²."""
+
+    def posterior(self, embeddings: Sequence[Tensor]) -> Mixture:
+        found = super().posterior(embeddings)
+        scaling = self.learners[0].scaling
+        believed = torch.tensor([[4.0, 0.12, -4.0, 0.0]], dtype=torch.float64)
+        location = scaling.learned(believed).double().expand_as(found.location)
+        deviations = torch.tensor([1e-3, 0.3, 1.0, 1.0], dtype=torch.float64)
+        return Mixture(
+            log_weight=found.log_weight, location=location, factor=torch.diag(deviations).expand_as(found.factor)
+        )
+
+
+def test_of_an_unknown_size_a_weight_that_is_known_says_which_sizes_are_probable(model: Estimator) -> None:
+    """p(s | x, ρ) ∝ p(s) q(ρ/s)/π(ρ/s): the network reads a cloth of 0.12 kg/m² at any size, so that one of 0.15 is of
+    a larger flag. The wind is 4 √s m/s, which gives s."""
+    believing = Believing(**{field.name: getattr(model, field.name) for field in fields(model)})
+    film = even(8 * FRAMES, rate=2 * RATE)
+    found = measured(film, believing, size=None, area_weight=parse("0.15"), first=0.0, last=1.6 * FRAMES / RATE)
+    sizes = (found.draws[:, 0] / 4.0) ** 2
+    s = np.linspace(0.6, 2.0, 20_001)
+    share = np.exp(-0.5 * (np.log(s) / np.log(1.3)) ** 2) / s  # p(s), log-normal
+    weight = 0.15 / s
+    learned = torch.tensor(np.stack([np.full_like(s, 4.0), weight, np.full_like(s, -4.0), 0 * s], axis=1))
+    logit = believing.learners[0].scaling.learned(learned)[:, 1].double().numpy()
+    believed = believing.learners[0].scaling.learned(torch.tensor([[4.0, 0.12, -4.0, 0.0]]))[0, 1].item()
+    share *= np.exp(-0.5 * ((logit - believed) / 0.3) ** 2 + 0.5 * logit**2)  # π: the standard normal of the logit
+    share[(weight < 0.10) | (weight > 0.17)] = 0.0
+    share /= share.sum()
+    mean = float(share @ s)
+    deviation = float(np.sqrt(share @ (s - mean) ** 2))
+    assert sizes.mean() == pytest.approx(mean, abs=0.25 * deviation)
+    assert sizes.std() == pytest.approx(deviation, rel=0.25)
+    np.testing.assert_allclose(found.draws[:, 1], 0.15, rtol=1e-9)
+
+
+def test_a_weight_that_makes_the_film_improbable_is_called_a_contradiction(model: Estimator) -> None:
+    believing = Believing(**{field.name: getattr(model, field.name) for field in fields(model)})
+
+    def kinds(text: str) -> set[str]:
+        return {finding.kind for finding in measured(even(2 * FRAMES), believing, area_weight=parse(text)).findings}
+
+    assert "area-weight-contradicted" not in kinds("0.12")
+    assert "area-weight-contradicted" not in kinds("0.11:0.17")
+    assert "area-weight-contradicted" in kinds("0.16")  # more than four standard deviations away
+    assert "area-weight-contradicted" in kinds("0.155:0.165")
+
+
 def test_an_area_weight_is_that_of_the_flag_itself_whatever_its_size(model: Estimator) -> None:
     # a flag twice as long with 0.24 to 0.26 kg/m² moves like one of the training with 0.12 to 0.13
     film = even(6 * FRAMES)
-    large = measured(film, model, size=FlagSize(length=3.0, height=2.0), area_weight=(0.24, 0.26)).quantities[1]
+    large = measured(film, model, size=FlagSize(length=3.0, height=2.0), area_weight=parse("0.24:0.26")).quantities[1]
     assert large.assumed == (0.24, 0.26)
     assert 0.24 <= large.span.low < large.span.high <= 0.26
 
 
 def test_an_area_weight_that_no_training_had_is_refused(model: Estimator) -> None:
     with pytest.raises(UsageError, match=r"knows 0\.1 to 0\.17"):
-        measured(even(2 * FRAMES), model, area_weight=(0.15, 0.30))
+        measured(even(2 * FRAMES), model, area_weight=parse("0.15:0.30"))
     with pytest.raises(UsageError, match=r"knows 0\.2 to 0\.34"):
-        measured(even(6 * FRAMES), model, size=FlagSize(length=3.0, height=2.0), area_weight=(0.12, 0.15))
+        measured(even(6 * FRAMES), model, size=FlagSize(length=3.0, height=2.0), area_weight=parse("0.12"))
 
 
 def test_windows_that_overlap_are_shown_and_not_counted_twice(model: Estimator) -> None:

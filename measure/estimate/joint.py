@@ -1,0 +1,207 @@
+"""Draws of a film's windows, at each size of flag that is considered, as quantities of the flag itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.rng import child_seed, stream
+from measure.estimate.answer import Quantity, quantities
+from measure.estimate.combine import OWN, Dependence, combined, effective
+from measure.estimate.gate import Reason
+from measure.estimate.options import Options
+from measure.estimate.similarity import POWERS, Sizes, scaled_back
+from measure.estimate.windows import Layout
+from models.estimator import Estimator
+from models.mixture import Mixture
+from models.restriction import Conditioned, Known
+
+DRAWS = 400
+"""How many draws there are of each window's posterior, for each size of flag."""
+_NORMAL = 1.645
+"""Standard deviations either way that hold 90 % of a normal distribution."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WindowAnswer:
+    """What one window said by itself.
+
+    Attributes:
+        start, end: of its frames, at the smallest and largest size considered [s from the film's first frame].
+        quantities: with their intervals.
+        p: that a familiar clip is at least as strange.
+    """
+
+    start: float
+    end: float
+    quantities: tuple[Quantity, ...]
+    p: float
+
+    def quantity(self, name: str) -> Quantity:
+        """The one of that name."""
+        return next(quantity for quantity in self.quantities if quantity.name == name)
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return {
+            "start": self.start, "end": self.end, "p": self.p,
+            "quantities": {quantity.name: quantity.as_dict() for quantity in self.quantities},
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Look:
+    """A window as the model sees it at each size: its posterior without what is known, logits (i, n, target) of draws
+    with it, its first network's summaries (i, dimension), reasons, and for each draw (i, n) the log Bayes factor of
+    what is known (0 if nothing is)."""
+
+    start: float
+    posterior: Mixture
+    logits: NDArray[np.float64]
+    summaries: NDArray[np.float32]
+    reasons: tuple[list[Reason], ...]
+    log_factor: NDArray[np.float64]
+
+    @property
+    def blank(self) -> bool:
+        """Whether there is nothing to measure, at any size."""
+        return all(reasons[0].blank for reasons in self.reasons)
+
+    def only(self, places: Sequence[int]) -> Look:
+        """The same at some of the sizes."""
+        chosen = list(places)
+        return replace(
+            self, posterior=self.posterior.rows(chosen), logits=self.logits[chosen], summaries=self.summaries[chosen],
+            reasons=tuple(self.reasons[place] for place in chosen), log_factor=self.log_factor[chosen],
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Joint:
+    """Turns logits at the sizes considered into quantities of the flag itself."""
+
+    model: Estimator
+    sizes: Sizes
+    options: Options
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.model.learners[0].scaling.quantities
+
+    def joint(self, seen: Sequence[Look], dependence: Dependence) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n, target) draws of all windows together, the wind their mean, and (m, target) places of the windows' own in
+        the network's range."""
+        own = [place for place, name in enumerate(self.names) if name in OWN]
+        cloth = [place for place, name in enumerate(self.names) if name not in OWN]
+        parts, places = [], []
+        for stratum in range(len(self.sizes.scale)):
+            prior = self.prior_logits[stratum]
+            winds, shared = combined(
+                np.stack([one.logits[stratum] for one in seen]), names=self.names, centre=prior.mean(axis=0),
+                spread=prior.std(axis=0), dependence=dependence, given=self.stated_exactly,
+                generator=stream(self.options.seed, "combine", stratum),
+            )  # fmt: skip
+            logits = np.empty((*winds.shape[:2], len(self.names)))
+            logits[..., own] = winds
+            logits[..., cloth] = shared
+            values = self._values(logits)
+            parts.append(scaled_back(values.mean(axis=0), self.names, self.sizes.draws[stratum]))
+            places.append(self._places(values))
+        tempered = effective(len(seen), dependence.cloth) / len(seen)
+        rows = self._rows(tempered * np.sum([one.log_factor for one in seen], axis=0), "answer")
+        draws = np.concatenate(parts)[rows]
+        for name, stated in self.options.stated.items():
+            if not stated.sigma:  # combining windows moves draws a little, some out of the range
+                column = self.names.index(name)
+                draws[:, column] = np.clip(draws[:, column], stated.low, stated.high)
+        return draws, np.concatenate(places, axis=1)[:, rows].reshape(-1, len(self.names))
+
+    def window(self, one: Look, layout: Layout, p: float) -> WindowAnswer:
+        values = [self._values(logits) for logits in one.logits]
+        draws = [scaled_back(v, self.names, s) for v, s in zip(values, self.sizes.draws, strict=True)]
+        places = np.concatenate([self._places(v) for v in values])
+        rows = self._rows(one.log_factor, "window")
+        return WindowAnswer(
+            start=one.start, end=one.start + layout.length,
+            quantities=self.quantities(np.concatenate(draws)[rows], places[rows]), p=p,
+        )  # fmt: skip
+
+    def _rows(self, log_factor: NDArray[np.float64], *names: str) -> NDArray[np.intp]:
+        """Which of the draws, those of all sizes in a row, make the answer: each as often as the Bayes factor (i, n) of
+        what is known makes its size probable, by systematic resampling.
+
+        A size s is as probable before as the prior of sizes has it, and what is known of the cloth says nothing of it.
+        With the film x_s, which the network looks at as that of a flag of this size, and with p(x_s) alike for all
+        sizes, as where nothing is known, p(s | x, L) ∝ p(s) p(x_s | L, s)/p(x_s) = p(s) Z/Z_π (`models.restriction`).
+        """
+        total = log_factor.ravel()
+        if np.ptp(total) == 0:
+            return np.arange(len(total))
+        share = np.exp(total - total.max()).cumsum()
+        first = stream(self.options.seed, "sizes", *names).uniform()
+        return np.searchsorted(share / share[-1], (first + np.arange(len(total))) / len(total))
+
+    def quantities(self, draws: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[Quantity, ...]:
+        return quantities(
+            draws, self.prior, self.names, level=self.options.level, assumed=self.assumed, places=places,
+            stated={name: stated.within(_NORMAL) for name, stated in self.options.stated.items()},
+        )  # fmt: skip
+
+    def _places(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Places of values (…, target) in the network's range, 0 to 1: the range moves with the flag's size."""
+        low, high = self._ends
+        return (values - low) / (high - low)
+
+    @property
+    def _ends(self) -> NDArray[np.float64]:
+        """(2, target) of the range that the model learned."""
+        return np.array([[t.low for t in self.model.targets], [t.high for t in self.model.targets]])
+
+    @cached_property
+    def prior(self) -> NDArray[np.float64]:
+        """(n, target) draws of what is assumed of a flag of these sizes."""
+        logits = self.prior_logits
+        return scaled_back(
+            self._values(logits.reshape(-1, len(self.names))), self.names, self.sizes.draws.ravel()
+        )  # fmt: skip
+
+    @cached_property
+    def prior_logits(self) -> NDArray[np.float64]:
+        """(i, n, target) draws of the same as the model knows them, for each size of flag."""
+        learner, shape = self.model.learners[0], self.sizes.draws.shape
+        known = self.options.known(self.sizes, self.model)
+        if known:
+            return given_alone(self.model, known, seed=self.options.seed, sizes=shape[0]).logits.cpu().numpy()
+        normal = stream(self.options.seed, "prior").standard_normal((*shape, len(self.names)))
+        return learner.centre.double().cpu().numpy() + learner.spread.double().cpu().numpy() * normal
+
+    @cached_property
+    def assumed(self) -> NDArray[np.float64]:
+        """(target, 2) range that was simulated, at these sizes; of what was not simulated evenly 90 % of it."""
+        ends = self._ends
+        smallest, largest = np.quantile(self.sizes.draws, [0.05, 0.95])
+        low, high = scaled_back(ends[0], self.names, smallest), scaled_back(ends[1], self.names, largest)
+        even = np.array([name in POWERS for name in self.names])[:, None]
+        found = np.where(even, np.stack([low, high], axis=1), np.quantile(self.prior, [0.05, 0.95], axis=0).T)
+        for name, stated in self.options.stated.items():
+            found[self.names.index(name)] = stated.within(_NORMAL)
+        return found
+
+    @property
+    def stated_exactly(self) -> tuple[str, ...]:
+        """Targets whose value was given."""
+        return tuple(name for name, stated in self.options.stated.items() if stated.exact)
+
+    def _values(self, logits: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self.model.learners[0].scaling.values(torch.from_numpy(logits)).numpy()
+
+
+def given_alone(model: Estimator, known: Sequence[Known], *, seed: int, sizes: int) -> Conditioned:
+    """What is assumed before the film where something is known, at so many sizes."""
+    return model.given(model.prior(sizes), known, seed=child_seed(seed, "prior"), draws=DRAWS)

@@ -1,0 +1,87 @@
+"""How a film is measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from flagdata.errors import UsageError
+from flagdata.stated import Stated
+from measure.estimate.similarity import POWERS, FlagSize, Sizes
+from models.estimator import Estimator
+from models.restriction import Known
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """How a film is measured.
+
+    Attributes:
+        size: of the flag; None if unknown.
+        step: from one window to the next [s]; None for windows that follow each other.
+        first, last: the part of the film [s]; None for its ends.
+        level: of the intervals.
+        false_alarm: rate of the gate.
+        seed: of all draws.
+        refine: simulated clips of a refinement; None for none.
+        area_weight: what is known of the cloth's area weight [kg/m²]; None if it is unknown.
+
+    Raises:
+        UsageError: a refinement of a flag whose size is not known.
+    """
+
+    size: FlagSize | None = None
+    step: float | None = None
+    first: float | None = None
+    last: float | None = None
+    level: float = 0.9
+    false_alarm: float = 0.05
+    seed: int = 0
+    refine: int | None = None
+    area_weight: Stated | None = None
+
+    def __post_init__(self) -> None:
+        if self.refine is not None and self.size is None:
+            raise UsageError(
+                "a refinement simulates the flag, whose size is not known",
+                fix="give --flag-size, length along the wind times height, as in 1.5x1.0",
+            )
+
+    def recipe(self) -> dict[str, Any]:
+        """JSON values."""
+        return {
+            "flag_size": None if self.size is None else [self.size.length, self.size.height], "step": self.step,
+            "first": self.first, "last": self.last, "level": self.level, "false_alarm": self.false_alarm,
+            "refine": self.refine, "area_weight": None if self.area_weight is None else self.area_weight.recipe(),
+        }  # fmt: skip
+
+    @property
+    def stated(self) -> Mapping[str, Stated]:
+        """What is known of quantities besides the film, by their names."""
+        return {} if self.area_weight is None else {"density": self.area_weight}
+
+    def known(self, sizes: Sizes, model: Estimator) -> tuple[Known, ...]:
+        """The same at each size considered, as of a flag of the network's own size.
+
+        Raises:
+            UsageError: a quantity that the model does not estimate, or a statement beyond what it knows at any size.
+        """
+        found = []
+        for name, stated in self.stated.items():
+            target = next((target for target in model.targets if target.name == name), None)
+            if target is None:
+                raise UsageError(
+                    f"the model {model.name!r} does not estimate an area weight", where="--area-weight",
+                    fix="leave it out",
+                )  # fmt: skip
+            least, most = (end * sizes.scale ** POWERS[name] for end in (target.low, target.high))
+            if not ((least * (1 - 1e-9) <= stated.low) & (stated.high <= most * (1 + 1e-9))).any():
+                raise UsageError(
+                    f"an {target.about} of {stated.text} {target.unit}; of a flag of this size the model knows "
+                    f"{least.min():.3g} to {most.max():.3g}",
+                    where="--area-weight", fix="give one within that" + ("" if sizes.given else ", and --flag-size"),
+                )  # fmt: skip
+            scale = sizes.draws if sizes.given is None else sizes.scale[:, None]
+            found.append(Known.stated(name, stated, scale=scale ** POWERS[name]))
+        return tuple(found)
