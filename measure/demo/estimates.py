@@ -92,10 +92,11 @@ def read(path: Path, recording: Artifact) -> Series:
         InputError: a film that is too short or too slow.
     """
     model = estimator.shipped()
-    film = ConditionedFilm(RecordFilm(path, name=recording.name))
+    film = RecordFilm(path, name=recording.name)
+    options = Options(size=SIZE, step=STEP)
     measured = measure(
-        film, model, gate=gate_of(model), dependence=of_model(model), options=Options(size=SIZE, step=STEP)
-    )
+        ConditionedFilm(film), model, gate=gate_of(model), dependence=of_model(model), options=options
+    )  # fmt: skip
     return Series(measured=measured, beside=beside(measured, start=film.start, wind=film.record.wind()))
 
 
