@@ -18,6 +18,10 @@ MUJOCO_VENV := .venv-mujoco
 MUJOCO_STAMP := $(MUJOCO_VENV)/.installed
 MUJOCO := $(CURDIR)/$(MUJOCO_VENV)/bin/python
 
+# VTK, the renderer of the films that `python -m tests.validation films` measures.
+VTK_VENV := .venv-vtk
+VTK_STAMP := $(VTK_VENV)/.installed
+
 # The oldest dependencies that pyproject.toml admits.
 OLDEST_VENV := .venv-oldest
 OLDEST_STAMP := $(OLDEST_VENV)/.installed
@@ -35,7 +39,7 @@ IN_TWO := -n 2 --dist loadfile --no-loadscope-reorder
 # Tests start the program many times: without its bytecode each start would compile the package anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-oldest blender mujoco system lint docs bench validate clean
+.PHONY: demo test test-oldest blender mujoco vtk system lint docs bench validate clean
 
 demo: $(STAMP)
 	$(BIN)/flagdata demo --out $(OUT)/demo
@@ -50,6 +54,8 @@ test-oldest: $(OLDEST_STAMP) $(BLENDER_STAMP) $(MUJOCO_STAMP)
 blender: $(BLENDER_STAMP)
 
 mujoco: $(MUJOCO_STAMP)
+
+vtk: $(VTK_STAMP)
 
 system:
 	$(SUDO) apt-get install --yes --no-install-recommends $(SYSTEM)
@@ -80,8 +86,12 @@ $(BLENDER_STAMP): sim/blender/environment.py | $(STAMP)
 	$(BIN)/flagdata blender-setup --folder $(BLENDER_VENV)
 	touch $@
 
-$(MUJOCO_STAMP): tests/validation/mujoco/environment.py | $(STAMP)
-	$(BIN)/python -m tests.validation.mujoco.environment $(MUJOCO_VENV)
+$(MUJOCO_STAMP): tests/validation/environments.py | $(STAMP)
+	$(BIN)/python -m tests.validation.environments mujoco $(MUJOCO_VENV)
+	touch $@
+
+$(VTK_STAMP): tests/validation/environments.py | $(STAMP)
+	$(BIN)/python -m tests.validation.environments vtk $(VTK_VENV)
 	touch $@
 
 # An environment (its folder, its constraints) with the package and what its tests need.
@@ -94,4 +104,4 @@ touch $(1)/.installed
 endef
 
 clean:
-	rm -rf $(VENV) $(BLENDER_VENV) $(MUJOCO_VENV) $(OLDEST_VENV) $(OUT) build site *.egg-info
+	rm -rf $(VENV) $(BLENDER_VENV) $(MUJOCO_VENV) $(VTK_VENV) $(OLDEST_VENV) $(OUT) build site *.egg-info

@@ -33,7 +33,7 @@ from measure.observe import Observed
 from measure.observe.recipe import load, read
 from measure.shares import Share
 from measure.verdict.record import Conclusion, Estimate
-from tests.validation.mujoco import environment
+from tests.validation.environments import MUJOCO
 from tests.validation.mujoco.experiments import NOISE, NOMINAL, NOTHING, SPEEDS, UNDECLARED, Truth, draw, write
 
 _NULLS, _EFFECTS, _KINDS = 20, 1, 40
@@ -43,9 +43,9 @@ _COVERED = ("density", "bending", "damping")
 def run(*, seed: int, out: Path) -> dict[str, Any]:
     """Verdicts and what they are worth; what is missing where MuJoCo is."""
     try:
-        python = environment.find()
+        python = MUJOCO.find()
     except NotFoundError as error:
-        return {"missing": f"{error.what}: make mujoco, or set {environment.SETTING}"}
+        return {"missing": f"{error.what}: {error.fix}"}
     torch.set_num_threads(1)
     named = [(f"null-{k:03d}", NOTHING) for k in range(_number("NULLS", _NULLS))]
     for name, undeclared in UNDECLARED.items():

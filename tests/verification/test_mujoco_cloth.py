@@ -13,7 +13,7 @@ from scipy.special import j0
 
 from flagdata.errors import NotFoundError
 from sim.mesh import grid
-from tests.validation.mujoco import environment
+from tests.validation.environments import MUJOCO
 from tests.validation.mujoco.cloth import Air, Flight, Floats, Integrator, Method, Sheet, Wind, fly
 
 STILL, CALM = Air(pressure=0.0), Wind()
@@ -25,9 +25,9 @@ METHODS = (Method(), Method(integrator=Integrator.DISCRETE, step=1e-3))
 def mujoco() -> Path:
     """The Python of MuJoCo's environment."""
     try:
-        return environment.find()
+        return MUJOCO.find()
     except NotFoundError as error:
-        pytest.skip(f"{error.what}: make mujoco, or set {environment.SETTING}")
+        pytest.skip(f"{error.what}: {error.fix}")
 
 
 def _level(sheet: Sheet) -> Floats:

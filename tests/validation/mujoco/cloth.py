@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.mesh import Mesh
-from tests.validation.mujoco.environment import MujocoError
+from tests.validation.environments import UnusableError
 
 Floats = NDArray[np.float64]
 _WORKER = Path(__file__).with_name("worker.py")
@@ -153,7 +153,7 @@ def fly(
         gravity: along −z [m/s²].
 
     Raises:
-        MujocoError: the worker failed, or its cloth became unstable.
+        UnusableError: the worker failed, or its cloth became unstable.
     """
     settings: dict[str, Any] = {
         "step": method.step, "integrator": method.integrator.value, "gravity": gravity, "poisson": sheet.poisson,
@@ -176,4 +176,6 @@ def _run(command: Sequence[str]) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         said = done.stderr.strip().splitlines()
-        raise MujocoError(said[-1] if said else "the worker printed nothing", where="MuJoCo", fix="take smaller steps")
+        raise UnusableError(
+            said[-1] if said else "the worker printed nothing", where="MuJoCo", fix="take smaller steps"
+        )

@@ -149,7 +149,7 @@ def write(truth: Truth, folder: Path, *, python: Path, seed: int) -> Path:
     """Simulate an experiment and write it: a marker table for each wind, the material, and the recipe that is returned.
 
     Raises:
-        MujocoError: the simulation failed.
+        UnusableError: the simulation failed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     rest = truth.sheet.mesh.rest
