@@ -30,8 +30,10 @@ ALL_RATES = {
 COMPARED = ("24", "25", "30", "60", "120")
 """Rates whose answers may differ by 0.1 m/s at most."""
 _SIZES = ((640, 480), (480, 848), (1280, 720))
-_DURATION, _FAST_DURATION = 8.0, 5.0
-"""Of a film, and of one of more than 100 frames a second [s]."""
+_DURATION = 6.0
+"""Of a film [s]: three periods of a wind that varies."""
+_SHORTER = {"120": 4.0, "240": 3.0}
+"""Duration of films of these rates [s]: every film has its own pictures."""
 _SHUTTERS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.25, 0.5)
 """Share of the time between two frames for which the shutter is open; 0 for an instant."""
 
@@ -100,7 +102,7 @@ def _rates() -> list[Design]:
     return [
         Design(
             name=f"rates-w{wind}-{name}", part="rates", run=f"jittered/null_w{wind}", rate=name,
-            duration=_FAST_DURATION if name == "240" else _DURATION, texture="quarters", background="field", yaw=22.0,
+            duration=_SHORTER.get(name, _DURATION), texture="quarters", background="field", yaw=22.0,
             share=0.58, camera=Camera(noise=1.0, crf=20), alike=f"rates-{wind}",
         )
         for wind, names in ((5, tuple(ALL_RATES)), (3, COMPARED), (7, COMPARED))
@@ -109,8 +111,8 @@ def _rates() -> list[Design]:
 
 
 _COVERAGE_RATES = (
-    "30", "25", "59.94", "29.97", "24", "60", "30", "23.976", "50", "25", "29.97", "48", "30", "60", "24", "120", "30",
-    "23.976", "25", "59.94", "29.97", "50", "30", "240", "24", "48", "60", "29.97", "25", "23.976", "30",
+    "30", "25", "59.94", "29.97", "24", "60", "30", "23.976", "25", "29.97", "24", "30", "50", "120", "30", "23.976",
+    "25", "29.97", "48", "30", "240", "24", "60", "29.97", "25", "23.976", "30", "59.94", "30", "24", "25",
 )  # fmt: skip
 """In the order of the films: of 31, so that each run and view meets others."""
 
@@ -125,8 +127,8 @@ def _coverage() -> list[Design]:
         short = run.rpartition("/")[2]
         rng = stream(SEED, "films", "coverage", short, view)
         rate = _COVERAGE_RATES[number % len(_COVERAGE_RATES)]
-        fast = ALL_RATES[rate] > 100
-        length = 3.6 if short == "flag_w4_dt05" else _FAST_DURATION if fast else _DURATION
+        fast = rate in _SHORTER
+        length = 3.6 if short == "flag_w4_dt05" else _SHORTER.get(rate, _DURATION)
         spare = {"flag_w4_dt05": 4.0, "flag_w4_dt5": 16.0, "flag_w8_dt5": 16.0}.get(short, 10.0) - length
         found.append(
             Design(
@@ -134,8 +136,8 @@ def _coverage() -> list[Design]:
                 rate=rate, start=float(rng.uniform(0, spare)), duration=length,
                 size=_SIZES[int(rng.choice(3, p=(0.6, 0.2, 0.2)))], texture=str(rng.choice(list(TEXTURES))),
                 background=str(rng.choice(list(BACKGROUNDS))),
-                yaw=float(rng.uniform(15, 40)) * int(rng.choice([-1, 1])), elevation=float(rng.uniform(-16, 3)), side=int(rng.choice([-1, 1])),
-                distance=float(rng.uniform(5, 20)), share=float(rng.uniform(0.45, 0.68)),
+                yaw=float(rng.uniform(15, 40)) * int(rng.choice([-1, 1])),
+                elevation=float(rng.uniform(-16, 3)), side=int(rng.choice([-1, 1])), distance=float(rng.uniform(5, 20)), share=float(rng.uniform(0.45, 0.68)),
                 aside=(float(rng.uniform(-0.06, 0.06)), float(rng.uniform(-0.06, 0.06))),
                 shutter=0.0 if fast else float(rng.choice(_SHUTTERS)),
                 camera=Camera(noise=float(rng.uniform(0.5, 3.0)), crf=int(rng.integers(18, 31))),
@@ -182,7 +184,8 @@ def stressor_of(design: Design) -> str:
 
 def designs() -> list[Design]:
     """All of them, in the order in which they are made."""
-    return [*_rates(), *_stressed(), *_coverage()]
+    rates = _rates()
+    return [*rates[: len(ALL_RATES)], *_coverage(), *_stressed(), *rates[len(ALL_RATES) :]]
 
 
 def scene_of(design: Design, motion: Motion) -> Scene:
