@@ -9,6 +9,7 @@ VALIDATIONS = {
     "arcsim-jittered": "tests.validation.arcsim_jittered",
     "clock-recovery": "tests.validation.clock_recovery",
     "datasets": "tests.validation.datasets",
+    "films": "tests.validation.films",
     "flags": "tests.validation.flags",
     "flutter": "tests.validation.flutter",
     "foreign": "tests.validation.foreign",

@@ -134,10 +134,11 @@ def _coverage() -> list[Design]:
             Design(
                 name=f"coverage-{short}-{view}", part="other air" if run in OTHER_AIR else "coverage", run=run,
                 rate=rate, start=float(rng.uniform(0, spare)), duration=length,
-                size=_SIZES[int(rng.choice(3, p=(0.6, 0.2, 0.2)))], texture=str(rng.choice(list(TEXTURES))),
+                size=_SIZES[int(rng.choice(3, p=(0.7, 0.2, 0.1)))], texture=str(rng.choice(list(TEXTURES))),
                 background=str(rng.choice(list(BACKGROUNDS))),
                 yaw=float(rng.uniform(15, 40)) * int(rng.choice([-1, 1])),
-                elevation=float(rng.uniform(-16, 3)), side=int(rng.choice([-1, 1])), distance=float(rng.uniform(5, 20)), share=float(rng.uniform(0.45, 0.68)),
+                elevation=float(rng.uniform(-16, 3)), side=int(rng.choice([-1, 1])),
+                distance=float(rng.uniform(5, 20)), share=float(rng.uniform(0.45, 0.68)),
                 aside=(float(rng.uniform(-0.06, 0.06)), float(rng.uniform(-0.06, 0.06))),
                 shutter=0.0 if fast else float(rng.choice(_SHUTTERS)),
                 camera=Camera(noise=float(rng.uniform(0.5, 3.0)), crf=int(rng.integers(18, 31))),

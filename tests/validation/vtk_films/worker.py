@@ -133,7 +133,7 @@ def main() -> None:
         renderer.AddActor(body.actor)
     window = vtkRenderWindow()
     window.SetOffScreenRendering(1)
-    window.SetMultiSamples(settings["samples"])
+    window.SetMultiSamples(0)
     window.SetSize(width, height)
     window.AddRenderer(renderer)
     grab = vtkWindowToImageFilter()
