@@ -6,7 +6,7 @@ import json
 import math
 import os
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -227,7 +227,8 @@ def film(python: Path, scene: Scene, path: Path, rng: np.random.Generator) -> No
         UnusableError: the worker failed.
     """
     partial = path.with_suffix(".part.mp4")
-    write(partial, (developed(one, scene.camera, rng) for one in pictures(python, scene)), scene)
+    shown = (developed(one, scene.camera, rng) for one in pictures(python, scene))
+    write(partial, shown, rate=scene.rate, crf=scene.camera.crf)
     partial.replace(path)
 
 
@@ -241,13 +242,15 @@ def developed(picture: NDArray[np.uint8], camera: Camera, rng: np.random.Generat
     return np.ascontiguousarray(out[:, ::-1]) if camera.mirrored else out
 
 
-def write(path: Path, frames: Iterator[NDArray[np.uint8]], scene: Scene) -> None:
-    """An MP4 file of H.264 with 4:2:0 colours."""
-    width, height = scene.view.size
+def write(path: Path, frames: Iterable[NDArray[np.uint8]], *, rate: Fraction, crf: int) -> None:
+    """An MP4 file of H.264 with 4:2:0 colours, of pictures (height, width, 3)."""
+    stream: Any = None
     with av.open(str(path), "w") as container:
-        stream: Any = container.add_stream("libx264", rate=scene.rate)
-        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
-        stream.options = {"crf": str(scene.camera.crf), "preset": "veryfast", "threads": "1"}
         for picture in frames:
+            if stream is None:
+                stream = container.add_stream("libx264", rate=rate)
+                stream.height, stream.width = picture.shape[:2]
+                stream.pix_fmt = "yuv420p"
+                stream.options = {"crf": str(crf), "preset": "veryfast", "threads": "1"}
             container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
         container.mux(stream.encode(None))
