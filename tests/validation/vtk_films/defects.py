@@ -1,7 +1,7 @@
 """Films that nobody can measure a wind by, each for one known reason: thirteen kinds, six of each.
 
-Most are made of the films of `designs`, as a careless recording would be; of some VTK draws a scene of its own. The list
-was fixed before the first of them was judged. Those of even number are for choosing thresholds, the others judge.
+Most are made of the films of `designs`, as a careless recording would be; of some VTK draws a scene of its own. The
+list was fixed before the first of them was judged. Those of even number are for choosing thresholds, the others judge.
 """
 
 from __future__ import annotations
@@ -154,7 +154,7 @@ def close_up(makings: Makings) -> Source:
 
 
 def moving_camera(makings: Makings) -> Source:
-    """A hand-held or a panning camera, and behind the flag an even sky that shows no motion; the pole is out of sight."""
+    """A hand-held or a panning camera, and behind the flag an even sky that shows no motion; no pole."""
     scene = makings.scene(texture="stripes")
     times = np.arange(scene.frames) / float(scene.rate)
     turned = shaking(times, float(makings.rng.uniform(6, 15)), makings.rng)
@@ -170,9 +170,8 @@ def repeated(makings: Makings) -> Source:
     film = makings.film()
     count = len(film.frames)
     if makings.number % 2:
-        index = np.arange(count) // int(makings.rng.integers(2, 5)) * 1
-        index *= max(1, round(np.arange(count)[-1] / max(index[-1], 1)))
-        return film.of(film.frames[np.minimum(index, count - 1)])
+        times = int(makings.rng.integers(2, 5))
+        return film.of(film.frames[np.arange(count) // times * times])
     fresh = makings.rng.random(count) < 1 / 3
     return film.of(film.frames[np.maximum.accumulate(np.where(fresh, np.arange(count), 0))])
 
