@@ -12,17 +12,22 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from flagdata.stated import Stated
 from measure.ends import PILED, WITHIN, Bound, Span, limits_of, span
-from models.targets import TARGETS
+from models.targets import ASPECT, TARGETS
 
 LEAST_INFORMATION = 0.05
 """Information of a posterior over its prior, Kullback–Leibler of Gaussians of the same moments [nat]. Below it the film
 did not constrain it: a posterior of the same mean then has 78 % of the prior's standard deviation or more."""
-SHORT = {"wind_speed": "wind", "density": "area weight", "bending_scale": "bending", "anisotropy": "anisotropy"}
+SHORT = {
+    "wind_speed": "wind", "density": "area weight", "bending_scale": "bending", "anisotropy": "anisotropy",
+    ASPECT: "logarithm of length over height",
+}  # fmt: skip
 """Names in the one-line answer."""
 HEADLINE = ("wind_speed", "density")
 """What the one-line answer is about."""
-_DIGITS = {"wind_speed": 1, "density": 2, "bending_scale": 2, "anisotropy": 2}
+_UNITS = {target.name: target.unit for target in TARGETS.values()}
+_DIGITS = {"wind_speed": 1, "density": 2, "bending_scale": 2, "anisotropy": 2, ASPECT: 2}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +43,7 @@ class Quantity:
         span: central interval of the measurement's level, or a bound on one side (`measure.ends`).
         assumed: the range that the simulations covered, for this size of flag, or what was stated.
         information: what the film added to that, see `LEAST_INFORMATION` [nat].
+        given: whether it was stated where it lies.
     """
 
     name: str
@@ -47,16 +53,12 @@ class Quantity:
     span: Span
     assumed: tuple[float, float]
     information: float
+    given: bool = False
 
     @property
     def constrained(self) -> bool:
         """Whether the film adds information to the prior."""
         return self.information >= LEAST_INFORMATION and self.span.bound is not Bound.NOTHING
-
-    @property
-    def given(self) -> bool:
-        """Whether its value was stated, so that the film has nothing to add."""
-        return self.assumed[0] == self.assumed[1]
 
     def phrase(self, *, first: bool) -> str:
         """In words, without a full stop.
@@ -65,10 +67,12 @@ class Quantity:
             first: whether the level of an interval is stated; that of a bound always is.
         """
         short, bound = SHORT[self.name], self.span.bound
-        if self.given:
-            return f"{short} {self.value:g}{self._suffix}, as given"
         if not self.constrained:
+            if self.given and self.assumed[0] == self.assumed[1]:
+                return f"{short} {self.value:g}{self._suffix}, as given"
             low, high = (self._number(end) for end in self.assumed)
+            if self.given:
+                return f"{short} {low} to {high}{self._suffix}, as given"
             return f"{short}: not constrained by this clip (prior range {low} to {high}{self._suffix})"
         stated = f"{self.span.level * 100:.3g} %"
         if bound is None:
@@ -112,12 +116,13 @@ class Quantity:
             "unit": self.unit, "value": self.value, "sigma": self.sigma, "interval": self.span.ends(),
             "level": self.span.level, "bound": None if self.span.bound is None else self.span.bound.value,
             "assumed": list(self.assumed), "information": self.information, "constrained": self.constrained,
+            "given": self.given,
         }  # fmt: skip
 
 
 def quantities(
     draws: NDArray[np.float64], prior: NDArray[np.float64], names: Sequence[str], *, level: float,
-    assumed: NDArray[np.float64], places: NDArray[np.float64], stated: Mapping[str, tuple[float, float]],
+    assumed: NDArray[np.float64], places: NDArray[np.float64], stated: Mapping[str, Stated],
 ) -> tuple[Quantity, ...]:  # fmt: skip
     """All quantities of a posterior.
 
@@ -128,7 +133,7 @@ def quantities(
         level: share of each central interval.
         assumed: (target, 2) range of the simulations, for this size of flag.
         places: (k, target) of the draws in the range that the model learned, 0 to 1; of means, those of their parts.
-        stated: name → the range in which the user states that the quantity lies.
+        stated: name → what the user states of the quantity.
 
     Raises:
         InputError: a level that is not between 0 and 1.
@@ -138,16 +143,18 @@ def quantities(
     found = []
     for k, name in enumerate(names):
         ends = float(assumed[k, 0]), float(assumed[k, 1])
-        limits = stated.get(name, limits_of(name))
-        if ends[0] == ends[1]:
-            found.append(_given(name, ends[0], level=level))
+        given, limits = stated.get(name), limits_of(name)
+        if given is not None and given.exact:
+            found.append(_given(name, given.low, level=level))
             continue
+        if given is not None and not given.sigma:
+            limits = given.low, given.high
         own = span(draws[:, k], places[:, k], level=level, limits=limits, assumed=ends)
         found.append(
             Quantity(
-                name=name, unit=TARGETS[name].unit, value=float(draws[:, k].mean()) if own.estimated else None,
+                name=name, unit=_UNITS[name], value=float(draws[:, k].mean()) if own.estimated else None,
                 sigma=float(draws[:, k].std()) if own.estimated else None, span=own, assumed=ends,
-                information=information(draws[:, k], prior[:, k]),
+                information=information(draws[:, k], prior[:, k]), given=given is not None,
             )
         )  # fmt: skip
     return tuple(found)
@@ -157,8 +164,9 @@ def _given(name: str, value: float, *, level: float) -> Quantity:
     """A quantity whose value was stated."""
     own = Span(low=value, high=value, level=level, bound=None, estimated=True)
     return Quantity(
-        name=name, unit=TARGETS[name].unit, value=value, sigma=0.0, span=own, assumed=(value, value), information=0.0
-    )
+        name=name, unit=_UNITS[name], value=value, sigma=0.0, span=own, assumed=(value, value), information=0.0,
+        given=True,
+    )  # fmt: skip
 
 
 def information(posterior: NDArray[np.float64], prior: NDArray[np.float64]) -> float:

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
               "of a hanging cloth its width and height.")  # fmt: skip
 @click.option("--area-weight", type=STATED, metavar="VALUE",
               help="Area weight of the cloth [kg/m²]: 0.284, 0.284±0.01 (deviation) or 0.27:0.30.")  # fmt: skip
+@click.option("--material", metavar="NAME", help="Cloth whose area weight is taken, a material of the catalog or a "
+              "fabric that films of the lake declare; nothing else of it is used.")  # fmt: skip
 @click.option("--windows", "--window", "step", type=DURATION, metavar="TIME",
               help="A wind series, one window every so often, as in 1.2s.")  # fmt: skip
 @click.option("--crop", metavar="X,Y,W,H", help="Region in which the flag is [px]; by default the whole picture.")
@@ -72,6 +74,7 @@ def measure(
     query: str | None,
     flag_size: str | None,
     area_weight: Stated | None,
+    material: str | None,
     step: float | None,
     crop: str | None,
     flag: int | None,
@@ -108,11 +111,14 @@ def measure(
     """
     if as_json and as_csv:
         raise UsageError("more than one form of output", fix="choose one of --json and --csv")
+    if area_weight is not None and material is not None:
+        raise UsageError("the area weight is given twice", fix="choose one of --area-weight and --material")
     if cache is not None and refine is None:
         raise UsageError("--cache without --refine", fix="give --refine N, or leave --cache out")
     from flagdata.ingest.camera import CropBox, parse_crop
     from flagdata.lake import Lake
     from flagdata.outputs import check_file, check_folder
+    from measure.estimate.material import weight_of
     from measure.estimate.measuring import Options
     from measure.estimate.similarity import parse_size
     from measure.estimate.source import Reading, network, subjects
@@ -124,15 +130,18 @@ def measure(
     box = None if crop is None else parse_crop(crop)
     if not (box is None or isinstance(box, CropBox)):
         raise UsageError(f"the crop {crop!r} is not a box", where="--crop", fix="give x,y,width,height in pixels")
+    lake = None if lake_path is None else Lake.open(lake_path)
+    if lake is not None and not read_only:
+        lake.check_writable()
+    seen = at if at is not None else branch
+    if material is not None:
+        area_weight, origin = weight_of(material, lake=lake, at=seen)
+        say(f"area weight {area_weight.text} kg/m² of {material}: {origin}")
     reading = Reading(crop=box, flag=flag, true_fps=true_fps, sequence_fps=sequence_fps)
     options = Options(
         size=None if flag_size is None else parse_size(flag_size), step=step, first=first, last=last, level=level,
         false_alarm=false_alarm, seed=seed, refine=refine, area_weight=area_weight,
     )  # fmt: skip
-    lake = None if lake_path is None else Lake.open(lake_path)
-    if lake is not None and not read_only:
-        lake.check_writable()
-    seen = at if at is not None else branch
     found = subjects(source, query=query, lake=lake, at=seen, reading=reading)
     job = _Job(
         options=options, reading=reading, network=network(model, lake=lake, at=seen), lake=lake, at=seen, branch=branch,
@@ -336,6 +345,9 @@ def _report(done: _Done, *, series: bool) -> None:
     mark = "refused by the gate, not to be relied on: " if measured.verdict.refused else ""
     click.echo(mark + measured.sentence)
     say(f"  {measured.verdict.sentence}; {measured.combined} of {len(measured.verdict.window_p)} windows in the answer")
+    for finding in measured.bounds:
+        if finding.severity is Severity.NOTE:
+            say(f"  {finding.what}; {finding.fix}")
     if done.refinement is not None:
         click.echo(f"{mark}refined: {done.refinement.sentence}")
     if not series:

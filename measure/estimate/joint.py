@@ -11,7 +11,9 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
+from flagdata.stated import Stated
 from measure.estimate.answer import Quantity, quantities
 from measure.estimate.combine import OWN, Dependence, combined, effective
 from measure.estimate.gate import Reason
@@ -24,6 +26,11 @@ from models.restriction import Conditioned, Known
 
 DRAWS = 400
 """How many draws there are of each window's posterior, for each size of flag."""
+WIND, WEIGHT = "wind_speed", "density"
+_LIGHT_AND_HEAVY = (0.1, 0.9)
+"""Quantiles of the answer's area weights at which the wind is given where the weight is open."""
+_MATTERS = 0.25
+"""Share of the wind's interval by which it changes between these where the weight matters."""
 _NORMAL = 1.645
 """Standard deviations either way that hold 90 % of a normal distribution."""
 
@@ -94,6 +101,55 @@ class Joint:
     def names(self) -> tuple[str, ...]:
         return self.model.learners[0].scaling.quantities
 
+    @cached_property
+    def known(self) -> tuple[Known, ...]:
+        """What is known besides the film, of a flag of the network's own size."""
+        return self.options.known(self.sizes, self.model)
+
+    @cached_property
+    def _before(self) -> Conditioned:
+        """What is assumed before the film where something is known."""
+        own = child_seed(self.options.seed, "prior")
+        return self.model.given(self.model.prior(len(self.sizes.scale)), self.known, seed=own, draws=DRAWS)
+
+    def given(self, posterior: Mixture, *, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Logits (i, n, target) of a window's posterior given what is known, and their log Bayes factors (i, n)."""
+        found = self.model.given(posterior, self.known, seed=seed, draws=DRAWS)
+        factor = torch.where(found.log_mass > -torch.inf, found.log_mass - self._before.log_mass, -torch.inf)
+        return found.logits.cpu().numpy(), factor.cpu().numpy()
+
+    def by_weight(
+        self, seen: Sequence[Look], dependence: Dependence, found: Sequence[Quantity], draws: NDArray[np.float64]
+    ) -> Finding | None:  # fmt: skip
+        """How the wind would change with the weight of the cloth, where that is open and matters: the answers for a
+        light and a heavy cloth of those that the answer leaves possible; None where it does not.
+
+        Args:
+            found: the answer's quantities.
+            draws: (n, target) of the answer.
+        """
+        wind = next((one for one in found if one.name == WIND and one.value is not None), None)
+        if wind is None or WEIGHT not in self.names or self.options.area_weight is not None:
+            return None
+        ends = np.quantile(draws[:, self.names.index(WEIGHT)], _LIGHT_AND_HEAVY)
+        weights = [float(f"{end:.2g}") for end in ends]
+        winds = []
+        for weight in weights:
+            weighed = replace(self, options=replace(self.options, area_weight=Stated.of(weight)))
+            parts = []
+            for place, one in enumerate(seen):
+                logits, log_factor = weighed.given(one.posterior, seed=child_seed(self.options.seed, WEIGHT, place))
+                parts.append(replace(one, logits=logits, log_factor=log_factor))
+            winds.append(float(weighed.joint(parts, dependence)[0][:, self.names.index(WIND)].mean()))
+        if abs(winds[1] - winds[0]) < _MATTERS * (wind.span.high - wind.span.low):
+            return None
+        light, heavy = (f"at {weight:g} kg/m² {own:.1f} m/s" for weight, own in zip(weights, winds, strict=True))
+        return Finding(
+            kind="weight-open", severity=Severity.NOTE, value=winds[1] - winds[0],
+            what=f"the wind depends on the weight of the cloth, which was not given: {light}, {heavy}",
+            fix="weigh the cloth and give --area-weight",
+        )  # fmt: skip
+
     def joint(self, seen: Sequence[Look], dependence: Dependence) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(n, target) draws of all windows together, the wind their mean, and (m, target) places of the windows' own in
         the network's range."""
@@ -116,7 +172,7 @@ class Joint:
         tempered = effective(len(seen), dependence.cloth) / len(seen)
         rows = self._rows(tempered * np.sum([one.log_factor for one in seen], axis=0), "answer")
         draws = np.concatenate(parts)[rows]
-        for name, stated in self.options.stated.items():
+        for name, stated in self.options.stated(self.model).items():
             if not stated.sigma:  # combining windows moves draws a little, some out of the range
                 column = self.names.index(name)
                 draws[:, column] = np.clip(draws[:, column], stated.low, stated.high)
@@ -150,7 +206,7 @@ class Joint:
     def quantities(self, draws: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[Quantity, ...]:
         return quantities(
             draws, self.prior, self.names, level=self.options.level, assumed=self.assumed, places=places,
-            stated={name: stated.within(_NORMAL) for name, stated in self.options.stated.items()},
+            stated=self.options.stated(self.model),
         )  # fmt: skip
 
     def _places(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -175,9 +231,8 @@ class Joint:
     def prior_logits(self) -> NDArray[np.float64]:
         """(i, n, target) draws of the same as the model knows them, for each size of flag."""
         learner, shape = self.model.learners[0], self.sizes.draws.shape
-        known = self.options.known(self.sizes, self.model)
-        if known:
-            return given_alone(self.model, known, seed=self.options.seed, sizes=shape[0]).logits.cpu().numpy()
+        if self.known:
+            return self._before.logits.cpu().numpy()
         normal = stream(self.options.seed, "prior").standard_normal((*shape, len(self.names)))
         return learner.centre.double().cpu().numpy() + learner.spread.double().cpu().numpy() * normal
 
@@ -189,19 +244,14 @@ class Joint:
         low, high = scaled_back(ends[0], self.names, smallest), scaled_back(ends[1], self.names, largest)
         even = np.array([name in POWERS for name in self.names])[:, None]
         found = np.where(even, np.stack([low, high], axis=1), np.quantile(self.prior, [0.05, 0.95], axis=0).T)
-        for name, stated in self.options.stated.items():
+        for name, stated in self.options.stated(self.model).items():
             found[self.names.index(name)] = stated.within(_NORMAL)
         return found
 
     @property
     def stated_exactly(self) -> tuple[str, ...]:
         """Targets whose value was given."""
-        return tuple(name for name, stated in self.options.stated.items() if stated.exact)
+        return tuple(name for name, stated in self.options.stated(self.model).items() if stated.exact)
 
     def _values(self, logits: NDArray[np.float64]) -> NDArray[np.float64]:
         return self.model.learners[0].scaling.values(torch.from_numpy(logits)).numpy()
-
-
-def given_alone(model: Estimator, known: Sequence[Known], *, seed: int, sizes: int) -> Conditioned:
-    """What is assumed before the film where something is known, at so many sizes."""
-    return model.given(model.prior(sizes), known, seed=child_seed(seed, "prior"), draws=DRAWS)

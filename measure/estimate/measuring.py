@@ -17,14 +17,13 @@ from measure.estimate.answer import Quantity, sentence
 from measure.estimate.combine import OWN, Dependence
 from measure.estimate.film import Film
 from measure.estimate.gate import Gate, Verdict, verdict
-from measure.estimate.joint import DRAWS, Joint, Look, WindowAnswer, given_alone
+from measure.estimate.joint import DRAWS, Joint, Look, WindowAnswer
 from measure.estimate.options import Options
 from measure.estimate.repeats import Distinct
-from measure.estimate.similarity import TRAINED, Sizes, sizes, spacing
+from measure.estimate.similarity import Sizes, sizes, spacing, trained_on
 from measure.estimate.windows import Layout, Window, cut, findings_of, lay_out
 from models.estimator import Estimator
 from models.learner import Loss
-from models.restriction import Conditioned, Known
 
 CONTRADICTION = 1 / 150
 """Bayes factor of the area weight that was stated, below which a warning is due: very strong evidence against it (Kass
@@ -51,7 +50,8 @@ class Measurement:
         summary: (dimension,) of the window of median p.
         clip: (frames, height, width) of the first window, at the size at which the film is least strange.
         findings: on film, size and windows.
-        bounds: why quantities are bounded on one side only; a part of the answer.
+        bounds: why quantities are bounded on one side only, and how the wind depends on a weight that is open: parts
+            of the answer.
     """
 
     film: str
@@ -124,10 +124,9 @@ def measure(
         )  # fmt: skip
     considered = sizes(
         options.size, rate=film.rate, frames_rate=model.front_end.rate, draws=DRAWS,
-        generator=stream(options.seed, "sizes"), trained=TRAINED[model.cloth],
+        generator=stream(options.seed, "sizes"), trained=trained_on(model.targets),
     )  # fmt: skip
-    known = options.known(considered, model)
-    before = given_alone(model, known, seed=options.seed, sizes=len(considered.scale)) if known else None
+    given = Joint(model=model, sizes=considered, options=options)
     layout = lay_out(
         frames=model.front_end.frames, rate=film.rate, duration=film.duration, step=options.step, first=options.first,
         last=options.last, spacings=tuple(spacing(s, rate=model.front_end.rate) for s in considered.scale.tolist()),
@@ -138,7 +137,7 @@ def measure(
     margin = 2 * layout.period
     distinct = Distinct(film.frames(layout.first - margin, layout.last + margin))
     for window in cut(distinct, layout):
-        one = _look(window, model, gate, seed=options.seed, known=known, before=before)
+        one = _look(window, gate, given)
         if clips is None or (all(earlier.blank for earlier in seen) and not one.blank):
             clips = window.clips
         seen.append(one)
@@ -163,33 +162,31 @@ def measure(
         if not (blank and judged.measurable)
     )
     own = answer.quantities(draws, places)
+    open_weight = answer.by_weight([whole[k] for k in used], dependence, own, draws)
     return Measurement(
         film=film.name, rate=film.rate, duration=film.duration, model=model.name, options=options,
         names=tuple(answer.names), draws=draws, quantities=own, windows=windows, combined=len(used),
         dependence=dependence, verdict=judged, sizes=kept, summary=middle.summaries[judged.size],
         clip=clips[judged.size],
         findings=(*film.findings(), *kept.findings, *found, *_about_windows(whole, judged, used, dependence)),
-        bounds=tuple(_at_ends(own, windows)),
+        bounds=(*_at_ends(own, windows), *([] if open_weight is None else [open_weight])),
     )  # fmt: skip
 
 
 @torch.no_grad()
-def _look(
-    window: Window, model: Estimator, gate: Gate, *, seed: int, known: Sequence[Known], before: Conditioned | None
-) -> Look:
+def _look(window: Window, gate: Gate, given: Joint) -> Look:
+    model, own = given.model, child_seed(given.options.seed, "window", window.index)
     embeddings = model.embeddings(model.inputs(window.clips))
     posterior = model.posterior(embeddings)
-    own, log_factor = child_seed(seed, "window", window.index), np.zeros((len(window.clips), DRAWS))
-    if before is None:
-        logits = model.logits(embeddings, seed=own, draws=DRAWS)[:, :DRAWS]
+    if given.known:
+        logits, log_factor = given.given(posterior, seed=own)
     else:
-        found = model.given(posterior, known, seed=own, draws=DRAWS)
-        logits, possible = found.logits, found.log_mass > -torch.inf
-        log_factor = torch.where(possible, found.log_mass - before.log_mass, -torch.inf).cpu().numpy()
+        logits = model.logits(embeddings, seed=own, draws=DRAWS)[:, :DRAWS].double().cpu().numpy()
+        log_factor = np.zeros(logits.shape[:2])
     summaries = embeddings[0].cpu().numpy().astype(np.float32)
     reasons = tuple(gate.judge(clip, summary) for clip, summary in zip(window.clips, summaries, strict=True))
     return Look(
-        start=window.start, posterior=posterior, logits=logits.double().cpu().numpy(), summaries=summaries,
+        start=window.start, posterior=posterior, logits=logits, summaries=summaries,
         reasons=reasons, log_factor=log_factor,
     )  # fmt: skip
 

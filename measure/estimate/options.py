@@ -10,7 +10,8 @@ from flagdata.errors import UsageError
 from flagdata.stated import Stated
 from measure.estimate.similarity import POWERS, FlagSize, Sizes
 from models.estimator import Estimator
-from models.restriction import Known
+from models.restriction import Known, stated_aspect
+from models.targets import ASPECT
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,10 +57,16 @@ class Options:
             "refine": self.refine, "area_weight": None if self.area_weight is None else self.area_weight.recipe(),
         }  # fmt: skip
 
-    @property
-    def stated(self) -> Mapping[str, Stated]:
-        """What is known of quantities besides the film, by their names."""
-        return {} if self.area_weight is None else {"density": self.area_weight}
+    def stated(self, model: Estimator) -> Mapping[str, Stated]:
+        """What is known of quantities besides the film, by their names: the weight that was given, and of a model that
+        estimates a flag's aspect that of the size that was given, where it is one that the model knows."""
+        found = {} if self.area_weight is None else {"density": self.area_weight}
+        aspect = next((target for target in model.targets if target.name == ASPECT), None)
+        if aspect is not None and self.size is not None:
+            own = stated_aspect(self.size.length, self.size.height)
+            if aspect.low <= own.low and own.high <= aspect.high:
+                found[ASPECT] = own
+        return found
 
     def known(self, sizes: Sizes, model: Estimator) -> tuple[Known, ...]:
         """The same at each size considered, as of a flag of the network's own size.
@@ -68,14 +75,15 @@ class Options:
             UsageError: a quantity that the model does not estimate, or a statement beyond what it knows at any size.
         """
         found = []
-        for name, stated in self.stated.items():
+        for name, stated in self.stated(model).items():
             target = next((target for target in model.targets if target.name == name), None)
             if target is None:
                 raise UsageError(
                     f"the model {model.name!r} does not estimate an area weight", where="--area-weight",
                     fix="leave it out",
                 )  # fmt: skip
-            least, most = (end * sizes.scale ** POWERS[name] for end in (target.low, target.high))
+            power = POWERS.get(name, 0.0)  # an aspect has none
+            least, most = (end * sizes.scale**power for end in (target.low, target.high))
             if not ((least * (1 - 1e-9) <= stated.low) & (stated.high <= most * (1 + 1e-9))).any():
                 raise UsageError(
                     f"an {target.about} of {stated.text} {target.unit}; of a flag of this size the model knows "
@@ -83,5 +91,5 @@ class Options:
                     where="--area-weight", fix="give one within that" + ("" if sizes.given else ", and --flag-size"),
                 )  # fmt: skip
             scale = sizes.draws if sizes.given is None else sizes.scale[:, None]
-            found.append(Known.stated(name, stated, scale=scale ** POWERS[name]))
+            found.append(Known.stated(name, stated, scale=scale**power))
         return tuple(found)

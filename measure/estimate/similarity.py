@@ -35,29 +35,38 @@ from scipy.special import ndtr, ndtri
 
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.findings import Finding, Severity
-from models.targets import Cloth
+from models.targets import ASPECT, Cloth, Target
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trained:
-    """The cloths that a model is trained on: all of one size and shape.
+    """The cloths that a model is trained on: all of one size, and of one shape or of shapes that it knows of.
 
     Attributes:
         noun: what they are called.
         length: of a flag along the wind, of a hanging cloth along the edge that is held [m].
-        aspect: length over height.
+        aspects: the least and the largest length over height.
     """
 
     noun: str
     length: float
-    aspect: float
+    aspects: tuple[float, float]
 
 
 TRAINED = {
-    Cloth.FLAG: Trained(noun="flag", length=1.5, aspect=1.5),
-    Cloth.HANGING: Trained(noun="cloth", length=1.0, aspect=1.0),
+    Cloth.FLAG: Trained(noun="flag", length=1.5, aspects=(1.5, 1.5)),
+    Cloth.HANGING: Trained(noun="cloth", length=1.0, aspects=(1.0, 1.0)),
 }
 FLAG = TRAINED[Cloth.FLAG]
+
+
+def trained_on(targets: Sequence[Target]) -> Trained:
+    """The cloths that a model with these targets is trained on; one that estimates the aspect knows several."""
+    own = TRAINED[targets[0].cloth]
+    ends = [(math.exp(target.low), math.exp(target.high)) for target in targets if target.name == ASPECT]
+    return replace(own, aspects=ends[0]) if ends else own
+
+
 _SHORTEST, _LONGEST = 0.1, 20.0  # m
 _ASPECT_SLACK = 0.05  # relative; printed sizes are rounded
 _SIZE = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*[x×]\s*(\d+(?:\.\d*)?|\.\d+)\s*(?:m)?\s*")
@@ -93,14 +102,15 @@ class FlagSize:
     def findings(self, trained: Trained = FLAG) -> tuple[Finding, ...]:
         """What is to be said of its shape."""
         aspect = self.length / self.height
-        if abs(aspect / trained.aspect - 1) <= _ASPECT_SLACK:
+        least, most = trained.aspects
+        if least * (1 - _ASPECT_SLACK) <= aspect <= most * (1 + _ASPECT_SLACK):
             return ()
         return (
             Finding(
                 kind="aspect-ratio", severity=Severity.WARNING, value=aspect,
                 what=f"the {trained.noun} is {aspect:.2f} times as long as it is high, those of the training "
-                f"{trained.aspect:.2f} times: similarity is exact for one shape only, so that intervals may be too "
-                "narrow",
+                + (f"{least:.2f}" if least == most else f"{least:.2f} to {most:.2f}")
+                + " times: similarity is exact for one shape only, so that intervals may be too narrow",
             ),
         )  # fmt: skip
 

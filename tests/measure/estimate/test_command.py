@@ -19,12 +19,15 @@ from PIL import Image
 
 from flagdata.cli import main
 from flagdata.dataset.clips import clip_rows
+from flagdata.errors import UnknownNameError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
+from flagdata.stated import Stated
 from flagdata.timebase import NANOSECONDS
 from measure.estimate.artifact import read
+from measure.estimate.material import weight_of
 from measure.estimate.nearest import nearest
 from models.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, RATE, pictures, write_video
@@ -110,6 +113,29 @@ def test_the_shipped_model_measures_a_file_without_any_option_but_the_films(tmp_
     found = answer(path, "--anyway")
     assert found["model"] == "flow"
     assert "size-assumed" in [finding["kind"] for finding in found["findings"]]  # type: ignore[index, union-attr]
+
+
+def test_a_material_states_its_area_weight_from_the_catalog_or_the_lakes_films(film: Path, lake: Path) -> None:
+    named = (film, *SIZED, "--anyway", "--json", "--read-only", "--lake", lake, "--material")
+    done = run(*named, "tango-red-jet-set")
+    assert "Wang" in done.stderr
+    found = json.loads(done.stdout)
+    assert found["options"]["area_weight"] == 0.113  # Wang et al. 2011, table of densities
+    assert found["quantities"]["density"]["given"] is True
+    assert found["sentence"].endswith("area weight 0.113 kg/m², as given")
+    made = Lake.open(lake)
+    with made.transaction("declared") as transaction:
+        for name, session, density in (("one", "felt", 0.24), ("two", "linen", 0.2), ("three", "linen", 0.21)):
+            cloth = {"cloth": {"fabric": session, "density": density}}
+            transaction.add(Artifact(kind=Kind.RECORDING, name=name, session=session, recipe=cloth, frame_count=1))
+    assert weight_of("felt", lake=made, at=None)[0] == Stated.of(0.24)
+    with pytest.raises(UsageError, match=r"2 area weights, 0\.2 to 0\.21"):
+        weight_of("linen", lake=made, at=None)
+    with pytest.raises(UnknownNameError, match="felt"):
+        weight_of("fellt", lake=made, at=None)
+    with pytest.raises(UnknownNameError, match="--material"):
+        weight_of("felt", lake=None, at=None)
+    assert "twice" in run(film, "--material", "paper", "--area-weight", "0.1", code=2).stderr
 
 
 def test_the_shipped_model_of_hanging_cloth_gives_weights_of_its_range(film: Path) -> None:

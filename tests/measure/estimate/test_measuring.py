@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,10 +22,11 @@ from measure.estimate.combine import Dependence
 from measure.estimate.gate import Reason, gate_of
 from measure.estimate.measuring import Measurement, Options, measure
 from measure.estimate.similarity import FlagSize
+from models import estimator
 from models.estimator import Estimator
 from models.learner import Loss
 from models.mixture import Mixture
-from tests.measure.estimate.conftest import FRAMES, RATE, Pictures, even, pictures
+from tests.measure.estimate.conftest import FRAMES, RATE, Pictures, even, pictures, written
 
 APART = Dependence(wind=0.2, cloth=0.2, source="given")
 WHOLE = FlagSize(length=1.5, height=1.0)
@@ -169,6 +172,66 @@ def test_of_an_unknown_size_a_weight_that_is_known_says_which_sizes_are_probable
     assert sizes.mean() == pytest.approx(mean, abs=0.25 * deviation)
     assert sizes.std() == pytest.approx(deviation, rel=0.25)
     np.testing.assert_allclose(found.draws[:, 1], 0.15, rtol=1e-9)
+
+
+class Ambiguous(Believing):
+    """As it, of which the logits of wind and weight are correlated by 0.9, each with a deviation of 1 or less."""
+
+    def posterior(self, embeddings: Sequence[Tensor]) -> Mixture:
+        found = super().posterior(embeddings)
+        covariance = torch.eye(4, dtype=torch.float64)
+        covariance[:2, :2] = torch.tensor([[1.0, 0.9], [0.9, 1.0]])
+        return replace(
+            found, factor=torch.linalg.cholesky(self.card["spread"] ** 2 * covariance).expand_as(found.factor)
+        )
+
+    def logits(self, embeddings: Sequence[Tensor], *, seed: int, draws: int) -> Tensor:
+        return self.posterior(embeddings).sample(draws, torch.Generator().manual_seed(seed % 1000))
+
+
+def test_a_weight_that_is_open_is_answered_with_the_winds_of_a_light_and_a_heavy_cloth(model: Estimator) -> None:
+    """Of a wind and a weight whose logits are those of 4 m/s and 0.12 kg/m² plus z and z', the conditional median at a
+    weight is that of z = 0.9 z'."""
+    values = {field.name: getattr(model, field.name) for field in fields(model)}
+    ambiguous = Ambiguous(**{**values, "card": {**model.card, "spread": 1.0}})
+    film = even(FRAMES)
+    (finding,) = [one for one in measured(film, ambiguous).bounds if one.kind == "weight-open"]
+    light, heavy = re.findall(r"at ([\d.]+) kg/m² ([\d.]+) m/s", finding.what)
+    scaling = model.learners[0].scaling
+
+    def logits(wind: float, weight: float) -> np.ndarray:
+        return scaling.learned(torch.tensor([[wind, weight, -4.0, 0.0]], dtype=torch.float64))[0].double().numpy()
+
+    base = logits(4.0, 0.12)
+    for weight, wind in (light, heavy):
+        z = 0.9 * (logits(4.0, float(weight))[1] - base[1])
+        draws = base[0] + z + np.sqrt(1 - 0.81) * np.random.default_rng(0).standard_normal(20_000)
+        low, high = (float(bound[0]) for bound in scaling.bounds)
+        expected = low + (high - low) / (1 + np.exp(-draws))
+        assert float(wind) == pytest.approx(expected.mean(), abs=0.05 + 4 * expected.std() / 20)  # of 400 draws
+    assert float(light[0]) < 0.12 < float(heavy[0])
+    assert finding.fix == "weigh the cloth and give --area-weight"
+    assert finding.severity is Severity.NOTE
+    given = measured(film, ambiguous, area_weight=parse("0.13"))
+    assert "weight-open" not in [one.kind for one in given.bounds]
+    independent = Believing(**values)
+    assert "weight-open" not in [one.kind for one in measured(film, independent).bounds]
+
+
+def test_a_flags_aspect_is_known_from_its_size_by_a_model_that_estimates_it(tmp_path: Path) -> None:
+    aspects = estimator.load(written(tmp_path / "aspects", ("wind_speed", "density", "aspect")))
+    for size, given in ((FlagSize(length=1.5, height=1.0), True), (FlagSize(length=1.5, height=0.5), False)):
+        found = measured(even(2 * FRAMES), aspects, size=size)
+        aspect = found.quantities[2]
+        kinds = [finding.kind for finding in found.findings]
+        assert ("aspect-ratio" in kinds) is not given, size
+        assert aspect.given is given
+        if given:  # the middle, 4 % either way
+            assert np.log(1.44) - 0.01 <= aspect.span.low < aspect.span.high <= np.log(1.56) + 0.01
+    weighed = measured(even(2 * FRAMES), aspects, area_weight=parse("0.12"))
+    assert weighed.quantities[1].value == 0.12
+    assert weighed.quantities[2].span.high <= np.log(1.56) + 0.01
+    assert not measured(even(2 * FRAMES), aspects, size=None, first=0.0, last=0.6).quantities[2].given
 
 
 def test_a_weight_that_makes_the_film_improbable_is_called_a_contradiction(model: Estimator) -> None:
