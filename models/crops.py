@@ -7,7 +7,8 @@ angle to the wind, changes its sign (`SIDED`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -50,6 +51,8 @@ class Cropping:
         size: it is resized to [px].
         scales: sides of the squares, as shares of the film's shorter side; one is drawn each time.
         mirror: whether half of the crops are mirror images.
+        conditioned: whether films are conditioned before (`models.conditioning`), and shown at the network's instants
+            whatever their rate.
 
     Raises:
         InputError: no scale, or one outside of [`LEAST_SCALE`, 1].
@@ -59,6 +62,12 @@ class Cropping:
     size: int = 224
     scales: tuple[float, ...] = (1.0, 0.9, 0.8)
     mirror: bool = True
+    conditioned: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """As JSON; the entry `conditioned` is left out where it is false, so that older recipes keep their hash."""
+        found = asdict(self)
+        return found if self.conditioned else {key: value for key, value in found.items() if key != "conditioned"}
 
     def __post_init__(self) -> None:
         if not self.scales or not all(LEAST_SCALE <= scale <= 1 for scale in self.scales):

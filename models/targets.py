@@ -95,7 +95,7 @@ ASPECT = "log_aspect"
 
 _OF_FLAGS_OUTDOORS = {
     "outdoor_wind": Target(name="wind_speed", unit="m/s", low=0.0, high=16.0, about="wind speed"),
-    "aspect": Target(
+    ASPECT: Target(
         name=ASPECT, unit="1", low=-0.05, high=0.75, about="natural logarithm of the length over the height"
     ),
 }  # fmt: skip

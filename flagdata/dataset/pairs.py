@@ -17,6 +17,7 @@ from flagdata.dataset.sample import Sample
 from flagdata.dataset.table import PairTable
 from flagdata.dataset.tolerance import Refusal
 from flagdata.record import Record
+from flagdata.timebase import NANOSECONDS
 
 OPEN_RECORDS = 64  # record files that a thread keeps open
 
@@ -102,6 +103,17 @@ class Pairs(Batchable):
             raise IndexError(f"pair {index} of {len(self.table)}")
         record = self._record(int(self.table.object[index]))
         return record.frames(0, record.frame_count)
+
+    def film_times(self, index: int) -> NDArray[np.float64]:
+        """(frames,) instants of the frames of `film`, from the first [s].
+
+        Raises:
+            IndexError: beyond the last pair.
+        """
+        if not 0 <= index < len(self.table):
+            raise IndexError(f"pair {index} of {len(self.table)}")
+        times = self._record(int(self.table.object[index])).frame_times
+        return (times - times[0]) / NANOSECONDS
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name != "_open"}

@@ -13,9 +13,9 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import CropBox
 from flagdata.schema import FRAME_SIZE
 from measure.estimate.film import Film
-from measure.estimate.repeats import TimedFrame
 from models.conditioning import Conditioning, Follower, conditioning_of
 from models.conditioning.conditioning import LEAST, SAMPLE
+from models.conditioning.repeats import TimedFrame
 
 _HELD = 200_000_000
 """Bytes of frames that are held, so that a short film is decoded once."""

@@ -16,10 +16,11 @@ from flagdata.errors import InputError
 from flagdata.record.video import decode
 from flagdata.rng import child_seed
 from models.estimator import Estimator
+from models.training.conditioned import FitFilm
 from models.training.recipe import DataSpec
 from sim.assets import Assets
 from sim.datasets import jobs, picture
-from sim.datasets.cast import Cast
+from sim.datasets.cast import Cast, of_group
 from sim.datasets.films import EPOCH, Film
 from sim.datasets.reading import load
 from sim.datasets.recipe import DatasetRecipe
@@ -83,20 +84,32 @@ def _of_dataset(recipe: DatasetRecipe, count: int, model: Estimator, *, windows:
     frames = model.front_end.frames
     time = replace(recipe.simulation.time, frames=windows * frames, rate=model.front_end.rate)
     simulation = replace(recipe.simulation, name=f"{recipe.name}-long", seed=seed, count=count, batch=_BATCH, time=time)
-    crew, side = Crew(simulation), recipe.side(_SIDE)
-    bases: dict[int, list[int]] = {}
-    for index in range(count):
-        bases.setdefault(crew.member(index).base, []).append(index)
-    for base, indices in bases.items():
-        for first in range(0, len(indices), _BATCH):
-            yield from _batch(recipe, simulation, Cast(side=side, session=None, simulation=simulation), base,
-                              indices[first : first + _BATCH], windows)  # fmt: skip
+    for cast in _casts(recipe, simulation):
+        crew = Crew(cast.simulation)
+        bases: dict[int, list[int]] = {}
+        for index in range(cast.simulation.count):
+            bases.setdefault(crew.member(index).base, []).append(index)
+        for base, indices in bases.items():
+            for first in range(0, len(indices), _BATCH):
+                yield from _batch(recipe, cast, base, indices[first : first + _BATCH], model, windows)
+
+
+def _casts(recipe: DatasetRecipe, simulation: Recipe) -> Iterator[Cast]:
+    """The films' cloths: together, or batch by batch where each draws its own shape; the rate is the model's."""
+    side = recipe.side(_SIDE)
+    if recipe.groups is None:
+        yield Cast(side=side, session=None, simulation=simulation)
+        return
+    groups = replace(recipe.groups, rates=(simulation.time.rate,))
+    for first in range(0, simulation.count, _BATCH):
+        few = replace(simulation, count=min(_BATCH, simulation.count - first))
+        yield of_group(few, groups, side, seed=child_seed(simulation.seed, "group", first))
 
 
 def _batch(
-    recipe: DatasetRecipe, simulation: Recipe, cast: Cast, base: int, indices: Sequence[int], windows: int
+    recipe: DatasetRecipe, cast: Cast, base: int, indices: Sequence[int], model: Estimator, windows: int
 ) -> Iterator[LongFilm]:
-    assets = Assets(photos=recipe.photos)
+    assets, simulation = Assets(photos=recipe.photos), cast.simulation
     for outcome in jobs.simulate(simulation, base, indices, "cpu").outcomes:
         if outcome.sequence is None:
             continue
@@ -109,7 +122,9 @@ def _batch(
         zeta, drawn = recipe.prior.draw(seed, assets), picture.settings(recipe.camera, seed=seed)
         seen = jobs.shot(recipe, job, outcome.sequence, zeta, assets, device="cpu").numpy()
         film = np.stack(decode(picture.coded(seen, drawn, recipe.camera, seed=seed), where=job.name))
+        if model.cropping.conditioned:
+            film = FitFilm.of(film, np.arange(len(film)) / simulation.time.rate).frames
         yield LongFilm(
             dataset=recipe.name, windows=film.reshape(windows, -1, *film.shape[1:]),
-            parameters=parameters_of(member, zeta, drawn, recipe.anemometer.truth),
+            parameters=parameters_of(member, zeta, {**cast.stated, **drawn}, recipe.anemometer.truth),
         )  # fmt: skip

@@ -19,9 +19,9 @@ from measure.estimate.film import Film
 from measure.estimate.gate import Gate, Verdict, verdict
 from measure.estimate.joint import DRAWS, Joint, Look, WindowAnswer
 from measure.estimate.options import Options
-from measure.estimate.repeats import Distinct
 from measure.estimate.similarity import Sizes, sizes, spacing, trained_on
 from measure.estimate.windows import Layout, Window, cut, findings_of, lay_out
+from models.conditioning.repeats import Distinct
 from models.estimator import Estimator
 from models.learner import Loss
 

@@ -1,7 +1,7 @@
 """A film cut into windows of the network's length, once for each size of flag that is considered.
 
 A window starts on a frame. Where no frame is near an instant of the network, its picture is interpolated between the
-two frames about it (`measure.estimate.instants`); frames that repeat the one before are left out first. A window in
+two frames about it (`models.conditioning.instants`); frames that repeat the one before are left out first. A window in
 which frames are missing is left out.
 """
 
@@ -16,17 +16,11 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
-from measure.estimate.instants import Interpolator
-from measure.estimate.repeats import TimedFrame
+from models.conditioning.instants import Interpolator, TimedFrame, at_instants
 
-_NEAR = 0.25
-"""Share of the time between two frames within which an instant is shown by the nearer one. A nearest frame makes the
-motion uneven, an interpolated one smooths it, and the wind that the network reads moves down with the one and up with
-the other; at this share films of 25, 30 and 60 frames a second agree (decision 035)."""
-_NEAR_OF_SLOW = 0.4
-"""The same of a film slower than the network's frames, between which more of the motion is lost."""
 _BEYOND = 0.05
-"""The same beyond the film's last frame: stamps are rounded to milliseconds."""
+"""Share of the time between two frames by which an instant may lie beyond the film's last: stamps are rounded to
+milliseconds."""
 _FEWEST = 0.8
 """Share of the network's frames that a window must have of its own, so that most of its pictures were taken."""
 _LONGEST = 1.75
@@ -165,16 +159,9 @@ def _window(held: deque[TimedFrame], layout: Layout, index: int, interpolator: I
         within = np.count_nonzero((times >= start - 1e-6) & (times < instants[-1]))
         if within < _FEWEST * (layout.frames - 1):
             return None
-        near = _NEAR if layout.period <= spacing else _NEAR_OF_SLOW
-        clip = []
-        for k, instant, at in zip(before.tolist(), instants.tolist(), place.tolist(), strict=True):
-            nearest = min(round(at), 1)
-            if abs(at - nearest) <= near:
-                clip.append(held[k + nearest][1])
-            else:
-                clip.append(interpolator.between(held[k], held[k + 1], instant))
-                interpolated += 1
-        clips.append(np.stack(clip))
+        clip, between = at_instants(held, instants, period=layout.period, interpolator=interpolator)
+        clips.append(clip)
+        interpolated += between
     return Window(index=index, start=start, clips=np.stack(clips), interpolated=interpolated)
 
 

@@ -21,10 +21,12 @@ from flagdata.dataset.resolve import explicit_sides
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.schema import Kind
+from flagdata.timebase import NANOSECONDS
 from measure.gate.distortions import DISTORTIONS, Film
 from measure.gate.features import Features, features_of
 from measure.gate.gate import Gate
 from models.estimator import SHIPPED, Estimator, load
+from models.training.conditioned import FitFilm
 from models.training.recipe import DataSpec
 
 PLAIN, DISTORTED = 360, 30
@@ -89,16 +91,19 @@ class FilmsOf(Sequence[Film]):
         data: the data sets.
         side: "train", "validation" or "test".
         at: ref of the lake; None for its head.
+        rate: at which films are shown [Hz], once they were conditioned; None for films as they are.
 
     Raises:
         InputError: there are none.
         RefusedError: films of this side share a sequence or a session with those of another side.
     """
 
-    def __init__(self, lake_path: Path, data: DataSpec, side: str, *, at: str | None = None) -> None:
+    def __init__(
+        self, lake_path: Path, data: DataSpec, side: str, *, at: str | None = None, rate: float | None = None
+    ) -> None:
         import flagdata
 
-        self._lake = flagdata.open(lake_path).lake
+        self._lake, self._rate = flagdata.open(lake_path).lake, rate
         explicit_sides(self._lake.table(self._lake.view(at)), data.split("train", "validation", "test"))
         films = {"kind": Kind.RECORDING, **data.where(side)}
         rows = self._lake.rows(films, columns=["name", "seed", "object"], at=at).to_pylist()
@@ -121,13 +126,21 @@ class FilmsOf(Sequence[Film]):
         from flagdata.record import Record
 
         record = Record.open(self._lake.object_path(self._objects[index]))
-        return record.frames(0, record.frame_count)
+        film = record.frames(0, record.frame_count)
+        if self._rate is None:
+            return film
+        return FitFilm.of(film, (record.frame_times - record.frame_times[0]) / NANOSECONDS).whole(self._rate)
 
 
 def data_of(model: Estimator) -> DataSpec:
     """The data sets that a model was trained on, all of their simulations."""
     recipe: Any = model.card["recipe"]
     return replace(DataSpec.of_identity(recipe["data"]), sequences=None)
+
+
+def rate_of(model: Estimator) -> float | None:
+    """The rate at which a model's films are conditioned [Hz]; None where they are taken as they are."""
+    return model.front_end.rate if model.cropping.conditioned else None
 
 
 @click.command()
@@ -145,7 +158,9 @@ def main(model: Path, lake_path: Path, datasets: tuple[str, ...], at: str | None
     torch.set_num_threads(1)
     loaded = load(model)
     data = DataSpec(datasets=datasets) if datasets else data_of(loaded)
-    training, validation = (FilmsOf(lake_path, data, side, at=at) for side in ("train", "validation"))
+    training, validation = (
+        FilmsOf(lake_path, data, side, at=at, rate=rate_of(loaded)) for side in ("train", "validation")
+    )
     with progress(len(validation) + PLAIN + DISTORTED * len(DISTORTIONS), label="measure", unit="clip") as advance:
         gate = calibrated(loaded, training, validation, seed=seed, advance=advance)
     say(f"{len(gate.calibration)} calibration clips; stored in {write(model, gate, loaded)}")

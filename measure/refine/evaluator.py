@@ -147,7 +147,7 @@ class Evaluator:
 
 def fingerprint(estimator: Estimator) -> str:
     """A hash of an estimator's weights and front end."""
-    parts = [canonical({"front_end": asdict(estimator.front_end), "cropping": asdict(estimator.cropping)})]
+    parts = [canonical({"front_end": asdict(estimator.front_end), "cropping": estimator.cropping.as_dict()})]
     for learner in estimator.learners:
         for name, value in sorted(learner.state_dict().items()):
             parts.append(f"{name}:{digest(value.cpu().double().numpy().tobytes().hex())}")

@@ -149,7 +149,8 @@ def trained(
         with bars(len(films), f"{recipe.name}: prepare", "film") as advance:
             train_inputs = prepare_films(
                 train_pairs, recipe.front_end, recipe.cropping, variants=recipe.variants, folder=cache,
-                workers=workers, advance=advance, sequences=recipe.data.sequences, seed=recipe.seed,
+                workers=workers, advance=advance, augment=recipe.augment, sequences=recipe.data.sequences,
+                seed=recipe.seed,
             )  # fmt: skip
         with bars(len(validation_pairs), f"{recipe.name}: prepare what validates", "clip") as advance:
             validation_inputs = prepare_clips(

@@ -18,7 +18,7 @@ import io
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -39,9 +39,12 @@ from flagdata.timebase import NANOSECONDS
 from models import targets
 from models.crops import Cropping
 from models.frontend import FrontEnd, standardised
+from models.training.augment import Augment
+from models.training.conditioned import VERSION, FitFilm
 
 _LOG = logging.getLogger("flagdata")
 _RATE_ERROR = 0.01
+_VERSION = {"conditioning": VERSION}
 Advance = Callable[[int], None]
 
 
@@ -162,6 +165,7 @@ def prepare_films(
     folder: Path,
     workers: int,
     advance: Advance,
+    augment: Augment | None = None,
     sequences: int | None = None,
     seed: int = 0,
 ) -> Prepared:
@@ -170,6 +174,7 @@ def prepare_films(
     The crops depend on the film and the number of the variant alone, not on a training's seed.
 
     Args:
+        augment: what happens to conditioned films beside; None for nothing.
         sequences: how many of the simulations are used, those of a random order's beginning; None for all.
         seed: of that order.
         advance: called with the number of entries done.
@@ -179,16 +184,25 @@ def prepare_films(
         FlagdataError: the disk is full.
     """
     rows = film_rows(pairs, sequences=sequences, seed=seed)
+    disturbed = augment if augment is not None else Augment()
 
     def key(row: int) -> dict[str, Any]:
-        return {"film": pairs.table.recording[row], "variants": variants, "crops": asdict(cropping)}
+        found = {"film": pairs.table.recording[row], "variants": variants, "crops": cropping.as_dict()}
+        if not cropping.conditioned:
+            return found
+        beside = str(pairs.table.recording[_beside(pairs, row)])
+        return {**found, "augment": disturbed.identity(), "beside": beside, **_VERSION}
 
     def made(row: int) -> list[Tensor]:
+        if cropping.conditioned:
+            return _conditioned_crops(pairs, row, front_end, cropping, variants=variants, augment=disturbed)
         film, recording = pairs.film(row), str(pairs.table.recording[row])
         drawn = [cropping.draw(stream(0, "crop", recording, variant), _shape(film)) for variant in range(variants)]
         return [cropping.cut(film, crop) for crop in drawn]
 
-    return _prepared(pairs, rows, front_end, key, made, variants, folder, workers, advance)
+    return _prepared(
+        pairs, rows, front_end, key, made, variants, folder, workers, advance, conditioned=cropping.conditioned
+    )
 
 
 def film_rows(pairs: Pairs, *, sequences: int | None, seed: int) -> NDArray[np.int64]:
@@ -206,19 +220,58 @@ def prepare_clips(
 ) -> Prepared:
     """The catalog's clips as they are, the largest square of each, for validation and tests: entries are clips.
 
+    A conditioned clip is as long as the front end takes, from the first frame of the catalog's on, or from as early as
+    its film has to be entered to be long enough.
+
     Raises:
         InputError: clips of another length than the front end takes.
         FlagdataError: the disk is full.
     """
 
     def key(row: int) -> dict[str, Any]:
-        return {"clip": pairs.table.artifact[row], "size": cropping.size, "frames": cropping.frames}
+        found = {"clip": pairs.table.artifact[row], "size": cropping.size, "frames": cropping.frames}
+        return {**found, **_VERSION} if cropping.conditioned else found
 
     def made(row: int) -> list[Tensor]:
-        clip = pairs[row].clip[0].numpy()
+        clip = _conditioned_clip(pairs, row, front_end) if cropping.conditioned else pairs[row].clip[0].numpy()
         return [cropping.cut(clip, cropping.whole(_shape(clip)))]
 
-    return _prepared(pairs, np.arange(len(pairs)), front_end, key, made, 1, folder, workers, advance)
+    return _prepared(
+        pairs, np.arange(len(pairs)), front_end, key, made, 1, folder, workers, advance,
+        conditioned=cropping.conditioned,
+    )  # fmt: skip
+
+
+def _conditioned_crops(
+    pairs: Pairs, row: int, front_end: FrontEnd, cropping: Cropping, *, variants: int, augment: Augment
+) -> list[Tensor]:
+    """Random crops of a film that was disturbed and conditioned once; each starts on a frame of its own."""
+    recording, times = str(pairs.table.recording[row]), pairs.film_times(row)
+    disturbed = augment.before(
+        pairs.film(row), times, source=recording, other=lambda: pairs.film(_beside(pairs, row))
+    )  # fmt: skip
+    film = FitFilm.of(disturbed, times)
+    starts, found = film.starts(front_end.frames, front_end.rate), []
+    for variant in range(variants):
+        rng = stream(0, "crop", recording, variant)
+        clip, instants = film.clip(int(rng.choice(starts)), front_end.frames, front_end.rate)
+        clip = augment.after(clip, instants, source=recording, variant=variant, weight=film.weight)
+        found.append(cropping.cut(clip, cropping.draw(rng, _shape(clip))))
+    return found
+
+
+def _beside(pairs: Pairs, row: int) -> int:
+    """A row of the film that a second flag is of: of all films in the order of their artifacts the next."""
+    recordings, first = np.unique(pairs.table.recording, return_index=True)
+    place = int(np.searchsorted(recordings, pairs.table.recording[row]))
+    return int(first[(place + 1) % len(recordings)])
+
+
+def _conditioned_clip(pairs: Pairs, row: int, front_end: FrontEnd) -> NDArray[np.uint8]:
+    """(frames, size, size) the clip of a row, of its conditioned film."""
+    film = FitFilm.of(pairs.film(row), pairs.film_times(row))
+    starts = film.starts(front_end.frames, front_end.rate)
+    return film.clip(min(int(pairs.table.frame_first[row]), int(starts[-1])), front_end.frames, front_end.rate)[0]
 
 
 def _prepared(
@@ -231,8 +284,11 @@ def _prepared(
     folder: Path,
     workers: int,
     advance: Advance,
+    *,
+    conditioned: bool,
 ) -> Prepared:
-    _check_rate(pairs, rows, front_end)
+    if not conditioned:
+        _check_rate(pairs, rows, front_end)
     own = folder / f"{front_end.maps}-{front_end.hash}"
     named = [_name(key(row), front_end, str(pairs.table.objects[pairs.table.object[row]])) for row in rows.tolist()]
     paths = tuple(own / name[:2] / f"{name}.npy" for name in named)

@@ -40,7 +40,7 @@ def card_of(
     return {
         "name": recipe.name, "title": recipe.title, "recipe": recipe.identity(), "recipe_hash": recipe.hash,
         "data": data, "code_version": code_version(), "seed": recipe.seed, "batches": batches,
-        "front_end": asdict(recipe.front_end), "cropping": asdict(recipe.cropping),
+        "front_end": asdict(recipe.front_end), "cropping": recipe.cropping.as_dict(),
         "parameters": sum(weights.numel() for weights in learner.network.parameters()),
         "epochs": len(trained.course.epochs), "best": None if best is None else asdict(best),
         "seconds": trained.seconds, "course": trained.course.as_list(),

@@ -3,7 +3,10 @@
 title, seed
 [data]       dataset: a data set's name, or a list of them; sequences: of the training side, all by default
 [input]      maps: "frames", "spectral-maps", "wave-maps", "flow-maps" or "flow-maps-3"; size [px], frames; scales,
-             mirror: of crops; variants: crops of each film that are prepared
+             mirror: of crops; variants: crops of each film that are prepared; conditioned = true: films are made fit as
+             `flagdata measure` does it, at the network's instants
+[input.augment.NAME]  of conditioned films, NAME of `models.training.augment.DISTURBANCES`: share (of the films), low,
+             high
 [network]    name: of `models.registry.NETWORKS`; its other keys are the network's own
 [loss]       name: "regression", "posterior" or "contrastive"; targets: of `models.targets`; components, margin
 [optimiser]  rate, decay, batch, epochs; schedule: "steps" or "cosine"; drop-after: epochs; clip-norm; precision:
@@ -35,6 +38,8 @@ from models.frontend import RATE_LIMIT, FrontEnd, Maps
 from models.learner import NUMBER_LIMIT, Learner, Loss, build
 from models.registry import NETWORKS
 from models.targets import TARGETS
+from models.training.augment import DISTURBANCES, Augment, Strength
+from models.training.conditioned import VERSION
 
 TRAININGS = Shelf(folder="training", noun="training recipe")
 RECIPE_VERSION = 1
@@ -165,6 +170,7 @@ class TrainingRecipe:
         seed: of initial weights, crops and orders.
         data, input, network, loss, optimiser: the tables above.
         variants: crops of each film that are prepared; an epoch takes one of them, the next the next.
+        augment: what happens to films beside crops and mirror images.
     """
 
     name: str
@@ -174,6 +180,7 @@ class TrainingRecipe:
     front_end: FrontEnd
     cropping: Cropping
     variants: int
+    augment: Augment
     network: NetworkSpec
     loss: LossSpec
     optimiser: OptimiserSpec
@@ -182,7 +189,8 @@ class TrainingRecipe:
         """All that shapes the weights beside the data themselves, as JSON."""
         return {
             "training": RECIPE_VERSION, "seed": self.seed, "data": self.data.identity(),
-            "front_end": asdict(self.front_end), "cropping": asdict(self.cropping), "variants": self.variants,
+            "front_end": asdict(self.front_end), "cropping": self.cropping.as_dict(), "variants": self.variants,
+            **({"augment": self.augment.identity(), "conditioning": VERSION} if self.cropping.conditioned else {}),
             "network": {"name": self.network.name, "options": dict(self.network.options)},
             "loss": asdict(self.loss), "optimiser": asdict(self.optimiser),
         }  # fmt: skip
@@ -236,10 +244,11 @@ def load(source: str) -> TrainingRecipe:
 def parse(text: str, *, name: str, where: str, folder: Path = Path()) -> TrainingRecipe:
     """A recipe from its text; raises as `load`."""
     top = Table(parsed(text, where=where), where=where)
-    front_end, cropping, variants = _input(top.table("input"))
+    front_end, cropping, variants, augment = _input(top.table("input"))
     recipe = TrainingRecipe(
         name=name, title=top.text("title", name) or name, seed=top.whole("seed", 0, least=0),
         data=_data(top.table("data")), front_end=front_end, cropping=cropping, variants=variants,
+        augment=augment,
         network=_network(top.table("network"), front_end), loss=_loss(top.table("loss")),
         optimiser=_optimiser(top.table("optimiser")),
     )  # fmt: skip
@@ -260,7 +269,7 @@ def _data(table: Table) -> DataSpec:
     return DataSpec(datasets=tuple(datasets), sequences=sequences)
 
 
-def _input(table: Table) -> tuple[FrontEnd, Cropping, int]:
+def _input(table: Table) -> tuple[FrontEnd, Cropping, int, Augment]:
     maps = cast("Maps", table.named("maps", "spectral-maps", _MAPS, noun="kind of maps"))
     size, frames = table.whole("size", 224, least=4), table.whole("frames", 30, least=4)
     front_end = FrontEnd(
@@ -274,8 +283,26 @@ def _input(table: Table) -> tuple[FrontEnd, Cropping, int]:
             f"{variants} variants of {math.prod(front_end.shape)} values are {values:.3g} values of each film",
             where=table.where, fix=f"at most {FILM_LIMIT} are kept: give fewer variants or a smaller size",
         )  # fmt: skip
+    conditioned = table.flag("conditioned")
+    augment = _augment(table.table("augment"))
+    if augment.strengths and not conditioned:
+        raise UsageError(
+            "disturbances of films that are not conditioned", where=f"{table.where} [augment]",
+            fix="write conditioned = true in [input], or leave them out",
+        )  # fmt: skip
     table.done()
-    return front_end, Cropping(frames=frames, size=size, scales=scales, mirror=mirror), variants
+    cropping = Cropping(frames=frames, size=size, scales=scales, mirror=mirror, conditioned=conditioned)
+    return front_end, cropping, variants, augment
+
+
+def _augment(table: Table) -> Augment:
+    strengths = {}
+    for name in table.names():
+        if name not in DISTURBANCES:
+            raise UnknownNameError.of("disturbance", name, DISTURBANCES, where=table.where)
+        strengths[name] = table.table(name).record(Strength)
+    table.done()
+    return Augment(strengths=strengths)
 
 
 def _network(table: Table, front_end: FrontEnd) -> NetworkSpec:

@@ -54,31 +54,26 @@ def casts(recipe: DatasetRecipe) -> Iterator[Cast]:
 def _groups(recipe: DatasetRecipe, groups: GroupSpec, side: Side, root: Simulation) -> Iterator[Cast]:
     """The sequences of a side, a batch at a time."""
     for number, first in enumerate(range(0, side.sequences, root.batch)):
-        simulation = of_group(root, groups, seed=child_seed(recipe.seed, "sequences", side.name, number))
-        count = min(root.batch, side.sequences - first)
-        scene = simulation.scene
-        yield Cast(
-            side=side, session=None, simulation=replace(simulation, name=f"{root.name}-{number:03d}", count=count),
-            stated={"width": scene.width, "height": scene.height},
-        )  # fmt: skip
+        named = replace(root, name=f"{root.name}-{number:03d}", count=min(root.batch, side.sequences - first))
+        yield of_group(named, groups, side, seed=child_seed(recipe.seed, "sequences", side.name, number))
 
 
-def of_group(simulation: Simulation, groups: GroupSpec, *, seed: int) -> Simulation:
-    """A scene with the height, the attachment and the rate that a group of this seed draws, as long as before [s]."""
+def of_group(simulation: Simulation, groups: GroupSpec, side: Side, *, seed: int) -> Cast:
+    """Sequences with the height, the attachment and the rate that a group of this seed draws, as long as before [s]."""
 
     def drawn(name: str) -> float:
         return stream(seed, "group", name).random()
 
     height, time = groups.height, simulation.time
     rate = groups.rates[int(drawn("rate") * len(groups.rates))]
-    return replace(
-        simulation, seed=seed,
-        scene=replace(
-            simulation.scene,
-            height=height.at(drawn("height")) if isinstance(height, Range) else height,
-            attachment=groups.attachments[int(drawn("attachment") * len(groups.attachments))],
-        ),
-        time=replace(time, rate=rate, frames=max(1, round(time.frames / time.rate * rate))),
+    scene = replace(
+        simulation.scene, height=height.at(drawn("height")) if isinstance(height, Range) else height,
+        attachment=groups.attachments[int(drawn("attachment") * len(groups.attachments))],
+    )  # fmt: skip
+    time = replace(time, rate=rate, frames=max(1, round(time.frames / time.rate * rate)))
+    return Cast(
+        side=side, session=None, simulation=replace(simulation, seed=seed, scene=scene, time=time),
+        stated={"width": scene.width, "height": scene.height},
     )  # fmt: skip
 
 

@@ -152,7 +152,7 @@ def test_two_quantities_that_are_known_are_conditioned_on_together_in_any_order(
 
 def test_of_a_flag_that_was_measured_and_weighed_both_restrict_the_wind() -> None:
     """A Gaussian of wind, weight and aspect, all on logits: the wind's variance falls with each that is known."""
-    scaling = Scaling(names=("outdoor_wind", "fabric_density", "aspect"))
+    scaling = Scaling(names=("outdoor_wind", "fabric_density", "log_aspect"))
     covariance = torch.tensor([[1.0, 0.7, 0.6], [0.7, 1.0, 0.1], [0.6, 0.1, 1.0]], dtype=torch.float64)
     mixture = Mixture(
         log_weight=torch.zeros((1, 1), dtype=torch.float64), location=torch.zeros((1, 1, 3), dtype=torch.float64),

@@ -123,12 +123,12 @@ def test_a_target_of_the_same_cloth_whose_range_is_wide_enough_is_offered() -> N
 
 def test_the_aspect_is_the_logarithm_of_length_over_height() -> None:
     parameters = {"width": np.array([1.5, 2.0]), "height": np.array([1.0, 2.0]), "wind_speed": np.array([15.5, 3.0])}
-    found = truth(parameters, ("outdoor_wind", "aspect"))
+    found = truth(parameters, ("outdoor_wind", "log_aspect"))
     assert found[:, 0].tolist() == [15.5, 3.0]
     assert found[:, 1] == pytest.approx([0.4054651, 0.0])
-    Scaling(names=("outdoor_wind", "aspect")).check(found, where="here")
+    Scaling(names=("outdoor_wind", "log_aspect")).check(found, where="here")
     with pytest.raises(InputError, match="states its height"):
-        truth({"width": np.array([1.5])}, ("aspect",))
+        truth({"width": np.array([1.5])}, ("log_aspect",))
 
 
 def test_the_ranges_of_flags_outdoors_hold_all_that_their_data_sets_can_draw() -> None:
@@ -142,5 +142,5 @@ def test_the_ranges_of_flags_outdoors_hold_all_that_their_data_sets_can_draw() -
         assert material.density is not None
         assert ends(material.density) == (TARGETS["fabric_density"].low, TARGETS["fabric_density"].high)
         aspects = [math.log(scene.width / height) for height in ends(recipe.groups.height)]
-        assert TARGETS["aspect"].low < min(aspects)
-        assert max(aspects) < TARGETS["aspect"].high
+        assert TARGETS["log_aspect"].low < min(aspects)
+        assert max(aspects) < TARGETS["log_aspect"].high

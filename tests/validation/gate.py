@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from flagdata.errors import NotFoundError
 from measure.gate.gate import Gate
 from measure.gate.judgement import CONFIDENCE, FALSE_ALARM, Judgement, judge
-from measure.gate.prepare import FilmsOf, calibrated, data_of
+from measure.gate.prepare import FilmsOf, calibrated, data_of, rate_of
 from measure.gate.storage import read
 from measure.shares import Share
 from models.estimator import SHIPPED, Estimator, shipped
@@ -43,7 +43,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     torch.set_num_threads(1)
     model = shipped()
     gate = gate_of(model, Path(path), seed=seed)
-    films = FilmsOf(Path(path), data_of(model), "test")
+    films = FilmsOf(Path(path), data_of(model), "test", rate=rate_of(model))
     with torch.no_grad():
         begun = time.perf_counter()
         plain = [judge(films[index][: model.front_end.frames], model, gate) for index in range(SOURCES, len(films))]
@@ -65,7 +65,9 @@ def gate_of(model: Estimator, lake: Path, *, seed: int) -> Gate:
     try:
         return read(SHIPPED / model.name, model)
     except NotFoundError:
-        train, validation = (FilmsOf(lake, data_of(model), side) for side in ("train", "validation"))
+        train, validation = (
+            FilmsOf(lake, data_of(model), side, rate=rate_of(model)) for side in ("train", "validation")
+        )
         return calibrated(model, train, validation, seed=seed, advance=lambda _: None)
 
 

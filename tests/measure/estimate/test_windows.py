@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
-from measure.estimate.instants import Interpolator
-from measure.estimate.repeats import Distinct
 from measure.estimate.windows import cut, findings_of, lay_out
+from models.conditioning.instants import Interpolator
+from models.conditioning.repeats import Distinct
 
 
 def numbered(times: NDArray[np.float64]) -> list[tuple[float, NDArray[np.uint8]]]:

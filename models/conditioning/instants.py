@@ -11,18 +11,58 @@ and the picture is (1 − t) A(x + F_{t→0}) + t B(x + F_{t→1}). Where nothin
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 _FLOWS = 8
 """Pairs of frames whose flows are kept: windows at several sizes of flag meet the same pairs again."""
+NEAR = 0.25
+"""Share of the time between two frames within which an instant is shown by the nearer one. A nearest frame makes the
+motion uneven, an interpolated one smooths it, and the wind that the network reads moves down with the one and up with
+the other; at this share films of 25, 30 and 60 frames a second agree (decision 035)."""
+NEAR_OF_SLOW = 0.4
+"""The same of a film slower than the network's frames, between which more of the motion is lost."""
+TimedFrame = tuple[float, NDArray[np.uint8]]
+"""Time from the film's first frame [s], and the picture, (height, width) gray."""
+
+
+def at_instants(
+    frames: Sequence[TimedFrame], instants: NDArray[np.floating], *, period: float, interpolator: Interpolator
+) -> tuple[NDArray[np.uint8], int]:
+    """(n, height, width) a film's pictures at n instants, and how many of them were interpolated.
+
+    Args:
+        frames: two or more, in order.
+        instants: [s], evenly; one before the first frame is shown by that, one beyond the last by the last.
+        period: of the film [s].
+    """
+    near = NEAR if period <= instants[1] - instants[0] else NEAR_OF_SLOW
+    times = np.array([time for time, _ in frames])
+    before = np.searchsorted(times, instants, side="right").clip(1, len(times) - 1) - 1
+    place = ((instants - times[before]) / (times[before + 1] - times[before])).clip(0.0, 1.0)
+    shown, interpolated = [], 0
+    for k, instant, at in zip(before.tolist(), instants.tolist(), place.tolist(), strict=True):
+        nearest = round(at)
+        if abs(at - nearest) <= near:
+            shown.append(frames[k + nearest][1])
+        else:
+            shown.append(interpolator.between(frames[k], frames[k + 1], instant))
+            interpolated += 1
+    return np.stack(shown), interpolated
 
 
 class Interpolator:
-    """Pictures between frames of one film. Flows of the last pairs are kept."""
+    """Pictures between frames of one film. Flows of the last pairs are kept.
 
-    def __init__(self) -> None:
+    Args:
+        kept: how many.
+    """
+
+    def __init__(self, *, kept: int = _FLOWS) -> None:
+        self._kept = kept
         # The search divides the picture among threads, and its result depends on how many there are.
         cv2.setNumThreads(1)
         self._search = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
@@ -57,7 +97,7 @@ class Interpolator:
         """(height, width, 2) flows from the first frame to the second and back [px, x then y]."""
         key = (first[0], second[0])
         if key not in self._flows:
-            while len(self._flows) >= _FLOWS:
+            while len(self._flows) >= self._kept:
                 self._flows.pop(next(iter(self._flows)))
             self._flows[key] = (self._calculated(first[1], second[1]), self._calculated(second[1], first[1]))
         return self._flows[key]

@@ -13,14 +13,13 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from models.conditioning.instants import TimedFrame
+
 SHARE = 0.15
 """Chosen on six real films: of those whose frames all differ none is below 0.2, and of one with 15 pictures in 60
 frames two thirds are."""
 _ABOUT = 4
 """Frames before and after whose changes are compared: up to three of four frames may be repetitions."""
-
-TimedFrame = tuple[float, NDArray[np.uint8]]
-"""Time from the film's first frame [s], and the picture, (height, width) gray."""
 
 
 class Distinct:

@@ -1,0 +1,160 @@
+"""Which disturbances a training draws, how strong they are, and the named streams that they are drawn from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, UnknownNameError
+from flagdata.registry import Registry
+from flagdata.rng import stream
+
+Film = NDArray[np.uint8]
+"""(n, height, width) gray."""
+
+BEFORE = Registry("disturbance", {
+    "tree": "models.training.augment.rim:TREE",
+    "second-flag": "models.training.augment.rim:SECOND_FLAG",
+    "shake": "models.training.augment.camera:SHAKE",
+    "blur": "models.training.augment.light:BLUR",
+    "gamma": "models.training.augment.light:GAMMA",
+    "dusk": "models.training.augment.light:DUSK",
+    "noise": "models.training.augment.light:NOISE",
+    "coding": "models.training.augment.coding:CODING",
+})  # fmt: skip
+"""Of films as they were taken, in the order in which they happen: scene, camera, light, file."""
+AFTER = Registry("disturbance", {
+    "left-over-shake": "models.training.augment.motion:LEFT_OVER_SHAKE",
+    "pole-sway": "models.training.augment.motion:POLE_SWAY",
+})  # fmt: skip
+"""Of conditioned clips."""
+DISTURBANCES = (*BEFORE, *AFTER)
+"""Names of all."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disturbance:
+    """One disturbance.
+
+    Attributes:
+        apply: makes it of what `Drawn` says.
+        unit: of its strength.
+        least, most: strengths that make sense at all.
+    """
+
+    apply: Callable[[Drawn], Film]
+    unit: str
+    least: float = 0.0
+    most: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Drawn:
+    """What a disturbance is made of.
+
+    Attributes:
+        film: what it happens to.
+        times: (n,) of its frames [s].
+        strength: in the disturbance's unit.
+        rng: of all else that it draws.
+        other: gives another film of the training side, (n', height', width'), at its own rate.
+        weight: (height, width) float32 1 on the cloth of a conditioned clip, 0 where it is frozen; 1 everywhere before.
+    """
+
+    film: Film
+    times: NDArray[np.float64]
+    strength: float
+    rng: np.random.Generator
+    other: Callable[[], Film]
+    weight: NDArray[np.float32]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Strength:
+    """How often a disturbance happens and how strongly: uniform from `low` to `high` in its unit.
+
+    Attributes:
+        share: of the films or clips, 0 to 1.
+    """
+
+    share: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Augment:
+    """The disturbances of a training.
+
+    Attributes:
+        strengths: name of `DISTURBANCES` → how often and how strongly.
+
+    Raises:
+        UnknownNameError: a name that is none.
+        InputError: a share outside of 0 to 1, or strengths that are not in order or beyond what makes sense.
+    """
+
+    strengths: Mapping[str, Strength] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, strength in self.strengths.items():
+            limits: Disturbance = _known(name)
+            ordered = limits.least <= strength.low <= strength.high <= limits.most
+            if not (0 <= strength.share <= 1 and ordered):
+                raise InputError(
+                    f"{name} of a share of {strength.share:g} of the films, {strength.low:g} to {strength.high:g} "
+                    f"{limits.unit}",
+                    where="[input] [augment]",
+                    fix=f"give a share of 0 to 1, and low ≤ high from {limits.least:g} to {limits.most:g}",
+                )
+
+    def identity(self) -> dict[str, Any]:
+        """As JSON."""
+        return {name: vars(strength).copy() for name, strength in sorted(self.strengths.items())}
+
+    def before(self, film: Film, times: NDArray[np.float64], *, source: str, other: Callable[[], Film]) -> Film:
+        """A film as it was taken, disturbed.
+
+        Args:
+            source: the recording, after which its streams are named.
+            other: see `Drawn`.
+        """
+        everywhere = np.ones(film.shape[1:], dtype=np.float32)
+        return self._applied(BEFORE, film, times, (source,), other, everywhere)
+
+    def after(
+        self, clip: Film, times: NDArray[np.float64], *, source: str, variant: int, weight: NDArray[np.float32]
+    ) -> Film:
+        """A conditioned clip, disturbed by what conditioning leaves."""
+
+        def none() -> Film:
+            raise TypeError("what happens after conditioning takes no other film")
+
+        return self._applied(AFTER, clip, times, (source, variant), none, weight)
+
+    def _applied(
+        self, known: Registry, film: Film, times: NDArray[np.float64], source: tuple[str | int, ...],
+        other: Callable[[], Film], weight: NDArray[np.float32],
+    ) -> Film:  # fmt: skip
+        for name in known:
+            strength = self.strengths.get(name)
+            if strength is None:
+                continue
+            rng = stream(0, "augment", name, *source)
+            if rng.random() < strength.share:
+                drawn = Drawn(
+                    film=film, times=times, strength=rng.uniform(strength.low, strength.high), rng=rng, other=other,
+                    weight=weight,
+                )  # fmt: skip
+                film = known[name].apply(drawn)
+        return film
+
+
+def _known(name: str) -> Disturbance:
+    if name not in DISTURBANCES:
+        raise UnknownNameError.of("disturbance", name, DISTURBANCES)
+    return BEFORE[name] if name in BEFORE else AFTER[name]

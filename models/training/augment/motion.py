@@ -1,0 +1,45 @@
+"""What conditioning leaves: motion of the cloth's part of the picture that is not the cloth's own."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from models.training.augment.augment import Disturbance, Drawn, Film
+from models.training.augment.camera import course
+
+_SLOWEST, _FASTEST = 0.4, 3.0
+"""Natural frequencies of poles [Hz]: of a 20 m mast, and of a rod of 2 m."""
+
+
+def _left_over_shake(drawn: Drawn) -> Film:
+    """A camera's motion that was not removed; the strength is its root mean square along each axis [px]."""
+    path = drawn.strength * course(drawn.rng, drawn.times, 2)
+    return _moved(drawn, path, np.ones(drawn.film.shape[1:], dtype=np.float32))
+
+
+def _pole_sway(drawn: Drawn) -> Film:
+    """The pole sways, and the cloth with it: to the sides, the more the higher; the strength is the amplitude at the
+    top of the picture [px]."""
+    height, width = drawn.film.shape[1:]
+    frequency = np.exp(drawn.rng.uniform(np.log(_SLOWEST), np.log(_FASTEST)))
+    sway = drawn.strength * np.sin(2 * np.pi * frequency * drawn.times + drawn.rng.uniform(0, 2 * np.pi))
+    up = np.linspace(1.0, 0.5, height, dtype=np.float32)[:, None]
+    return _moved(drawn, np.stack([sway, 0 * sway], axis=1), np.repeat(up, width, axis=1))
+
+
+def _moved(drawn: Drawn, path: NDArray[np.float64], share: NDArray[np.float32]) -> Film:
+    """Each frame moved by its place of the path times `share`, where it is not frozen."""
+    rows, columns = np.indices(drawn.film.shape[1:], dtype=np.float32)
+    share = share * drawn.weight
+    moved = np.empty_like(drawn.film)
+    for place, (x, y) in enumerate(path.astype(np.float32)):
+        moved[place] = cv2.remap(
+            drawn.film[place], columns - share * x, rows - share * y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+        )
+    return moved
+
+
+LEFT_OVER_SHAKE = Disturbance(apply=_left_over_shake, unit="px", most=30.0)
+POLE_SWAY = Disturbance(apply=_pole_sway, unit="px", most=30.0)
