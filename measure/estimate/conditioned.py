@@ -150,7 +150,7 @@ class ConditionedFilm:
 
 
 def _of_camera(found: Conditioning, follower: Follower) -> list[Finding]:
-    if not len(found.camera.corners):
+    if not found.camera.known:
         return [
             Finding(
                 kind="camera-unknown", severity=Severity.NOTE,

@@ -3,7 +3,8 @@
 Corners (Shi and Tomasi, Good Features to Track, CVPR 1994) of one reference picture are followed to each frame by
 pyramidal Lucas–Kanade (Bouguet 2001). Those that most frames move by one similarity transform are the background's:
 cloth bends, so that its corners follow no such transform over a whole film. Where the corners stay in their places, the
-camera is still, and no frame is resampled.
+camera is still, and no frame is resampled. Of a background without corners its edges are followed
+(`models.conditioning.edges`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from models.conditioning.edges import Edges
 
 WORK = 480
 """Longer side [px] of the pictures in which features are followed."""
@@ -37,6 +40,8 @@ _FEWEST = 8
 """Corners of which a transform is made."""
 _SPREAD = 0.08
 """Least extent of the background's corners along both axes, as a share of the picture's sides."""
+_LOST = 0.3
+"""Share of the frames to which edges that are the background's fit."""
 _MOST_TURN, _MOST_ZOOM = 0.35, 1.5
 
 
@@ -47,12 +52,19 @@ class Camera:
     Attributes:
         reference: (height, width) gray, its longer side `WORK` px at most.
         corners: (n, 2) float32 places of the background's features in it; none where it has none.
+        edges: of the background, which are followed where it has no corners; None where it has none either.
         moves: whether frames are moved back; of a camera that is still, and of one whose motion no feature shows, none.
     """
 
     reference: NDArray[np.uint8]
     corners: NDArray[np.float32]
     moves: bool
+    edges: Edges | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether the background shows how the camera moves."""
+        return len(self.corners) > 0 or self.edges is not None
 
     def follow(self, picture: NDArray[np.uint8], guess: Transform) -> Transform | None:
         """Where the reference picture is in another one; None where too few features are found.
@@ -63,6 +75,9 @@ class Camera:
         """
         if not self.moves:
             return STILL
+        if self.edges is not None:
+            shift = self.edges.shift(picture, (float(guess[0, 2]), float(guess[1, 2])))
+            return None if shift is None else np.array([[1.0, 0.0, shift[0]], [0.0, 1.0, shift[1]]])
         places, found = _followed(self.reference, picture, self.corners, guess)
         return _similarity(self.corners[found], places[found])
 
@@ -101,6 +116,36 @@ def camera_of(
     if motion(transforms, (width / 2, height / 2)) < least:
         return replace(moving, moves=False), unmoved
     return moving, transforms
+
+
+def by_edges(
+    pictures: Sequence[NDArray[np.uint8]], *, outside: NDArray[np.bool_], least: float = 0.0
+) -> tuple[Camera, list[Transform]]:
+    """The same from the background's edges.
+
+    Args:
+        outside: (height, width) where they may lie.
+    """
+    middle = len(pictures) // 2
+    edges = Edges.of(pictures[middle], outside)
+    still = Camera(reference=pictures[middle], corners=np.zeros((0, 2), np.float32), moves=False)
+    unmoved = [STILL] * len(pictures)
+    if edges is None:
+        return still, unmoved
+    camera = replace(still, edges=edges, moves=True)
+    transforms, lost = list(unmoved), 0
+    for order in (range(middle + 1, len(pictures)), range(middle - 1, -1, -1)):
+        guess = STILL
+        for k in order:
+            found = camera.follow(pictures[k], guess)
+            lost += found is None
+            guess = transforms[k] = found if found is not None else guess
+    if lost > _LOST * len(pictures):
+        return still, unmoved
+    height, width = pictures[middle].shape
+    if motion(transforms, (width / 2, height / 2)) < least:
+        return replace(camera, moves=False), unmoved
+    return camera, transforms
 
 
 def motion(transforms: Sequence[Transform], place: tuple[float, float]) -> float:

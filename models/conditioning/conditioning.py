@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from models.conditioning import framing
-from models.conditioning.camera import STILL, WORK, Camera, Transform, camera_of, path
+from models.conditioning.camera import STILL, WORK, Camera, Transform, by_edges, camera_of, path
 from models.conditioning.framing import Square
 from models.conditioning.regions import Region, regions_of
 
@@ -30,12 +30,19 @@ _FEATHER = 0.04
 _BACKGROUND = 48
 """Frames of the sample whose median is the frozen background."""
 _NOISES = 3.0
-"""Deviations of the camera's noise that are left where the film is frozen: a picture without any would be unlike all
-that networks are trained on."""
-_ROUNDING = 2.0
-"""Gray levels that are left at least: what rounding and coding change."""
+"""Deviations of the camera's noise that a frozen place may be off its median."""
+_USUAL = 1.5
+"""Deviation of a place that is noise and no more, in deviations of the noise: coding leaves more at edges."""
+_ROUNDING = 0.7
+"""Least deviation [gray levels] that counts as noise, of rounding and coding."""
+_ROUGH = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
+"""The difference of two Laplacians; white noise of deviation σ leaves 6 σ."""
+_MEDIAN = 0.6745
+"""Median of the absolute value of a standard normal variable."""
 _DRIFT = 10
 """Frames over which the camera's place is smoothed for its drift."""
+_NEARBY = 6
+"""Frames of the sample about the middle one over which a camera without known motion counts as still."""
 _AHEAD = 0.1
 """Width of the band about cloth in which no feature of the background is sought, in sizes of the region."""
 
@@ -53,7 +60,8 @@ class Conditioning:
         square: that is judged, in the reference picture [px of the film].
         weight: (size, size) float32, 1 where the film is shown, 0 where it is frozen.
         background: (size, size) what is shown there, the median in time.
-        noise: from which a frame differs by this much at most where it is frozen [gray levels].
+        noise: deviation of the camera's [gray levels], which is left where the film is frozen.
+        kept: (size, size) float32 share of each pixel's changes that is noise, 0 to 1.
         path: (n, 2) of the square's centre over the sample [px of the film].
         looked: frames of the sample.
     """
@@ -67,6 +75,7 @@ class Conditioning:
     weight: NDArray[np.float32]
     background: NDArray[np.uint8]
     noise: float
+    kept: NDArray[np.float32]
     path: NDArray[np.float64]
     looked: int
 
@@ -88,7 +97,7 @@ class Conditioning:
         """(size, size) picture of the flag: registered, cropped, scaled, all else frozen."""
         drawn = _framed(frame, self.square, self.size, transform, scale=self.scale, moves=self.camera.moves)
         away = drawn - self._still
-        kept = np.clip(away, -self.noise, self.noise)
+        kept = np.clip(self.kept * away, -_NOISES * self.noise, _NOISES * self.noise)
         return np.rint(self._still + kept + self.weight * (away - kept)).astype(np.uint8)
 
     @cached_property
@@ -220,11 +229,12 @@ def conditioning_of(
     if regions:
         weight = _weight(regions[chosen].mask, square, size, scale)
     stack = np.stack(framed)
-    frozen = weight == 0
-    spread = float(np.median(stack[:, frozen].std(axis=0))) if frozen.any() else 0.0
+    noise = _noise(stack, weight)
+    spread = np.maximum(stack.std(axis=0, dtype=np.float32), 1e-3)
     return Conditioning(
         size=size, scale=scale, camera=camera, regions=regions, chosen=chosen, square=square, weight=weight,
-        background=np.median(stack, axis=0).astype(np.uint8), noise=max(_NOISES * spread, _ROUNDING),
+        background=np.median(stack, axis=0).astype(np.uint8),
+        noise=noise, kept=np.minimum(_USUAL * noise / spread, 1.0).astype(np.float32),
         path=np.stack([_centre(square, transform, scale) for transform in transforms]), looked=len(sample),
     )  # fmt: skip
 
@@ -247,16 +257,28 @@ def _camera_and_regions(
     """
     least = _LEAST_MOTION * unit
     camera, transforms = camera_of(small, least=least)
-    regions = regions_of(_registered(small, transforms), within=inside)
-    if not regions:
-        return camera, transforms, regions
-    outside = np.ones(small[0].shape, bool)
+    if camera.known:
+        regions = regions_of(_registered(small, transforms), within=inside)
+        again, moved = (
+            camera_of(small, outside=_outside(regions, small[0].shape), least=least) if regions else (camera, [])
+        )
+    else:  # while the camera moves little, what moves is cloth
+        middle = len(small) // 2
+        regions = regions_of(np.stack(small[max(0, middle - _NEARBY) : middle + _NEARBY + 1]), within=inside)
+        again, moved = (
+            by_edges(small, outside=_outside(regions, small[0].shape), least=least) if regions else (camera, [])
+        )
+    if regions and again.known:
+        camera, transforms = again, moved
+    return camera, transforms, regions_of(_registered(small, transforms), within=inside)
+
+
+def _outside(regions: Sequence[Region], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Where the background is: away from all moving cloth."""
+    outside = np.ones(shape, bool)
     for region in regions:
         outside &= ~_widened(region.mask, _AHEAD).astype(bool)
-    again, moved = camera_of(small, outside=outside, least=least)
-    if not len(again.corners):
-        return camera, transforms, regions
-    return again, moved, regions_of(_registered(small, moved), within=inside)
+    return outside
 
 
 def _registered(small: list[NDArray[np.uint8]], transforms: list[Transform]) -> NDArray[np.uint8]:
@@ -303,6 +325,20 @@ def _weight(mask: NDArray[np.bool_], square: Square, size: int, scale: float) ->
     feather = max(_FEATHER * extent / scale / step, 1.0)
     away = cv2.distanceTransform(np.asarray(out, dtype=np.uint8), cv2.DIST_L2, 5)
     return np.clip(away / feather, 0.0, 1.0).astype(np.float32)
+
+
+def _noise(stack: NDArray[np.uint8], weight: NDArray[np.float32]) -> float:
+    """Deviation of the camera's noise where the film (n, size, size) is frozen [gray levels].
+
+    Immerkær's filter (Computer Vision and Image Understanding 64, 1996), by which smooth changes do not pass, over the
+    differences of frames, by the median.
+    """
+    frozen = weight == 0
+    if not frozen.any():
+        return _ROUNDING
+    change = np.diff(stack.astype(np.float32), axis=0)
+    rough = np.stack([cv2.filter2D(picture, cv2.CV_32F, _ROUGH)[frozen] for picture in change])
+    return max(float(np.median(np.abs(rough))) / (_MEDIAN * 6 * np.sqrt(2)), _ROUNDING)
 
 
 def _inside(within: tuple[int, int, int, int], shape: tuple[int, ...], scale: float) -> NDArray[np.bool_]:

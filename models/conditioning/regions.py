@@ -29,6 +29,8 @@ _MOST = 6
 _VISITED = 0.06
 """Share of the region's strongest deviation from which on a place counts as visited, beyond the noise."""
 _NOISES = 5.0
+_DEVIATION = 48
+"""Pictures of which the deviation is taken."""
 _REACH = 0.35
 """How far a cloth may reach beyond the region of its strong motion, in sizes of the region."""
 _CLOSED = 0.08
@@ -108,8 +110,9 @@ def _shrunk(pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 def _deviation(pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
     """(height, width) 95 % quantile of the distance from the median in time: a rare visit counts."""
-    middle = np.median(pictures, axis=0).astype(np.int16)
-    away = np.sort(np.abs(pictures.astype(np.int16) - middle), axis=0)
+    some = pictures[:: -(-len(pictures) // _DEVIATION)]
+    middle = np.median(some, axis=0).astype(np.int16)
+    away = np.sort(np.abs(some.astype(np.int16) - middle), axis=0)
     rank = min(len(away) - 1, int(np.ceil(0.95 * len(away))))
     return np.asarray(cv2.GaussianBlur(away[rank].astype(np.float32), (0, 0), 1.0), np.float32)
 

@@ -130,7 +130,7 @@ def test_the_flag_is_found_among_trembling_leaves_and_they_are_frozen() -> None:
     assert y - 0.4 * height < top < y + 5
     assert bottom < y + 1.4 * height
     leaves = found.frames[:, outside(found)].astype(float).std(axis=0)
-    assert np.quantile(leaves, 0.95) <= found.found.noise
+    assert np.quantile(leaves, 0.95) <= 2 * found.found.noise
 
 
 def test_a_flag_hangs_at_the_side_where_it_moves_least() -> None:
@@ -147,7 +147,7 @@ def test_two_flags_are_numbered_by_their_motion_and_one_can_be_chosen() -> None:
     assert first.found.square.x < second.found.square.x
     assert second.found.square.side < first.found.square.side
     # The other flag is frozen in either.
-    assert np.quantile(second.frames[:, outside(second)].astype(float).std(axis=0), 0.99) <= second.found.noise
+    assert np.quantile(second.frames[:, outside(second)].astype(float).std(axis=0), 0.99) <= 2 * second.found.noise
     with pytest.raises(UsageError, match="flag 3 of a film in which 2 regions"):
         made(drawn, flag=3)
 
@@ -172,6 +172,21 @@ def test_a_background_without_features_leaves_the_camera_unknown() -> None:
     found = made(Drawn(scenery=False))
     assert len(found.found.camera.corners) == 0
     assert not found.found.camera.moves
+
+
+def test_a_pole_before_a_plain_sky_shows_how_the_camera_moves() -> None:
+    rng = stream(7, "pole")
+    shift = np.cumsum(rng.normal(0, 0.5, (COUNT, 2)), axis=0) * [1.0, 0.0]
+    frames = []
+    for (dx, _), picture in zip(shift, Drawn(scenery=False, noise=0.0).frames(), strict=True):
+        picture[30:, 63:67] = 230
+        moved = cv2.warpAffine(
+            picture, np.array([[1.0, 0.0, dx], [0.0, 1.0, 0.0]]), (WIDTH, HEIGHT), borderMode=cv2.BORDER_REPLICATE
+        )
+        frames.append(moved)
+    found = conditioned(np.stack(frames).astype(np.uint8), TIMES, size=120)
+    assert found.found.camera.moves
+    np.testing.assert_allclose(found.path[:, 0] - found.path[0, 0], shift[:, 0] - shift[0, 0], atol=0.3)
 
 
 def test_nothing_moves_in_a_still_picture() -> None:
