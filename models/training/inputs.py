@@ -190,8 +190,10 @@ def prepare_films(
         found = {"film": pairs.table.recording[row], "variants": variants, "crops": cropping.as_dict()}
         if not cropping.conditioned:
             return found
-        beside = str(pairs.table.recording[_beside(pairs, row)])
-        return {**found, "augment": disturbed.identity(), "beside": beside, **_VERSION}
+        found |= {"augment": disturbed.identity(), **_VERSION}
+        if disturbed.happens("second-flag", str(pairs.table.recording[row])):
+            found["beside"] = pairs.table.recording[_beside(pairs, row)]
+        return found
 
     def made(row: int) -> list[Tensor]:
         if cropping.conditioned:

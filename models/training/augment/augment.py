@@ -116,6 +116,11 @@ class Augment:
         """As JSON."""
         return {name: vars(strength).copy() for name, strength in sorted(self.strengths.items())}
 
+    def happens(self, name: str, *source: str | int) -> bool:
+        """Whether a disturbance happens to a film, or to a variant of it."""
+        strength = self.strengths.get(name)
+        return strength is not None and self._stream(name, source).random() < strength.share
+
     def before(self, film: Film, times: NDArray[np.float64], *, source: str, other: Callable[[], Film]) -> Film:
         """A film as it was taken, disturbed.
 
@@ -141,17 +146,18 @@ class Augment:
         other: Callable[[], Film], weight: NDArray[np.float32],
     ) -> Film:  # fmt: skip
         for name in known:
-            strength = self.strengths.get(name)
-            if strength is None:
-                continue
-            rng = stream(0, "augment", name, *source)
-            if rng.random() < strength.share:
+            if self.happens(name, *source):
+                rng, strength = self._stream(name, (*source, "drawn")), self.strengths[name]
                 drawn = Drawn(
                     film=film, times=times, strength=rng.uniform(strength.low, strength.high), rng=rng, other=other,
                     weight=weight,
                 )  # fmt: skip
                 film = known[name].apply(drawn)
         return film
+
+    @staticmethod
+    def _stream(name: str, source: tuple[str | int, ...]) -> np.random.Generator:
+        return stream(0, "augment", name, *source)
 
 
 def _known(name: str) -> Disturbance:
