@@ -137,10 +137,12 @@ def measure(
     if material is not None:
         area_weight, origin = weight_of(material, lake=lake, at=seen)
         say(f"area weight {area_weight.text} kg/m² of {material}: {origin}")
-    reading = Reading(crop=box, flag=flag, true_fps=true_fps, sequence_fps=sequence_fps)
+    size = None if flag_size is None else parse_size(flag_size)
+    aspect = None if size is None else size.length / size.height
+    reading = Reading(crop=box, flag=flag, aspect=aspect, true_fps=true_fps, sequence_fps=sequence_fps)
     options = Options(
-        size=None if flag_size is None else parse_size(flag_size), step=step, first=first, last=last, level=level,
-        false_alarm=false_alarm, seed=seed, refine=refine, area_weight=area_weight,
+        size=size, step=step, first=first, last=last, level=level, false_alarm=false_alarm, seed=seed, refine=refine,
+        area_weight=area_weight,
     )  # fmt: skip
     found = subjects(source, query=query, lake=lake, at=seen, reading=reading)
     job = _Job(
@@ -276,6 +278,7 @@ class _Job:
         """
         from measure.estimate.nearest import nearest
         from measure.estimate.page import Context, Section, page
+        from measure.estimate.pictures import steps
         from measure.refine.section import section
 
         model = self.network.estimator
@@ -293,7 +296,7 @@ class _Job:
                 )
         context = Context(
             provenance=self._provenance(subject, artifact), known=subject.known or {}, neighbours=neighbours,
-            compared=compared, rate=model.front_end.rate,
+            compared=compared, rate=model.front_end.rate, steps=steps(subject.film), figures=subject.film.sentences,
         )  # fmt: skip
         sections = ()
         if refinement is not None:

@@ -22,6 +22,9 @@ _HELD = 200_000_000
 _LOST = 0.05
 """Share of frames without the background's features from which on a warning is due."""
 _ENLARGED = 2.0
+_LONGER = 1.15
+"""By how much an outline may be longer, for its height at the hoist, than the flag that was given: it is foreshortened,
+droops and flutters, all of which make it shorter."""
 
 
 class WholeFilm(Film, Protocol):
@@ -45,6 +48,7 @@ class ConditionedFilm:
         film: that is made fit.
         crop: the region in which the flag is; None for the whole picture.
         flag: number of the flag, from 1; None for the one that is most like a flag.
+        aspect: length over height of the flag as the user gave it; None where it was not given.
 
     Attributes:
         found: what the last reading found; None before the first, and of fewer frames than a search takes.
@@ -54,13 +58,15 @@ class ConditionedFilm:
         UsageError: a crop beyond the picture.
     """
 
-    def __init__(self, film: WholeFilm, *, crop: CropBox | None = None, flag: int | None = None) -> None:
+    def __init__(
+        self, film: WholeFilm, *, crop: CropBox | None = None, flag: int | None = None, aspect: float | None = None
+    ) -> None:
         if crop is not None and (crop.x + crop.width > film.width or crop.y + crop.height > film.height):
             raise UsageError(
                 f"the crop {crop} reaches beyond the picture of {film.width} × {film.height} px", where="--crop",
                 fix="give x,y,width,height of a region inside it",
             )  # fmt: skip
-        self._film, self._crop, self._flag = film, crop, flag
+        self._film, self._crop, self._flag, self._aspect = film, crop, flag, aspect
         self._follower: Follower | None = None
         self.found: Conditioning | None = None
         self.reference: NDArray[np.uint8] | None = None
@@ -125,7 +131,14 @@ class ConditionedFilm:
         found, follower = self.found, self._follower
         if found is None or follower is None:
             return self._film.findings()
-        return (*self._film.findings(), *_of_camera(found, follower), *_of_flag(found, self.reference))
+        own = (*_of_camera(found, follower), *_of_flag(found, self.reference), *_of_aspect(found, self._aspect))
+        return (*self._film.findings(), *own)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What was found, for people; none before a reading."""
+        before = len(self._film.findings())
+        return tuple(finding.what for finding in self.findings()[before:])
 
     def as_dict(self) -> dict[str, Any] | None:
         """JSON values of what was found; None before a reading."""
@@ -217,3 +230,17 @@ def _of_flag(found: Conditioning, reference: NDArray[np.uint8] | None) -> list[F
             )
         )  # fmt: skip
     return notes
+
+
+def _of_aspect(found: Conditioning, given: float | None) -> list[Finding]:
+    region = found.region
+    if given is None or region is None or region.hoist == "top" or region.aspect <= _LONGER * given:
+        return []
+    return [
+        Finding(
+            kind="flag-size-contradicted", severity=Severity.WARNING, value=region.aspect,
+            what=f"the flag's outline is {region.aspect:.2f} times as long as it is high at the hoist, and of the size "
+            f"that was given it would be {given:.2f} times at most",
+            fix="check --flag-size: length along the wind times height along the pole",
+        )
+    ]  # fmt: skip

@@ -43,6 +43,8 @@ class Context:
         known: what a simulated film states of itself; empty for a real one.
         neighbours, compared: the nearest simulated clips, of so many; none where no lake was given.
         rate: of the network's frames [Hz].
+        steps: picture of how the film was made fit, as a URL; None where it was too short for it.
+        figures: what was measured for that, in sentences.
     """
 
     provenance: Mapping[str, str]
@@ -50,6 +52,8 @@ class Context:
     neighbours: Sequence[Neighbour]
     compared: int
     rate: float
+    steps: str | None = None
+    figures: Sequence[str] = ()
 
 
 def page(
@@ -72,6 +76,7 @@ def page(
         "simulated": bool(context.known), "level": f"{measured.options.level * 100:.3g} %",
         "clip": moving(measured.clip, rate=clip_rate, side=_SIDE),
         "neighbours": [_neighbour(one, context.rate) for one in context.neighbours], "compared": context.compared,
+        "steps": context.steps, "figures": list(context.figures),
         "corner": pictures.corner(measured) if shown else None,
         "series": pictures.series(series, level=measured.verdict.level)
         if shown and len(series.time) > 1 else None,

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
+from PIL import Image, ImageDraw
 
-from flagdata.pages.pictures import figure_url
+from flagdata.pages.pictures import figure_url, still
 from measure.estimate.answer import SHORT
+from measure.estimate.conditioned import ConditionedFilm
 from measure.estimate.measuring import Measurement
 from measure.estimate.series import Beside, Spectrum
 
@@ -15,6 +18,42 @@ if TYPE_CHECKING:
     pass
 
 _BLUE, _RUST, _GRAY = "#2b6f8f", "#c4622d", "0.6"
+_CROP, _BEYOND = "#e3b505", "#d8d8d8"
+_SHOWN = 640
+"""Longer side [px] of the picture of a film's steps."""
+
+
+def steps(film: ConditionedFilm) -> str | None:
+    """The reference frame with all moving cloths, numbered, the outline of what is not frozen, and the square that is
+    judged; None before the film was read."""
+    found, reference = film.found, film.reference
+    if found is None or reference is None:
+        return None
+    height, width = reference.shape
+    square = found.square
+    left, top = min(0, square.x), min(0, square.y)
+    right, bottom = max(width, square.x + square.side), max(height, square.y + square.side)
+    scale = _SHOWN / max(right - left, bottom - top)
+    picture = Image.new("RGB", (round((right - left) * scale), round((bottom - top) * scale)), _BEYOND)
+    frame = Image.fromarray(reference).resize((round(width * scale), round(height * scale)), Image.Resampling.HAMMING)
+    picture.paste(frame.convert("RGB"), (round(-left * scale), round(-top * scale)))
+    pen = ImageDraw.Draw(picture)
+
+    def at(x: float, y: float) -> tuple[float, float]:
+        return (x - left) * scale, (y - top) * scale
+
+    for number, region in enumerate(found.regions, start=1):
+        colour = _RUST if number == found.chosen + 1 else _BLUE
+        lines, _ = cv2.findContours(region.mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        for line in lines:
+            points = [at(*place) for place in (line.reshape(-1, 2) / found.scale).tolist()]
+            pen.line([*points, points[0]], fill=colour, width=2)
+        corner = at(region.box[0] / found.scale, region.box[1] / found.scale)
+        pen.text((corner[0] + 3, corner[1] + 3), str(number), fill=colour, font_size=22)
+    pen.rectangle(
+        (*at(square.x, square.y), *at(square.x + square.side - 1, square.y + square.side - 1)), outline=_CROP, width=2
+    )
+    return still(picture)
 
 
 def corner(measured: Measurement) -> str:

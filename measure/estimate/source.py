@@ -17,7 +17,7 @@ from flagdata.provenance import digest, file_hash
 from flagdata.record import Record
 from flagdata.schema import Kind
 from measure.estimate.checked import CheckedGate
-from measure.estimate.conditioned import ConditionedFilm
+from measure.estimate.conditioned import ConditionedFilm, WholeFilm
 from measure.estimate.film import CameraFilm, RecordFilm
 from measure.estimate.gate import Gate, gate_of
 from measure.gate import storage
@@ -37,14 +37,20 @@ class Reading:
     Attributes:
         crop: region in which the flag is; None for the whole picture.
         flag: its number among the moving cloths, from 1; None for the first.
+        aspect: length over height of the flag as it was given, which its outline is compared with.
         true_fps: rate at which a high-speed camera really ran [Hz]; of files only.
         sequence_fps: rate of images without stamps [Hz]; of files only.
     """
 
     crop: CropBox | None = None
     flag: int | None = None
+    aspect: float | None = None
     true_fps: float | None = None
     sequence_fps: float | None = None
+
+    def conditioned(self, film: WholeFilm) -> ConditionedFilm:
+        """A film, made fit."""
+        return ConditionedFilm(film, crop=self.crop, flag=self.flag, aspect=self.aspect)
 
     def recipe(self) -> dict[str, Any]:
         """JSON values."""
@@ -111,7 +117,7 @@ def subjects(
     path = None if source is None else local_path(source)
     if path is not None and path.exists():
         film = CameraFilm(path, true_fps=reading.true_fps, sequence_fps=reading.sequence_fps)
-        return [Subject(film=ConditionedFilm(film, crop=reading.crop, flag=reading.flag), path=path)]
+        return [Subject(film=reading.conditioned(film), path=path)]
     if lake is None:
         what = "a query needs a lake" if source is None else f"there is no file {source!r}, and no lake was named"
         raise NotFoundError(what, fix="correct the path, or name the lake by --lake")
@@ -149,9 +155,7 @@ def _stored(lake: Lake, artifact: Artifact, reading: Reading) -> Subject:
         lake.object_path(artifact.object), name=artifact.name,
         first=(artifact.frame_first or 0) if clip else 0, count=artifact.frame_count if clip else None,
     )  # fmt: skip
-    return Subject(
-        film=ConditionedFilm(film, crop=reading.crop, flag=reading.flag), artifact=artifact, record=film.record
-    )
+    return Subject(film=reading.conditioned(film), artifact=artifact, record=film.record)
 
 
 def gate_beside(found: Network, *, false_alarm: float) -> Gate:

@@ -53,6 +53,14 @@ class Pictures:
     start: int | None = None
 
     @property
+    def width(self) -> int:
+        return self.images.shape[2]
+
+    @property
+    def height(self) -> int:
+        return self.images.shape[1]
+
+    @property
     def rate(self) -> float:
         return float(1 / np.median(np.diff(self.times)))
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from measure.estimate.artifact import artifact, read, write
+from measure.estimate.conditioned import ConditionedFilm
 from measure.estimate.series import beside
 from measure.estimate.source import Network, Reading, Subject
 from models.estimator import Estimator
@@ -18,7 +19,7 @@ from tests.measure.estimate.test_measuring import far, measured
 def test_a_bound_is_no_wind_of_the_catalog(model: Estimator) -> None:
     film, strong = even(3 * FRAMES), far(model, 0, 1.0)
     network = Network(estimator=strong, identity="0" * 64, artifact=None, folder=Path())
-    row = artifact(measured(film, strong), Subject(film=film), network, Reading())
+    row = artifact(measured(film, strong), Subject(film=ConditionedFilm(film)), network, Reading())
     assert (row.wind, row.wind_sigma) == (None, None)
     assert "wind_speed" not in json.loads(str(row.parameters))
     assert "wind-speed-at-end" in row.quality

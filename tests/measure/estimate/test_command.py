@@ -267,7 +267,7 @@ def test_a_clip_is_its_part_of_the_recording(lake: Path, model_folder: Path) -> 
     own, cut = answer(clip["artifact"], *options), answer("made-1", *options, *part)
     # Two frames about the part belong to the sample from which its still background is made.
     for name, quantity in own["quantities"].items():  # type: ignore[union-attr]
-        assert quantity["interval"] == pytest.approx(cut["quantities"][name]["interval"], rel=1e-3)  # type: ignore[index]
+        assert quantity["interval"] == pytest.approx(cut["quantities"][name]["interval"], rel=5e-3)  # type: ignore[index]
 
 
 def test_a_wind_series_is_a_table_and_a_data_set(lake: Path, model_folder: Path, tmp_path: Path) -> None:
