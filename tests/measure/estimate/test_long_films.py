@@ -9,10 +9,11 @@ import pytest
 
 from flagdata.errors import InputError
 from measure.estimate.dependence import columns_of, errors
-from measure.estimate.long_films import LongFilm, _shares, simulated
+from measure.estimate.long_films import LongFilm, _casts, _shares, simulated
 from models import estimator
 from models.estimator import Estimator
 from models.targets import truth
+from sim.datasets.reading import load
 
 
 @pytest.fixture(scope="module")
@@ -61,3 +62,15 @@ def test_what_cannot_be_measured_is_refused(films: list[LongFilm], shipped: Esti
     bare = replace(shipped, card={"name": "bare"})
     with pytest.raises(InputError, match="what it was trained on"):
         next(simulated(bare, count=10, windows=2, seed=0))
+
+
+def test_cloths_that_are_drawn_by_batches_are_so_in_long_films_too_at_the_models_rate() -> None:
+    recipe = load("outdoor")
+    wanted = replace(recipe.simulation, seed=4, count=20, batch=8, time=replace(recipe.simulation.time, frames=90))
+    casts = list(_casts(recipe, wanted))
+    assert [cast.simulation.count for cast in casts] == [8, 8, 4]
+    assert len({cast.stated["height"] for cast in casts}) == 3
+    assert len({cast.simulation.seed for cast in casts}) == 3
+    assert {(cast.simulation.time.rate, cast.simulation.time.frames) for cast in casts} == {(25.0, 90)}
+    (together,) = _casts(load("flagsim-wide"), wanted)
+    assert together.simulation == wanted

@@ -10,8 +10,10 @@ import pytest
 from flagdata.errors import InputError, RefusedError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
-from measure.gate.prepare import FilmsOf
+from measure.gate.prepare import FilmsOf, rate_of
+from models import estimator
 from models.training.recipe import DataSpec
+from tests.models.conftest import fill
 
 
 def lake_of(path: Path, sides: dict[str, Artifact]) -> DataSpec:
@@ -43,3 +45,14 @@ def test_a_side_has_its_own_films(tmp_path: Path) -> None:
     assert FilmsOf(tmp_path / "lake", data, "validation").names == ("o'brien-validation-00000",)
     with pytest.raises(InputError, match="no films of the test side"):
         FilmsOf(tmp_path / "lake", data, "test")
+
+
+def test_films_of_a_network_of_conditioned_films_are_conditioned_and_shown_at_its_rate(tmp_path: Path) -> None:
+    """14 frames at 30 Hz are 0.433 s: 11 pictures at 25 Hz, of 300 px, as they are measured."""
+    fill(Lake.create(tmp_path / "lake"), period=33_333_333)
+    data = DataSpec(datasets=("made",))
+    assert FilmsOf(tmp_path / "lake", data, "validation")[0].shape == (14, 40, 48)
+    assert FilmsOf(tmp_path / "lake", data, "validation", rate=25.0)[0].shape == (11, 300, 300)
+    plain = estimator.shipped()
+    assert rate_of(plain) is None
+    assert rate_of(replace(plain, cropping=replace(plain.cropping, conditioned=True))) == 25.0
