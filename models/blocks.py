@@ -15,9 +15,11 @@ def initialise(module: nn.Module) -> None:
     """Draw the weights of all convolutions from N(0, 2/fan_out) with torch's own generator; normalisations start at 1.
 
     Fan-out keeps the variance of the gradients from layer to layer (He et al. 2015, section 2.2, backward case).
+    Weights without memory (`torch.device("meta")`) are left as they are: there is nothing to draw, and drawing it would
+    load torch's compiler, which takes as long as torch itself.
     """
     for layer in module.modules():
-        if isinstance(layer, nn.Conv2d):
+        if isinstance(layer, nn.Conv2d) and not layer.weight.is_meta:
             nn.init.kaiming_normal_(layer.weight, mode="fan_out", nonlinearity="relu")
         elif isinstance(layer, nn.BatchNorm2d):
             nn.init.ones_(layer.weight)

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn.functional import softplus
@@ -187,8 +188,10 @@ class MixtureHead(nn.Module):
         self.components = components
         below = targets * (targets - 1) // 2
         self.linear = nn.Linear(dimension, components * (1 + 2 * targets + below))
-        rows, columns = torch.tril_indices(targets, targets, offset=-1)
-        self.register_buffer("below", rows * targets + columns, persistent=False)
+        rows, columns = np.tril_indices(targets, -1)
+        self.register_buffer("below", torch.from_numpy(rows * targets + columns), persistent=False)
+        if self.linear.weight.is_meta:  # no memory, see `models.blocks.initialise`
+            return
         with torch.no_grad():
             self.linear.weight.mul_(0.1)
             bias = torch.zeros(components, 1 + 2 * targets + below)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
-from scipy.stats import rankdata
 
 from flagdata.align.motion import MotionSeries
 from flagdata.errors import InputError
@@ -122,7 +121,9 @@ def normal_scores(values: Series) -> Series:
     finite = np.isfinite(values)
     count = int(np.count_nonzero(finite))
     if count:
-        scores[finite] = ndtri((rankdata(values[finite]) - 0.5) / count)
+        _, place, ties = np.unique(values[finite], return_inverse=True, return_counts=True)
+        rank = np.cumsum(ties) - (ties - 1) / 2
+        scores[finite] = ndtri((rank[place] - 0.5) / count)
     return scores
 
 

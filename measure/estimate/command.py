@@ -209,7 +209,6 @@ class _Job:
         from measure.estimate.artifact import keep, write
         from measure.estimate.dependence import of_model
         from measure.estimate.measuring import measure as measured_of
-        from measure.estimate.refined import refined
         from measure.estimate.series import beside
         from measure.estimate.source import gate_beside
 
@@ -226,19 +225,21 @@ class _Job:
         shown = measured.shown(anyway=self.anyway)
         refinement = None
         if self.options.refine is not None and shown:
+            from measure.estimate.refined import refined
+
             refinement = refined(
                 measured, subject, estimator, budget=self.options.refine, cropped=subject.film.moved,
                 cache=self.cache,
             )  # fmt: skip
             _warn(refinement.findings)
-        refined = None if refinement is None else refinement.as_dict()
+        found = None if refinement is None else refinement.as_dict()
         lake = self.lake if self.commit and shown else None
         artifact = None if lake is None else artifact_of(measured, subject, self.network, self.reading).id
         text = None
         if self.report is not None:
             text = self._page(measured, series, subject, artifact, refinement)
         published = lake is not None and keep(
-            lake, measured, subject, self.network, self.reading, series, branch=self.branch, refinement=refined
+            lake, measured, subject, self.network, self.reading, series, branch=self.branch, refinement=found
         )
         if artifact is not None:
             say(f"{artifact[:12]}  measurement, {'committed' if published else 'there already'}")
@@ -248,7 +249,7 @@ class _Job:
 
         if self.zarr is not None and shown:
             with writing("its Zarr folder"), fresh_folder(self.zarr) as scratch:
-                write(scratch, measured, series, refined)
+                write(scratch, measured, series, found)
         if self.report is not None and text is not None:
             with writing("its report"):
                 write_file(self.report, text, command="measure")

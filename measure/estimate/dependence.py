@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -30,10 +30,12 @@ from flagdata.console import LocalPath, progress, say
 from flagdata.errors import CorruptError, InputError
 from flagdata.rng import child_seed, stream
 from measure.estimate.combine import OWN, UNKNOWN, Dependence
-from measure.estimate.long_films import LongFilm, simulated
 from models.estimator import SHIPPED, Estimator
 from models.storage import CARD, card_bytes, read_card, renew
 from models.targets import truth
+
+if TYPE_CHECKING:
+    from measure.estimate.long_films import LongFilm
 
 CARD_KEY = "window_correlation"
 _DRAWS = 200
@@ -201,6 +203,7 @@ def of_model(model: Estimator) -> Dependence:
 @click.option("--out", type=LocalPath(), default=SHIPPED, help="Folder of the models that are shipped.")
 def main(name: str, films: int, windows: int, seed: int, out: Path) -> None:
     """Measure how alike windows of one film are to the shipped model NAME, and write it into its card."""
+    from measure.estimate.long_films import simulated
     from models.estimator import load
 
     model = load(out / name)

@@ -24,9 +24,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.align.lag import LagSearch, estimate_offset
-from flagdata.align.motion import MotionSeries
-from flagdata.align.windbins import wind_bins
 from flagdata.dataset.truth import TruthSeries, over_ground
 from flagdata.errors import InputError
 from flagdata.rng import stream
@@ -262,6 +259,10 @@ def spectrum(time: NDArray[np.float64], estimated: NDArray[np.float64], logged: 
 def _delay(series: Beside, start: int, wind: WindSeries, seed: int) -> Delay:
     if series.time[-1] - series.time[0] < _SHORTEST_DELAY:
         return Delay(offset=None, sigma=None, reasons=(f"the film is shorter than {_SHORTEST_DELAY:.0f} s",))
+    from flagdata.align.lag import LagSearch, estimate_offset  # only now: few films have an anemometer beside them
+    from flagdata.align.motion import MotionSeries
+    from flagdata.align.windbins import wind_bins
+
     step = float(np.median(np.diff(series.time)))
     instants = start + np.round(series.time * NANOSECONDS).astype(np.int64)
     try:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import beta
+from scipy.special import betainc
 
 from flagdata.errors import InputError
 
@@ -72,7 +72,7 @@ def level(count: int, false_alarm: float, confidence: float) -> float:
             f"a false-alarm rate of {false_alarm:g} with confidence {confidence:g}", fix="give shares between 0 and 1"
         )
     k = np.arange(1, count + 1)
-    kept = np.flatnonzero(beta.cdf(false_alarm, k, count + 1 - k) >= confidence)
+    kept = np.flatnonzero(betainc(k, count + 1 - k, false_alarm) >= confidence)
     if len(kept) == 0:
         fewest = int(np.ceil(np.log(1 - confidence) / np.log(1 - false_alarm)))
         raise InputError(

@@ -45,6 +45,28 @@ def test_help_loads_neither_torch_nor_arrow_nor_a_decoder() -> None:
     assert done.stdout.splitlines()[-1] == "LOADED []"
 
 
+def test_a_measurement_loads_neither_torchs_compiler_nor_what_only_other_commands_need() -> None:
+    """Each of these takes as long to load as a tenth of a film takes to measure, or more."""
+    heavy = (
+        "torch._dynamo",
+        "sympy",
+        "pandas",
+        "sklearn",
+        "scipy.stats",
+        "scipy.optimize",
+        "sim",
+        "matplotlib",
+        "zarr",
+    )
+    code = (
+        "import sys\nfrom measure.estimate import artifact, command, measuring, series, source\n"
+        "source.network(None, lake=None, at=None)\n"
+        f"print('LOADED', sorted(set({heavy!r}) & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "LOADED []"
+
+
 def test_a_record_and_the_lake_know_nothing_of_the_readers_of_logs() -> None:
     offenders = [
         f"{path.relative_to(ROOT)}: {name}"

@@ -184,3 +184,11 @@ def test_the_density_at_several_points_is_that_at_each() -> None:
     many = torch.stack([points(), points() + 0.5], dim=1)
     for place in range(2):
         np.testing.assert_allclose(mixture.log_density(many)[:, place], mixture.log_prob(many[:, place]), rtol=1e-12)
+
+
+def test_a_head_without_memory_has_the_shapes_of_one_with_it() -> None:
+    with torch.device("meta"):
+        bare = MixtureHead(dimension=8, targets=3, components=2)
+    head = MixtureHead(dimension=8, targets=3, components=2)
+    shapes = {name: value.shape for name, value in head.state_dict().items()}
+    assert {name: value.shape for name, value in bare.state_dict().items()} == shapes
