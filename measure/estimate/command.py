@@ -111,15 +111,13 @@ def measure(
     """
     if as_json and as_csv:
         raise UsageError("more than one form of output", fix="choose one of --json and --csv")
-    if area_weight is not None and material is not None:
-        raise UsageError("the area weight is given twice", fix="choose one of --area-weight and --material")
     if cache is not None and refine is None:
         raise UsageError("--cache without --refine", fix="give --refine N, or leave --cache out")
     from flagdata.ingest.camera import CropBox, parse_crop
     from flagdata.lake import Lake
     from flagdata.outputs import check_file, check_folder
-    from measure.estimate.material import weight_of
     from measure.estimate.measuring import Options
+    from measure.estimate.run import weight
     from measure.estimate.similarity import parse_size
     from measure.estimate.source import Reading, network, subjects
 
@@ -134,15 +132,15 @@ def measure(
     if lake is not None and not read_only:
         lake.check_writable()
     seen = at if at is not None else branch
-    if material is not None:
-        area_weight, origin = weight_of(material, lake=lake, at=seen)
-        say(f"area weight {area_weight.text} kg/m² of {material}: {origin}")
+    stated, origin = weight(area_weight, material, lake=lake, at=seen)
+    if stated is not None and origin is not None:
+        say(f"area weight {stated.text} kg/m² of {material}: {origin}")
     size = None if flag_size is None else parse_size(flag_size)
-    aspect = None if size is None else size.length / size.height
+    aspect = None if size is None else size.aspect
     reading = Reading(crop=box, flag=flag, aspect=aspect, true_fps=true_fps, sequence_fps=sequence_fps)
     options = Options(
         size=size, step=step, first=first, last=last, level=level, false_alarm=false_alarm, seed=seed, refine=refine,
-        area_weight=area_weight,
+        area_weight=stated,
     )  # fmt: skip
     found = subjects(source, query=query, lake=lake, at=seen, reading=reading)
     job = _Job(
@@ -207,18 +205,12 @@ class _Job:
         from flagdata.outputs import fresh_folder, write_file
         from measure.estimate.artifact import artifact as artifact_of
         from measure.estimate.artifact import keep, write
-        from measure.estimate.dependence import of_model
-        from measure.estimate.measuring import measure as measured_of
+        from measure.estimate.run import run
         from measure.estimate.series import beside
-        from measure.estimate.source import gate_beside
 
         estimator = self.network.estimator
-        gate = gate_beside(self.network, false_alarm=self.options.false_alarm)
         with _advancing("measure", "window") as advance:
-            measured = measured_of(
-                subject.film, estimator, gate=gate, dependence=of_model(estimator), options=self.options,
-                advance=advance,
-            )  # fmt: skip
+            measured = run(subject, self.network, self.options, advance=advance)
         wind = None if subject.record is None else subject.record.wind()
         series = beside(measured, start=subject.film.start, wind=wind)
         _warn(measured.noticed(anyway=self.anyway))

@@ -95,13 +95,18 @@ class FlagSize:
                 fix=f"give length x height in metres, each from {_SHORTEST:g} to {_LONGEST:g}, as in 1.5x1.0",
             )  # fmt: skip
 
+    @property
+    def aspect(self) -> float:
+        """Length over height."""
+        return self.length / self.height
+
     def scale(self, trained: Trained = FLAG) -> float:
         """s, the length in lengths of the cloths that the model is trained on."""
         return self.length / trained.length
 
     def findings(self, trained: Trained = FLAG) -> tuple[Finding, ...]:
         """What is to be said of its shape."""
-        aspect = self.length / self.height
+        aspect = self.aspect
         least, most = trained.aspects
         if least * (1 - _ASPECT_SLACK) <= aspect <= most * (1 + _ASPECT_SLACK):
             return ()

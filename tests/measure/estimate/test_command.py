@@ -17,9 +17,10 @@ import pytest
 import torch
 from PIL import Image
 
+import flagdata
 from flagdata.cli import main
 from flagdata.dataset.clips import clip_rows
-from flagdata.errors import UnknownNameError, UsageError
+from flagdata.errors import RefusedError, UnknownNameError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter
 from flagdata.schema import Kind
@@ -106,6 +107,42 @@ def test_a_video_file_is_answered_in_one_line(film: Path, model_folder: Path) ->
     done = run(film, *SIZED, "--model", model_folder, "--anyway")
     assert len(done.stdout.splitlines()) == 1
     assert re.search(r"wind(: not constrained by this clip| \d+\.\d m/s \[\d+\.\d, \d+\.\d\] 90 %)", done.stdout)
+
+
+def test_python_gives_the_answer_of_the_command_as_arrays(film: Path, model_folder: Path) -> None:
+    options = ("--model", model_folder, "--area-weight", "0.12:0.15", "--anyway")
+    said = answer(film, *SIZED, *options)
+    found = flagdata.measure(
+        film, flag_size=(1.5, 1.0), area_weight=(0.12, 0.15), model=str(model_folder), anyway=True
+    )  # fmt: skip
+    assert found.sentence == said["sentence"]
+    assert found.refused == said["gate"]["refused"]  # type: ignore[index]
+    assert [finding.as_dict() for finding in found.findings] == said["findings"]
+    assert found.figures == said["conditioning"]
+    for name, own in said["quantities"].items():  # type: ignore[attr-defined]
+        estimate = found.quantities[name]
+        ends = [None if np.isinf(end) else end for end in estimate.interval]
+        assert (estimate.value, ends, estimate.unit) == (own["value"], own["interval"], own["unit"])
+    assert found.wind is found.quantities["wind_speed"]
+    assert {values.shape for values in found.draws.values()} == {(400,)}
+    assert found.draws["wind_speed"].mean() == pytest.approx(found.wind.value)
+    windows = said["windows"]
+    np.testing.assert_array_equal(found.windows.start, [window["start"] for window in windows])  # type: ignore[attr-defined]
+    assert found.windows.low["density"].min() >= 0.12
+    assert {values.shape for values in found.windows.value.values()} == {(4,)}
+
+
+def test_python_returns_a_refused_film_with_its_reasons_and_hides_its_values(strange: Path, model_folder: Path) -> None:
+    found = flagdata.measure(strange, flag_size=(1.5, 1.0), model=str(model_folder))
+    assert found.refused
+    assert found.reasons[0].kind == "unlike-training"
+    assert found.reasons[0].value is not None
+    for name in ("answer", "sentence", "quantities", "wind", "draws", "windows"):
+        with pytest.raises(RefusedError, match="not like what the network was trained on"):
+            getattr(found, name)
+    assert flagdata.measure(strange, flag_size=(1.5, 1.0), model=str(model_folder), anyway=True).wind.unit == "m/s"
+    with pytest.raises(UsageError, match="twice"):
+        flagdata.measure(strange, area_weight=0.1, material="paper")
 
 
 def test_the_shipped_model_measures_a_file_without_any_option_but_the_films(tmp_path: Path) -> None:

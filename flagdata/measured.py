@@ -1,0 +1,143 @@
+"""What `flagdata.measure` returns: the posterior of a film as arrays, or why the film was refused."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import RefusedError
+from flagdata.findings import Finding
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """One quantity of a film, SI.
+
+    Attributes:
+        unit: of all numbers.
+        value, sigma: mean and standard deviation of its posterior; None where only a bound is known.
+        interval: its central interval, or a bound: an end that nothing bounds is infinite.
+        level: probability that the interval holds.
+        bound: "at-least", "at-most" or "nothing"; None of an interval with two ends.
+        constrained: whether the film added anything to what was assumed.
+        assumed: the range that was simulated, or what was given.
+        given: whether it was given.
+    """
+
+    unit: str
+    value: float | None
+    sigma: float | None
+    interval: tuple[float, float]
+    level: float
+    bound: str | None
+    constrained: bool
+    assumed: tuple[float, float]
+    given: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Windows:
+    """The windows of a film, each by itself, in order.
+
+    Attributes:
+        start, end: (k,) of their frames [s from the film's first frame].
+        p: (k,) that a familiar clip is at least as strange.
+        value: quantity → (k,) means; NaN where only a bound is known.
+        low, high: quantity → (k,) ends of the intervals; infinite at an end that nothing bounds.
+    """
+
+    start: NDArray[np.float64]
+    end: NDArray[np.float64]
+    p: NDArray[np.float64]
+    value: Mapping[str, NDArray[np.float64]]
+    low: Mapping[str, NDArray[np.float64]]
+    high: Mapping[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Answer:
+    """What a film says.
+
+    Attributes:
+        sentence: in one line, as `flagdata measure` prints it.
+        quantities: name → estimate: "wind_speed", "density" (area weight) and what else the network estimates.
+        draws: name → (n,) draws of the joint posterior, in the same order for all names.
+        windows: each by itself.
+    """
+
+    sentence: str
+    quantities: Mapping[str, Estimate]
+    draws: Mapping[str, NDArray[np.float64]]
+    windows: Windows
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Measured:
+    """A film, measured or refused.
+
+    Attributes:
+        film: its name.
+        rate, duration: of it [Hz, s].
+        network: that measured it.
+        refused: whether the gate refused it.
+        verdict: of the gate, in one sentence.
+        reasons: what the gate found of a usual window, the strongest first; `value` is the p of each.
+        findings: on film, size, weight and windows.
+        figures: of how the film was made fit: camera, flags, crop; as in `--json` under "conditioning". None of a film
+            that is too short for that.
+        given: the answer; None where it is not shown: of a refused film, unless it was asked for `anyway`.
+    """
+
+    film: str
+    rate: float
+    duration: float
+    network: str
+    refused: bool
+    verdict: str
+    reasons: tuple[Finding, ...]
+    findings: tuple[Finding, ...]
+    figures: Mapping[str, Any] | None
+    given: Answer | None
+
+    @property
+    def answer(self) -> Answer:
+        """What the film says.
+
+        Raises:
+            RefusedError: the film was refused, and was not measured `anyway`; or there is nothing to measure in it.
+        """
+        if self.given is None:
+            raise RefusedError(
+                self.verdict, where=self.film,
+                fix=self.reasons[0].fix or "look at it with anyway=True",
+            )  # fmt: skip
+        return self.given
+
+    @property
+    def sentence(self) -> str:
+        """The answer in one line. Raises as `answer`."""
+        return self.answer.sentence
+
+    @property
+    def quantities(self) -> Mapping[str, Estimate]:
+        """Name → estimate. Raises as `answer`."""
+        return self.answer.quantities
+
+    @property
+    def wind(self) -> Estimate:
+        """The wind speed [m/s], of a long film the mean over its windows. Raises as `answer`."""
+        return self.answer.quantities["wind_speed"]
+
+    @property
+    def draws(self) -> Mapping[str, NDArray[np.float64]]:
+        """Name → (n,) draws of the joint posterior. Raises as `answer`."""
+        return self.answer.draws
+
+    @property
+    def windows(self) -> Windows:
+        """The windows, each by itself. Raises as `answer`."""
+        return self.answer.windows

@@ -1,0 +1,115 @@
+"""One film through everything, for the command line and for Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from flagdata.errors import UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera import CropBox
+from flagdata.lake import Lake
+from flagdata.measured import Answer, Estimate, Measured, Windows
+from flagdata.stated import Stated
+from measure.estimate.answer import Quantity
+from measure.estimate.dependence import of_model
+from measure.estimate.material import weight_of
+from measure.estimate.measuring import Measurement, Options, measure
+from measure.estimate.similarity import FlagSize
+from measure.estimate.source import Network, Reading, Subject, gate_beside, network, subjects
+
+
+def run(
+    subject: Subject, network: Network, options: Options, *, advance: Callable[[int, int], None] | None = None
+) -> Measurement:
+    """Measure one film by a network, with the gate and the dependence of windows that belong to it.
+
+    Args:
+        advance: called after each window with how many there are and 1.
+
+    Raises:
+        FlagdataError: see `measure.estimate.measuring.measure`.
+    """
+    gate = gate_beside(network, false_alarm=options.false_alarm)
+    return measure(
+        subject.film, network.estimator, gate=gate, dependence=of_model(network.estimator), options=options,
+        advance=advance,
+    )  # fmt: skip
+
+
+def weight(
+    given: Stated | None, material: str | None, *, lake: Lake | None, at: str | None
+) -> tuple[Stated | None, str | None]:
+    """The area weight that was given, by itself or by a material's name, and where the latter is from.
+
+    Raises:
+        UsageError: both were given.
+        UnknownNameError: no such material.
+    """
+    if given is not None and material is not None:
+        raise UsageError("the area weight is given twice", fix="choose one of --area-weight and --material")
+    return (given, None) if material is None else weight_of(material, lake=lake, at=at)
+
+
+def measured(
+    source: Path | str, *, flag_size: tuple[float, float] | None,
+    area_weight: float | tuple[float, float] | str | Stated | None, material: str | None, step: float | None,
+    crop: tuple[int, int, int, int] | None, flag: int | None, start: float | None, end: float | None,
+    true_fps: float | None, sequence_fps: float | None, level: float, seed: int, model: str | None,
+    false_alarm: float, lake: Path | str | None, at: str | None, anyway: bool,
+) -> Measured:  # fmt: skip
+    """What `flagdata.measure` does; see there for what it takes.
+
+    Raises:
+        FlagdataError: see `flagdata.measure`.
+    """
+    opened = None if lake is None else Lake.open(lake)
+    given = None if area_weight is None else Stated.of(area_weight)
+    stated, _ = weight(given, material, lake=opened, at=at)
+    size = None if flag_size is None else FlagSize(length=flag_size[0], height=flag_size[1])
+    options = Options(
+        size=size, step=step, first=start, last=end, level=level, false_alarm=false_alarm, seed=seed,
+        area_weight=stated,
+    )  # fmt: skip
+    box = None if crop is None else CropBox(x=crop[0], y=crop[1], width=crop[2], height=crop[3])
+    reading = Reading(
+        crop=box, flag=flag, aspect=None if size is None else size.aspect, true_fps=true_fps, sequence_fps=sequence_fps
+    )
+    (subject,) = subjects(str(source), query=None, lake=opened, at=at, reading=reading)
+    found = run(subject, network(model, lake=opened, at=at), options)
+    verdict = found.verdict
+    return Measured(
+        film=found.film, rate=found.rate, duration=found.duration, network=found.model, refused=verdict.refused,
+        verdict=verdict.sentence,
+        reasons=tuple(
+            Finding(kind=reason.kind, severity=Severity.WARNING, what=reason.what, value=reason.p, fix=reason.fix)
+            for reason in verdict.reasons
+        ),
+        findings=found.noticed(anyway=anyway), figures=subject.film.as_dict(),
+        given=_answer(found) if found.shown(anyway=anyway) else None,
+    )  # fmt: skip
+
+
+def _answer(found: Measurement) -> Answer:
+    quantities = {one.name: _estimate(one) for one in found.quantities}
+    rows = {name: [window.quantity(name) for window in found.windows] for name in found.names}
+    nan = float("nan")
+    windows = Windows(
+        start=np.array([window.start for window in found.windows]),
+        end=np.array([window.end for window in found.windows]), p=np.array([window.p for window in found.windows]),
+        value={name: np.array([nan if q.value is None else q.value for q in own]) for name, own in rows.items()},
+        low={name: np.array([q.span.low for q in own]) for name, own in rows.items()},
+        high={name: np.array([q.span.high for q in own]) for name, own in rows.items()},
+    )  # fmt: skip
+    draws = {name: found.draws[:, column] for column, name in enumerate(found.names)}
+    return Answer(sentence=found.sentence, quantities=quantities, draws=draws, windows=windows)
+
+
+def _estimate(one: Quantity) -> Estimate:
+    return Estimate(
+        unit=one.unit, value=one.value, sigma=one.sigma, interval=(one.span.low, one.span.high), level=one.span.level,
+        bound=None if one.span.bound is None else one.span.bound.value, constrained=one.constrained,
+        assumed=one.assumed, given=one.given,
+    )  # fmt: skip
