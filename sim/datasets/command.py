@@ -44,8 +44,8 @@ def build(
 ) -> None:
     """Build a data set: simulate its sequences, film them, and lay both into the lake with their ground truth.
 
-    RECIPE is a TOML file, or a recipe of the catalog: flagsim, flagsim-small, clothsim, field. The lake is made if
-    there is none.
+    RECIPE is a TOML file, or a recipe of the catalog: flagsim, flagsim-small, clothsim, field, outdoor. The lake is
+    made if there is none.
 
     A build that was stopped or killed goes on where its last commit was when the command is given again, and ends with
     the same objects. At the end the data set's card, an HTML page, is written into the lake's folder cards.
