@@ -26,7 +26,7 @@ _BRIDGE = 0.02
 _NUMBERED = 0.1
 """Share of the first region's motion that another has to have to be numbered."""
 _MOST = 6
-_VISITED = 0.06
+_VISITED = 0.12
 """Share of the region's strongest deviation from which on a place counts as visited, beyond the noise."""
 _NOISES = 5.0
 _DEVIATION = 48
