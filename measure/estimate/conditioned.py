@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,6 +16,7 @@ from flagdata.schema import FRAME_SIZE
 from measure.estimate.film import Film
 from models.conditioning import Conditioning, Follower, conditioning_of
 from models.conditioning.conditioning import LEAST, SAMPLE
+from models.conditioning.regions import MOMENT
 from models.conditioning.repeats import TimedFrame
 
 _HELD = 200_000_000
@@ -97,12 +99,12 @@ class ConditionedFilm:
 
     def frames(self, first: float, last: float) -> Iterator[TimedFrame]:
         held: list[TimedFrame] | None = []
-        sample: list[NDArray[np.uint8]] = []
-        every = max(1, int(np.ceil((min(last, self.duration) - max(first, 0.0)) * self.rate / SAMPLE)))
+        sample: list[TimedFrame] = []
+        chosen = _chosen(self.rate, min(last, self.duration) - max(first, 0.0))
         bytes_held = 0
         for k, (time, picture) in enumerate(self._film.frames(first, last)):
-            if k % every == 0:
-                sample.append(picture)
+            if chosen(k):
+                sample.append((time, picture))
             bytes_held += picture.nbytes
             if held is not None:
                 held.append((time, picture))
@@ -112,9 +114,13 @@ class ConditionedFilm:
         if len(sample) < LEAST:
             yield from source
             return
-        self.found = conditioning_of(sample, size=FRAME_SIZE, flag=self._flag, within=self._within(sample[0].shape))
-        self.reference = sample[len(sample) // 2]
-        del sample
+        pictures = [picture for _, picture in sample]
+        self.found = conditioning_of(
+            pictures, size=FRAME_SIZE, times=np.array([time for time, _ in sample]), flag=self._flag,
+            within=self._within(pictures[0].shape),
+        )  # fmt: skip
+        self.reference = pictures[len(pictures) // 2]
+        del sample, pictures
         self._follower = follower = Follower(self.found)
         for time, picture in source:
             yield time, follower.show(picture)
@@ -160,6 +166,21 @@ class ConditionedFilm:
             "chosen": found.chosen + 1 if found.regions else None,
             "square": [found.square.x, found.square.y, found.square.side],
         }  # fmt: skip
+
+
+def _chosen(rate: float, duration: float) -> Callable[[int], bool]:
+    """Which frames of a film belong to a sample of some `SAMPLE`: evenly spread; of a long film in pairs, the frames of
+    each `MOMENT` apart at most.
+
+    Args:
+        rate: of the film [Hz].
+        duration: of the part that is read [s].
+    """
+    every = max(1, math.ceil(duration * rate / SAMPLE))
+    beside = max(1, math.floor(MOMENT * rate))
+    if every <= beside:
+        return lambda k: k % every == 0
+    return lambda k: k % (2 * every) in (0, beside)
 
 
 def _of_camera(found: Conditioning, follower: Follower) -> list[Finding]:

@@ -139,7 +139,8 @@ def conditioned(
     """
     if len(frames) < LEAST or len(times) != len(frames):
         raise InputError(f"{len(frames)} frames at {len(times)} instants", fix="give three frames or more, each a time")
-    found = conditioning_of(frames[:: -(-len(frames) // SAMPLE)], size=size, flag=flag)
+    every = -(-len(frames) // SAMPLE)
+    found = conditioning_of(frames[::every], times=times[::every], size=size, flag=flag)
     follower = Follower(found)
     shown = np.stack([follower.show(frame) for frame in frames])
     return Conditioned(frames=shown, found=found, path=follower.path, lost=follower.lost)
@@ -189,14 +190,15 @@ class Follower:
 
 
 def conditioning_of(
-    sample: Sequence[NDArray[np.uint8]] | NDArray[np.uint8], *, size: int, flag: int | None = None,
-    within: tuple[int, int, int, int] | None = None,
+    sample: Sequence[NDArray[np.uint8]] | NDArray[np.uint8], *, size: int, times: NDArray[np.float64] | None = None,
+    flag: int | None = None, within: tuple[int, int, int, int] | None = None,
 ) -> Conditioning:  # fmt: skip
     """What a sample of a film's frames shows.
 
     Args:
         sample: (height, width) gray, spread over the film, in order; three or more.
         size: of the pictures that are to come out [px].
+        times: (n,) of the sample [s], where it is uneven: cloth is sought between those `regions.MOMENT` apart at most.
         flag: number of the flag, from 1; None for the first.
         within: x, y, width and height of the part of the middle frame in which the flag is [px]; None for all.
 
@@ -208,7 +210,8 @@ def conditioning_of(
     scale = min(1.0, WORK / max(height, width))
     small = [shrunk(frame, scale) for frame in sample]
     inside = None if within is None else _inside(within, small[0].shape, scale)
-    camera, transforms, regions = _camera_and_regions(small, inside, scale * max(width, height) / size)
+    instants = np.arange(len(small), dtype=np.float64) if times is None else times
+    camera, transforms, regions = _camera_and_regions(small, instants, inside, scale * max(width, height) / size)
     if flag is not None and not 1 <= flag <= len(regions):
         raise UsageError(
             f"flag {flag} of a film in which {len(regions)} regions move like cloth", where="--flag",
@@ -248,7 +251,7 @@ def shrunk(frame: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
 
 
 def _camera_and_regions(
-    small: list[NDArray[np.uint8]], inside: NDArray[np.bool_] | None, unit: float
+    small: list[NDArray[np.uint8]], times: NDArray[np.float64], inside: NDArray[np.bool_] | None, unit: float
 ) -> tuple[Camera, list[Transform], tuple[Region, ...]]:
     """Camera and cloth, each found again with the other known.
 
@@ -258,19 +261,20 @@ def _camera_and_regions(
     least = _LEAST_MOTION * unit
     camera, transforms = camera_of(small, least=least)
     if camera.known:
-        regions = regions_of(_registered(small, transforms), within=inside)
+        regions = regions_of(_registered(small, transforms), times, within=inside)
         again, moved = (
             camera_of(small, outside=_outside(regions, small[0].shape), least=least) if regions else (camera, [])
         )
     else:  # while the camera moves little, what moves is cloth
         middle = len(small) // 2
-        regions = regions_of(np.stack(small[max(0, middle - _NEARBY) : middle + _NEARBY + 1]), within=inside)
+        nearby = slice(max(0, middle - _NEARBY), middle + _NEARBY + 1)
+        regions = regions_of(np.stack(small[nearby]), times[nearby], within=inside)
         again, moved = (
             by_edges(small, outside=_outside(regions, small[0].shape), least=least) if regions else (camera, [])
         )
     if regions and again.known:
         camera, transforms = again, moved
-    return camera, transforms, regions_of(_registered(small, transforms), within=inside)
+    return camera, transforms, regions_of(_registered(small, transforms), times, within=inside)
 
 
 def _outside(regions: Sequence[Region], shape: tuple[int, ...]) -> NDArray[np.bool_]:

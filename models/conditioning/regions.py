@@ -19,6 +19,8 @@ _COARSE = 120
 """Longer side [px] of the shrunk frames."""
 _SEED = 0.15
 """Share of the strongest change from which on a region is sought."""
+MOMENT = 0.2
+"""Time [s] between pictures that are compared, where there are pictures so near: a part of a flutter's period."""
 _FAINTEST = 0.5
 """Gray levels of change that shrunk noise and coding leave at most."""
 _BRIDGE = 0.02
@@ -63,16 +65,21 @@ class Region:
         return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
 
 
-def regions_of(pictures: NDArray[np.uint8], *, within: NDArray[np.bool_] | None = None) -> tuple[Region, ...]:
+def regions_of(
+    pictures: NDArray[np.uint8], times: NDArray[np.float64], *, within: NDArray[np.bool_] | None = None
+) -> tuple[Region, ...]:
     """The regions of a film, the strongest motion first; none where nothing moves.
 
     Args:
         pictures: (n, height, width) gray, registered, in order; n of 3 or more.
+        times: (n,) of them [s]: between pictures far apart clouds move as well, and the light changes.
         within: (height, width) where to look; everywhere by default.
     """
     height, width = pictures.shape[1:]
     coarse = _shrunk(pictures)
-    change = np.abs(np.diff(coarse, axis=0)).mean(axis=0)
+    apart = np.diff(times)
+    near = apart <= max(MOMENT, float(apart.min()) * 1.5)
+    change = np.abs(coarse[1:][near] - coarse[:-1][near]).mean(axis=0)
     change = cv2.GaussianBlur(change, (0, 0), 1.0)
     floor = float(np.median(change))
     change = np.maximum(change - floor, 0.0)
