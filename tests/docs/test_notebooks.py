@@ -24,8 +24,8 @@ NotebookClient(nbformat.read(sys.argv[1], as_version=4), timeout=300, kernel_nam
 """
 
 
-def test_the_three_main_jobs_have_a_notebook() -> None:
-    assert [path.stem for path in NOTEBOOKS] == ["close-the-loop", "field-recording", "simulate"]
+def test_the_four_main_jobs_have_a_notebook() -> None:
+    assert [path.stem for path in NOTEBOOKS] == ["close-the-loop", "field-recording", "measure", "simulate"]
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
