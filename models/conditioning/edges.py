@@ -50,7 +50,8 @@ class Edges:
         """Those of a picture (height, width) in places that may be the background's; None where there are too few."""
         smoothed = [_smoothed(reference, blur) for blur in _BLURS]
         slopes = [
-            np.stack([np.gradient(picture, axis=1), np.gradient(picture, axis=0)], axis=-1) for picture in smoothed
+            np.stack([cv2.Sobel(picture, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)], axis=-1)
+            for picture in smoothed
         ]
         steep = np.linalg.norm(slopes[-1], axis=-1)
         steep[~outside] = 0.0

@@ -203,3 +203,9 @@ def test_the_same_film_gives_the_same_pictures() -> None:
 def test_a_film_of_two_frames_is_too_short() -> None:
     with pytest.raises(InputError, match="2 frames"):
         conditioned(Drawn().frames()[:2], TIMES[:2])
+
+
+@pytest.mark.parametrize("shape", [(3, 1, 1), (5, 1, 5), (3, 8, 8), (4, 16, 400), (40, 2, 2)])
+def test_films_of_any_shape_become_square_pictures(shape: tuple[int, int, int]) -> None:
+    frames = stream(1, "shapes").integers(0, 255, shape).astype(np.uint8)
+    assert conditioned(frames, np.arange(len(frames)) / RATE, size=60).frames.shape == (len(frames), 60, 60)
