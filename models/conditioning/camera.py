@@ -42,6 +42,8 @@ _SPREAD = 0.08
 """Least extent of the background's corners along both axes, as a share of the picture's sides."""
 _LOST = 0.3
 """Share of the frames to which edges that are the background's fit."""
+_BETTER = 0.9
+"""Share of the misfit of shifts across edges to which shifts along them have to bring it, to be believed."""
 _MOST_TURN, _MOST_ZOOM = 0.35, 1.5
 
 
@@ -132,20 +134,40 @@ def by_edges(
     unmoved = [STILL] * len(pictures)
     if edges is None:
         return still, unmoved
-    camera = replace(still, edges=edges, moves=True)
-    transforms, lost = list(unmoved), 0
+    both, across = (_aligned(pictures, replace(still, edges=one, moves=True)) for one in (edges, edges.across))
+    found = both if both.misfit < _BETTER * across.misfit else across
+    if found.lost > _LOST * len(pictures):
+        return still, unmoved
+    height, width = pictures[middle].shape
+    if motion(found.transforms, (width / 2, height / 2)) < least:
+        return replace(found.camera, moves=False), unmoved
+    return found.camera, found.transforms
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Aligned:
+    """Transforms of a sample by edges, in how many frames they do not fit, and their mean misfit."""
+
+    camera: Camera
+    transforms: list[Transform]
+    lost: int
+    misfit: float
+
+
+def _aligned(pictures: Sequence[NDArray[np.uint8]], camera: Camera) -> _Aligned:
+    middle, lost = len(pictures) // 2, 0
+    transforms = [STILL] * len(pictures)
     for order in (range(middle + 1, len(pictures)), range(middle - 1, -1, -1)):
         guess = STILL
         for k in order:
             found = camera.follow(pictures[k], guess)
             lost += found is None
             guess = transforms[k] = found if found is not None else guess
-    if lost > _LOST * len(pictures):
-        return still, unmoved
-    height, width = pictures[middle].shape
-    if motion(transforms, (width / 2, height / 2)) < least:
-        return replace(camera, moves=False), unmoved
-    return camera, transforms
+    misfit = 0.0
+    if camera.edges is not None:
+        pairs = zip(pictures, transforms, strict=True)
+        misfit = float(np.mean([camera.edges.misfit(one, (at[0, 2], at[1, 2])) for one, at in pairs]))
+    return _Aligned(camera=camera, transforms=transforms, lost=lost, misfit=misfit)
 
 
 def motion(transforms: Sequence[Transform], place: tuple[float, float]) -> float:

@@ -7,7 +7,7 @@ edge a shift does not show; there it stays near that of the frame before.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -39,11 +39,13 @@ class Edges:
         places: (n, 2) x and y [px].
         values: (blur, n) gray levels.
         slopes: (blur, n, 2) along x and y [gray levels/px].
+        axes: (a, 2) unit vectors along which the picture may shift: both, or the one across a single straight edge.
     """
 
     places: NDArray[np.float32]
     values: NDArray[np.float32]
     slopes: NDArray[np.float32]
+    axes: NDArray[np.float64]
 
     @classmethod
     def of(cls, reference: NDArray[np.uint8], outside: NDArray[np.bool_]) -> Edges | None:
@@ -63,8 +65,19 @@ class Edges:
         return cls(
             places=np.stack([columns, rows], axis=1).astype(np.float32),
             values=np.stack([picture[rows, columns] for picture in smoothed]).astype(np.float32),
-            slopes=np.stack([slope[rows, columns] for slope in slopes]).astype(np.float32),
-        )
+            slopes=np.stack([slope[rows, columns] for slope in slopes]).astype(np.float32), axes=np.eye(2),
+        )  # fmt: skip
+
+    @property
+    def across(self) -> Edges:
+        """The same, shifting only across the edges, where a shift shows best."""
+        slopes = self.slopes[-1].astype(np.float64)
+        return replace(self, axes=np.linalg.eigh(slopes.T @ slopes)[1][:, 1:].T)
+
+    def misfit(self, picture: NDArray[np.uint8], shift: tuple[float, float]) -> float:
+        """Mean difference of a picture from the reference at a shift [gray levels], each up to twice `_HUBER`."""
+        away = self._difference(_smoothed(picture, _BLURS[-1]), -1, np.array(shift))
+        return float(np.minimum(np.abs(away), 2 * _HUBER).mean())
 
     def shift(self, picture: NDArray[np.uint8], guess: tuple[float, float]) -> tuple[float, float] | None:
         """Along x and y [px], from the reference picture to this one; None where none fits.
@@ -90,7 +103,8 @@ class Edges:
                 square = (slopes * weight[:, None]).T @ slopes
                 stiff = _STIFF * float(np.linalg.eigvalsh(square)[-1])
                 wanted = (slopes * weight[:, None]).T @ -difference - stiff * (shift - guess)
-                step = np.linalg.solve(square + stiff * np.eye(2), wanted)
+                inside = self.axes @ (square + stiff * np.eye(2)) @ self.axes.T
+                step = self.axes.T @ np.linalg.solve(inside, self.axes @ wanted)
                 shift = shift + step
                 if np.abs(step).max() < 0.01:
                     break
@@ -101,7 +115,9 @@ class Edges:
     def _searched(self, smoothed: NDArray[np.float32], guess: NDArray[np.float64]) -> NDArray[np.float64]:
         """The best of all shifts on a grid about a guess: after a jerk of the camera."""
         steps = np.arange(-_JERK, _JERK + 1, _GRID, dtype=np.float64)
-        shifts = guess + np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+        shifts = (
+            guess + np.stack(np.meshgrid(*[steps] * len(self.axes)), axis=-1).reshape(-1, len(self.axes)) @ self.axes
+        )
         some = slice(None, None, max(1, len(self.places) // _LOOKED))
         at = (self.places[some][None] + shifts[:, None]).astype(np.float32)
         seen = cv2.remap(smoothed, at[..., 0], at[..., 1], cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)

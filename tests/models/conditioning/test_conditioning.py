@@ -189,6 +189,17 @@ def test_a_pole_before_a_plain_sky_shows_how_the_camera_moves() -> None:
     np.testing.assert_allclose(found.path[:, 0] - found.path[0, 0], shift[:, 0] - shift[0, 0], atol=0.3)
 
 
+def test_a_single_straight_edge_shows_no_shift_along_it() -> None:
+    rng = stream(8, "noise")
+    frames = []
+    for picture in Drawn(scenery=False, noise=0.0).frames():
+        picture[30:, 63:67] = np.linspace(200, 230, HEIGHT - 30)[:, None]
+        frames.append(np.clip(picture + rng.normal(0, 3, picture.shape), 0, 255).astype(np.uint8))
+    found = conditioned(np.stack(frames), TIMES, size=120)
+    assert found.found.camera.known
+    assert not found.found.camera.moves
+
+
 def test_nothing_moves_in_a_still_picture() -> None:
     found = made(Drawn(flags=()))
     assert found.found.regions == ()
