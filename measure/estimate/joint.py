@@ -245,7 +245,9 @@ class Joint:
         even = np.array([name in POWERS for name in self.names])[:, None]
         found = np.where(even, np.stack([low, high], axis=1), np.quantile(self.prior, [0.05, 0.95], axis=0).T)
         for name, stated in self.options.stated(self.model).items():
-            found[self.names.index(name)] = stated.within(_NORMAL)
+            column = self.names.index(name)
+            within = np.array(stated.within(_NORMAL))
+            found[column] = np.clip(within, *found[column]) if stated.sigma else within
         return found
 
     @property

@@ -219,7 +219,7 @@ def test_a_weight_that_is_open_is_answered_with_the_winds_of_a_light_and_a_heavy
 
 
 def test_a_flags_aspect_is_known_from_its_size_by_a_model_that_estimates_it(tmp_path: Path) -> None:
-    aspects = estimator.load(written(tmp_path / "aspects", ("wind_speed", "density", "aspect")))
+    aspects = estimator.load(written(tmp_path / "aspects", ("wind_speed", "density", "log_aspect")))
     for size, given in ((FlagSize(length=1.5, height=1.0), True), (FlagSize(length=1.5, height=0.5), False)):
         found = measured(even(2 * FRAMES), aspects, size=size)
         aspect = found.quantities[2]
@@ -244,6 +244,12 @@ def test_a_weight_that_makes_the_film_improbable_is_called_a_contradiction(model
     assert "area-weight-contradicted" not in kinds("0.11:0.17")
     assert "area-weight-contradicted" in kinds("0.16")  # more than four standard deviations away
     assert "area-weight-contradicted" in kinds("0.155:0.165")
+
+
+def test_a_weighing_near_the_end_of_the_models_range_is_assumed_up_to_that_end(model: Estimator) -> None:
+    density = measured(even(FRAMES), model, area_weight=parse("0.165±0.01")).quantities[1]
+    assert density.assumed == pytest.approx((0.165 - 0.01645, 0.17))
+    assert density.span.high <= 0.17 or density.span.bound is Bound.LEAST
 
 
 def test_an_area_weight_is_that_of_the_flag_itself_whatever_its_size(model: Estimator) -> None:

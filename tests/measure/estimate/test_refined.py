@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flagdata.stated import parse
 from measure.ends import Bound, Span
-from measure.estimate.refined import scaled
+from measure.estimate.refined import _searched, scaled
 from measure.refine.refinement import Interval, Refinement, Round
 
 NOTHING: Any = None
@@ -74,3 +75,10 @@ def test_rounds_and_the_networks_first_estimate_scale_alike(found: Refinement) -
 
 def test_a_flag_of_the_simulated_size_is_left_as_it_is(found: Refinement) -> None:
     assert scaled(found, 1.0) is found
+
+
+def test_an_area_weight_is_searched_as_a_range_at_the_size_that_is_simulated() -> None:
+    # Two standard deviations either way, 1 % of a value; a flag twice as long weighs twice as much.
+    assert _searched(parse("0.12:0.15"), 1.0) == pytest.approx((0.12, 0.15))
+    assert _searched(parse("0.28±0.01"), 2.0) == pytest.approx((0.13, 0.15))
+    assert _searched(parse("0.2"), 1.0) == pytest.approx((0.198, 0.202))
