@@ -16,6 +16,8 @@ from models.conditioning.camera import STILL, WORK, Camera, Transform, by_edges,
 from models.conditioning.framing import Square
 from models.conditioning.regions import Region, regions_of
 
+VERSION = 2
+"""Raised whenever the same film gives other pictures: what networks are trained on is then made anew."""
 SAMPLE = 96
 """Frames of a film that are looked at to find camera and flag."""
 LEAST = 3

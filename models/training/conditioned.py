@@ -16,8 +16,6 @@ from flagdata.errors import InputError
 from models.conditioning import Conditioning, Follower, conditioning_of
 from models.conditioning.instants import Interpolator, TimedFrame, at_instants
 
-VERSION = 1
-"""Raised whenever the same film gives other clips."""
 SIZE = 300
 """Side of conditioned pictures [px]."""
 SAMPLE = 32
@@ -44,10 +42,11 @@ class FitFilm:
     @classmethod
     def of(cls, film: NDArray[np.uint8], times: NDArray[np.float64], *, size: int = SIZE) -> FitFilm:
         """A film (n, height, width) gray with the times of its frames [s], made fit."""
-        sample = film[:: -(-len(film) // SAMPLE)]
-        found = conditioning_of(sample, size=size)
+        every = -(-len(film) // SAMPLE)
+        sample, instants = film[::every], times[::every]
+        found = conditioning_of(sample, times=instants, size=size)
         if (flag := _nearest_to_the_middle(found)) != found.chosen:
-            found = conditioning_of(sample, size=size, flag=flag + 1)
+            found = conditioning_of(sample, times=instants, size=size, flag=flag + 1)
         follower = Follower(found)
         return cls(found=found, frames=np.stack([follower.show(frame) for frame in film]), times=times - times[0])
 

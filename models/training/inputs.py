@@ -37,10 +37,11 @@ from flagdata.provenance import canonical, digest
 from flagdata.rng import stream
 from flagdata.timebase import NANOSECONDS
 from models import targets
+from models.conditioning.conditioning import VERSION
 from models.crops import Cropping
 from models.frontend import FrontEnd, standardised
 from models.training.augment import Augment
-from models.training.conditioned import VERSION, FitFilm
+from models.training.conditioned import FitFilm
 
 _LOG = logging.getLogger("flagdata")
 _RATE_ERROR = 0.01

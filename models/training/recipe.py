@@ -33,13 +33,13 @@ from flagdata.provenance import recipe_hash
 from flagdata.recipes import Shelf, is_name, parsed
 from flagdata.schema import Kind
 from flagdata.tables import COUNT, Bounds, Table
+from models.conditioning.conditioning import VERSION
 from models.crops import Cropping
 from models.frontend import RATE_LIMIT, FrontEnd, Maps
 from models.learner import NUMBER_LIMIT, Learner, Loss, build
 from models.registry import NETWORKS
 from models.targets import TARGETS
 from models.training.augment import DISTURBANCES, Augment, Strength
-from models.training.conditioned import VERSION
 
 TRAININGS = Shelf(folder="training", noun="training recipe")
 RECIPE_VERSION = 1
