@@ -128,8 +128,13 @@ class Joint:
             found: the answer's quantities.
             draws: (n, target) of the answer.
         """
-        wind = next((one for one in found if one.name == WIND and one.value is not None), None)
-        if wind is None or WEIGHT not in self.names or self.options.area_weight is not None:
+        wind = next(one for one in found if one.name == WIND)
+        if (
+            wind.value is None
+            or not wind.constrained
+            or WEIGHT not in self.names
+            or self.options.area_weight is not None
+        ):
             return None
         ends = np.quantile(draws[:, self.names.index(WEIGHT)], _LIGHT_AND_HEAVY)
         weights = [float(f"{end:.2g}") for end in ends]

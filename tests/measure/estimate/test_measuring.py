@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,8 +20,10 @@ from flagdata.rng import child_seed
 from flagdata.stated import parse
 from measure.ends import Bound
 from measure.estimate.combine import Dependence
+from measure.estimate.command import _Done, _report
 from measure.estimate.gate import Reason, gate_of
 from measure.estimate.measuring import Measurement, Options, measure
+from measure.estimate.series import beside
 from measure.estimate.similarity import FlagSize
 from models import estimator
 from models.estimator import Estimator
@@ -189,13 +192,20 @@ class Ambiguous(Believing):
         return self.posterior(embeddings).sample(draws, torch.Generator().manual_seed(seed % 1000))
 
 
-def test_a_weight_that_is_open_is_answered_with_the_winds_of_a_light_and_a_heavy_cloth(model: Estimator) -> None:
+def test_a_weight_that_is_open_is_answered_with_the_winds_of_a_light_and_a_heavy_cloth(
+    model: Estimator, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Of a wind and a weight whose logits are those of 4 m/s and 0.12 kg/m² plus z and z', the conditional median at a
     weight is that of z = 0.9 z'."""
     values = {field.name: getattr(model, field.name) for field in fields(model)}
     ambiguous = Ambiguous(**{**values, "card": {**model.card, "spread": 1.0}})
     film = even(FRAMES)
-    (finding,) = [one for one in measured(film, ambiguous).bounds if one.kind == "weight-open"]
+    found = measured(film, ambiguous)
+    (finding,) = [one for one in found.bounds if one.kind == "weight-open"]
+    nowhere: Any = None
+    series = beside(found, start=None, wind=None)
+    _report(_Done(measured=found, series=series, artifact=None, subject=nowhere, refinement=None), series=False)
+    assert f"  {finding.what}; weigh the cloth and give --area-weight\n" in capsys.readouterr().err
     light, heavy = re.findall(r"at ([\d.]+) kg/m² ([\d.]+) m/s", finding.what)
     scaling = model.learners[0].scaling
 
