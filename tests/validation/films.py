@@ -17,12 +17,13 @@ import numpy as np
 import torch
 
 from flagdata.errors import FlagdataError, NotFoundError
+from flagdata.stated import Stated
 from measure.estimate.dependence import of_model
-from measure.estimate.film import CameraFilm
 from measure.estimate.gate import Gate
-from measure.estimate.measuring import Measurement, Options, measure
+from measure.estimate.measuring import Measurement, measure
+from measure.estimate.options import Options
 from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Network, gate_beside, network
+from measure.estimate.source import Network, Reading, gate_beside, network, subjects
 from measure.shares import Share
 from tests.evidence import ABSENT, REFERENCE
 from tests.validation.environments import VTK
@@ -30,7 +31,7 @@ from tests.validation.vtk_films.designs import COMPARED, Design, designs, stress
 from tests.validation.vtk_films.making import FOLDER, make, path_of
 from tests.validation.vtk_films.runs import DENSITY, HEIGHT, LENGTH, read
 
-WEIGHT = (0.27, 0.30)
+WEIGHT = Stated(low=0.27, high=0.30)
 """Range of the area weight that is stated, about the true 0.284 kg/m²."""
 _LEVEL = 0.9
 _PARTS = ("rates", "coverage", "other air", "stressors")
@@ -78,9 +79,10 @@ def answers(design: Design, found: Network, gate: Gate, *, seed: int) -> dict[st
 
 def answer(path: Path, found: Network, gate: Gate, options: Options) -> dict[str, Any]:
     """What is said of a film: wind and area weight with their intervals, or why it is refused."""
+    (subject,) = subjects(str(path), query=None, lake=None, at=None, reading=Reading())
     try:
         measured = measure(
-            CameraFilm(path), found.estimator, gate=gate, dependence=of_model(found.estimator), options=options
+            subject.film, found.estimator, gate=gate, dependence=of_model(found.estimator), options=options
         )
     except FlagdataError as error:
         return {"refused": True, "reasons": [error.kind], "why": str(error)}
@@ -179,7 +181,7 @@ def page(sheet: Mapping[str, Any]) -> str:
     lines = [
         "# Films of another simulator by another renderer", "",
         (f"Model {sheet['model']}; ArcSim's runs filmed by VTK, {len(sheet['films'])} films, each measured with the "
-        f"flag's size and once with the area weight open, once with {WEIGHT[0]:g} to {WEIGHT[1]:g} kg/m² (true "
+        f"flag's size and once with the area weight open, once with {WEIGHT.low:g} to {WEIGHT.high:g} kg/m² (true "
         f"{DENSITY:g}). The films were listed before the first was measured; their motion has nothing above 12.5 Hz "
         "(`python -m tests.validation films`)."), "",
         ("| films | weight | refused | answered | 90 % intervals hold | mean width [m/s] | median error [m/s] | bias "

@@ -7,6 +7,7 @@ list was fixed before the first of them was judged. Those of even number are for
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -22,7 +23,7 @@ from tests.evidence import REFERENCE
 from tests.validation.gate_clips import person
 from tests.validation.vtk_films.bodies import shaking, tree
 from tests.validation.vtk_films.designs import SEED, Design, designs, scene_of
-from tests.validation.vtk_films.making import path_of
+from tests.validation.vtk_films.making import make, path_of
 from tests.validation.vtk_films.pictures import background, texture
 from tests.validation.vtk_films.runs import read
 from tests.validation.vtk_films.scene import Body, Scene, developed, pictures, write
@@ -74,7 +75,9 @@ class Makings:
 
     def film(self) -> Source:
         """Its first seconds."""
-        with av.open(str(path_of(self.design(), self.folder))) as container:
+        design = self.design()
+        make([design], folder=self.folder, python=self.python)
+        with av.open(str(path_of(design, self.folder))) as container:
             rate = container.streams.video[0].average_rate
             assert rate is not None
             found = []
@@ -323,7 +326,7 @@ def defect(kind: str, number: int, *, folder: Path, python: Path) -> Path:
     if not path.exists():
         rng = stream(SEED, "films", "defects", kind, number)
         made = DEFECTS[kind][0](Makings(python=python, folder=folder, number=number, rng=rng))
-        partial = path.with_suffix(".part.mp4")
+        partial = path.with_suffix(f".{os.getpid()}.part.mp4")
         write(partial, made.frames, rate=made.rate, crf=int(rng.integers(20, 27)))
         partial.replace(path)
     return path

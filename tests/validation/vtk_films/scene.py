@@ -226,7 +226,7 @@ def film(python: Path, scene: Scene, path: Path, rng: np.random.Generator) -> No
     Raises:
         UnusableError: the worker failed.
     """
-    partial = path.with_suffix(".part.mp4")
+    partial = path.with_suffix(f".{os.getpid()}.part.mp4")
     shown = (developed(one, scene.camera, rng) for one in pictures(python, scene))
     write(partial, shown, rate=scene.rate, crf=scene.camera.crf)
     partial.replace(path)
