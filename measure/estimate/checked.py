@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from measure.estimate.gate import Reason
 from measure.gate.gate import Gate as Calibrated
-from measure.gate.judgement import CONFIDENCE, judge
+from measure.gate.judgement import CONFIDENCE, Cause, judge
 from measure.gate.tail_probability import level
 from models.estimator import Estimator
 
@@ -33,12 +33,15 @@ class CheckedGate:
         if not found.reasons:
             return [Reason(kind="familiar", what=f"no check is unusual, p = {found.p:.3f} over all checks", p=found.p)]
         # The first speaks for all checks together.
-        return [
-            Reason(
-                kind=cause.kind, what=cause.sentence, p=cause.p if place else found.p, fix=cause.fix, blank=cause.blank
-            )
-            for place, cause in enumerate(found.reasons)
-        ]
+        return [_reason(cause, p=cause.p if place else found.p) for place, cause in enumerate(found.reasons)]
 
     def level(self, false_alarm: float) -> float:
         return level(len(self.calibrated.calibration), false_alarm, CONFIDENCE)
+
+
+def _reason(cause: Cause, *, p: float) -> Reason:
+    """What a statistic says: only that the window is unlike the training clips, and in which figure. Faults such as a
+    moving camera are counted in the film (`measure.gate.counted`), and are stated from there."""
+    if cause.blank or not cause.figure:
+        return Reason(kind=cause.kind, what=cause.sentence, p=p, fix=cause.fix, blank=cause.blank)
+    return Reason(kind="unlike-training", what=cause.figure, p=p)

@@ -255,6 +255,8 @@ class _Job:
         verdict = done.measured.verdict
         if not done.measured.shown(anyway=self.anyway):
             where = done.measured.film + (f", see {self.report}" if self.report is not None else "")
+            for reason in verdict.reasons[1:]:
+                say(f"also: {reason.what}")
             raise RefusedError(
                 verdict.sentence, where=where,
                 fix=verdict.reasons[0].fix,

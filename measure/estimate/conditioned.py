@@ -14,6 +14,8 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import CropBox
 from flagdata.schema import FRAME_SIZE
 from measure.estimate.film import Film
+from measure.gate.counted import reasons
+from measure.gate.watch import FilmWatch
 from models.conditioning import Conditioning, Follower, conditioning_of
 from models.conditioning.conditioning import LEAST, SAMPLE
 from models.conditioning.regions import MOMENT
@@ -70,6 +72,7 @@ class ConditionedFilm:
             )  # fmt: skip
         self._film, self._crop, self._flag, self._aspect = film, crop, flag, aspect
         self._follower: Follower | None = None
+        self._watch: FilmWatch | None = None
         self.found: Conditioning | None = None
         self.reference: NDArray[np.uint8] | None = None
 
@@ -121,8 +124,9 @@ class ConditionedFilm:
         )  # fmt: skip
         self.reference = pictures[len(pictures) // 2]
         del sample, pictures
-        self._follower = follower = Follower(self.found)
+        self._follower, self._watch = follower, watch = Follower(self.found), FilmWatch(rate=self.rate)
         for time, picture in source:
+            watch.look(time, picture)
             yield time, follower.show(picture)
 
     def _within(self, shape: tuple[int, ...]) -> tuple[int, int, int, int] | None:
@@ -134,11 +138,11 @@ class ConditionedFilm:
         return x, y, width, height
 
     def findings(self) -> tuple[Finding, ...]:
-        found, follower = self.found, self._follower
-        if found is None or follower is None:
+        found, follower, watch = self.found, self._follower, self._watch
+        if found is None or follower is None or watch is None:
             return self._film.findings()
         own = (*_of_camera(found, follower), *_of_flag(found, self.reference), *_of_aspect(found, self._aspect))
-        return (*self._film.findings(), *own)
+        return (*self._film.findings(), *own, *reasons(watch, found, follower))
 
     @property
     def sentences(self) -> tuple[str, ...]:

@@ -1,5 +1,8 @@
 """Whether a recording is one that the model can judge, before any interval is shown.
 
+Two kinds of reasons refuse it: faults of the film that were counted while it was made fit (`measure.gate.counted`),
+each with a figure that a person can check, and windows unlike those that the model was trained on. Faults come first.
+
 A gate looks at one window and gives reasons, each with the p-value of a familiar clip being as strange. A recording has
 several windows; how many of them may be strange, and from which p on one is, `measure.gate.several` says.
 
@@ -21,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
+from flagdata.findings import Finding
 from measure.gate.blank import blank
 from measure.gate.several import refusing, window_rate
 from models.estimator import Estimator
@@ -29,21 +33,26 @@ from models.outliers import Familiarity
 
 @dataclass(frozen=True, kw_only=True)
 class Reason:
-    """One thing that was looked at in a window.
+    """One thing that was looked at in a film or a window.
 
     Attributes:
         kind: stable name in kebab-case.
         what: a sentence for people, with the figure in it.
-        p: probability that a familiar clip is at least as strange.
+        p: probability that a familiar clip is at least as strange; None of what was counted.
         fix: what the user can do about it.
         blank: whether there is nothing to measure in the window, so that no number is given of it in any case.
     """
 
     kind: str
     what: str
-    p: float
+    p: float | None
     fix: str = "crop to the flag by --crop, give another film, or look at it with --anyway"
     blank: bool = False
+
+    @classmethod
+    def counted(cls, fault: Finding) -> Reason:
+        """A fault of the film."""
+        return cls(kind=fault.kind, what=fault.what, p=None, fix=fault.fix or cls.fix)
 
     def as_dict(self) -> dict[str, Any]:
         """JSON values."""
@@ -128,7 +137,8 @@ class Verdict:
         p: of the window that decides there, the `refusing`-th strangest.
         window_p: (k,) of each window there.
         blank: (k,) whether there is nothing to measure in it, at any size.
-        reasons: of a usual window, among the strange ones where the recording is refused; the strongest first.
+        faults: of the film, that were counted; any of them refuses it.
+        window_reasons: of a usual window, among the strange ones where these refuse the recording; the strongest first.
     """
 
     false_alarm: float
@@ -139,11 +149,22 @@ class Verdict:
     p: float
     window_p: tuple[float, ...]
     blank: tuple[bool, ...]
-    reasons: tuple[Reason, ...]
+    faults: tuple[Reason, ...]
+    window_reasons: tuple[Reason, ...]
+
+    @property
+    def unlike(self) -> bool:
+        """Whether its windows refuse it."""
+        return self.p <= self.level
 
     @property
     def refused(self) -> bool:
-        return self.p <= self.level
+        return bool(self.faults) or self.unlike
+
+    @property
+    def reasons(self) -> tuple[Reason, ...]:
+        """All of them, the weightiest first."""
+        return self.faults if self.faults and not self.unlike else (*self.faults, *self.window_reasons)
 
     @property
     def measurable(self) -> bool:
@@ -168,7 +189,10 @@ class Verdict:
         if not self.measurable:
             what = self.reasons[0].what
             return f"there is nothing to measure, so that no number is given, not even with --anyway: {what}"
-        if self.refused:
+        if self.faults:
+            more = len(self.reasons) - 1
+            return f"the film cannot be measured: {self.faults[0].what}" + (f"; {more} more reasons" if more > 1 else "; 1 more reason" if more else "")
+        if self.unlike:
             return f"this is not like what the network was trained on: {self.reasons[0].what}; {windows} ({rate})"
         return f"like what the network was trained on; {windows} ({rate})"
 
@@ -182,14 +206,16 @@ class Verdict:
 
 
 def verdict(
-    windows: Sequence[Sequence[Sequence[Reason]]], *, false_alarm: float, level: Callable[[float], float]
-) -> Verdict:
+    windows: Sequence[Sequence[Sequence[Reason]]], *, false_alarm: float, level: Callable[[float], float],
+    faults: Sequence[Finding] = (),
+) -> Verdict:  # fmt: skip
     """The verdict on a recording.
 
     Args:
-        windows: the reasons of each window, for each size of flag considered.
+        windows: the reasons of each window, for each size of flag considered; the first of each has a p-value.
         false_alarm: between 0 and 1.
         level: p at or below which a window is strange, of the rate at which familiar windows may be; see `Gate.level`.
+        faults: of the film, the weightiest first.
 
     Raises:
         InputError: no window, a rate out of range, or a window about which the gate said nothing.
@@ -208,5 +234,6 @@ def verdict(
         false_alarm=false_alarm, level=at, refusing=needed, sizes=kept, size=size, p=float(deciding[size]),
         window_p=tuple(p[:, size].tolist()),
         blank=tuple(all(reasons[0].blank for reasons in sizes) for sizes in windows),
-        reasons=tuple(windows[int(order[speaking // 2])][size]),
+        faults=tuple(Reason.counted(fault) for fault in faults),
+        window_reasons=tuple(windows[int(order[speaking // 2])][size]),
     )  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.errors import FlagdataError, InputError, UsageError
+from flagdata.errors import FlagdataError, RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
 from measure.estimate.answer import Quantity, sentence
@@ -21,6 +21,7 @@ from measure.estimate.joint import DRAWS, Joint, Look, WindowAnswer
 from measure.estimate.options import Options
 from measure.estimate.similarity import Sizes, sizes, spacing, trained_on
 from measure.estimate.windows import Layout, Window, cut, findings_of, lay_out
+from measure.gate.reasons import REASONS
 from models.conditioning.repeats import Distinct
 from models.estimator import Estimator
 from models.learner import Loss
@@ -115,7 +116,8 @@ def measure(
 
     Raises:
         UsageError: a model without distributions, a part that the film does not have, or gaps in every window.
-        InputError: a film that is too short or too slow, or whose frames repeat too often.
+        InputError: a film that is too short.
+        RefusedError: a film that is too slow, or whose frames repeat too often, so that no window is whole.
     """
     if model.learners[0].objective is not Loss.POSTERIOR:
         raise UsageError(
@@ -144,9 +146,11 @@ def measure(
         interpolated += window.interpolated
         if advance is not None:
             advance(layout.count, 1)
+    of_film = film.findings()
+    faults = [one for one in of_film if one.kind in REASONS]
     if clips is None:
-        raise _without_windows(film, layout, distinct)
-    judged = verdict([one.reasons for one in seen], false_alarm=options.false_alarm, level=gate.level)
+        raise _without_windows(film, layout, distinct, faults)
+    judged = verdict([one.reasons for one in seen], false_alarm=options.false_alarm, level=gate.level, faults=faults)
     kept = considered.only(judged.sizes)
     answer = Joint(model=model, sizes=kept, options=options)
     whole = [one.only(judged.sizes) for one in seen]
@@ -168,7 +172,7 @@ def measure(
         names=tuple(answer.names), draws=draws, quantities=own, windows=windows, combined=len(used),
         dependence=dependence, verdict=judged, sizes=kept, summary=middle.summaries[judged.size],
         clip=clips[judged.size],
-        findings=(*film.findings(), *kept.findings, *found, *_about_windows(whole, judged, used, dependence)),
+        findings=(*of_film, *kept.findings, *found, *_about_windows(whole, judged, used, dependence)),
         bounds=(*_at_ends(own, windows), *([] if open_weight is None else [open_weight])),
     )  # fmt: skip
 
@@ -191,14 +195,25 @@ def _look(window: Window, gate: Gate, given: Joint) -> Look:
     )  # fmt: skip
 
 
-def _without_windows(film: Film, layout: Layout, distinct: Distinct) -> FlagdataError:
+def _without_windows(film: Film, layout: Layout, distinct: Distinct, faults: Sequence[Finding]) -> FlagdataError:
     """Why no window of a film is whole."""
-    if distinct.repeated:
-        return InputError(
-            f"{distinct.share:.0%} of {distinct.frames} frames repeat the one before, so that the camera took "
-            f"{(1 - distinct.share) * film.rate:.3g} pictures a second; none of {layout.count} windows has enough",
-            where=film.name, fix="film with light enough for at least 25 pictures a second",
+    if film.rate < layout.least_rate:
+        slow = REASONS["low-frame-rate"]
+        return RefusedError(
+            f"{slow.sentence}: {film.rate:.3g}, and of a flag of this size the network takes "
+            f"{layout.least_rate:.3g} at least",
+            where=film.name, fix=slow.fix,
         )  # fmt: skip
+    if distinct.repeated:
+        repeated = REASONS["repeated-frames"]
+        return RefusedError(
+            f"{repeated.sentence}: {distinct.share:.0%} of {distinct.frames} frames repeat the one before, so that the "
+            f"camera took {(1 - distinct.share) * film.rate:.3g} pictures a second; none of {layout.count} windows has "
+            "enough",
+            where=film.name, fix=repeated.fix,
+        )  # fmt: skip
+    if faults:
+        return RefusedError(faults[0].what, where=film.name, fix=faults[0].fix or "give another film")
     return UsageError(
         f"none of {layout.count} windows has all its frames", where=film.name,
         fix="the film's stamps have gaps: choose another part by --start and --end",

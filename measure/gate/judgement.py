@@ -37,6 +37,7 @@ class Cause:
     Attributes:
         kind: of `measure.gate.reasons`.
         sentence: what is wrong, with the figure and its usual range.
+        figure: these two alone.
         fix: what can be done.
         check: the score that shows it.
         value: its figure, in the unit that the sentence names; None where none could be measured.
@@ -46,6 +47,7 @@ class Cause:
 
     kind: str
     sentence: str
+    figure: str = ""
     fix: str
     check: str
     value: float | None
@@ -193,7 +195,8 @@ def _cause(gate: Gate, place: int, value: float, p: float) -> Cause:
         shown = check.shown(score.sign * value)
         low, high = (check.shown(float(end)) for end in np.quantile(column, _USUAL))
         usual = f"of simulated clips, 98 % have {low:.3g} to {high:.3g}"
+    figure = f"{score.what}: {shown:.3g}; {usual}"
     return Cause(
-        kind=score.reason, sentence=f"{reason.sentence} ({score.what}: {shown:.3g}; {usual})", fix=reason.fix,
-        check=score.name, value=shown, p=p,
+        kind=score.reason, sentence=f"{reason.sentence} ({figure})", figure=figure, fix=reason.fix, check=score.name,
+        value=shown, p=p,
     )  # fmt: skip

@@ -19,36 +19,38 @@ class Reason:
 
 
 REASONS: dict[str, Reason] = {
+    "scene-cut": Reason(
+        sentence="the picture cuts to another scene",
+        fix="choose a part of the film between two cuts by --start and --end",
+    ),
+    "too-few-frames": Reason(sentence="there are too few frames", fix="give a longer film"),
+    "low-frame-rate": Reason(sentence="there are too few frames a second", fix="film at 25 frames a second or more"),
+    "repeated-frames": Reason(
+        sentence="frames are repeated", fix="give a film whose frames are all different, or one taken in better light"
+    ),
+    "too-dark": Reason(
+        sentence="the picture is too dark, too flat or too noisy", fix="film by daylight, or expose longer"
+    ),
     "no-motion": Reason(
         sentence="nothing in the picture moves like a flag",
         fix="crop to the flag, or choose a part of the film in which it flies",
     ),
+    "moving-camera": Reason(
+        sentence="the camera moves, and the background does not show how",
+        fix="film from a tripod, with something that stands still in the picture",
+    ),
     "cut-off": Reason(
         sentence="the picture's edge cuts through the moving cloth",
         of_motion=True,
-        fix="crop or film so that the whole flag is in the frame",
+        fix="film so that the whole flag is in the picture, or choose another by --flag",
     ),
-    "moving-camera": Reason(
-        sentence="the camera moves: the background shifts", fix="film from a tripod, or stabilise the film first"
-    ),
-    "repeated-frames": Reason(
-        sentence="frames are repeated: the clip loops or stops for a part of it",
-        fix="give a film whose frames are all different",
-    ),
-    "too-few-frames": Reason(sentence="there are too few frames", fix="give a longer film"),
-    "low-frame-rate": Reason(
-        sentence="frames look duplicated: the real frame rate is below the model's",
-        fix="film at the model's rate or more",
-    ),
-    "too-dark": Reason(
-        sentence="the picture is darker, flatter or noisier than the training clips",
-        fix="film by daylight, or expose longer",
-    ),
-    "several-flags": Reason(sentence="more than one region moves", fix="crop to one flag", of_motion=True),
     "scale": Reason(
-        sentence="the flag is larger or smaller in the picture than in the training clips",
-        fix="crop so that the flag takes a half to most of the frame",
+        sentence="the flag is too small or too large in the picture",
+        fix="film from nearer, so that the flag spans 100 pixels or more",
         of_motion=True,
+    ),
+    "several-flags": Reason(
+        sentence="more than one region moves", fix="choose one by --flag, or crop to it", of_motion=True
     ),
     "unlike-cloth": Reason(
         sentence="the motion is unlike that of simulated cloth",
@@ -56,3 +58,4 @@ REASONS: dict[str, Reason] = {
         of_motion=True,
     ),
 }
+"""By kind, in the order in which they are stated: what is wrong with the recording before what follows from it."""

@@ -2,7 +2,7 @@
 
 The list of films was fixed before the first was measured (`tests.validation.vtk_films.designs`). Each is measured with
 the flag's size, once with the area weight open and once with a range about the true one. FLAGDATA_FILMS names the
-folder of the films, where those that are missing are made; FLAGDATA_FILMS_ONLY names beginnings of names.
+folder of the films, where those that are missing are made; FLAGDATA_FILMS_ONLY gives patterns of their names.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Mapping, Sequence
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -57,9 +58,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 
 def chosen(found: Sequence[Design]) -> list[Design]:
-    """Those whose names begin as FLAGDATA_FILMS_ONLY says, all by default."""
-    only = tuple(os.environ.get("FLAGDATA_FILMS_ONLY", "").split())
-    return [one for one in found if one.name.startswith(only or "")]
+    """Those whose names match one of the patterns of FLAGDATA_FILMS_ONLY, all by default."""
+    only = os.environ.get("FLAGDATA_FILMS_ONLY", "*").split()
+    return [one for one in found if any(fnmatch(one.name, pattern) for pattern in only)]
 
 
 def answers(design: Design, found: Network, gate: Gate, *, seed: int) -> dict[str, Any]:

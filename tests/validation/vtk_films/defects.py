@@ -89,7 +89,7 @@ class Makings:
 
     def scene(self, **change: object) -> Scene:
         """What a design shows, with something else in it."""
-        design = replace(self.design(), duration=_SECONDS, start=1.0, **change)  # type: ignore[arg-type]
+        design = replace(self.design(), duration=3.6, start=0.2, **change)  # type: ignore[arg-type]
         return scene_of(design, read(REFERENCE, design.run))
 
     def drawn(self, scene: Scene) -> Source:

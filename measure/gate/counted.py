@@ -1,0 +1,86 @@
+"""Why a film cannot be measured, by what was counted while it was made fit: each reason with a figure to be checked.
+
+The reasons are in the order of `REASONS`: a fault of the recording comes before the faults that it brings about.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from flagdata.findings import Finding, Severity
+from measure.gate.reasons import REASONS
+from measure.gate.watch import FilmWatch
+from models.conditioning import Conditioning, Follower
+
+_REPEATED = 0.5
+"""Share of frames that look like an earlier one, above which a film loops or stands still."""
+_DARK, _FLAT = 35.0, 4.0
+"""Gray levels: of the brightest hundredth of the picture, and of the contrast, below which it is too dark."""
+_NOISY = 0.35
+"""Noise of a pixel over the picture's contrast, above which cloth is lost in it."""
+_LOST = 0.1
+"""Share of frames in which the background is not found, above which the camera's motion is unknown."""
+_RESTING = 25
+"""Pixels of the small copies with an edge at rest, below which nothing in the picture stands still."""
+_AT_EDGE, _AT_EDGE_MOVING = 0.08, 0.3
+"""Share of the frames in which cloth moves at one edge of the picture, above which it is cut off; and of a camera that
+moves, along whose edges the background moves too."""
+_SMALL = 40.0
+"""Pixels of the film that the cloth's places span at least."""
+
+
+def reasons(watch: FilmWatch, found: Conditioning, follower: Follower) -> tuple[Finding, ...]:
+    """All of them.
+
+    Args:
+        watch: that looked at all frames.
+        found: camera and flag.
+        follower: that followed the camera through all frames.
+    """
+    of = {finding.kind: finding for finding in _all(watch, found, follower)}
+    return tuple(of[kind] for kind in REASONS if kind in of)
+
+
+def _all(watch: FilmWatch, found: Conditioning, follower: Follower) -> Iterator[Finding]:
+    height, width = watch.shape
+    region = found.region
+    box = None if region is None else tuple(edge / found.scale for edge in region.box)
+    cuts = watch.cuts()
+    if cuts:
+        times = "once" if len(cuts) == 1 else f"{len(cuts)} times"
+        yield _reason("scene-cut", len(cuts), f"{times}, first at {cuts[0]:.1f} s")
+    if watch.brightness < _DARK or watch.contrast < _FLAT:
+        what = f"its brightest hundredth has gray level {watch.brightness:.0f} of 255, its contrast is "
+        yield _reason("too-dark", watch.brightness, f"{what}{watch.contrast:.1f}")
+    elif watch.noise > _NOISY * watch.contrast:
+        what = f"noise of {watch.noise:.1f} gray levels at a contrast of {watch.contrast:.1f}"
+        yield _reason("too-dark", watch.noise / watch.contrast, what)
+    if region is None or box is None:
+        yield _reason("no-motion", 0.0, "no region of the picture moves like cloth")
+        return
+    shares = (box[0] / width, box[1] / height, min(box[2] / width, 1.0), min(box[3] / height, 1.0))
+    twins = watch.twins(shares)
+    if twins > _REPEATED:
+        yield _reason("repeated-frames", twins, f"{twins:.0%} of the frames look like another one")
+    total = max(len(follower.path), 1)
+    if follower.lost > _LOST * total:
+        what = f"in {follower.lost} of {total} frames the background was not found"
+        yield _reason("moving-camera", follower.lost / total, what)
+    resting = watch.resting()
+    if not len(found.camera.corners) and resting < _RESTING:
+        yield _reason("moving-camera", float(resting), "nothing in the picture stands still")
+    least = _AT_EDGE_MOVING if found.camera.moves else _AT_EDGE
+    edges = {name: share for name, share in watch.at_edges(region.mask).items() if share > least}
+    if edges:
+        what = ", ".join(f"at the {name} edge in {share:.0%} of the frames" for name, share in edges.items())
+        yield _reason("cut-off", max(edges.values()), what)
+    span = max(box[2] - box[0], box[3] - box[1])
+    if span < _SMALL:
+        yield _reason("scale", span, f"its places span {span:.0f} px, {_SMALL:.0f} are needed")
+
+
+def _reason(kind: str, value: float, what: str) -> Finding:
+    reason = REASONS[kind]
+    return Finding(
+        kind=kind, severity=Severity.ERROR, what=f"{reason.sentence}: {what}", value=float(value), fix=reason.fix
+    )

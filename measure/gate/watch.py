@@ -1,0 +1,194 @@
+"""What is counted of a film while it is read: cuts, loops, light, and how often cloth reaches the picture's edge.
+
+It looks at small copies of whole frames, some 25 a second, and keeps of each what is small: a thumbnail, and strips
+along the picture's four edges. What it counts can be checked by eye on the film.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+SIDE = 240
+"""Longer side [px] of the small copies."""
+_RATE = 25.0
+"""Frames a second that are looked at, about."""
+_STRIP = 2
+"""Width [px] of the strips along the edges."""
+_THUMB = 40
+"""Longer side [px] of the thumbnails."""
+_COMPARED = 500
+"""Frames at most of which each is compared with each other, for loops: the first 20 s."""
+_APART = 4
+"""Least number of frames between two that are alike."""
+_CUT, _CUT_TIMES = 6.0, 3.0
+"""Mean change of the thumbnail [gray levels], and its ratio to the largest change about it, from which on it is a cut:
+a camera that turns changes many frames."""
+_ABOUT = 5
+"""Changes before and after a cut that it is compared with."""
+_TWIN = 0.1
+"""Distance of a frame's nearest twin, over the median distance of frames, below which it repeats that one. Chosen on
+the films with defects of even number and the films without defects."""
+_SAMPLED = 10
+"""Every so many-th frame that is looked at is kept as it is, up to `_KEPT`."""
+_KEPT = 40
+_ROUGH = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
+"""The difference of two Laplacians; white noise of deviation σ leaves 6 σ (Immerkær 1996)."""
+_MEDIAN = 0.6745
+_SLOPE = 6.0
+"""Gray levels a pixel from which on there is an edge in a small copy."""
+_RESTING = 0.8
+"""Length of an edge's mean gradient over the mean of its length, from which on it is at rest."""
+
+Picture = NDArray[np.uint8]
+
+
+@dataclass(eq=False)
+class FilmWatch:
+    """Looks at a film's frames, in order.
+
+    Args:
+        rate: of the film [Hz].
+
+    Attributes:
+        shape: height and width of its frames; (0, 0) before the first.
+        times: of the frames that were looked at [s].
+    """
+
+    rate: float
+    shape: tuple[int, int] = (0, 0)
+    times: list[float] = field(default_factory=list)
+    _frames: int = 0
+    _thumbs: list[NDArray[np.float32]] = field(default_factory=list)
+    _strips: list[NDArray[np.uint8]] = field(default_factory=list)
+    _sample: list[Picture] = field(default_factory=list)
+    _bright: list[float] = field(default_factory=list)
+    _noise: list[float] = field(default_factory=list)
+
+    def look(self, time: float, picture: Picture) -> None:
+        """The next frame, (height, width) gray of the whole picture."""
+        every = max(1, round(self.rate / _RATE))
+        self._frames += 1
+        if (self._frames - 1) % every:
+            return
+        self.shape = (picture.shape[0], picture.shape[1])
+        small = _shrunk(picture, SIDE)
+        self.times.append(time)
+        self._thumbs.append(_shrunk(small, _THUMB).astype(np.float32))
+        self._strips.append(_edges(small))
+        if len(self.times) % _SAMPLED == 1 and len(self._sample) < _KEPT:
+            self._sample.append(small)
+            self._bright.append(float(np.quantile(picture[::4, ::4], 0.99)))
+            rough = cv2.filter2D(picture.astype(np.float32), -1, _ROUGH)
+            self._noise.append(float(np.median(np.abs(rough[2:-2, 2:-2]))) / (_MEDIAN * 6))
+
+    @property
+    def small(self) -> tuple[int, int]:
+        """Height and width of the small copies."""
+        height, width = self._sample[0].shape
+        return height, width
+
+    @property
+    def brightness(self) -> float:
+        """Gray level of the brightest hundredth of the picture."""
+        return float(np.median(self._bright)) if self._bright else 0.0
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of a pixel's noise [gray levels]."""
+        return float(np.median(self._noise)) if self._noise else 0.0
+
+    @property
+    def contrast(self) -> float:
+        """Standard deviation of the gray levels in the mean of the small copies."""
+        return float(np.stack(self._sample).mean(axis=0).std()) if self._sample else 0.0
+
+    def cuts(self) -> list[float]:
+        """Instants at which the picture changes to another at once [s]."""
+        if len(self._thumbs) < 3:
+            return []
+        change = np.array([np.abs(b - a).mean() for a, b in zip(self._thumbs, self._thumbs[1:], strict=False)])
+        found = []
+        for k, own in enumerate(change):
+            about = np.concatenate([change[max(0, k - _ABOUT) : k], change[k + 1 : k + 1 + _ABOUT]])
+            if own > _CUT and own > _CUT_TIMES * about.max(initial=0.0):
+                found.append(self.times[k + 1])
+        return found
+
+    def twins(self, box: tuple[float, float, float, float] | None = None) -> float:
+        """Share of the frames that look like another one four frames away or more, 0 to 1: a loop, or frames that are
+        shown again.
+
+        Args:
+            box: left, top, right and bottom of what moves, in shares of the picture; None for all of it.
+        """
+        thumbs = np.stack(self._thumbs[:_COMPARED]) if self._thumbs else np.zeros((0, 1, 1), np.float32)
+        if len(thumbs) < 3 * _APART:
+            return 0.0
+        if box is not None:
+            height, width = thumbs.shape[1:]
+            left, top = int(box[0] * width), int(box[1] * height)
+            thumbs = thumbs[:, top : int(box[3] * height) + 1, left : int(box[2] * width) + 1]
+        flat = thumbs.reshape(len(thumbs), -1)
+        flat = flat - flat.mean(axis=0)
+        square = np.square(flat).sum(axis=1)
+        distance = np.sqrt(np.maximum(square[:, None] + square[None] - 2 * flat @ flat.T, 0.0))
+        place = np.arange(len(flat))
+        far = np.abs(place[:, None] - place[None]) >= _APART
+        usual = float(np.median(distance[far]))
+        nearest = np.where(far, distance, np.inf).min(axis=1)
+        return float((nearest < _TWIN * usual).mean()) if usual > 0 else 1.0
+
+    def at_edges(self, mask: NDArray[np.bool_]) -> dict[str, float]:
+        """Share of the frames in which cloth moves at the picture's left, top, right and lower edge.
+
+        Args:
+            mask: (height, width) all places that the cloth visits, in any scale.
+        """
+        height, width = self.small
+        wide = np.asarray(cv2.resize(mask.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST))
+        size = max(float(np.ptp(np.flatnonzero(wide.any(axis=k)))) if wide.any() else 0.0 for k in (0, 1))
+        near = cv2.dilate(wide, np.ones((5, 5), np.uint8))
+        strips = np.stack(self._strips).astype(np.int16)
+        away = np.abs(strips - np.median(strips, axis=0)) > max(_EDGE_NOISES * self.noise / 2, _EDGE_CHANGE)
+        moving = away & (_edges(near)[None] > 0)
+        least = max(3.0, _EDGE_SHARE * size)
+        found, begin = {}, 0
+        for name, length in (("left", height), ("top", width), ("right", height), ("lower", width)):
+            own = moving[:, begin : begin + length].sum(axis=1)
+            found[name] = float((own >= least).mean())
+            begin += length
+        return found
+
+    def resting(self) -> int:
+        """Pixels of the small copies in which an edge stays where it is: of background, pole and hoist."""
+        if len(self._sample) < 3:
+            return 0
+        mean, length = np.zeros((2, *self.small), np.float32), np.zeros(self.small, np.float32)
+        for one in self._sample:
+            gray = cv2.GaussianBlur(one.astype(np.float32), (0, 0), 1.0)
+            slope = np.stack([cv2.Sobel(gray, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)])
+            mean += slope / len(self._sample)
+            length += np.hypot(*slope) / len(self._sample)
+        return int(((np.hypot(*mean) > _RESTING * length) & (length > _SLOPE)).sum())
+
+
+_EDGE_CHANGE, _EDGE_NOISES = 8.0, 5.0
+"""Gray levels, and deviations of the noise, from the median in time from which on a pixel at the edge shows cloth."""
+_EDGE_SHARE = 0.05
+"""Share of the cloth's size that has to move along an edge."""
+
+
+def _shrunk(picture: Picture, side: int) -> Picture:
+    scale = min(1.0, side / max(picture.shape))
+    size = (max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale)))
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def _edges(small: Picture) -> NDArray[np.uint8]:
+    """Means over the strips along the left, top, right and lower edge, one after the other."""
+    parts = (small[:, :_STRIP].mean(1), small[:_STRIP].mean(0), small[:, -_STRIP:].mean(1), small[-_STRIP:].mean(0))
+    return np.concatenate(parts).round().astype(np.uint8)
