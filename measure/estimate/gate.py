@@ -190,8 +190,9 @@ class Verdict:
             what = self.reasons[0].what
             return f"there is nothing to measure, so that no number is given, not even with --anyway: {what}"
         if self.faults:
-            more = len(self.reasons) - 1
-            return f"the film cannot be measured: {self.faults[0].what}" + (f"; {more} more reasons" if more > 1 else "; 1 more reason" if more else "")
+            others = len(self.reasons) - 1
+            more = "" if not others else f" ({others} more {'reasons' if others > 1 else 'reason'})"
+            return f"the film cannot be measured: {self.faults[0].what}{more}"
         if self.unlike:
             return f"this is not like what the network was trained on: {self.reasons[0].what}; {windows} ({rate})"
         return f"like what the network was trained on; {windows} ({rate})"

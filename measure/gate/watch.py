@@ -38,10 +38,12 @@ _KEPT = 40
 _ROUGH = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
 """The difference of two Laplacians; white noise of deviation σ leaves 6 σ (Immerkær 1996)."""
 _MEDIAN = 0.6745
-_SLOPE = 6.0
+_SLOPE = 3.0
 """Gray levels a pixel from which on there is an edge in a small copy."""
-_RESTING = 0.8
-"""Length of an edge's mean gradient over the mean of its length, from which on it is at rest."""
+_RESTING = 0.6
+"""An edge is at rest where its gradient, along the mean one, is never below this share of it."""
+_TOGETHER = 5
+"""Copies that are compared for edges at rest: two seconds."""
 
 Picture = NDArray[np.uint8]
 
@@ -164,16 +166,10 @@ class FilmWatch:
         return found
 
     def resting(self) -> int:
-        """Pixels of the small copies in which an edge stays where it is: of background, pole and hoist."""
-        if len(self._sample) < 3:
-            return 0
-        mean, length = np.zeros((2, *self.small), np.float32), np.zeros(self.small, np.float32)
-        for one in self._sample:
-            gray = cv2.GaussianBlur(one.astype(np.float32), (0, 0), 1.0)
-            slope = np.stack([cv2.Sobel(gray, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)])
-            mean += slope / len(self._sample)
-            length += np.hypot(*slope) / len(self._sample)
-        return int(((np.hypot(*mean) > _RESTING * length) & (length > _SLOPE)).sum())
+        """Pixels of the small copies in which an edge stays where it is for two seconds, as those of background, pole
+        and hoist do: the median over the film, of which a camera may drift."""
+        counts = [_resting(self._sample[k : k + _TOGETHER]) for k in range(0, len(self._sample) - 2, _TOGETHER)]
+        return int(np.median(counts)) if counts else 0
 
 
 _EDGE_CHANGE, _EDGE_NOISES = 8.0, 5.0
@@ -192,3 +188,13 @@ def _edges(small: Picture) -> NDArray[np.uint8]:
     """Means over the strips along the left, top, right and lower edge, one after the other."""
     parts = (small[:, :_STRIP].mean(1), small[:_STRIP].mean(0), small[:, -_STRIP:].mean(1), small[-_STRIP:].mean(0))
     return np.concatenate(parts).round().astype(np.uint8)
+
+
+def _resting(sample: list[Picture]) -> int:
+    """Pixels of pictures (height, width) in which an edge stays where it is."""
+    gray = [cv2.GaussianBlur(one.astype(np.float32), (0, 0), 1.0) for one in sample]
+    slope = np.stack([[cv2.Sobel(one, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)] for one in gray])
+    mean = slope.mean(axis=0)  # (2, height, width)
+    length = np.hypot(*mean)
+    along = (slope * (mean / np.maximum(length, 1e-6))).sum(axis=1)
+    return int(((along.min(axis=0) > _RESTING * length) & (length > _SLOPE)).sum())

@@ -1,0 +1,132 @@
+"""Faults of a film are counted: drawn films of which it is known what is wrong, and how much of it."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from flagdata.findings import Finding
+from flagdata.rng import stream
+from measure.gate.counted import reasons
+from measure.gate.reasons import REASONS
+from measure.gate.watch import FilmWatch
+from models.conditioning import Follower, conditioning_of
+
+Frames = NDArray[np.uint8]
+RATE, COUNT, HEIGHT, WIDTH = 25.0, 60, 180, 240
+FLAG = (70, 50, 90, 60)
+"""x, y, width and height at rest [px]."""
+
+
+def drawn(
+    *, box: tuple[int, int, int, int] = FLAG, scenery: bool = True, shift: NDArray[np.float64] | None = None,
+    noise: float = 1.0,
+) -> Frames:  # fmt: skip
+    """(COUNT, HEIGHT, WIDTH): striped cloth whose waves grow towards its free end and never come again.
+
+    Args:
+        scenery: whether the background has features.
+        shift: (COUNT, 2) of all that is shown, to the right and down [px].
+    """
+    rng = stream(5, "drawn")
+    rough = rng.uniform(40, 220, (HEIGHT // 10 + 4, WIDTH // 10 + 4))
+    pad = 20
+    high, wide = HEIGHT + 2 * pad, WIDTH + 2 * pad
+    behind = cv2.resize(rough, (wide, high), interpolation=cv2.INTER_CUBIC) if scenery else np.full((high, wide), 150.0)
+    rows, columns = np.mgrid[:high, :wide].astype(np.float64)
+    x, y, width, height = box[0] + pad, box[1] + pad, box[2], box[3]
+    along = (columns - x) / width
+    out = []
+    for k in range(COUNT):
+        time = k / RATE
+        phases = [2 * np.pi * (a * along - b * time) for a, b in ((1.4, 2.3), (0.9, 1.31), (2.1, 3.77))]
+        down = (rows - y - 0.07 * height * along * np.sum(np.sin(phases), axis=0)) / height
+        cloth = np.where((down * 4).astype(int) % 2, 200.0, 60.0) + 15 * np.sum(np.cos(phases), axis=0)
+        picture = np.where((along >= 0) & (along < 1) & (down >= 0) & (down < 1), cloth, behind)
+        dx, dy = (0.0, 0.0) if shift is None else shift[k]
+        moved = cv2.warpAffine(
+            picture, np.array([[1.0, 0.0, pad - dx], [0.0, 1.0, pad - dy]]), (WIDTH, HEIGHT),
+            flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP,
+        )  # fmt: skip
+        out.append(moved + rng.normal(0, noise, moved.shape))
+    return np.clip(np.rint(out), 0, 255).astype(np.uint8)
+
+
+def counted(frames: Frames) -> list[Finding]:
+    """The faults of a film at 25 Hz."""
+    found, watch = conditioning_of(frames, size=120), FilmWatch(rate=RATE)
+    follower = Follower(found)
+    for k, frame in enumerate(frames):
+        watch.look(k / RATE, frame)
+        follower.show(frame)
+    return list(reasons(watch, found, follower))
+
+
+def kinds(frames: Frames) -> list[str]:
+    return [fault.kind for fault in counted(frames)]
+
+
+@pytest.fixture(scope="module")
+def plain() -> Frames:
+    return drawn()
+
+
+def test_a_whole_flag_before_a_background_has_no_fault(plain: Frames) -> None:
+    assert kinds(plain) == []
+    assert kinds(drawn(noise=3.0)) == []
+
+
+def test_faults_are_stated_in_the_order_of_the_table(plain: Frames) -> None:
+    dark = (plain[:, :, : FLAG[0] + FLAG[2] // 2] // 12).astype(np.uint8)
+    found = kinds(dark)
+    assert found[0] == "too-dark"
+    assert found == sorted(found, key=list(REASONS).index)
+
+
+def test_cloth_at_an_edge_is_counted_by_frames_and_named_by_its_edge(plain: Frames) -> None:
+    middle = FLAG[0] + FLAG[2] // 2
+    (fault,) = counted(np.ascontiguousarray(plain[:, :, :middle]))
+    assert (fault.kind, fault.value) == ("cut-off", 1.0)
+    assert fault.what.endswith("at the right edge in 100% of the frames")
+    (mirrored,) = counted(np.ascontiguousarray(plain[:, :, :middle][:, :, ::-1]))
+    assert mirrored.what.endswith("at the left edge in 100% of the frames")
+
+
+def test_a_cut_to_another_scene_has_its_instant(plain: Frames) -> None:
+    other = 255 - np.roll(plain, WIDTH // 3, axis=2)
+    fault = counted(np.concatenate([plain[:25], other[25:]]))[0]
+    assert (fault.kind, fault.value) == ("scene-cut", 1.0)
+    assert "once, first at 1.0 s" in fault.what
+
+
+def test_a_loop_is_counted_by_the_frames_that_look_like_others(plain: Frames) -> None:
+    rng = stream(3, "loop")
+    looped = plain[np.arange(2 * COUNT) % 13].astype(np.float64) + rng.normal(0, 1, (2 * COUNT, *plain.shape[1:]))
+    fault = next(
+        fault for fault in counted(np.clip(looped, 0, 255).astype(np.uint8)) if fault.kind == "repeated-frames"
+    )
+    assert fault.value == 1.0
+    assert fault.what.endswith("100% of the frames look like another one")
+
+
+def test_a_film_in_which_nothing_moves_and_one_that_is_black_say_so(plain: Frames) -> None:
+    noise = stream(4, "still").normal(0, 1, plain.shape)
+    still = np.clip(plain[:1] + noise, 0, 255).astype(np.uint8)
+    assert kinds(still) == ["no-motion"]
+    assert kinds(np.clip(8 + noise, 0, 255).astype(np.uint8))[0] == "too-dark"
+
+
+def test_a_camera_that_moves_before_an_even_background_is_named() -> None:
+    path = np.stack([14 * np.sin(2.6 * np.arange(COUNT) / RATE), 9 * np.cos(2 * np.arange(COUNT) / RATE)], axis=1)
+    assert kinds(drawn(shift=path, scenery=False))[0] == "moving-camera"
+    assert kinds(drawn(scenery=False)) == []
+    assert kinds(drawn(shift=0.3 * path)) == []
+
+
+def test_a_flag_of_few_pixels_is_too_small() -> None:
+    (fault,) = counted(drawn(box=(100, 60, 24, 18), noise=0.3))
+    assert fault.kind == "scale"
+    assert fault.value is not None
+    assert 20 <= fault.value <= 36  # its length at rest, and the waves about it
