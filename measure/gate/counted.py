@@ -20,7 +20,7 @@ _NOISY = 0.35
 """Noise of a pixel over the picture's contrast, above which cloth is lost in it."""
 _LOST = 0.1
 """Share of frames in which the background is not found, above which the camera's motion is unknown."""
-_RESTING = 25
+_RESTING = 100
 """Pixels of the small copies with an edge at rest, below which nothing in the picture stands still."""
 _AT_EDGE, _AT_EDGE_MOVING = 0.08, 0.3
 """Share of the frames in which cloth moves at one edge of the picture, above which it is cut off; and of a camera that
