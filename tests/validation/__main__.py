@@ -14,6 +14,7 @@ VALIDATIONS = {
     "flutter": "tests.validation.flutter",
     "foreign": "tests.validation.foreign",
     "gate": "tests.validation.gate",
+    "gate-films": "tests.validation.gate_films",
     "hanging-cloth": "tests.validation.hanging_cloth",
     "hostile": "tests.validation.hostile",
     "measure-windows": "tests.validation.measure_windows",

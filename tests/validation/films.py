@@ -25,6 +25,7 @@ from measure.estimate.measuring import Measurement, measure
 from measure.estimate.options import Options
 from measure.estimate.similarity import FlagSize
 from measure.estimate.source import Network, Reading, gate_beside, network, subjects
+from measure.gate.reasons import REASONS
 from measure.shares import Share
 from tests.evidence import ABSENT, REFERENCE
 from tests.validation.environments import VTK
@@ -86,7 +87,8 @@ def answer(path: Path, found: Network, gate: Gate, options: Options) -> dict[str
             subject.film, found.estimator, gate=gate, dependence=of_model(found.estimator), options=options
         )
     except FlagdataError as error:
-        return {"refused": True, "reasons": [error.kind], "why": str(error)}
+        kind = next((kind for kind, one in REASONS.items() if error.what.startswith(one.sentence)), error.kind)
+        return {"refused": True, "reasons": [kind], "why": error.what}
     return {"refused": measured.verdict.refused, **_reasons(measured), **_quantities(measured)}
 
 

@@ -298,7 +298,7 @@ DEFECTS: Mapping[str, tuple[Callable[[Makings], Source], tuple[str, ...]]] = {
     "dark": (dark, ("too-dark",)),
     "overlapping flags": (overlapping, ("several-flags",)),
     "small": (small, ("scale",)),
-    "no flag": (no_flag, ("no-motion", "unlike-cloth")),
+    "no flag": (no_flag, ("no-motion", "unlike-cloth", "unlike-training")),
     "still": (still, ("no-motion",)),
     "scenes": (scenes, ("scene-cut",)),
     "loop": (looped, ("repeated-frames",)),
