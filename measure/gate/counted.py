@@ -25,6 +25,8 @@ _RESTING = 100
 _AT_EDGE, _AT_EDGE_MOVING = 0.08, 0.3
 """Share of the frames in which cloth moves at one edge of the picture, above which it is cut off; and of a camera that
 moves, along whose edges the background moves too."""
+_GRAIN = 0.38
+"""See `FilmWatch.grain`: of nine films of whole flags the least was 0.51, of a tree 0.28."""
 _SMALL = 40.0
 """Pixels of the film that the cloth's places span at least."""
 
@@ -56,7 +58,11 @@ def _all(watch: FilmWatch, found: Conditioning, follower: Follower) -> Iterator[
         what = f"noise of {watch.noise:.1f} gray levels at a contrast of {watch.contrast:.1f}"
         yield _reason("too-dark", watch.noise / watch.contrast, what)
     if region is None or box is None:
-        yield _reason("no-motion", 0.0, "no region of the picture moves like cloth")
+        spot = watch.spot()
+        if 0 < spot < _SMALL:
+            yield _reason("scale", spot, f"what moves spans {spot:.0f} px, {_SMALL:.0f} are needed")
+        else:
+            yield _reason("no-motion", 0.0, "no region of the picture moves like cloth")
         return
     shares = (box[0] / width, box[1] / height, min(box[2] / width, 1.0), min(box[3] / height, 1.0))
     twins = watch.twins(shares)
@@ -66,17 +72,19 @@ def _all(watch: FilmWatch, found: Conditioning, follower: Follower) -> Iterator[
     if follower.lost > _LOST * total:
         what = f"in {follower.lost} of {total} frames the background was not found"
         yield _reason("moving-camera", follower.lost / total, what)
-    resting = watch.resting()
-    if not len(found.camera.corners) and resting < _RESTING:
-        yield _reason("moving-camera", float(resting), "nothing in the picture stands still")
     least = _AT_EDGE_MOVING if found.camera.moves else _AT_EDGE
     edges = {name: share for name, share in watch.at_edges(region.mask).items() if share > least}
     if edges:
         what = ", ".join(f"at the {name} edge in {share:.0%} of the frames" for name, share in edges.items())
         yield _reason("cut-off", max(edges.values()), what)
+    elif not len(found.camera.corners) and watch.resting() < _RESTING:  # cloth that is cut off hides what stands still
+        yield _reason("moving-camera", float(watch.resting()), "nothing in the picture stands still")
     span = max(box[2] - box[0], box[3] - box[1])
     if span < _SMALL:
         yield _reason("scale", span, f"its places span {span:.0f} px, {_SMALL:.0f} are needed")
+    elif (grain := watch.grain(region.mask)) < _GRAIN:
+        what = f"it is as fine as leaves: averaged over a fortieth of the picture, {grain:.0%} of the change is left"
+        yield _reason("unlike-cloth", grain, what)
 
 
 def _reason(kind: str, value: float, what: str) -> Finding:

@@ -35,6 +35,11 @@ REASONS: dict[str, Reason] = {
         sentence="nothing in the picture moves like a flag",
         fix="crop to the flag, or choose a part of the film in which it flies",
     ),
+    "unlike-cloth": Reason(
+        sentence="the motion is unlike that of simulated cloth",
+        fix="make sure that the crop shows a flag on a pole and little else that moves",
+        of_motion=True,
+    ),
     "moving-camera": Reason(
         sentence="the camera moves, and the background does not show how",
         fix="film from a tripod, with something that stands still in the picture",
@@ -51,11 +56,6 @@ REASONS: dict[str, Reason] = {
     ),
     "several-flags": Reason(
         sentence="more than one region moves", fix="choose one by --flag, or crop to it", of_motion=True
-    ),
-    "unlike-cloth": Reason(
-        sentence="the motion is unlike that of simulated cloth",
-        fix="make sure that the crop shows a flag on a pole and little else that moves",
-        of_motion=True,
     ),
 }
 """By kind, in the order in which they are stated: what is wrong with the recording before what follows from it."""

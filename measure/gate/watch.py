@@ -45,6 +45,9 @@ _RESTING = 0.6
 _TOGETHER = 5
 """Copies that are compared for edges at rest: two seconds."""
 
+_SPOT_NOISES, _SPOT_CHANGE = 5.0, 3.0
+"""Deviation in time, over the median one and in gray levels, from which on a pixel belongs to a spot that changes."""
+
 Picture = NDArray[np.uint8]
 
 
@@ -64,6 +67,9 @@ class FilmWatch:
     shape: tuple[int, int] = (0, 0)
     times: list[float] = field(default_factory=list)
     _frames: int = 0
+    _last: NDArray[np.float32] | None = None
+    _fine: NDArray[np.float32] | None = None
+    _coarse: NDArray[np.float32] | None = None
     _thumbs: list[NDArray[np.float32]] = field(default_factory=list)
     _strips: list[NDArray[np.uint8]] = field(default_factory=list)
     _sample: list[Picture] = field(default_factory=list)
@@ -79,13 +85,22 @@ class FilmWatch:
         self.shape = (picture.shape[0], picture.shape[1])
         small = _shrunk(picture, SIDE)
         self.times.append(time)
-        self._thumbs.append(_shrunk(small, _THUMB).astype(np.float32))
+        self._thumbs.append(_averaged(small.astype(np.float32), _THUMB))
+        self._change(small.astype(np.float32))
         self._strips.append(_edges(small))
         if len(self.times) % _SAMPLED == 1 and len(self._sample) < _KEPT:
             self._sample.append(small)
             self._bright.append(float(np.quantile(picture[::4, ::4], 0.99)))
             rough = cv2.filter2D(picture.astype(np.float32), -1, _ROUGH)
             self._noise.append(float(np.median(np.abs(rough[2:-2, 2:-2]))) / (_MEDIAN * 6))
+
+    def _change(self, small: NDArray[np.float32]) -> None:
+        """Add up how much the picture changes, in itself and averaged."""
+        if self._last is not None:
+            fine, coarse = np.abs(small - self._last), np.abs(self._thumbs[-1] - self._thumbs[-2])
+            self._fine = fine if self._fine is None else self._fine + fine
+            self._coarse = coarse if self._coarse is None else self._coarse + coarse
+        self._last = small
 
     @property
     def small(self) -> tuple[int, int]:
@@ -144,6 +159,31 @@ class FilmWatch:
         nearest = np.where(far, distance, np.inf).min(axis=1)
         return float((nearest < _TWIN * usual).mean()) if usual > 0 else 1.0
 
+    def grain(self, mask: NDArray[np.bool_]) -> float:
+        """Share of the change that is left when pixels are averaged over a fortieth of the picture's longer side: of
+        cloth more than a half, of leaves less than a third.
+
+        Args:
+            mask: (height, width) where, in any scale.
+        """
+        if self._fine is None or self._coarse is None:
+            return 1.0
+        fine, coarse = (float(of[_resized(mask, of.shape)].mean()) for of in (self._fine, self._coarse))
+        return coarse / fine if fine > 0 else 1.0
+
+    def spot(self) -> float:
+        """Longer side of the largest spot that changes, in pixels of the film; 0 where none does."""
+        if len(self._sample) < 3:
+            return 0.0
+        deviation = np.stack(self._sample).astype(np.float32).std(axis=0)
+        moving = (deviation > max(_SPOT_NOISES * float(np.median(deviation)), _SPOT_CHANGE)).astype(np.uint8)
+        joined = cv2.morphologyEx(moving, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+        count, _, found, _ = cv2.connectedComponentsWithStats(joined)
+        if count < 2:
+            return 0.0
+        spot = found[1 + int(np.argmax(found[1:, cv2.CC_STAT_AREA]))]
+        return float(max(spot[cv2.CC_STAT_WIDTH], spot[cv2.CC_STAT_HEIGHT]) * max(self.shape) / max(self.small))
+
     def at_edges(self, mask: NDArray[np.bool_]) -> dict[str, float]:
         """Share of the frames in which cloth moves at the picture's left, top, right and lower edge.
 
@@ -151,7 +191,7 @@ class FilmWatch:
             mask: (height, width) all places that the cloth visits, in any scale.
         """
         height, width = self.small
-        wide = np.asarray(cv2.resize(mask.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST))
+        wide = _resized(mask, (height, width)).astype(np.uint8)
         size = max(float(np.ptp(np.flatnonzero(wide.any(axis=k)))) if wide.any() else 0.0 for k in (0, 1))
         near = cv2.dilate(wide, np.ones((5, 5), np.uint8))
         strips = np.stack(self._strips).astype(np.int16)
@@ -182,6 +222,16 @@ def _shrunk(picture: Picture, side: int) -> Picture:
     scale = min(1.0, side / max(picture.shape))
     size = (max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale)))
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def _averaged(picture: NDArray[np.float32], side: int) -> NDArray[np.float32]:
+    scale = side / max(picture.shape)
+    size = (max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale)))
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
+
+
+def _resized(mask: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    return cv2.resize(mask.astype(np.uint8), shape[::-1], interpolation=cv2.INTER_NEAREST).astype(bool)
 
 
 def _edges(small: Picture) -> NDArray[np.uint8]:

@@ -130,3 +130,17 @@ def test_a_flag_of_few_pixels_is_too_small() -> None:
     assert fault.kind == "scale"
     assert fault.value is not None
     assert 20 <= fault.value <= 36  # its length at rest, and the waves about it
+
+
+def test_what_moves_as_finely_as_leaves_is_no_cloth() -> None:
+    """Pixels that take one of two values by themselves: a pixel changes by half of their difference d on average, the
+    mean of 36 by √(2/π) σ with σ = d √½/6."""
+    leaves = drawn(box=(0, 0, 1, 1))
+    leaves[:, 60:130, 70:170] = stream(6, "leaves").integers(0, 2, (COUNT, 70, 100)) * 120 + 60
+    (fault,) = counted(leaves)
+    assert fault.kind == "unlike-cloth"
+    assert fault.value == pytest.approx(np.sqrt(2 / np.pi) * np.sqrt(0.5) / 6 / 0.5, abs=0.03)
+
+
+def test_a_spot_of_a_few_pixels_is_too_small_rather_than_still() -> None:
+    assert kinds(drawn(box=(100, 60, 12, 8), noise=0.3)) == ["scale"]

@@ -221,7 +221,7 @@ def small(makings: Makings) -> Source:
 
 
 def no_flag(makings: Makings) -> Source:
-    """Trees in the wind, water, or a person who waves."""
+    """Trees in the wind, water, or a person who waves, whose drawing loops."""
     if makings.number % 3 == 0:
         scene = makings.scene()
         times = np.arange(scene.frames) / float(scene.rate)
@@ -298,7 +298,7 @@ DEFECTS: Mapping[str, tuple[Callable[[Makings], Source], tuple[str, ...]]] = {
     "dark": (dark, ("too-dark",)),
     "overlapping flags": (overlapping, ("several-flags",)),
     "small": (small, ("scale",)),
-    "no flag": (no_flag, ("no-motion", "unlike-cloth", "unlike-training")),
+    "no flag": (no_flag, ("no-motion", "unlike-cloth", "unlike-training", "repeated-frames")),
     "still": (still, ("no-motion",)),
     "scenes": (scenes, ("scene-cut",)),
     "loop": (looped, ("repeated-frames",)),
