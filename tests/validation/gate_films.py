@@ -83,8 +83,8 @@ def page(sheet: Mapping[str, Any]) -> str:
         "",
         (
             f"Model {sheet['model']}; {len(sheet['films'])} films of {len(DEFECTS)} kinds, made of ArcSim's runs "
-            "filmed by VTK and of drawn scenes (`python -m tests.validation gate-films`). Thresholds were chosen on one "
-            "half."
+            "filmed by VTK and of drawn scenes (`python -m tests.validation gate-films`). Thresholds were chosen on "
+            "one half."
         ),
         "",
         "| half | films | refused | the true reason first | among the reasons |",
