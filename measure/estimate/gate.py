@@ -41,6 +41,7 @@ class Reason:
         p: probability that a familiar clip is at least as strange; None of what was counted.
         fix: what the user can do about it.
         blank: whether there is nothing to measure in the window, so that no number is given of it in any case.
+        value: the figure of what was counted.
     """
 
     kind: str
@@ -48,15 +49,16 @@ class Reason:
     p: float | None
     fix: str = "crop to the flag by --crop, give another film, or look at it with --anyway"
     blank: bool = False
+    value: float | None = None
 
     @classmethod
     def counted(cls, fault: Finding) -> Reason:
         """A fault of the film."""
-        return cls(kind=fault.kind, what=fault.what, p=None, fix=fault.fix or cls.fix)
+        return cls(kind=fault.kind, what=fault.what, p=None, fix=fault.fix or cls.fix, value=fault.value)
 
     def as_dict(self) -> dict[str, Any]:
         """JSON values."""
-        return {"kind": self.kind, "what": self.what, "p": self.p, "fix": self.fix}
+        return {"kind": self.kind, "what": self.what, "p": self.p, "value": self.value, "fix": self.fix}
 
 
 class Gate(Protocol):
@@ -187,7 +189,7 @@ class Verdict:
             else f"windows with p at {self.level:.2g} or below: {strange} of {count}, refused from {self.refusing} on"
         )
         if not self.measurable:
-            what = self.reasons[0].what
+            what = self.window_reasons[0].what
             return f"there is nothing to measure, so that no number is given, not even with --anyway: {what}"
         if self.faults:
             others = len(self.reasons) - 1

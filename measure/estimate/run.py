@@ -84,7 +84,7 @@ def measured(
         film=found.film, rate=found.rate, duration=found.duration, network=found.model, refused=verdict.refused,
         verdict=verdict.sentence,
         reasons=tuple(
-            Finding(kind=reason.kind, severity=Severity.WARNING, what=reason.what, value=reason.p, fix=reason.fix)
+            Finding(kind=reason.kind, severity=Severity.WARNING, what=reason.what, value=reason.value if reason.p is None else reason.p, fix=reason.fix)
             for reason in verdict.reasons
         ),
         findings=found.noticed(anyway=anyway), figures=subject.film.as_dict(),

@@ -193,7 +193,7 @@ class FilmWatch:
         height, width = self.small
         wide = _resized(mask, (height, width)).astype(np.uint8)
         size = max(float(np.ptp(np.flatnonzero(wide.any(axis=k)))) if wide.any() else 0.0 for k in (0, 1))
-        near = cv2.dilate(wide, np.ones((5, 5), np.uint8))
+        near = np.asarray(cv2.dilate(wide, np.ones((5, 5), np.uint8)), dtype=np.uint8)
         strips = np.stack(self._strips).astype(np.int16)
         away = np.abs(strips - np.median(strips, axis=0)) > max(_EDGE_NOISES * self.noise / 2, _EDGE_CHANGE)
         moving = away & (_edges(near)[None] > 0)
