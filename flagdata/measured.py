@@ -85,8 +85,8 @@ class Measured:
         network: that measured it.
         refused: whether the gate refused it.
         verdict: of the gate, in one sentence.
-        reasons: why the film is refused, the weightiest first; `value` is the figure of a fault that was counted, and the
-            p of a window that is unlike the training clips.
+        reasons: why the film is refused, the weightiest first; `value` is the figure of a counted fault, or the p of a
+            window that is unlike the training clips.
         findings: on film, size, weight and windows.
         figures: of how the film was made fit: camera, flags, crop; as in `--json` under "conditioning". None of a film
             that is too short for that.

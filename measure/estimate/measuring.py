@@ -117,7 +117,7 @@ def measure(
     Raises:
         UsageError: a model without distributions, a part that the film does not have, or gaps in every window.
         InputError: a film that is too short.
-        RefusedError: a film that is too slow, or whose frames repeat too often, so that no window is whole.
+        RefusedError: a film whose frames are too few a second, or repeat too often, so that no window is whole.
     """
     if model.learners[0].objective is not Loss.POSTERIOR:
         raise UsageError(
@@ -197,14 +197,8 @@ def _look(window: Window, gate: Gate, given: Joint) -> Look:
 
 def _without_windows(film: Film, layout: Layout, distinct: Distinct, faults: Sequence[Finding]) -> FlagdataError:
     """Why no window of a film is whole."""
-    if film.rate < layout.least_rate:
-        slow = REASONS["low-frame-rate"]
-        return RefusedError(
-            f"{slow.sentence}: {film.rate:.3g}, and of a flag of this size the network takes "
-            f"{layout.least_rate:.3g} at least",
-            where=film.name, fix=slow.fix,
-        )  # fmt: skip
-    if distinct.repeated:
+    still = [fault for fault in faults if fault.kind == "no-motion"]
+    if distinct.repeated and not still:
         repeated = REASONS["repeated-frames"]
         return RefusedError(
             f"{repeated.sentence}: {distinct.share:.0%} of {distinct.frames} frames repeat the one before, so that the "

@@ -84,8 +84,11 @@ def measured(
         film=found.film, rate=found.rate, duration=found.duration, network=found.model, refused=verdict.refused,
         verdict=verdict.sentence,
         reasons=tuple(
-            Finding(kind=reason.kind, severity=Severity.WARNING, what=reason.what, value=reason.value if reason.p is None else reason.p, fix=reason.fix)
-            for reason in verdict.reasons
+            Finding(
+                kind=one.kind, severity=Severity.WARNING, what=one.what, fix=one.fix,
+                value=one.value if one.p is None else one.p,
+            )
+            for one in verdict.reasons
         ),
         findings=found.noticed(anyway=anyway), figures=subject.film.as_dict(),
         given=_answer(found) if found.shown(anyway=anyway) else None,

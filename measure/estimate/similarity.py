@@ -33,8 +33,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.errors import RefusedError, UnknownNameError, UsageError
 from flagdata.findings import Finding, Severity
+from measure.gate.reasons import REASONS
 from models.targets import ASPECT, Cloth, Target
 
 
@@ -220,15 +221,16 @@ def sizes(
         trained: the cloths that the model is trained on.
 
     Raises:
-        InputError: the film is too slow for the flag's size, or for half of what is likely where that is unknown.
+        RefusedError: the film is too slow for the flag's size, or for half of what is likely where that is unknown.
     """
     prior = prior if prior is not None else SizePrior(median=trained.length)
     if given is not None:
         own = given.scale(trained)
         needed = RATE_SLACK * frames_rate / math.sqrt(own)
         if rate < needed:
-            raise InputError(
-                f"the film has {rate:.4g} frames a second, a {trained.noun} of {given.length:g} m needs {needed:.4g}",
+            raise RefusedError(
+                f"{REASONS['low-frame-rate'].sentence}: {rate:.4g}, and a {trained.noun} of {given.length:g} m needs "
+                f"{needed:.4g}",
                 where="frame rate", fix=f"film at {math.ceil(10 * needed) / 10:g} frames a second or more",
             )  # fmt: skip
         return Sizes(
@@ -238,9 +240,9 @@ def sizes(
     admitted = prior.share_above(least)
     if admitted < LEAST_SHARE:
         enough = RATE_SLACK * frames_rate * math.sqrt(trained.length / prior.median)
-        raise InputError(
-            f"the film has {rate:.4g} frames a second, too few for a {trained.noun} shorter than {least:.2f} m, and "
-            "its size was not given",
+        raise RefusedError(
+            f"{REASONS['low-frame-rate'].sentence}: {rate:.4g}, not enough for a {trained.noun} shorter than "
+            f"{least:.2f} m, and its size was not given",
             where="frame rate",
             fix=f"give --flag-size if the {trained.noun} is larger, or film at {enough:.3g} Hz or more",
         )  # fmt: skip

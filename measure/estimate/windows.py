@@ -57,11 +57,6 @@ class Layout:
         """How many windows there are."""
         return int(np.floor((self.last - self.first - self.length + 0.5 * self.period) / self.step + 1e-9)) + 1
 
-    @property
-    def least_rate(self) -> float:
-        """Frames a second that a film must have for whole windows at all sizes [Hz]."""
-        return _FEWEST / min(self.spacings)
-
     def start(self, index: int) -> float:
         """Start of window `index` [s from the film's first frame]."""
         return self.first + index * self.step

@@ -14,7 +14,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.findings import Severity
 from flagdata.rng import child_seed
 from flagdata.stated import parse
@@ -414,7 +414,7 @@ def test_a_part_of_a_film_is_the_film_of_that_part(model: Estimator) -> None:
 def test_a_film_that_is_too_short_or_too_slow_is_refused_with_what_it_takes(model: Estimator) -> None:
     with pytest.raises(InputError, match=r"at least 0\.44 s"):
         measured(even(FRAMES - 3), model)
-    with pytest.raises(InputError, match="frames a second"):
+    with pytest.raises(RefusedError, match="too few frames a second"):
         measured(even(40, rate=10.0), model)
 
 

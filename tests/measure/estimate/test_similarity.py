@@ -9,7 +9,7 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import RefusedError, UsageError
 from flagdata.rng import stream
 from measure.estimate.similarity import (
     FlagSize,
@@ -78,7 +78,7 @@ def test_a_flag_four_times_as_long_is_in_twice_the_wind_and_four_times_the_weigh
 
 def test_a_film_slower_than_the_scaled_frames_is_refused_with_the_least_rate() -> None:
     small = FlagSize(length=0.375, height=0.25)  # s = 1/4: frames 1/50 s apart
-    with pytest.raises(InputError, match=r"needs 47\.5; film at 47\.5"):
+    with pytest.raises(RefusedError, match=r"needs 47\.5; film at 47\.5"):
         sizes(small, rate=30.0, frames_rate=25.0, draws=4, generator=stream(0, "sizes"))
     assert sizes(small, rate=50.0, frames_rate=25.0, draws=4, generator=stream(0, "sizes")).scale[0] == 0.25
 
@@ -97,7 +97,7 @@ def test_sizes_that_the_frame_rate_cannot_show_are_left_out_and_reported() -> No
     found = sizes(None, rate=25.0, frames_rate=25.0, draws=500, generator=stream(0, "sizes"))
     assert found.draws.min() >= 0.95**2 - 1e-9
     assert "small-sizes-left-out" in {f.kind for f in found.findings}
-    with pytest.raises(InputError, match="size was not given"):
+    with pytest.raises(RefusedError, match="size was not given"):
         sizes(None, rate=15.0, frames_rate=25.0, draws=5, generator=stream(0, "sizes"))
 
 
