@@ -13,6 +13,7 @@ from flagdata.errors import UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import CropBox
 from flagdata.schema import FRAME_SIZE
+from measure.estimate.cut_off import CutOff
 from measure.estimate.film import Film
 from measure.gate.counted import reasons
 from measure.gate.watch import FilmWatch
@@ -20,6 +21,7 @@ from models.conditioning import Conditioning, Follower, conditioning_of
 from models.conditioning.conditioning import LEAST, SAMPLE
 from models.conditioning.regions import MOMENT
 from models.conditioning.repeats import TimedFrame
+from models.conditioning.whole import CUT, SIDES
 
 _HELD = 200_000_000
 """Bytes of frames that are held, so that a short film is decoded once."""
@@ -73,6 +75,7 @@ class ConditionedFilm:
         self._film, self._crop, self._flag, self._aspect = film, crop, flag, aspect
         self._follower: Follower | None = None
         self._watch: FilmWatch | None = None
+        self._cut: CutOff | None = None
         self.found: Conditioning | None = None
         self.reference: NDArray[np.uint8] | None = None
 
@@ -123,11 +126,14 @@ class ConditionedFilm:
             within=self._within(pictures[0].shape),
         )  # fmt: skip
         self.reference = pictures[len(pictures) // 2]
+        self._cut = cut = CutOff.of(self.found, np.array([time for time, _ in sample]))
         del sample, pictures
         self._follower, self._watch = follower, watch = Follower(self.found), FilmWatch(rate=self.rate)
         for time, picture in source:
             watch.look(time, picture)
-            yield time, follower.show(picture)
+            shown = follower.show(picture)
+            if not cut.left_out(time):
+                yield time, shown
 
     def _within(self, shape: tuple[int, ...]) -> tuple[int, int, int, int] | None:
         """The crop in pixels of frames of this shape."""
@@ -138,11 +144,16 @@ class ConditionedFilm:
         return x, y, width, height
 
     def findings(self) -> tuple[Finding, ...]:
-        found, follower, watch = self.found, self._follower, self._watch
-        if found is None or follower is None or watch is None:
+        found, follower, watch, cut = self.found, self._follower, self._watch, self._cut
+        if found is None or follower is None or watch is None or cut is None:
             return self._film.findings()
-        own = (*_of_camera(found, follower), *_of_flag(found, self.reference), *_of_aspect(found, self._aspect))
-        return (*self._film.findings(), *own, *reasons(watch, found, follower))
+        faults = reasons(watch, found, follower)
+        if cut.partly:  # what is left shows the whole flag
+            faults = tuple(fault for fault in faults if fault.kind != "cut-off")
+        own = [*_of_camera(found, follower), *_of_flag(found, self.reference), *_of_aspect(found, self._aspect)]
+        if all(fault.kind != "cut-off" for fault in faults):
+            own += cut.findings()
+        return (*self._film.findings(), *own, *faults)
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -169,6 +180,7 @@ class ConditionedFilm:
             ],
             "chosen": found.chosen + 1 if found.regions else None,
             "square": [found.square.x, found.square.y, found.square.side],
+            "cut_off": dict(zip(SIDES, (found.cut > CUT).mean(axis=0).tolist(), strict=True)),
         }  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from models.conditioning import framing
 from models.conditioning.camera import STILL, WORK, Camera, Transform, by_edges, camera_of, path
 from models.conditioning.framing import Square
 from models.conditioning.regions import Region, regions_of
+from models.conditioning.whole import SIDES, at_edges
 
 VERSION = 2
 """Raised whenever the same film gives other pictures: what networks are trained on is then made anew."""
@@ -65,7 +66,7 @@ class Conditioning:
         noise: deviation of the camera's [gray levels], which is left where the film is frozen.
         kept: (size, size) float32 share of each pixel's changes that is noise, 0 to 1.
         path: (n, 2) of the square's centre over the sample [px of the film].
-        looked: frames of the sample.
+        cut: (n, 4) length at which the cloth moves along each of `whole.SIDES` of the picture, in sizes of the cloth.
     """
 
     size: int
@@ -79,7 +80,7 @@ class Conditioning:
     noise: float
     kept: NDArray[np.float32]
     path: NDArray[np.float64]
-    looked: int
+    cut: NDArray[np.float64]
 
     @property
     def region(self) -> Region | None:
@@ -213,7 +214,9 @@ def conditioning_of(
     small = [shrunk(frame, scale) for frame in sample]
     inside = None if within is None else _inside(within, small[0].shape, scale)
     instants = np.arange(len(small), dtype=np.float64) if times is None else times
-    camera, transforms, regions = _camera_and_regions(small, instants, inside, scale * max(width, height) / size)
+    camera, transforms, registered, regions = _camera_and_regions(
+        small, instants, inside, scale * max(width, height) / size
+    )
     if flag is not None and not 1 <= flag <= len(regions):
         raise UsageError(
             f"flag {flag} of a film in which {len(regions)} regions move like cloth", where="--flag",
@@ -230,8 +233,9 @@ def conditioning_of(
         _framed(frame, square, size, transform, scale=scale, moves=camera.moves)
         for frame, transform in zip(sample[::step], transforms[::step], strict=True)
     ]
-    weight = np.ones((size, size), np.float32)
+    weight, cut = np.ones((size, size), np.float32), np.zeros((len(small), len(SIDES)))
     if regions:
+        cut = at_edges(registered, instants, transforms, regions[chosen].mask)
         weight = _weight(regions[chosen].mask, square, size, scale)
     stack = np.stack(framed)
     noise = _noise(stack, weight)
@@ -240,7 +244,7 @@ def conditioning_of(
         size=size, scale=scale, camera=camera, regions=regions, chosen=chosen, square=square, weight=weight,
         background=np.median(stack, axis=0).astype(np.uint8),
         noise=noise, kept=np.minimum(_USUAL * noise / spread, 1.0).astype(np.float32),
-        path=np.stack([_centre(square, transform, scale) for transform in transforms]), looked=len(sample),
+        path=np.stack([_centre(square, transform, scale) for transform in transforms]), cut=cut,
     )  # fmt: skip
 
 
@@ -254,8 +258,8 @@ def shrunk(frame: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
 
 def _camera_and_regions(
     small: list[NDArray[np.uint8]], times: NDArray[np.float64], inside: NDArray[np.bool_] | None, unit: float
-) -> tuple[Camera, list[Transform], tuple[Region, ...]]:
-    """Camera and cloth, each found again with the other known.
+) -> tuple[Camera, list[Transform], NDArray[np.uint8], tuple[Region, ...]]:
+    """Camera and cloth, each found again with the other known, and the registered pictures.
 
     Args:
         unit: pixels of `small` in one of the pictures that come out, of a film that is shown whole.
@@ -276,7 +280,8 @@ def _camera_and_regions(
         )
     if regions and again.known:
         camera, transforms = again, moved
-    return camera, transforms, regions_of(_registered(small, transforms), times, within=inside)
+    registered = _registered(small, transforms)
+    return camera, transforms, registered, regions_of(registered, times, within=inside)
 
 
 def _outside(regions: Sequence[Region], shape: tuple[int, ...]) -> NDArray[np.bool_]:

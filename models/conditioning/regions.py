@@ -77,8 +77,7 @@ def regions_of(
     """
     height, width = pictures.shape[1:]
     coarse = _shrunk(pictures)
-    apart = np.diff(times)
-    near = apart <= max(MOMENT, float(apart.min()) * 1.5)
+    near = nearby(times)
     change = np.abs(coarse[1:][near] - coarse[:-1][near]).mean(axis=0)
     change = cv2.GaussianBlur(change, (0, 0), 1.0)
     floor = float(np.median(change))
@@ -105,6 +104,12 @@ def regions_of(
         hoist, aspect = _hoist(mask, change)
         found.append(Region(mask=mask, share=float(weights[k] / weights.sum()), hoist=hoist, aspect=aspect))
     return tuple(found)
+
+
+def nearby(times: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(n − 1,) whether each picture follows the one before so soon that they are compared."""
+    apart = np.diff(times)
+    return apart <= max(MOMENT, float(apart.min()) * 1.5)
 
 
 def _shrunk(pictures: NDArray[np.uint8]) -> NDArray[np.float32]:

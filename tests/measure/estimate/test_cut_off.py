@@ -1,0 +1,59 @@
+"""Parts of a film in which the picture's edge cuts the flag off."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from measure.estimate.conditioned import ConditionedFilm
+from measure.estimate.cut_off import CutOff
+from tests.measure.estimate.conftest import RATE, Pictures
+from tests.models.conditioning.test_conditioning import WIDTH, Drawn
+
+TIMES = np.arange(40) / 10
+
+
+def cut(*frames: int) -> CutOff:
+    """A sample at 10 Hz whose right edge cuts the flag off in these frames."""
+    found = np.zeros((len(TIMES), 4), bool)
+    found[list(frames), 2] = True
+    return CutOff(times=TIMES, cut=found)
+
+
+def test_a_film_is_left_out_where_it_is_cut_off_if_the_rest_is_long_enough() -> None:
+    partly = cut(*range(10, 20))
+    assert partly.partly
+    assert [time for time in TIMES if partly.left_out(float(time))] == pytest.approx(TIMES[10:21])
+    assert not partly.left_out(0.85)
+    assert partly.left_out(0.95)
+    (finding,) = partly.findings()
+    assert "the right edge in 25%" in finding.what
+    assert "left out" in finding.what
+
+
+def test_a_film_that_is_cut_off_all_the_time_keeps_its_frames_and_says_so() -> None:
+    always = cut(*range(0, 40, 5))
+    assert not any(always.left_out(float(time)) for time in TIMES)
+    (finding,) = always.findings()
+    assert "left out" not in finding.what
+    assert finding.value == pytest.approx(0.2)
+
+
+def test_a_whole_flag_is_not_reported() -> None:
+    assert cut().findings() == ()
+    assert not cut().left_out(1.0)
+
+
+def read(images: NDArray[np.uint8]) -> ConditionedFilm:
+    made = ConditionedFilm(Pictures(times=np.arange(len(images)) / RATE, images=images))
+    assert list(made.frames(0.0, 10.0))
+    return made
+
+
+def test_a_flag_beyond_the_right_edge_is_reported_and_a_whole_one_near_it_is_not() -> None:
+    beyond = Drawn(flags=((WIDTH - 60, 50, 80, 56),)).frames()
+    near = Drawn(flags=((WIDTH - 84, 50, 80, 56),)).frames()
+    (finding,) = [one for one in read(beyond).findings() if one.kind == "flag-cut-off"]
+    assert "the right edge" in finding.what
+    assert "flag-cut-off" not in {one.kind for one in read(near).findings()}
