@@ -21,7 +21,7 @@ class Estimate:
         unit: of all numbers.
         value, sigma: mean and standard deviation of its posterior; None where only a bound is known.
         interval: its central interval, or a bound: an end that nothing bounds is infinite.
-        level: probability that the interval holds.
+        level: probability that the interval contains the quantity.
         bound: "at-least", "at-most" or "nothing"; None of an interval with two ends.
         constrained: whether the film added anything to what was assumed.
         assumed: the range that was simulated, or what was given.

@@ -18,7 +18,7 @@ FORMS = "0.284, 0.284±0.01 (one standard deviation) or 0.27:0.30 (a range)"
 
 @dataclass(frozen=True, kw_only=True)
 class Stated:
-    """What is known of a number.
+    """What a user states about a number.
 
     Attributes:
         low, high: ends of the range in which it lies; equal where one value is stated.

@@ -143,7 +143,7 @@ class Estimator:
         Args:
             seed: of the draws; the same inputs and seed give the same draws.
             draws: of each clip's distribution, shared among the learners.
-            known: what is known of quantities of each clip.
+            known: statements about quantities of each clip.
         """
         embeddings = self.embeddings(inputs)
         if known:

@@ -43,7 +43,7 @@ REACH = 8.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Known:
-    """What is known of a quantity, clip by clip, or draw by draw.
+    """A statement about a quantity, clip by clip, or draw by draw.
 
     Attributes:
         name: of the quantity, as "density".
@@ -127,7 +127,7 @@ class Conditioned:
 def conditioned(
     mixture: Mixture, scaling: Scaling, known: Sequence[Known], *, draws: int, generator: torch.Generator
 ) -> Conditioned:  # fmt: skip
-    """Draw from mixtures given what is known of some of their quantities.
+    """Draw from mixtures given statements about some of their quantities.
 
     Args:
         mixture: n of them, over the targets' logits, float64.

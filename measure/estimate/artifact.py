@@ -26,7 +26,7 @@ from measure.estimate.source import Network, Reading, Subject
 _FORMAT = 1
 _ANSWER = 3
 """Raised when the same film, network and options get another answer, which is then another measurement. 2: bounds at
-the ends of the range, and sizes that are judged one by one. 3: what is known of the cloth is conditioned on exactly."""
+the ends of the range, and sizes that are judged one by one. 3: a stated weight is conditioned on exactly."""
 _HEAD = "flagdata_estimate"
 REFUSED = "refused-by-gate"
 """Quality flag of what was kept although the gate refused it."""

@@ -197,7 +197,7 @@ class Joint:
         """Which of the draws, those of all sizes in a row, make the answer: each as often as the Bayes factor (i, n) of
         what is known makes its size probable, by systematic resampling.
 
-        A size s is as probable before as the prior of sizes has it, and what is known of the cloth says nothing of it.
+        A size s is as probable before as the prior of sizes has it, and a statement about the cloth says nothing of it.
         With the film x_s, which the network looks at as that of a flag of this size, and with p(x_s) alike for all
         sizes, as where nothing is known, p(s | x, L) ∝ p(s) p(x_s | L, s)/p(x_s) = p(s) Z/Z_π (`models.restriction`).
         """

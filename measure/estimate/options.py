@@ -26,7 +26,7 @@ class Options:
         false_alarm: rate of the gate.
         seed: of all draws.
         refine: simulated clips of a refinement; None for none.
-        area_weight: what is known of the cloth's area weight [kg/m²]; None if it is unknown.
+        area_weight: what is stated about the cloth's area weight [kg/m²]; None if it is unknown.
 
     Raises:
         UsageError: a refinement of a flag whose size is not known.
@@ -58,7 +58,7 @@ class Options:
         }  # fmt: skip
 
     def stated(self, model: Estimator) -> Mapping[str, Stated]:
-        """What is known of quantities besides the film, by their names: the weight that was given, and of a model that
+        """What is stated about quantities, by their names: the weight that was given, and of a model that
         estimates a flag's aspect that of the size that was given, where it is one that the model knows."""
         found = {} if self.area_weight is None else {"density": self.area_weight}
         aspect = next((target for target in model.targets if target.name == ASPECT), None)

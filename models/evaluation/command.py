@@ -267,7 +267,7 @@ class _Desk:
 
     @property
     def _stated(self) -> str:
-        """What is known of all clips, in words."""
+        """What is stated about all clips, in words."""
         return "".join(
             f", area weight given as {stated.text} kg/m² (which only distributions use)"
             for stated in self._known.values()

@@ -35,7 +35,7 @@ def predict(
 
     Args:
         note: what tables say beside the model; clips whose truth lies beyond the model's ranges are added to it.
-        known: what is known of quantities of all clips, by name; only distributions use it.
+        known: statements about quantities of all clips, by name; only distributions use it.
         fitted_on: clips of the training side, needed by a model without a head, whose embeddings are then read by ridge
             regression.
     """

@@ -80,7 +80,7 @@ def answers(design: Design, found: Network, gate: Gate, *, seed: int) -> dict[st
 
 
 def answer(path: Path, found: Network, gate: Gate, options: Options) -> dict[str, Any]:
-    """What is said of a film: wind and area weight with their intervals, or why it is refused."""
+    """The answer for a film: wind and area weight with their intervals, or why it is refused."""
     (subject,) = subjects(str(path), query=None, lake=None, at=None, reading=Reading())
     try:
         measured = measure(
