@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from measure.estimate.gate import Reason
+from measure.gate.counted import COUNTED
 from measure.gate.gate import Gate as Calibrated
 from measure.gate.judgement import CONFIDENCE, Cause, judge
 from measure.gate.tail_probability import level
@@ -29,7 +30,9 @@ class CheckedGate:
     false_alarm: float
 
     def judge(self, frames: NDArray[np.uint8], summary: NDArray[np.floating]) -> list[Reason]:
-        found = judge(frames, self.model, self.calibrated, false_alarm=self.false_alarm, summary=summary)
+        found = judge(
+            frames, self.model, self.calibrated, false_alarm=self.false_alarm, summary=summary, without=COUNTED
+        )
         if not found.reasons:
             return [Reason(kind="familiar", what=f"no check is unusual, p = {found.p:.3f} over all checks", p=found.p)]
         # The first speaks for all checks together.

@@ -12,6 +12,8 @@ from measure.gate.reasons import REASONS
 from measure.gate.watch import FilmWatch
 from models.conditioning import Conditioning, Follower
 
+COUNTED = frozenset({"scene-cut", "low-frame-rate", "repeated-frames", "too-dark", "moving-camera", "cut-off", "scale"})
+"""Kinds of faults that are counted here, and while the frames are read: no statistic of a window need look for them."""
 _REPEATED = 0.5
 """Share of frames that look like an earlier one, above which a film loops or stands still."""
 _DARK, _FLAT = 35.0, 4.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,6 +106,7 @@ def judge(
     false_alarm: float = FALSE_ALARM,
     confidence: float = CONFIDENCE,
     summary: NDArray[np.floating] | None = None,
+    without: Collection[str] = (),
 ) -> Judgement:
     """Whether a clip is like what a model was trained on.
 
@@ -115,6 +117,8 @@ def judge(
         false_alarm: share of familiar clips that may be refused, by all checks together.
         confidence: probability that no larger share of them is, over the draw of the calibration clips.
         summary: (d,) the network's of these frames, where it is known already.
+        without: kinds of reasons whose scores are left out. The others are compared with calibration clips judged by
+            all scores, so that no more familiar clips are refused than `false_alarm` states.
 
     Raises:
         InputError: more frames than the model takes, another shape or type, or a rate that the calibration clips are
@@ -145,6 +149,7 @@ def judge(
     found = features_of(model, frames, summary)
     vector = found.vector(model)
     scores, surprises = gate.scores(vector[None])[0], gate.surprises(vector[None])[0]
+    surprises[[score.reason in without for score in SCORES]] = -np.inf
     p = gate.p_value(float(surprises.max()))
     still = found.checks[_AREA] <= np.log10(LEAST_AREA)
     reasons = () if p > at else _reasons(gate, scores, surprises, at, still=bool(still))

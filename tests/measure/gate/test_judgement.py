@@ -16,6 +16,7 @@ from measure.gate.distortions import DISTORTIONS
 from measure.gate.gate import Gate
 from measure.gate.judgement import judge
 from measure.gate.prepare import calibrated
+from measure.gate.reasons import REASONS
 from measure.gate.storage import read, write
 from models.estimator import Estimator
 from tests.measure.gate.made import film, small_model
@@ -73,6 +74,18 @@ def test_a_fault_is_refused_and_named(model: Estimator, gate: Gate, fault: str, 
     assert all(one.p <= judged.level for one in judged.reasons)
     assert not next(one for one in judged.reasons if one.kind == kind).check.startswith("like-")
     assert all(finding.fix and finding.kind.startswith("gate-") for finding in judged.findings())
+
+
+def test_kinds_that_are_left_out_refuse_nothing_and_make_no_other_kind_more_suspicious(
+    model: Estimator, gate: Gate
+) -> None:
+    held = clip(42)[(np.floor(np.arange(12) / 2.5) * 2.5).astype(int)]
+    whole = judge(held, model, gate)
+    part = judge(held, model, gate, without={"low-frame-rate", "repeated-frames"})
+    assert {"low-frame-rate"} <= {one.kind for one in whole.reasons}
+    assert not {"low-frame-rate", "repeated-frames"} & {one.kind for one in part.reasons}
+    assert part.p >= whole.p
+    assert judge(held, model, gate, without=REASONS).familiar
 
 
 def test_where_nothing_moves_no_reason_is_about_what_moves(model: Estimator, gate: Gate) -> None:
