@@ -30,6 +30,10 @@ CONTRADICTION = 1 / 150
 """Bayes factor of the area weight that was stated, below which a warning is due: very strong evidence against it (Kass
 and Raftery, Journal of the American Statistical Association 90, 1995, section 3.2)."""
 
+EXCLUDED = 0.05
+"""Share of the sizes that are possible without the area weight that was given, and not with it, above which a warning
+is due."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measurement:
@@ -238,6 +242,16 @@ def _about_windows(seen: Sequence[Look], judged: Verdict, used: Sequence[int], d
                 what=f"the area weight that was given makes the film much less probable (Bayes factor {factor:.2g}): "
                 "either it is wrong, or the flag's size is, or the model errs on this film",
                 fix="check --area-weight and --flag-size",
+            )
+        )  # fmt: skip
+    excluded = float(np.isneginf(seen[0].log_factor).mean())
+    if excluded > EXCLUDED:
+        found.append(
+            Finding(
+                kind="sizes-excluded-by-weight", severity=Severity.WARNING, value=excluded,
+                what=f"{excluded:.0%} of the sizes that were taken as possible were left out: of a flag of these the "
+                "network does not know the area weight that was given",
+                fix="give --flag-size LENGTHxHEIGHT",
             )
         )  # fmt: skip
     strange = int(judged.strange.sum())

@@ -88,7 +88,8 @@ class Options:
                 raise UsageError(
                     f"an {target.about} of {stated.text} {target.unit}; of a flag of this size the model knows "
                     f"{least.min():.3g} to {most.max():.3g}",
-                    where="--area-weight", fix="give one within that" + ("" if sizes.given else ", and --flag-size"),
+                    where="--area-weight",
+                    fix="give kg/m² within that (100 g/m² is 0.1)" + ("" if sizes.given else ", and --flag-size"),
                 )  # fmt: skip
             scale = sizes.draws if sizes.given is None else sizes.scale[:, None]
             found.append(Known.stated(name, stated, scale=scale**power))

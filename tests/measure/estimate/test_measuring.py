@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import fields, replace
@@ -175,6 +176,9 @@ def test_of_an_unknown_size_a_weight_that_is_known_says_which_sizes_are_probable
     assert sizes.mean() == pytest.approx(mean, abs=0.25 * deviation)
     assert sizes.std() == pytest.approx(deviation, rel=0.25)
     np.testing.assert_allclose(found.draws[:, 1], 0.15, rtol=1e-9)
+    (left_out,) = [finding for finding in found.findings if finding.kind == "sizes-excluded-by-weight"]
+    known = (np.log(np.array([0.15 / 0.17, 0.15 / 0.10])) / np.log(1.3) / np.sqrt(2)).tolist()
+    assert left_out.value == pytest.approx(1 - (math.erf(known[1]) - math.erf(known[0])) / 2, abs=0.04)  # of 1,200
 
 
 class Ambiguous(Believing):
