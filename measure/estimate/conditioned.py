@@ -168,7 +168,7 @@ class ConditionedFilm:
         found, follower = self.found, self._follower
         return {
             "camera": {
-                "moves": found.camera.moves, "features": len(found.camera.corners), **follower.motion(),
+                "moves": found.camera.moves, "evidence": found.camera.evidence, **follower.motion(),
                 "lost": follower.lost,
             },
             "flags": [
@@ -210,16 +210,16 @@ def _of_camera(found: Conditioning, follower: Follower) -> list[Finding]:
     if not found.camera.moves:
         return [
             Finding(
-                kind="camera-still", severity=Severity.NOTE, count=len(found.camera.corners),
-                what=f"the camera is still: {len(found.camera.corners)} features of the background stay in place",
+                kind="camera-still", severity=Severity.NOTE, count=found.camera.support,
+                what=f"the camera is still: {found.camera.evidence} stay in place",
             )
         ]  # fmt: skip
     motion = follower.motion()
     notes = [
         Finding(
-            kind="camera-moves", severity=Severity.NOTE, value=motion["drift"], count=len(found.camera.corners),
+            kind="camera-moves", severity=Severity.NOTE, value=motion["drift"], count=found.camera.support,
             what=f"the camera drifts {motion['drift']:.1f} px and shakes {motion['shake']:.2f} px from frame to frame, "
-            f"by {len(found.camera.corners)} features of the background; the frames were moved back",
+            f"by {found.camera.evidence}; the frames were moved back",
         )
     ]  # fmt: skip
     total = len(follower.path)

@@ -66,7 +66,17 @@ class Camera:
     @property
     def known(self) -> bool:
         """Whether the background shows how the camera moves."""
-        return len(self.corners) > 0 or self.edges is not None
+        return self.support > 0
+
+    @property
+    def support(self) -> int:
+        """How many corners, or pixels of edges where there are none, show how the camera moves."""
+        return len(self.corners) if self.edges is None else len(self.edges.places)
+
+    @property
+    def evidence(self) -> str:
+        """The same in words."""
+        return f"{self.support} {'corners' if self.edges is None else 'pixels at edges'} of the background"
 
     def follow(self, picture: NDArray[np.uint8], guess: Transform) -> Transform | None:
         """Where the reference picture is in another one; None where too few features are found.

@@ -27,7 +27,7 @@ _STIFF = 0.001
 _JERK, _GRID = 48, 3
 """Reach and step [px] of the search for a frame that is not near the one before."""
 _LOOKED = 400
-_FITS = 0.8
+_FITS = 0.6
 """Share of the edges' pixels that differ by less than twice `_HUBER` where a shift fits."""
 
 
