@@ -157,7 +157,7 @@ def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Pa
     with progress(len(train), label="prepare", unit="clip") as advance:
         inputs = prepare_films(
             train, recipe.front_end, recipe.cropping, variants=recipe.variants, folder=folder, workers=workers,
-            advance=advance, augment=recipe.augment,
+            advance=advance, augment=recipe.augment, sequences=recipe.data.sequences, seed=recipe.seed,
         )  # fmt: skip
     with progress(len(validation), label="prepare", unit="clip") as advance:
         judged = prepare_clips(
