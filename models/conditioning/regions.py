@@ -38,6 +38,10 @@ _REACH = 0.35
 _CLOSED = 0.08
 """Width of folds and plain parts that are closed to an outline, in sizes of the region."""
 
+_END, _HOIST = 0.12, 0.25
+"""Width of the ends whose motion is compared, and of the one over which the height at the hoist is taken, in widths."""
+_ALIKE = 0.8
+"""Ratio of motions from which on two ends move alike."""
 _THIN = 0.05
 """Half the width of a pole at most, in sizes of the region."""
 
@@ -101,7 +105,7 @@ def regions_of(
     for k in order:
         own = labels == k + 1
         mask = _outline(own, others & ~own, deviation, within)
-        hoist, aspect = _hoist(mask, change)
+        hoist, aspect = _hoist(mask, deviation)
         found.append(Region(mask=mask, share=float(weights[k] / weights.sum()), hoist=hoist, aspect=aspect))
     return tuple(found)
 
@@ -159,19 +163,19 @@ def _without_pole(mask: NDArray[np.uint8], size: float) -> NDArray[np.uint8]:
     return mask & np.asarray(cv2.dilate(body, _disc(2 * _THIN * size)), np.uint8) if body.any() else mask
 
 
-def _hoist(mask: NDArray[np.bool_], change: NDArray[np.float32]) -> tuple[Side, float]:
+def _hoist(mask: NDArray[np.bool_], deviation: NDArray[np.float32]) -> tuple[Side, float]:
+    """The side at which the cloth moves least, and its width over its height there."""
     rows, columns = np.nonzero(mask)
-    weight = change[rows, columns]
+    moves = deviation[rows, columns]
     left, right, top, bottom = columns.min(), columns.max(), rows.min(), rows.max()
     wide, high = right - left + 1, bottom - top + 1
-    total = max(float(weight.sum()), 1e-9)
-    across = float((columns * weight).sum() / total - (left + right) / 2) / wide
-    down = float((rows * weight).sum() / total - (top + bottom) / 2) / high
-    if down > 2 * abs(across) and high > 0.8 * wide:
+    at_left, at_right = columns < left + _END * wide, columns > right - _END * wide
+    at_top, at_bottom = rows < top + _END * high, rows > bottom - _END * high
+    of_left, of_right, of_top, of_bottom = (float(moves[at].mean()) for at in (at_left, at_right, at_top, at_bottom))
+    if min(of_left, of_right) > _ALIKE * max(of_left, of_right) and of_top < of_bottom * _ALIKE:
         return "top", float(wide / high)
-    at_hoist = columns < left + 0.25 * wide if across >= 0 else columns > right - 0.25 * wide
-    spans = np.ptp(rows[at_hoist]) + 1 if at_hoist.any() else high
-    return ("left" if across >= 0 else "right"), float(wide / spans)
+    near = columns < left + _HOIST * wide if of_left <= of_right else columns > right - _HOIST * wide
+    return ("left" if of_left <= of_right else "right"), float(wide / (np.ptp(rows[near]) + 1))
 
 
 def _size(mask: NDArray[np.bool_]) -> float:
