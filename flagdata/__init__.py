@@ -73,7 +73,9 @@ def measure(
     Raises:
         UsageError: options that contradict each other, or values that no flag has.
         NotFoundError: no such film, lake or network.
-        InputError: a file that is no film, or a film that is too short or too slow.
+        RefusedError: a film that is too slow, or whose frames repeat too often, so that no window of it can be looked
+            at and there is nothing to return.
+        InputError: a file that is no film, or a film that is too short.
     """
     # By its name, as the command line names its verbs: flagdata imports none of the packages that rest on it.
     measured: Measured = import_module("measure.estimate.run").measured(
