@@ -87,7 +87,7 @@ def answer(path: Path, found: Network, gate: Gate, options: Options) -> dict[str
             subject.film, found.estimator, gate=gate, dependence=of_model(found.estimator), options=options
         )
     except FlagdataError as error:
-        kind = next((kind for kind, one in REASONS.items() if error.what.startswith(one.sentence)), error.kind)
+        kind = next((kind for kind, one in REASONS.items() if error.what.startswith(f"{one.sentence}: ")), error.kind)
         return {"refused": True, "reasons": [kind], "why": error.what}
     return {"refused": measured.verdict.refused, **_reasons(measured), **_quantities(measured)}
 
