@@ -187,8 +187,8 @@ def page(sheet: Mapping[str, Any]) -> str:
         f"flag's size and once with the area weight open, once with {WEIGHT.low:g} to {WEIGHT.high:g} kg/m² (true "
         f"{DENSITY:g}). The films were listed before the first was measured; their motion has nothing above 12.5 Hz "
         "(`python -m tests.validation films`)."), "",
-        ("| films | weight | refused | answered | 90 % intervals hold | mean width [m/s] | median error [m/s] | bias "
-        "[m/s] | read too low |"), "|---|---|---|---|---|---|---|---|---|",
+        ("| films | weight | refused | answered | 90 % intervals contain the wind | mean width [m/s] | median "
+        "error [m/s] | bias [m/s] | read too low |"), "|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
     for part, of in sheet["errors"].items():
         for name, own in of.items():

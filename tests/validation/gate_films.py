@@ -51,7 +51,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 
 def row(kind: str, number: int, found: Network, gate: Gate, *, python: Path, seed: int) -> dict[str, Any]:
-    """What is said of one film."""
+    """What `flagdata measure` reports of one film."""
     path = defect(kind, number, folder=FOLDER, python=python)
     said = answer(path, found, gate, Options(size=FlagSize(length=LENGTH, height=HEIGHT), seed=seed))
     right = DEFECTS[kind][1]
