@@ -24,7 +24,7 @@ from models.frontend import FrontEnd
 from models.learner import Learner, Loss, build
 from models.mixture import Mixture
 from models.outliers import Familiarity
-from models.restriction import Conditioned, Known, conditioned
+from models.restriction import Known, Restricted, restricted
 from models.storage import WEIGHTS, check_model, read_card, read_tensors
 from models.targets import Cloth, Target
 
@@ -204,14 +204,14 @@ class Estimator:
         return together.rescaled(scale=widening, shift=(together.mean() * (1 - widening))[:, None])
 
     @torch.no_grad()
-    def given(self, posterior: Mixture, known: Sequence[Known], *, seed: int, draws: int) -> Conditioned:
+    def given(self, posterior: Mixture, known: Sequence[Known], *, seed: int, draws: int) -> Restricted:
         """Draws from distributions of `posterior` given what is known.
 
         Raises:
-            InputError: see `models.restriction.conditioned`.
+            InputError: see `models.restriction.restricted`.
         """
         generator = torch_generator(seed, "known", device=posterior.location.device)
-        return conditioned(posterior, self.learners[0].scaling, known, draws=draws, generator=generator)
+        return restricted(posterior, self.learners[0].scaling, known, draws=draws, generator=generator)
 
     def prior(self, count: int) -> Mixture:
         """What the training set's targets are like: `count` times the Gaussian of their logits' means and standard

@@ -111,7 +111,7 @@ def stated_aspect(length: float, height: float) -> Stated:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Conditioned:
+class Restricted:
     """A posterior given what is known.
 
     Attributes:
@@ -124,9 +124,9 @@ class Conditioned:
     log_mass: Tensor
 
 
-def conditioned(
+def restricted(
     mixture: Mixture, scaling: Scaling, known: Sequence[Known], *, draws: int, generator: torch.Generator
-) -> Conditioned:  # fmt: skip
+) -> Restricted:  # fmt: skip
     """Draw from mixtures given statements about some of their quantities.
 
     Args:
@@ -161,7 +161,7 @@ def conditioned(
         log_mass = torch.where(ends.inside(values), log_mass, -torch.inf)
     values = values.expand(-1, draws, -1)
     logits = mixture.sample_given(columns, ends.logits(values), generator)
-    return Conditioned(logits=logits, log_mass=log_mass.expand(-1, draws))
+    return Restricted(logits=logits, log_mass=log_mass.expand(-1, draws))
 
 
 def _drawn(

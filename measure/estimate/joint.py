@@ -22,7 +22,7 @@ from measure.estimate.similarity import POWERS, Sizes, scaled_back
 from measure.estimate.windows import Layout
 from models.estimator import Estimator
 from models.mixture import Mixture
-from models.restriction import Conditioned, Known
+from models.restriction import Known, Restricted
 
 DRAWS = 400
 """How many draws there are of each window's posterior, for each size of flag."""
@@ -107,7 +107,7 @@ class Joint:
         return self.options.known(self.sizes, self.model)
 
     @cached_property
-    def _before(self) -> Conditioned:
+    def _before(self) -> Restricted:
         """What is assumed before the film where something is known."""
         own = child_seed(self.options.seed, "prior")
         return self.model.given(self.model.prior(len(self.sizes.scale)), self.known, seed=own, draws=DRAWS)

@@ -181,14 +181,15 @@ def test_clips_beyond_the_range_of_their_target_are_refused_before_anything_is_p
 def test_a_model_of_hanging_cloth_estimates_the_same_quantities_in_its_own_ranges(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Trained, shipped and judged by the commands that are there for flags."""
+    """Trained on a part of the sequences, shipped and judged by the commands that are there for flags."""
     from tests.models.conftest import fill
 
     lake = tmp_path / "lake"
     fill(Lake.create(lake), strongest=6.0)
     Lake.open(lake).tag("v1")
     path = tmp_path / "small-cloth.toml"
-    path.write_text(TRAINING.replace('["wind_speed"]', '["cloth_wind", "cloth_density"]'))
+    part = TRAINING.replace("[data]\n", "[data]\nsequences = 8\n")
+    path.write_text(part.replace('["wind_speed"]', '["cloth_wind", "cloth_density"]'))
     trained = run("train", str(path), "--at", "v1", "--lake", str(lake), "--workers", "1", "--branch", "main")
     options = ["--lake", str(lake), "--at", "v1", "--out", str(tmp_path / "shipped")]
     done = CliRunner().invoke(shipping.main, [str(path), *options], catch_exceptions=False)
@@ -197,6 +198,7 @@ def test_a_model_of_hanging_cloth_estimates_the_same_quantities_in_its_own_range
     model = estimator.shipped("small-cloth")
     assert trained["name"] == model.name == "small-cloth"
     assert model.cloth is Cloth.HANGING
+    assert model.card["trained"]["sequences"] == 8
     assert [(target.name, target.high) for target in model.targets] == [("wind_speed", 6.0), ("density", 0.454)]
     found = run(
         "evaluate", "shipped/small-cloth", "--dataset", "made", "--lake", str(lake), "--out", str(tmp_path / "page")
