@@ -219,10 +219,7 @@ class _Job:
         if self.options.refine is not None and shown:
             from measure.estimate.refined import refined
 
-            refinement = refined(
-                measured, subject, estimator, budget=self.options.refine, cropped=subject.film.moved,
-                cache=self.cache,
-            )  # fmt: skip
+            refinement = refined(measured, subject, estimator, budget=self.options.refine, cache=self.cache)
             _warn(refinement.findings)
         found = None if refinement is None else refinement.as_dict()
         lake = self.lake if self.commit and shown else None

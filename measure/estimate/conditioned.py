@@ -95,14 +95,6 @@ class ConditionedFilm:
     def start(self) -> int | None:
         return self._film.start
 
-    @property
-    def moved(self) -> bool:
-        """Whether the pictures are another view than the film's largest centred square."""
-        if self.found is None or self.reference is None:
-            return False
-        height, width = self.reference.shape
-        return self.found.camera.moves or not self.found.square.central(width, height)
-
     def frames(self, first: float, last: float) -> Iterator[TimedFrame]:
         held: list[TimedFrame] | None = []
         sample: list[TimedFrame] = []

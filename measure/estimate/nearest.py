@@ -1,4 +1,7 @@
-"""The simulated clips of a lake that a model finds most like a film, to look at beside it."""
+"""The simulated clips of a lake that a model finds most like a film, to look at beside it.
+
+The film's summary is that of conditioned pictures (`models.conditioning`), so these clips are conditioned likewise.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +17,12 @@ from flagdata.lake import Lake
 from flagdata.record import Record
 from flagdata.rng import stream
 from flagdata.schema import Kind
+from flagdata.timebase import NANOSECONDS
 from models.estimator import Estimator
+from models.training.conditioned import FitFilm
 
 COMPARED = 48
-"""Clips of the lake that are looked at, drawn at random: each costs a tenth of a second."""
+"""Clips of the lake that are looked at, drawn at random: each costs a third of a second, most of it conditioning."""
 SHOWN = 3
 
 
@@ -27,7 +32,7 @@ class Neighbour:
 
     Attributes:
         artifact, name: of the clip.
-        frames: (frames, height, width) gray.
+        frames: (frames, height, width) gray, conditioned.
         distance: of the summaries, in standard deviations of the training clips.
         known: what its simulation was made with.
     """
@@ -47,7 +52,7 @@ def nearest(
     """The `SHOWN` nearest of `COMPARED` simulated clips, and how many were compared; none where the lake has none.
 
     Args:
-        summary: (dimension,) of the film.
+        summary: (dimension,) of the film, conditioned.
         without: the recording whose clips are left out, that of the film itself; None for none.
         advance: called after each clip with how many there are and 1.
     """
@@ -62,7 +67,9 @@ def nearest(
     for place in chosen:
         row = rows[place]
         record = Record.open(lake.object_path(row["object"]))
-        frames = record.frames(row["frame_first"], count)
+        first = row["frame_first"]
+        times = (record.frame_times[first : first + count] - record.frame_times[first]) / NANOSECONDS
+        frames = FitFilm.of(record.frames(first, count), times).frames
         own = model.summaries(model.inputs(frames[None]))[0].cpu().numpy()
         distance = float(np.linalg.norm(whitening @ (own.astype(np.float64) - summary)))
         found.append(

@@ -23,13 +23,15 @@ from models.targets import Cloth
 
 
 def refined(
-    measured: Measurement, subject: Subject, model: Estimator, *, budget: int, cropped: bool, cache: Path | None
+    measured: Measurement, subject: Subject, model: Estimator, *, budget: int, cache: Path | None
 ) -> Refinement:
     """Refine the first window of a film of a flag whose size is known.
 
+    Where the film's record states how it was simulated and filmed, the simulated clips are filmed likewise. Both are
+    conditioned after that, so it does not matter which square of the picture is judged.
+
     Args:
         budget: simulated clips.
-        cropped: whether the film was cropped, so that the view that its record states is not that of its pictures.
         cache: folder for evaluations, so that an interrupted run goes on; None for none.
 
     Raises:
@@ -41,7 +43,7 @@ def refined(
             f"the model {model.name!r} is of {model.cloth.value}, refinement simulates flags", where="--refine",
             fix="leave --refine out, or name a model of flags",
         )  # fmt: skip
-    clip = Clip(name=measured.film, frames=measured.clip, recording=None if cropped else subject.artifact)
+    clip = Clip(name=measured.film, frames=measured.clip, recording=subject.artifact)
     options = measured.options
     s = float(measured.sizes.scale[0])
     known = options.area_weight

@@ -42,8 +42,8 @@ class Clip:
 
     Attributes:
         name: for people.
-        frames: (frame, height, width) uint8 gray, as many and as fast as the model takes, of the region with the flag,
-            at instants that make the flag look like one of 1.5 m (see `measure.estimate`).
+        frames: (frame, height, width) uint8 gray, as many and as fast as the model takes, conditioned
+            (`models.conditioning`), at instants that make the flag look like one of 1.5 m (see `measure.estimate`).
         recording: its row in the lake, where it has one: a simulated recording states its own ζ.
     """
 

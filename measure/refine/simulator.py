@@ -1,4 +1,7 @@
-"""From points of the search space to films: simulated in joint batches, then filmed one by one.
+"""From points of the search space to films: simulated in joint batches, then filmed and conditioned one by one.
+
+A film that is measured is conditioned before anything is judged (`models.conditioning`). So what is compared with it is
+filmed by the target's view and then conditioned by the same code, which frames its flag as it frames the target's.
 
 Replicates of one θ differ in a start that is a millimetre off, of which nothing is left after the seconds that settle
 but another phase of the same motion, in the camera's noise, in ζ where it is not known, and in the internal damping:
@@ -23,6 +26,8 @@ from flagdata.rng import child_seed, stream
 from flagdata.tables import Range
 from measure.refine.space import DENSITY, WIND, Space
 from measure.refine.view import View
+from models.conditioning.conditioning import VERSION
+from models.training.conditioned import FitFilm
 from sim.assets import Assets
 from sim.material import BENDING_SHAPE
 from sim.render import RENDERERS, Meshes
@@ -55,8 +60,8 @@ class Film:
     """What became of a request.
 
     Attributes:
-        clip: (frame, height, width) uint8 gray; None where the simulation failed.
-        seconds: by stage, this film's share of them: "simulate", "render".
+        clip: (frame, height, width) uint8 gray, conditioned; None where the simulation failed.
+        seconds: by stage, this film's share of them: "simulate", "render", which includes filming and conditioning.
     """
 
     clip: NDArray[np.uint8] | None
@@ -123,11 +128,12 @@ class Simulator:
         own = {
             "recipes": [scene.recipe.identity() for scene in self.scenes], "view": self.view.identity,
             "renderer": self.renderer, "batch": self.batch, "start_noise": START_NOISE, "space": self.space.identity,
+            "conditioning": VERSION,
         }  # fmt: skip
         return digest(canonical(own))
 
     def films(self, requests: Sequence[Request]) -> list[Film]:
-        """Simulate and film requests, those of each scene in batches."""
+        """Simulate, film and condition requests, those of each scene in batches."""
         size = -(-self.batch // len(self.scenes))
         found: dict[int, Film] = {}
         for number, scene in enumerate(self.scenes):
@@ -148,7 +154,8 @@ class Simulator:
                 zeta, camera = self.view.at(request.seed)
                 with torch.no_grad():
                     seen = self._renderer.render(Meshes.flag(outcome.sequence, heading=0.0), zeta)
-                clip = camera.filmed(seen.numpy(), seed=child_seed(request.seed, "camera"))
+                filmed = camera.filmed(seen.numpy(), seed=child_seed(request.seed, "camera"))
+                clip = FitFilm.of(filmed, np.arange(len(filmed)) / scene.recipe.time.rate).frames
             films.append(Film(clip=clip, seconds={"simulate": share, "render": time.perf_counter() - begun}))
         return films
 

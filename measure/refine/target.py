@@ -22,7 +22,8 @@ class Target:
 
     Attributes:
         name: for tables and pictures.
-        clip: (frame, height, width) uint8 gray.
+        clip: (frame, height, width) uint8 gray, conditioned (`models.conditioning`), as the simulated clips are that it
+            is compared with.
         view: how simulated flags are filmed to be compared with it.
         truth: name → its known values, SI; for the trace's dashed line and for scores.
     """
@@ -44,7 +45,7 @@ def of_recording(recording: Artifact, clip: NDArray[np.uint8], *, otherwise: Vie
     """A target of a recording in the lake: ζ and truth are what its row states, if it is simulated.
 
     Args:
-        clip: (frame, height, width) of it.
+        clip: (frame, height, width) of it, conditioned.
         otherwise: the view of a recording that states no ζ.
     """
     content = json.loads(recording.parameters) if recording.parameters else {}
@@ -57,7 +58,7 @@ def as_stated(
     """A target of which `parameters` state what recordings of simulated flags state, or nothing.
 
     Args:
-        clip: (frame, height, width).
+        clip: (frame, height, width), conditioned.
         parameters: name → value [SI], ζ and the camera among them if it is simulated.
         otherwise: the view of one that states no ζ.
     """

@@ -38,10 +38,6 @@ class Square:
     y: int
     side: int
 
-    def central(self, width: int, height: int) -> bool:
-        """Whether it is the largest centred one of a picture of this size."""
-        return self == centred(width, height)
-
     def beyond(self, width: int, height: int) -> float:
         """Share of the square that lies beyond a picture of this size."""
         across = min(self.x + self.side, width) - max(self.x, 0)

@@ -58,7 +58,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             ),
             "program_start": _spread(lambda: _called([sys.executable, "-m", "flagdata.cli", "--version"])),
             "stages": {"open_film": opened, **_stages(subject.film, shipped)},
-            "refinement": _refinement(film.windows[0], shipped, seed=seed),
+            "refinement": _refinement(_first_clip(subject.film, shipped), shipped, seed=seed),
         }
 
 
@@ -96,7 +96,7 @@ def _stages(film: Film, shipped: Network) -> dict[str, float]:
     begun = time.perf_counter()
     gate = gate_beside(shipped, false_alarm=options.false_alarm)
     prepared = time.perf_counter()
-    clip = np.stack([frame for _, frame in film.frames(0.0, film.duration)])[: model.front_end.frames]
+    clip = _first_clip(film, shipped)
     read = time.perf_counter()
     inputs = model.inputs(clip[None])
     mapped = time.perf_counter()
@@ -111,6 +111,11 @@ def _stages(film: Film, shipped: Network) -> dict[str, float]:
         "networks_of_a_window": embedded - mapped, "gate_of_a_window": judged - embedded,
         "all_windows": measured - judged,
     }  # fmt: skip
+
+
+def _first_clip(film: Film, shipped: Network) -> NDArray[np.uint8]:
+    """(frame, height, width) conditioned, from the film's first frame on."""
+    return np.stack([frame for _, frame in film.frames(0.0, film.duration)])[: shipped.estimator.front_end.frames]
 
 
 def _refinement(clip: NDArray[np.uint8], shipped: Network, *, seed: int) -> dict[str, Any]:

@@ -43,6 +43,7 @@ from measure.refine.view import DrawnView
 from models import estimator as models
 from models.estimator import Estimator
 from models.evaluation.handmade import TARGETS, Fitted, fitted
+from models.training.conditioned import FitFilm
 from models.training.recipe import DataSpec
 from sim.assets import Assets
 from sim.render.prior import named
@@ -113,12 +114,13 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     stages: dict[str, list[float]] = {}
     own: list[Refinement] = []
     if lake == ARCSIM:
-        targets = _arcsim(count, frames=estimator.front_end.frames, seed=seed)
+        plain = _arcsim(count, frames=estimator.front_end.frames, seed=seed)
     elif lake == CHANGED:
-        targets = _changed(count, space, frames=estimator.front_end.frames, seed=seed, folder=cache / "films")
+        plain = _changed(count, space, frames=estimator.front_end.frames, seed=seed, folder=cache / "films")
     else:
-        targets = _targets(Path(lake), space, at=at, count=count, seed=seed)
-    for number, target in enumerate(targets):
+        plain = _targets(Path(lake), space, at=at, count=count, seed=seed)
+    for number, as_filmed in enumerate(plain):
+        target = _conditioned(as_filmed, rate=estimator.front_end.rate)
         found = refine(
             target, estimator, scenes, space=space, cache=cache,
             settings=Settings(budget=budget, level=LEVEL, seed=child_seed(seed, "refine", number), to_floor=False),
@@ -126,7 +128,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         own.append(found)
         scores += [_regression(target, estimator, space, seed), _of_own(target, found)]
         if handmade is not None:
-            scores.append(_boosting(target, handmade))
+            scores.append(_boosting(as_filmed, handmade))
         for stage, spent in found.seconds.items():
             stages.setdefault(stage, []).append(spent / found.evaluations)
         for peer in peers:
@@ -148,8 +150,17 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     return result
 
 
+def _conditioned(plain: Target, *, rate: float) -> Target:
+    """The target as `flagdata measure` gives it to a refinement.
+
+    Args:
+        rate: of its frames [Hz].
+    """
+    return replace(plain, clip=FitFilm.of(plain.clip, np.arange(len(plain.clip)) / rate).frames)
+
+
 def _targets(lake: Path, space: Space, *, at: str, count: int, seed: int) -> list[Target]:
-    """Clips of the test side, each of another simulation."""
+    """Clips of the test side, each of another simulation, as they were filmed."""
     source = Source.open(lake)
     pairs = source.pairs("side = 'test'", at=at)
     otherwise = DrawnView(prior=named(RENDERS), assets=Assets())
@@ -230,6 +241,7 @@ def _handmade(at: str, seed: int) -> Fitted | None:
 
 
 def _boosting(target: Target, models: Fitted) -> Score:
+    """Of the clip as it was filmed, as the clips are that boosting learned from."""
     begun = time.perf_counter()
     quantiles = models.quantiles(target.clip)
     seconds = time.perf_counter() - begun

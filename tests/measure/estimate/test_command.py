@@ -30,6 +30,7 @@ from flagdata.timebase import NANOSECONDS
 from measure.estimate.artifact import read
 from measure.estimate.material import weight_of
 from measure.estimate.nearest import nearest
+from models.conditioning import conditioned
 from models.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, RATE, pictures, write_video
 
@@ -266,10 +267,12 @@ def test_the_nearest_simulated_clips_are_those_of_other_recordings(lake: Path, m
     opened = Lake.open(lake)
     first, other = opened.rows("kind = 'recording'").to_pylist()
     record_ = Record.open(opened.object_path(first["object"]))
+    film = conditioned(record_.frames(0, FRAMES), np.arange(FRAMES) / RATE).frames
     with torch.no_grad():
-        summary = model.embeddings(model.inputs(record_.frames(0, FRAMES)[None]))[0][0].numpy()
+        summary = model.embeddings(model.inputs(film[None]))[0][0].numpy()
     found, compared = nearest(opened, model, summary, without=None, at=None, seed=0)
     assert found[0].distance == pytest.approx(0, abs=1e-4)
+    np.testing.assert_array_equal(found[0].frames, film)
     assert found[0].distance <= found[1].distance <= found[2].distance
     rest, fewer = nearest(opened, model, summary, without=first["artifact"], at=None, seed=0)
     assert (compared, fewer) == (6, 3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,11 @@ import pytest
 
 from flagdata.stated import parse
 from measure.ends import Bound, Span
-from measure.estimate.refined import _searched, scaled
+from measure.estimate.measuring import Options
+from measure.estimate.refined import _searched, refined, scaled
+from measure.refine.command import Clip
 from measure.refine.refinement import Interval, Refinement, Round
+from models.targets import Cloth
 
 NOTHING: Any = None
 
@@ -75,6 +79,22 @@ def test_rounds_and_the_networks_first_estimate_scale_alike(found: Refinement) -
 
 def test_a_flag_of_the_simulated_size_is_left_as_it_is(found: Refinement) -> None:
     assert scaled(found, 1.0) is found
+
+
+def test_the_view_that_a_record_states_is_that_of_the_simulated_clips_whatever_part_of_the_picture_is_judged(
+    found: Refinement, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: list[Clip] = []
+    monkeypatch.setattr("measure.estimate.refined.run", lambda clips, *_, **__: given.extend(clips) or found)
+    recording: Any = object()
+    measured: Any = SimpleNamespace(
+        film="flag", clip=np.zeros((2, 4, 4), np.uint8), options=Options(),
+        sizes=SimpleNamespace(scale=np.array([1.0])),
+    )  # fmt: skip
+    cut: Any = SimpleNamespace(artifact=recording)
+    model: Any = SimpleNamespace(cloth=Cloth.FLAG)
+    refined(measured, cut, model, budget=20, cache=None)
+    assert given[0].recording is recording
 
 
 def test_an_area_weight_is_searched_as_a_range_at_the_size_that_is_simulated() -> None:

@@ -12,6 +12,7 @@ from flagdata.errors import CorruptError
 from measure.refine.evaluator import Evaluator, fingerprint
 from measure.refine.simulator import Simulator
 from measure.refine.view import Camera, DrawnView, FixedView, of_parameters
+from models.conditioning.conditioning import VERSION
 from models.estimator import Estimator
 from sim.assets import Assets
 from sim.render.prior import named
@@ -54,6 +55,14 @@ def test_another_view_seed_or_model_is_another_evaluation(evaluator: Evaluator, 
     ]
     assert len({entry.identity for entry in [evaluator, *others]}) == 4
     assert fingerprint(estimator) == evaluator.model
+
+
+def test_what_was_kept_of_clips_conditioned_by_an_older_version_is_not_used(
+    evaluator: Evaluator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = evaluator.identity
+    monkeypatch.setattr("measure.refine.simulator.VERSION", VERSION - 1)
+    assert evaluator.identity != now
 
 
 def test_a_damaged_file_is_named_whichever_bit_of_it_changed(evaluator: Evaluator, points: np.ndarray) -> None:

@@ -1,4 +1,4 @@
-"""Replicates take turns at scenes, and draw the damping that nobody knows."""
+"""Replicates take turns at scenes, and draw the damping that nobody knows; what is filmed is conditioned."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.tables import Range, Scale
 from measure.refine.simulator import Request, Scene, Simulator
-from measure.refine.view import FixedView
+from measure.refine.view import Camera, FixedView
+from models.conditioning import conditioned
 from sim.run.recipe import IntegratorSpec, Recipe
 
 FRAMES, RATE = 8, 25.0
@@ -69,3 +71,26 @@ def test_a_range_that_nothing_would_draw_is_refused(recipe: Recipe, view: FixedV
 def test_only_a_range_of_damping_says_that_it_is_drawn(recipe: Recipe, view: FixedView) -> None:
     assert of([recipe, damped(recipe)], view).draws_damping
     assert not of(recipe, view).draws_damping
+
+
+@pytest.fixture
+def filmed(monkeypatch: pytest.MonkeyPatch) -> list[NDArray[np.uint8]]:
+    """What cameras film while a test goes on, (frame, height, width) each."""
+    found: list[NDArray[np.uint8]] = []
+    film = Camera.filmed
+
+    def kept(self: Camera, frames: NDArray[np.uint8], *, seed: int) -> NDArray[np.uint8]:
+        found.append(film(self, frames, seed=seed))
+        return found[-1]
+
+    monkeypatch.setattr(Camera, "filmed", kept)
+    return found
+
+
+@pytest.mark.parametrize("wind", [-1.0, 0.4], ids=["calm", "windy"])
+def test_a_simulated_clip_is_what_was_filmed_conditioned_once(
+    recipe: Recipe, view: FixedView, filmed: list[NDArray[np.uint8]], wind: float
+) -> None:
+    clip = of(recipe, view).films([Request(point=(*HERE[:-1], wind), seed=11)])[0].clip
+    (film,) = filmed
+    np.testing.assert_array_equal(clip, conditioned(film, np.arange(FRAMES) / RATE).frames)
