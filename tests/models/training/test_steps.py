@@ -23,6 +23,7 @@ from models.evaluation.predict import predict
 from models.frontend import FrontEnd
 from models.learner import Learner, Loss
 from models.training import checkpoint
+from models.training.augment import Augment
 from models.training.batches import Batches
 from models.training.inputs import Prepared
 from models.training.recipe import (
@@ -58,7 +59,7 @@ def recipe(loss: Loss = Loss.POSTERIOR, **optimiser: object) -> TrainingRecipe:
     targets = () if loss is Loss.CONTRASTIVE else ("wind_speed",)
     return TrainingRecipe(
         name="small", title="", seed=3, data=DataSpec(datasets=("made",)), front_end=FRONT_END,
-        cropping=Cropping(size=SIZE), variants=2,
+        cropping=Cropping(size=SIZE), variants=2, augment=Augment(),
         network=NetworkSpec(name="wave", options={"dimension": 4, "widths": (4, 4, 4)}),
         loss=LossSpec(name=loss, targets=targets, components=2), optimiser=replace(spec, **optimiser),  # pyright: ignore[reportArgumentType]
     )  # fmt: skip
