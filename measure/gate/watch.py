@@ -7,10 +7,13 @@ along the picture's four edges. What it counts can be checked by eye on the film
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from models.conditioning import noise
 
 SIDE = 240
 """Longer side [px] of the small copies."""
@@ -35,9 +38,6 @@ the films with defects of even number and the films without defects."""
 _SAMPLED = 10
 """Every so many-th frame that is looked at is kept as it is, up to `_KEPT`."""
 _KEPT = 40
-_ROUGH = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
-"""The difference of two Laplacians; white noise of deviation σ leaves 6 σ (Immerkær 1996)."""
-_MEDIAN = 0.6745
 _SLOPE = 3.0
 """Gray levels a pixel from which on there is an edge in a small copy."""
 _RESTING = 0.6
@@ -49,6 +49,7 @@ _SPOT_NOISES, _SPOT_CHANGE = 5.0, 3.0
 """Deviation in time, over the median one and in gray levels, from which on a pixel belongs to a spot that changes."""
 
 Picture = NDArray[np.uint8]
+_Gray = TypeVar("_Gray", np.uint8, np.float32)
 
 
 @dataclass(eq=False)
@@ -83,7 +84,7 @@ class FilmWatch:
         if (self._frames - 1) % every:
             return
         self.shape = (picture.shape[0], picture.shape[1])
-        small = _shrunk(picture, SIDE)
+        small = _averaged(picture, SIDE)
         self.times.append(time)
         self._thumbs.append(_averaged(small.astype(np.float32), _THUMB))
         self._change(small.astype(np.float32))
@@ -91,8 +92,7 @@ class FilmWatch:
         if len(self.times) % _SAMPLED == 1 and len(self._sample) < _KEPT:
             self._sample.append(small)
             self._bright.append(float(np.quantile(picture[::4, ::4], 0.99)))
-            rough = cv2.filter2D(picture.astype(np.float32), -1, _ROUGH)
-            self._noise.append(float(np.median(np.abs(rough[2:-2, 2:-2]))) / (_MEDIAN * 6))
+            self._noise.append(noise.deviation(noise.rough(picture.astype(np.float32))[2:-2, 2:-2]))
 
     def _change(self, small: NDArray[np.float32]) -> None:
         """Add up how much the picture changes, in itself and averaged."""
@@ -218,16 +218,11 @@ _EDGE_SHARE = 0.05
 """Share of the cloth's size that has to move along an edge."""
 
 
-def _shrunk(picture: Picture, side: int) -> Picture:
+def _averaged(picture: NDArray[_Gray], side: int) -> NDArray[_Gray]:
+    """A picture (height, width) averaged down to this longer side [px]."""
     scale = min(1.0, side / max(picture.shape))
     size = (max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale)))
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-
-
-def _averaged(picture: NDArray[np.float32], side: int) -> NDArray[np.float32]:
-    scale = side / max(picture.shape)
-    size = (max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale)))
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=picture.dtype)
 
 
 def _resized(mask: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.bool_]:

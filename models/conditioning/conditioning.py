@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
-from models.conditioning import framing
+from models.conditioning import framing, noise
 from models.conditioning.camera import STILL, WORK, Camera, Transform, by_edges, camera_of, path
 from models.conditioning.framing import Square
 from models.conditioning.regions import Region, regions_of
@@ -38,10 +38,6 @@ _USUAL = 1.5
 """Deviation of a place that is noise and no more, in deviations of the noise: coding leaves more at edges."""
 _ROUNDING = 0.7
 """Least deviation [gray levels] that counts as noise, of rounding and coding."""
-_ROUGH = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
-"""The difference of two Laplacians; white noise of deviation σ leaves 6 σ."""
-_MEDIAN = 0.6745
-"""Median of the absolute value of a standard normal variable."""
 _DRIFT = 10
 """Frames over which the camera's place is smoothed for its drift."""
 _NEARBY = 6
@@ -238,12 +234,12 @@ def conditioning_of(
         cut = at_edges(registered, instants, transforms, regions[chosen].mask)
         weight = _weight(regions[chosen].mask, square, size, scale)
     stack = np.stack(framed)
-    noise = _noise(stack, weight)
+    level = _noise(stack, weight)
     spread = np.maximum(stack.std(axis=0, dtype=np.float32), 1e-3)
     return Conditioning(
         size=size, scale=scale, camera=camera, regions=regions, chosen=chosen, square=square, weight=weight,
         background=np.median(stack, axis=0).astype(np.uint8),
-        noise=noise, kept=np.minimum(_USUAL * noise / spread, 1.0).astype(np.float32),
+        noise=level, kept=np.minimum(_USUAL * level / spread, 1.0).astype(np.float32),
         path=np.stack([_centre(square, transform, scale) for transform in transforms]), cut=cut,
     )  # fmt: skip
 
@@ -341,15 +337,14 @@ def _weight(mask: NDArray[np.bool_], square: Square, size: int, scale: float) ->
 def _noise(stack: NDArray[np.uint8], weight: NDArray[np.float32]) -> float:
     """Deviation of the camera's noise where the film (n, size, size) is frozen [gray levels].
 
-    Immerkær's filter (Computer Vision and Image Understanding 64, 1996), by which smooth changes do not pass, over the
-    differences of frames, by the median.
+    By the differences of frames, which have √2 times the noise of one.
     """
     frozen = weight == 0
     if not frozen.any():
         return _ROUNDING
     change = np.diff(stack.astype(np.float32), axis=0)
-    rough = np.stack([cv2.filter2D(picture, cv2.CV_32F, _ROUGH)[frozen] for picture in change])
-    return max(float(np.median(np.abs(rough))) / (_MEDIAN * 6 * np.sqrt(2)), _ROUNDING)
+    left = np.stack([noise.rough(picture)[frozen] for picture in change])
+    return max(noise.deviation(left) / np.sqrt(2), _ROUNDING)
 
 
 def _inside(within: tuple[int, int, int, int], shape: tuple[int, ...], scale: float) -> NDArray[np.bool_]:

@@ -1,0 +1,23 @@
+"""A camera's noise, from pictures of a scene: Immerkær (Computer Vision and Image Understanding 64, 1996)."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+_ROUGH = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
+"""The difference of two Laplacians, by which smooth changes do not pass; white noise of deviation σ leaves 6 σ."""
+_LEFT = 6.0
+_MEDIAN = 0.6745
+"""Median of the absolute value of a normal variable, over its deviation."""
+
+
+def rough(picture: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(height, width) what is left of a picture without its smooth parts."""
+    return np.asarray(cv2.filter2D(picture, cv2.CV_32F, _ROUGH), dtype=np.float32)
+
+
+def deviation(left: NDArray[np.float32]) -> float:
+    """Standard deviation of a pixel's noise, from what `rough` left of pixels, by the median [gray levels]."""
+    return float(np.median(np.abs(left))) / (_MEDIAN * _LEFT)
