@@ -1,0 +1,24 @@
+"""Asymmetry between the halves of the silhouette."""
+
+from __future__ import annotations
+
+from measure.observables.chord import Window, chord
+from measure.observables.observable import Observable
+
+
+def asymmetry(window: Window) -> float:
+    """Mean area above the mean chord less the mean area below it, over their sum [1]."""
+    across, up = chord(window).mean(axis=0)
+    shapes = window.silhouettes
+    above = shapes.rows[:, None] * across > shapes.columns[None, :] * up
+    whole = shapes.masks.sum()
+    return float(2 * (shapes.masks & above).sum() / whole - 1)
+
+
+ASYMMETRY = Observable(
+    name="asymmetry", unit="1",
+    meaning="area of the silhouette above the mean line from the middle of the hoist to the middle of the free edge, "
+    "less the area below it, over their sum",
+    blind="asymmetries that the view from above or below makes as well",
+    pixels=asymmetry, geometry=asymmetry, bias=0.0, sigma=0.05,
+)  # fmt: skip

@@ -1,0 +1,24 @@
+"""Bandwidth of the free edge's spectrum."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from measure.observables.chord import Window
+from measure.observables.frequency import moving
+from measure.observables.observable import Observable
+
+
+def bandwidth(window: Window) -> float:
+    """Deviation of the frequencies, each weighed by its power [Hz]."""
+    found, power = moving(window)
+    share = power / power.sum()
+    return float(np.sqrt((share * np.square(found - share @ found)).sum()))
+
+
+BANDWIDTH = Observable(
+    name="bandwidth", unit="Hz",
+    meaning="standard deviation of the frequencies in the same spectrum",
+    blind="whether a broad spectrum is of many waves or of one whose frequency follows the wind",
+    pixels=bandwidth, geometry=bandwidth, bias=0.0, sigma=0.2,
+)  # fmt: skip

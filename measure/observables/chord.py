@@ -1,0 +1,31 @@
+"""The line from the middle of the hoist to the free edge, frame by frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from measure.observables.cloth import ClothWindow
+from measure.observables.film import FilmWindow
+from measure.observables.unseen import UnseenError
+
+Window = FilmWindow | ClothWindow
+"""Both have `times`, `free_edge`, `middle`, `silhouettes`, `length` and `height`."""
+_NARROWEST = 0.12
+"""Share of the flat area that is seen below which the view is along the flag: one that hangs in folds shows more."""
+
+
+def chord(window: Window) -> NDArray[np.float64]:
+    """(n, 2) from the middle of the hoist to the middle of the free edge: away from the hoist, and up [m]. Frames
+    that show no cloth are left out.
+
+    Raises:
+        UnseenError: the flag is seen edge-on, or is hardly seen.
+    """
+    places = window.free_edge
+    places = places[np.isfinite(places).all(axis=1)]
+    if len(places) < 2:
+        raise UnseenError("no-silhouette")
+    if window.silhouettes.area.mean() < _NARROWEST * window.length * window.height:
+        raise UnseenError("edge-on")
+    return places

@@ -1,0 +1,83 @@
+"""A window of a film that was made fit, with the cloth's masks in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from measure.observables.silhouettes import Silhouettes
+from measure.observables.unseen import UnseenError
+
+_SHOWN = 0.8
+"""Share of a window's frames whose outline is to be found."""
+_FREE_END = (0.94, 1.0)
+"""Part of the silhouette's area, counted from the hoist, that stands for the free edge."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FilmWindow:
+    """A window of a film.
+
+    Attributes:
+        times: (n,) ascending [s].
+        frames: (n, size, size) gray, steadied and cropped (`models.conditioning`).
+        masks: (n, size, size) where the cloth is.
+        shown: (n,) whether the frame's mask was found.
+        scale: of the flag's plane at its hoist, from its given height [px/m].
+        hoist: (2, 2) upper and lower end of the hoist: column and row, the first pixel's middle at 0.5 [px].
+        side: 1 where the flag flies to the right, −1 to the left.
+        length, height: of the flat flag [m].
+
+    Raises:
+        InputError: shapes that disagree.
+    """
+
+    times: NDArray[np.float64]
+    frames: NDArray[np.uint8]
+    masks: NDArray[np.bool_]
+    shown: NDArray[np.bool_]
+    scale: float
+    hoist: NDArray[np.float64]
+    side: float
+    length: float
+    height: float
+
+    def __post_init__(self) -> None:
+        n = len(self.times)
+        if self.frames.shape != self.masks.shape or len(self.frames) != n or self.shown.shape != (n,):
+            raise InputError(
+                f"{self.frames.shape} frames, {self.masks.shape} masks at {n} instants", where="window of a film",
+                fix="give one frame and one mask of the same size at each instant",
+            )  # fmt: skip
+
+    @cached_property
+    def silhouettes(self) -> Silhouettes:
+        """Of the frames that show the cloth.
+
+        Raises:
+            UnseenError: too few of them do.
+        """
+        if self.shown.mean() < _SHOWN or self.shown.sum() < 2:
+            raise UnseenError("no-silhouette")
+        masks, middle = self.masks[self.shown], self.hoist.mean(axis=0)
+        if self.side < 0:
+            masks, middle = masks[:, :, ::-1], np.array([masks.shape[2] - middle[0], middle[1]])
+        return Silhouettes(
+            times=self.times[self.shown], masks=masks, scale=self.scale, hoist=middle, length=self.length,
+            height=self.height,
+        )  # fmt: skip
+
+    @cached_property
+    def free_edge(self) -> NDArray[np.float64]:
+        """(n, 2) middle of the free edge, as far as the outline shows it: away from the middle of the hoist, and above
+        it [m]."""
+        return self.silhouettes.middle_of(*_FREE_END)
+
+    @cached_property
+    def middle(self) -> NDArray[np.float64]:
+        """(n, 2) centroid of the middle third of the silhouette's area, likewise."""
+        return self.silhouettes.middle_of(1 / 3, 2 / 3)

@@ -1,0 +1,39 @@
+"""Centroid of the free edge's spectrum."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from measure.observables.chord import Window, chord
+from measure.observables.motion import spectrum
+from measure.observables.observable import Observable
+from measure.observables.unseen import UnseenError
+
+_STILL = 0.004
+"""Root mean square motion of the free edge, in flag lengths, below which there is no spectrum but of noise."""
+
+
+def moving(window: Window) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Frequencies and power of the free edge's motion, `motion.spectrum`.
+
+    Raises:
+        UnseenError: it does not move, or is not seen.
+    """
+    if np.sqrt(chord(window).var(axis=0).sum()) < _STILL * window.length:
+        raise UnseenError("no-motion")
+    return spectrum(window.silhouettes.times, window.free_edge)
+
+
+def frequency(window: Window) -> float:
+    """Mean of the frequencies, each weighed by its power [Hz]."""
+    found, power = moving(window)
+    return float((found * power).sum() / power.sum())
+
+
+FREQUENCY = Observable(
+    name="frequency", unit="Hz",
+    meaning="centroid of the power spectrum, 0.4 to 8 Hz, of the motion of the middle of the free edge in the picture",
+    blind="slower changes of the wind; which of size, tension and damping sets it",
+    pixels=frequency, geometry=frequency, bias=0.0, sigma=0.2,
+)  # fmt: skip

@@ -1,0 +1,72 @@
+"""What an observable is: a number of a window with a unit, defined on pixels and on geometry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from measure.observables.cloth import ClothWindow
+from measure.observables.film import FilmWindow
+from measure.observables.unseen import UnseenError
+
+__all__ = ["Observable", "Reading", "UnseenError"]
+
+_Window = TypeVar("_Window")
+WINDOW = 2.5
+"""Length of a window [s]: some flutter periods, and short beside the changes of a wind's mean."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """What a window gives for an observable.
+
+    Attributes:
+        value: in the observable's unit; NaN where the window does not show it.
+        reason: kind of why not, as reasons are counted; None where there is a value.
+    """
+
+    value: float
+    reason: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observable:
+    """A number of a window of `WINDOW` seconds.
+
+    Attributes:
+        name: in the registry.
+        unit: of the value.
+        meaning: what it is, one sentence.
+        blind: what it does not show.
+        pixels, geometry: its two definitions; each raises `UnseenError` where its window does not show it.
+        bias: mean of pixels less geometry in filmed simulations, in the unit.
+        sigma: standard deviation of the same for one window: what segmentation, blur and folds leave. Both are measured
+            by `python -m tests.validation observables` (docs/results/validate-observables.md).
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    blind: str
+    pixels: Callable[[FilmWindow], float]
+    geometry: Callable[[ClothWindow], float]
+    bias: float
+    sigma: float
+
+    def of_film(self, window: FilmWindow) -> Reading:
+        """The reading of pixels, less the bias."""
+        found = _read(self.pixels, window)
+        return Reading(value=found.value - self.bias, reason=found.reason)
+
+    def of_cloth(self, window: ClothWindow) -> Reading:
+        """The reading of geometry."""
+        return _read(self.geometry, window)
+
+
+def _read(definition: Callable[[_Window], float], window: _Window) -> Reading:
+    try:
+        return Reading(value=definition(window))
+    except UnseenError as why:
+        return Reading(value=math.nan, reason=why.kind)

@@ -1,0 +1,24 @@
+"""Why a window does not show an observable."""
+
+from __future__ import annotations
+
+REASONS = {
+    "no-silhouette": "the cloth's outline was not found in enough frames",
+    "no-motion": "the free edge hardly moves, so that its spectrum is noise",
+    "no-wave": "no wave travels along the chord: the phases at its sections do not belong together",
+    "edge-on": "the flag flies towards the camera or away from it: hardly any of it is in the picture",
+    "few-frames": "the window has fewer frames than the observable takes",
+}
+"""Kind of reason, by which windows are counted → a sentence for people."""
+
+
+class UnseenError(Exception):
+    """A definition finds nothing to measure in a window.
+
+    Args:
+        kind: of `REASONS`.
+    """
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+        super().__init__(REASONS[kind])

@@ -1,0 +1,23 @@
+"""Length of the travelling wave."""
+
+from __future__ import annotations
+
+import math
+
+from measure.observables.chord import Window
+from measure.observables.observable import Observable
+from measure.observables.waves import wave
+
+
+def wave_length(window: Window) -> float:
+    """Of the mean wave [flag lengths]."""
+    found = wave(window)
+    return 2 * math.pi / found.number
+
+
+WAVE_LENGTH = Observable(
+    name="wave-length", unit="1",
+    meaning="length, in flag lengths along the picture, of the wave that travels along the silhouette's middle line",
+    blind="waves whose crests are along the line of sight's direction of motion, and standing waves",
+    pixels=wave_length, geometry=wave_length, bias=0.0, sigma=0.5,
+)  # fmt: skip
