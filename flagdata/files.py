@@ -10,6 +10,8 @@ from pathlib import Path
 
 from flagdata.errors import InputError, LimitError, NotFoundError
 
+MCAP = b"\x89MCAP0\r\n"
+"""First bytes of an MCAP file."""
 _SHOWN = 300  # letters of a path in a message
 
 
@@ -18,6 +20,15 @@ def is_folder(path: Path) -> bool:
     try:
         return path.is_dir()
     except OSError:
+        return False
+
+
+def is_mcap(path: Path) -> bool:
+    """Whether there is a file at a path that begins as MCAP files do."""
+    try:
+        with open_regular(path) as stream:
+            return stream.read(len(MCAP)) == MCAP
+    except (OSError, ValueError):
         return False
 
 

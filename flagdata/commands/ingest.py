@@ -36,6 +36,7 @@ from flagdata.errors import UsageError
 )
 @click.option("--session", metavar="NAME", help="One set-up at one place; splits never cut through it.")
 @click.option("--name", help="What people call the artifact; the file's name by default.")
+@click.option("--topic", metavar="NAME", help="MCAP of other programs: the topic of pictures, or of numbers, to read.")
 @click.option("--zone", metavar="ZONE", help="Zone of a clock that does not say: Europe/Amsterdam, +02:00, UTC.")
 @click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")
 @click.option(
@@ -122,6 +123,7 @@ def ingest(
     format_name: str | None,
     session: str | None,
     name: str | None,
+    topic: str | None,
     zone: str | None,
     branch: str,
     start: str | None,
@@ -152,10 +154,10 @@ def ingest(
 ) -> None:
     """Bring camera files, anemometer logs, mesh sequences and marker tables in.
 
-    Whether a SOURCE is a camera's, an anemometer's, a folder of meshes or a table of markers is decided by its content,
-    and an option goes to the sources of its kind. Each is one commit: what fails leaves the lake as it was, and the
-    others go on. How a table without a recipe is to be read is drafted from its own text; such a draft is shown, and
-    enters only when it is confirmed at the terminal or by --accept.
+    Whether a SOURCE is a camera's, an anemometer's, a folder of meshes, a table of markers or a record that flagdata
+    exported is decided by its content, and an option goes to the sources of its kind. Each is one commit: what fails
+    leaves the lake as it was, and the others go on. How a table without a recipe is to be read is drafted from its own
+    text; such a draft is shown, and enters only when it is confirmed at the terminal or by --accept.
 
     \b
       flagdata ingest --sniff DSC_0001.MP4 TOA5_1234.dat
@@ -163,6 +165,8 @@ def ingest(
       flagdata ingest mast.csv --sensor generic-csv --zone +01:00 --session field-1
       flagdata ingest station.csv --unit km/h --zone Europe/Amsterdam
       flagdata ingest arcsim-output --name reference-4ms
+      flagdata ingest drive.mcap --topic /camera/front
+      flagdata ingest drive.mcap --topic /mast --columns 'time=time,speed=wind_speed[m/s]'
     """
     from flagdata.outputs import check_file
     from flagdata.timebase import names_zone
@@ -178,13 +182,13 @@ def ingest(
     options = Given(
         camera=camera_options(
             start=start, zone_name=zone, true_fps=true_fps, sequence_fps=sequence_fps, rate=rate, crop=crop,
-            exposure=exposure, archive=archive,
+            exposure=exposure, archive=archive, topic=topic,
         ),
         wind=wind_options(
             format_name=None if format_name in ("camera", "meshes", "markers") else format_name, sensor=sensor,
             zone_name=zone, date=date, date_order=date_order, platform=platform, talker=talker, azimuth=azimuth,
             clock=clock, zero_offset=zero_offset, encoding=encoding, unit=unit, start=start, wind=wind, columns=columns,
-            rate=rate if "rate" in given else None, missing=missing, expect=expect,
+            rate=rate if "rate" in given else None, missing=missing, expect=expect, topic=topic,
         ),
         meshes=mesh_options(rate=rate if "rate" in given else None, length=length_unit(unit)),
         markers=marker_options(rate=rate if "rate" in given else None, length=length_unit(unit)),

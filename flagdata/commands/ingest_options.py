@@ -30,11 +30,12 @@ FOREIGN = {
     "anemometer": ("an anemometer log", CAMERA_ONLY),
     "meshes": ("a mesh sequence", (*CAMERA_ONLY, *WIND_ONLY, "zone", "start")),
     "markers": ("a marker table", (*CAMERA_ONLY, *WIND_ONLY, "zone", "start")),
+    "record": ("a record of flagdata", (*CAMERA_ONLY, *WIND_ONLY, *LENGTHS, "zone", "start", "rate")),
 }
 """What each kind of source is called, and the options that mean nothing for it."""
 SNIFF = (
     "sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture", "unit", "wind",
-    "date_order", "columns",
+    "date_order", "columns", "topic",
 )  # fmt: skip
 ONE_SOURCE = ("start", "date", "name", "crop_picture", "accept")
 
@@ -70,6 +71,7 @@ def camera_options(
     crop: str,
     exposure: float | None,
     archive: str,
+    topic: str | None = None,
 ) -> CameraIngest:
     """Those of a camera.
 
@@ -98,6 +100,7 @@ def camera_options(
         rate="native" if rate.strip().lower() == "native" else _rate(rate, "frames a second, or native"),
         crop=parse_crop(crop),
         exposure=exposure,
+        topic=topic,
     )
     return CameraIngest(camera=options, coding=Coding(archive))
 
@@ -122,6 +125,7 @@ def wind_options(
     columns: str | None,
     missing: tuple[str, ...] = (),
     expect: tuple[str, ...] = (),
+    topic: str | None = None,
 ) -> WindIngest:
     """Those of an anemometer; `rate` is `None` where none is given.
 
@@ -169,6 +173,7 @@ def wind_options(
             columns=columns,
             missing=missing,
             expect=expect,
+            topic=topic,
         )
     )
 

@@ -46,6 +46,8 @@ def _lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
         lines += _mesh_lines(report)
     elif report["kind"] == "markers":
         lines += _marker_lines(report)
+    elif report["kind"] == "record":
+        lines += _record_lines(report)
     else:
         lines += _device_lines(report)
     for finding in report["findings"]:
@@ -71,6 +73,14 @@ def _marker_lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [
         ("frames", f"{report['frames']} at {rate}, over {report['span']:.3f} s"),
         ("markers", f"{report['markers']}, {report['tracked']} positions tracked"),
+    ]
+
+
+def _record_lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
+    wind = ", with wind" if report["wind"] else ""
+    return [
+        ("time", f"{report['start']} to {report['end']} ({report['span']:.3f} s)"),
+        ("frames", f"{report['frames']}{wind}"),
     ]
 
 

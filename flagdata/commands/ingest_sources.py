@@ -45,10 +45,13 @@ def ingest_sources(
     """
     from flagdata.ingest.classify import classify
 
-    recipe, columns = options.wind.wind.recipe, options.wind.wind.columns
+    wind = options.wind.wind
     kinds = _recognised(
-        sources, lambda source: classify(source, format_name=format_name, recipe=recipe, columns=columns)
-    )  # fmt: skip
+        sources,
+        lambda source: classify(
+            source, format_name=format_name, recipe=wind.recipe, columns=wind.columns, topic=wind.topic
+        ),
+    )
     check_applies([None if isinstance(kind, FlagdataError) else kind.kind for kind in kinds], options, given=given)
     if any(not isinstance(kind, FlagdataError) and kind.kind == "camera" for kind in kinds):
         options = replace(options, wind=replace(options.wind, wind=replace(options.wind.wind, start=None, rate=None)))
@@ -75,7 +78,9 @@ def sniff_sources(sources: Sequence[Path], options: Given, *, given: frozenset[s
     """
     from flagdata.ingest.classify import guesses
 
-    ranked = _recognised(sources, lambda source: _completed(source, guesses(source), options))
+    ranked = _recognised(
+        sources, lambda source: _completed(source, guesses(source, topic=options.wind.wind.topic), options)
+    )
     check_applies([None if isinstance(r, FlagdataError) else r[0].kind for r in ranked], options, given=given)
     entries, failures = _each(
         sources, ranked, lambda source, found: _look(source, found, options), print_sniffed, as_json=as_json
@@ -189,8 +194,11 @@ def _exit_on(failures: Sequence[tuple[Path, FlagdataError]], sources: Sequence[P
 def _one(lake: Lake, source: Path, kind: Guess, options: Given) -> tuple[IngestResult, ...]:
     """Artifacts of a source: of a table of markers one a recording, of any other one."""
     from flagdata.ingest.markers.store import ingest_markers
+    from flagdata.ingest.records import ingest_record
     from flagdata.ingest.store import ingest_camera
 
+    if kind.kind == "record":
+        return (ingest_record(lake, source, labels=options.labels, branch=options.branch),)
     if kind.kind == "markers":
         return ingest_markers(
             lake, source, options.markers, labels=options.labels, branch=options.branch, reasons=kind.reasons

@@ -19,6 +19,7 @@ from types import TracebackType
 from typing import Any, ClassVar, Self
 
 import numpy as np
+import pyarrow.parquet as pq
 
 from flagdata.dataset.truth import HISTORY
 from flagdata.errors import CorruptError
@@ -34,17 +35,20 @@ from flagdata.timebase import NANOSECONDS
 SAMPLE = "sample"
 """Metadata record of a subset: the artifact it is, the object it was cut from, the frames before the clip's own that
 H.264 needs, and its label as JSON."""
+ROWS = "artifacts.parquet"
+"""File of an export with the catalog's rows of what it holds, by which `flagdata ingest` restores them."""
 CHUNK_BYTES = 1 << 20  # uncompressed, as in committed records: readers reach a frame directly
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mcap:
-    """Files <artifact>.mcap."""
+    """Files <artifact>.mcap, and their rows in `ROWS`."""
 
     kinds: ClassVar[frozenset[Kind]] = FILMED | {Kind.WIND}
 
     def write(self, source: Source, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
         frames = 0
+        pq.write_table(source.rows, folder / ROWS, compression="zstd")
         with ExitStack() as stack:
             original: _Original | None = None
             for entry in source.entries():

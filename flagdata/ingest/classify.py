@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flagdata.errors import FlagdataError, InputError, UnknownNameError
-from flagdata.files import check_input, is_folder
+from flagdata.files import check_input, is_folder, is_mcap
 from flagdata.ingest.anemometer import Guess, sniff
 from flagdata.ingest.anemometer.formats.registry import FORMATS
 from flagdata.ingest.markers import COLUMNS, is_marker_table
@@ -19,8 +19,11 @@ MESHES = "meshes"
 MARKERS = "markers"
 
 
-def guesses(path: Path) -> tuple[Guess, ...]:
+def guesses(path: Path, *, topic: str | None = None) -> tuple[Guess, ...]:
     """What a source may be, the likeliest first; never empty. A file of no known signature is tried as a video.
+
+    Args:
+        topic: of an MCAP file, for which it is judged.
 
     Raises:
         NotFoundError: there is no such source.
@@ -31,6 +34,8 @@ def guesses(path: Path) -> tuple[Guess, ...]:
     if path.is_file() and is_marker_table(path):
         reason = f"its columns are {', '.join(COLUMNS)} and more"
         return (Guess(format="marker table", score=0.99, reasons=(reason,), kind="markers"),)
+    if is_mcap(path):
+        return _of_mcap(path, topic)
     found = sniff(path)
     if found[0].kind != "other":
         return found
@@ -42,18 +47,24 @@ def guesses(path: Path) -> tuple[Guess, ...]:
 
 
 def classify(
-    path: Path, *, format_name: str | None = None, recipe: str | None = None, columns: str | None = None
+    path: Path,
+    *,
+    format_name: str | None = None,
+    recipe: str | None = None,
+    columns: str | None = None,
+    topic: str | None = None,
 ) -> Guess:
-    """What a source is to be ingested as: a guess of kind "camera", "anemometer", "meshes" or "markers".
+    """What a source is to be ingested as: a guess of kind "camera", "anemometer", "meshes", "markers" or "record".
 
     Args:
         format_name: what the user says it is: "camera", "meshes", "markers" or an anemometer format; goes before the
             content.
         recipe: a sensor recipe the user named, for any source that is no camera's, meshes or markers by its content.
         columns: what the columns of a table are, by the user's word; likewise.
+        topic: of an MCAP file.
 
     Raises:
-        InputError: something else (one mesh, a record, an archive), with what to do.
+        InputError: something else (one mesh, an archive), with what to do.
         UnknownNameError: no such format.
         NotFoundError: there is no such source.
     """
@@ -69,8 +80,8 @@ def classify(
         if format_name not in FORMATS:
             raise UnknownNameError.of("format", format_name, [CAMERA, MESHES, MARKERS, *FORMATS], where="--as")
         return Guess(format=format_name, score=1.0, reasons=(f"the format {format_name} was named",))
-    best = guesses(path)[0]
-    by_content = best.kind in (CAMERA, MARKERS) or (best.kind == MESHES and path.is_dir())
+    best = guesses(path, topic=topic)[0]
+    by_content = best.kind in (CAMERA, MARKERS, "record") or (best.kind == MESHES and path.is_dir())
     if recipe is not None and not by_content:
         return Guess(format="delimited", score=1.0, reasons=(f"the recipe {recipe} was named",), recipe=recipe)
     if columns is not None and not by_content:
@@ -82,6 +93,33 @@ def classify(
         where=str(path),
         fix=best.fix or "see flagdata ingest --sniff",
     )
+
+
+def _of_mcap(path: Path, topic: str | None) -> tuple[Guess, ...]:
+    """A record of flagdata's, or of another program's file the topic that was named: pictures before numbers."""
+    from flagdata.ingest.anemometer.containers.mcap import of_numbers
+    from flagdata.ingest.mcap.pictures import of_pictures
+    from flagdata.ingest.mcap.topics import profile, topics
+    from flagdata.ingest.records import is_ours
+    from flagdata.record.writer import PROFILE
+
+    if topic is None and profile(path) == PROFILE and is_ours(path):
+        return (Guess(format="record", score=1.0, reasons=("its header says that flagdata wrote it",), kind="record"),)
+    present = [one for one in topics(path) if topic in (None, one.name)]
+    found = [
+        Guess(format="MCAP", score=0.9, reasons=(f"the topic {one} holds pictures",), kind="camera")
+        for one in of_pictures(present)
+    ]
+    found += [
+        Guess(format="MCAP", score=0.8, reasons=(f"the topic {one} holds numbers",))
+        for one in of_numbers(path, present)
+    ]
+    if found:
+        return tuple(found)
+    if topic is not None:
+        raise UnknownNameError.of("topic of pictures or numbers", topic, [one.name for one in topics(path)])
+    reason = f"its topics hold neither pictures nor numbers: {', '.join(map(str, present)) or 'there are none'}"
+    return (Guess(format="MCAP", score=0.0, reasons=(reason,), kind="other", fix="give a file that has such a topic"),)
 
 
 def _probe(path: Path) -> CameraProbe | None:

@@ -17,6 +17,7 @@ import pyarrow.compute as pc
 
 from flagdata.align.paired import PairedClocks, host_clock
 from flagdata.errors import ConflictError, FlagdataError, InputError, NothingMeasuredError
+from flagdata.files import is_mcap
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.ingest.anemometer.confirm import UNASKED, Confirm, confirmed
@@ -312,7 +313,9 @@ def _staged(
     staged = transaction.staging(".mcap")
     with RecordWriter(staged, metadata={PROVENANCE: source.provenance(recipe)}) as record:
         record.wind(log.series)
-        if path.stat().st_size <= ATTACHMENT_LIMIT:
+        if is_mcap(path):
+            findings = (*findings, _left_whole(path))
+        elif path.stat().st_size <= ATTACHMENT_LIMIT:
             record.attach_file(source.name, path, media_type="text/plain", log_time=int(time[0]))
         else:
             findings = (*findings, _not_attached(path))
@@ -380,6 +383,20 @@ def find(
     return IngestResult(artifact=artifact, created=False, report=json.loads(artifact.report or "{}"))
 
 
+def find_same(lake: Lake, artifact: str, labels: Labels, *, branch: str) -> IngestResult | None:
+    """The artifact of an identity, if it is on the branch.
+
+    Raises:
+        ConflictError: it is, under another name or session than the one asked for.
+    """
+    rows = lake.rows({"artifact": artifact}, at=branch).to_pylist()
+    if not rows:
+        return None
+    found = Artifact.from_row(rows[0])
+    _check_labels(found, labels)
+    return IngestResult(artifact=found, created=False, report=json.loads(found.report or "{}"))
+
+
 def _check_labels(artifact: Artifact, labels: Labels) -> None:
     """Refuse labels that the artifact, which is there already, does not have."""
     for label, asked, kept in (("name", labels.name, artifact.name), ("session", labels.session, artifact.session)):
@@ -435,6 +452,14 @@ def result_of(transaction: Transaction, artifact: Artifact, report: Mapping[str,
         return IngestResult(artifact=kept, created=True, report=report)
     _check_labels(kept, labels)
     return IngestResult(artifact=kept, created=False, report=json.loads(kept.report or "{}"))
+
+
+def _left_whole(path: Path) -> Finding:
+    return Finding(
+        kind="log-not-attached", severity=Severity.NOTE,
+        what=f"{path.name} was not attached: an MCAP file holds other topics as well",
+        fix="keep the original: the catalog has its hash",
+    )  # fmt: skip
 
 
 def _not_attached(path: Path) -> Finding:

@@ -26,7 +26,7 @@ def opened(path: Path, options: WindOptions, encoding: str | None = None) -> Tex
     Raises:
         FlagdataError: it cannot be read as text, or does not fit the options.
     """
-    source = open_text(path, limits=options.limits, encoding=options.encoding or encoding)
+    source = open_text(path, limits=options.limits, encoding=options.encoding or encoding, topic=options.topic)
     first = next((line.strip() for line in source.head() if line.strip()), "")
     flat = first.startswith("{") and first.endswith("}")
     if options.rate is not None:

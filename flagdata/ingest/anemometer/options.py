@@ -11,7 +11,7 @@ from flagdata.errors import UsageError
 from flagdata.ingest.anemometer.instants.clock import ClockChoice
 from flagdata.units import unit
 
-_LATER = frozenset({"clock", "unit", "start", "wind", "rate", "columns", "missing", "expect"})
+_LATER = frozenset({"clock", "unit", "start", "wind", "rate", "columns", "missing", "expect", "topic"})
 ZeroOffset: TypeAlias = float | Literal["report", "estimate"]
 """What to do with a reading that is not zero in calm air: subtract this many m/s, report what the idle stretches show
 and change nothing, or subtract what they show."""
@@ -63,6 +63,7 @@ class WindOptions:
         columns: what the columns of a table are, in one line (see `stated_columns`).
         missing: further spellings of "no value" of a table that no recipe describes.
         expect: checks of a draft that its user has answered (keys of `draft.doubts`).
+        topic: of numbers in an MCAP file; `None` takes the only one.
         zero_offset: see `ZeroOffset`; `None` is the recipe's, which is "report" unless it says otherwise.
         limits: see `Limits`.
     """
@@ -84,6 +85,7 @@ class WindOptions:
     columns: str | None = None
     missing: tuple[str, ...] = ()
     expect: tuple[str, ...] = ()
+    topic: str | None = None
     zero_offset: ZeroOffset | None = None
     limits: Limits = field(default_factory=Limits)
 
@@ -106,10 +108,10 @@ class WindOptions:
     def given(self) -> frozenset[str]:
         """Names of the options that a format has to heed.
 
-        Limits, encoding and a rate are settled before it; zero offset, a clock set anew and the platform after it, for
-        every format alike.
+        Limits, encoding, topic and a rate are settled before it; zero offset, a clock set anew and the platform after
+        it, for every format alike.
         """
-        apart = {"format", "recipe", "limits", "encoding", "zero_offset", "clock", "platform", "rate"}
+        apart = {"format", "recipe", "limits", "encoding", "zero_offset", "clock", "platform", "rate", "topic"}
         return frozenset(f.name for f in fields(self) if f.name not in apart and self._is_given(f.name))
 
     def _is_given(self, name: str) -> bool:

@@ -68,6 +68,19 @@ def luma_of_frame(frame: av.VideoFrame, *, codec: str) -> Luma:
     return Luma(image=image, black=float(16 << (bits - 8)), white=float(235 << (bits - 8)))
 
 
+def luma_of_image(image: Image.Image) -> Luma:
+    """Loads the pixels. A JPEG's own Y' is taken as it is; RGB is weighted by Rec. 601, see `luma_of_frame`."""
+    image.draft("L", image.size)
+    if image.mode.startswith("I;16"):
+        words = np.asarray(image).astype(np.float32)
+        return Luma(image=Image.fromarray(words), black=0.0, white=65535.0)
+    if image.mode in ("I", "F"):
+        raise InputError(f"an image of mode {image.mode} states no range of gray", fix="use images of 8 or 16 bits")
+    gray = image.convert("RGB").convert("L") if image.mode not in ("L", "LA") else image.convert("L")
+    gray.load()
+    return Luma(image=gray, black=0.0, white=255.0)
+
+
 def _converted(frame: av.VideoFrame, pixel_format: str) -> av.VideoFrame:
     """The same picture in another layout, by one thread: with several, swscale mixed up bands of rows."""
     return frame.reformat(format=pixel_format, threads=1)

@@ -99,6 +99,7 @@ class CameraOptions:
             grid period or 3/4 of a source period, whichever is more, but no more than 3 grid periods.
         size: side of the square frames that come out [px].
         threads: decoder threads; frames do not depend on it.
+        topic: of pictures in an MCAP file; `None` takes the only one.
     """
 
     start: int | None = None
@@ -112,6 +113,7 @@ class CameraOptions:
     size: int = FRAME_SIZE
     threads: int = 1
     limits: Limits = field(default_factory=Limits)
+    topic: str | None = None
 
     def __post_init__(self) -> None:
         rates = {"true_fps": self.true_fps, "sequence_fps": self.sequence_fps}
@@ -135,7 +137,11 @@ class CameraOptions:
             zone(self.zone, where="zone")
 
     def recipe(self) -> dict[str, Any]:
-        """All options that shape the frames or their times, as JSON values; threads and limits do not."""
+        """All options that shape the frames or their times, as JSON values; threads and limits do not.
+
+        A topic is there only where it is given, so that older artifacts keep their hash.
+        """
+        topic = {} if self.topic is None else {"topic": self.topic}
         return {
             "start": self.start,
             "zone": self.zone,
@@ -146,6 +152,7 @@ class CameraOptions:
             "exposure": self.exposure,
             "tolerance": self.tolerance,
             "size": self.size,
+            **topic,
         }
 
 

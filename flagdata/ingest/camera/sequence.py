@@ -15,7 +15,7 @@ from PIL import Image
 from flagdata.errors import InputError, LimitError, TimeError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.geometry import Orientation
-from flagdata.ingest.camera.luma import Luma
+from flagdata.ingest.camera.luma import luma_of_image
 from flagdata.ingest.camera.options import CameraOptions, Limits, exact
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import Timing, survey
@@ -96,7 +96,7 @@ class SequenceSource:
                         findings.append(
                             Finding(kind="alpha-ignored", severity=Severity.WARNING, what="transparency was left aside")
                         )
-                    _luma(image)
+                    luma_of_image(image)
                     return SourceFacts(
                         container="image-sequence",
                         codec=str(image.format).lower(),
@@ -126,7 +126,7 @@ class SequenceSource:
                     if image.size != (self.facts.width, self.facts.height):
                         self._resized += 1
                         continue
-                    luma = _luma(image)
+                    luma = luma_of_image(image)
             except _BROKEN:
                 self._broken.append(path.name)
                 continue
@@ -144,7 +144,7 @@ class SequenceSource:
                 try:
                     with _open(self._paths[index], self._limits) as image:
                         if image.size == (self.facts.width, self.facts.height):
-                            luma = _luma(image)
+                            luma = luma_of_image(image)
                             pictures.append(Picture(stamp=self._stamps[index], luma=lambda luma=luma: luma))
                 except _BROKEN:
                     continue
@@ -218,19 +218,6 @@ def _open(path: Path, limits: Limits) -> Image.Image:
             where=str(path), fix="raise the limit if the file is to be trusted",
         )  # fmt: skip
     return image
-
-
-def _luma(image: Image.Image) -> Luma:
-    """Loads the pixels. A JPEG's own Y' is taken as it is; RGB is weighted by Rec. 601, see `luma_of_frame`."""
-    image.draft("L", image.size)
-    if image.mode.startswith("I;16"):
-        words = np.asarray(image).astype(np.float32)
-        return Luma(image=Image.fromarray(words), black=0.0, white=65535.0)
-    if image.mode in ("I", "F"):
-        raise InputError(f"an image of mode {image.mode} states no range of gray", fix="use images of 8 or 16 bits")
-    gray = image.convert("RGB").convert("L") if image.mode not in ("L", "LA") else image.convert("L")
-    gray.load()
-    return Luma(image=gray, black=0.0, white=255.0)
 
 
 def _taken(exif: dict[int, object]) -> str | None:

@@ -26,6 +26,7 @@ class SourceFacts:
         recorded: the camera's wall-clock time inside the video stream, if it writes one there.
         sequence: whether the stamps were made from `sequence_fps`.
         findings: what opening it found.
+        stamped: instant of the first frame [UTC ns], where stamps state the day and the time; else `None`.
     """
 
     container: str
@@ -41,6 +42,7 @@ class SourceFacts:
     recorded: str | None
     sequence: bool
     findings: tuple[Finding, ...]
+    stamped: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

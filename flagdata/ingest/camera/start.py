@@ -45,19 +45,21 @@ def find_start(
     duration: float,
     where: str,
     chapter: Chapter | None = None,
+    stamped: int | None = None,
 ) -> Start:
     """The start of a recording.
 
-    In order: `option`; `com.apple.quicktime.creationdate`, which names its zone and means the start; the wall-clock
-    time that AVCHD cameras write into the video itself, with their zone or `place`; `creation_time`, which should be
-    UTC (ISO/IEC 14496-12, 8.2.2) and the start, but some cameras write local time and some phones the recording's end,
-    and cameras that split a recording into chapters stamp them all with its creation time.
+    In order: `option`; `stamped`; `com.apple.quicktime.creationdate`, which names its zone and means the start; the
+    wall-clock time that AVCHD cameras write into the video itself, with their zone or `place`; `creation_time`, which
+    should be UTC (ISO/IEC 14496-12, 8.2.2) and the start, but some cameras write local time and some phones the
+    recording's end, and cameras that split a recording into chapters stamp them all with its creation time.
     Neither the file's name nor its modification time is used.
 
     Args:
         recorded: ISO 8601 wall-clock time from within the video stream, with a zone or without.
         place: zone of the camera's clock, for times without one.
         duration: of the file [s].
+        stamped: instant of the first frame, where the frames' own stamps state the day and the time [UTC ns].
         chapter: where the file begins within the recording whose creation time it states; None where it is the whole.
 
     Raises:
@@ -72,6 +74,11 @@ def find_start(
         return Start(instant=UNKNOWN, source="unknown", sigma=None, findings=(finding,))
     if option is not None:
         return Start(instant=option, source="option", sigma=None)
+    if stamped is not None:
+        try:
+            return _checked(stamped, "stamps of the frames", 0.0)
+        except TimeError as error:
+            raise TimeError(f"the frames' stamps begin at {error.what}", where=where, fix=error.fix) from None
     default = zone(place, where="zone") if place else None
     passed_over: list[Finding] = []
     for key, text in (

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flagdata.addresses import local_path
 from flagdata.errors import LimitError, RefusedError, UsageError
-from flagdata.files import is_folder
+from flagdata.files import is_folder, is_mcap
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.chapters import chapter_of
 from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
@@ -62,7 +62,7 @@ class CameraStream:
             chapter = replace(chapter, before=chapter.before * float(self._scale))
         start = find_start(
             options.start, facts.metadata, recorded=facts.recorded, place=options.zone, duration=duration,
-            where=str(path), chapter=chapter,
+            where=str(path), chapter=chapter, stamped=facts.stamped,
         )  # fmt: skip
         self._opening += start.findings
         width, height = upright_size(facts.width, facts.height, facts.aspect, facts.orientation)
@@ -327,7 +327,17 @@ def open_camera(path: Path | str, options: CameraOptions | None = None) -> Camer
 
 
 def open_source(path: Path, options: CameraOptions) -> Source:
-    """The reader for `path`: a folder is an image sequence, anything else a video file."""
+    """The reader for `path`: a folder is an image sequence, an MCAP file a topic of it, anything else a video file.
+
+    Raises:
+        UsageError: a topic of what is no MCAP file.
+    """
+    if is_mcap(path):
+        from flagdata.ingest.mcap.pictures import TopicSource
+
+        return TopicSource(path, options)
+    if options.topic is not None:
+        raise UsageError("a topic of what is no MCAP file", where=str(path), fix="leave out --topic")
     return SequenceSource(path, options) if is_folder(path) else VideoSource(path, options)
 
 

@@ -19,8 +19,8 @@ from typing import IO
 
 import numpy as np
 
-from flagdata.errors import InputError, LimitError
-from flagdata.files import check_input
+from flagdata.errors import InputError, LimitError, UsageError
+from flagdata.files import MCAP, check_input
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.options import Limits
 
@@ -160,7 +160,7 @@ _SIGNATURES: tuple[tuple[int, bytes, str, str], ...] = (
     (0, b"<html", "a page of HTML", "save its table as CSV"),
     (0, b"<!DOCTYPE", "a page of HTML", "save its table as CSV"),
     (0, b"<!doctype", "a page of HTML", "save its table as CSV"),
-    (0, b"\x89MCAP", "an MCAP record", "it is a record already"),
+    (0, MCAP, "an MCAP record", "ingest it as it is"),
     (0, b"TOB1", "a Campbell TOB1 binary table", "convert it to TOA5 with LoggerNet's CardConvert"),
     (0, b'"TOB', "a Campbell binary table", "convert it to TOA5 with LoggerNet's CardConvert"),
 )
@@ -220,8 +220,11 @@ def first_bytes(path: Path) -> bytes:
     return head
 
 
-def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> TextFile:
+def open_text(path: Path, *, limits: Limits, encoding: str | None = None, topic: str | None = None) -> TextFile:
     """Check a file against the limits and settle its encoding, in one pass over its bytes.
+
+    Args:
+        topic: of an MCAP file; `None` takes the only one that holds numbers.
 
     Raises:
         NotFoundError, InputError: see `first_bytes`; not text, or not in the encoding named.
@@ -244,6 +247,12 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None) -> Tex
         from flagdata.ingest.anemometer.containers import netcdf
 
         return netcdf.open_dataset(path, limits=limits)
+    if head.startswith(MCAP):
+        from flagdata.ingest.anemometer.containers import mcap
+
+        return mcap.open_topic(path, topic, limits=limits)
+    if topic is not None:
+        raise UsageError("a topic of what is no MCAP file", where=where, fix="leave out --topic")
     other = signature(head)
     if other:
         raise InputError(f"this is {other[0]}, not a text log", where=where, fix=other[1])

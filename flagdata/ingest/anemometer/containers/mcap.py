@@ -1,0 +1,99 @@
+"""One topic of numbers in an MCAP file as a table of text: a row a message, a column a number, its path as the heading.
+
+A message's time is the one that it states, else the one at which it was logged. Messages of flagdata's own type, and
+those of ROS 2 whose type has one unit, get headings that name quantity and unit; other units are the user's to give.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from flagdata.errors import LimitError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.options import Limits
+from flagdata.ingest.anemometer.text.source import TableText
+from flagdata.ingest.mcap.topics import PICTURES, Topic, choose, messages, topics
+from flagdata.record.messages import WIND_FIELDS
+from flagdata.schema import CHANNELS
+from flagdata.timebase import iso
+
+_WIDEST = 200
+"""Columns of the widest message that is read."""
+_LONGEST = 16
+"""Numbers of the longest list that is read, each as a column."""
+_TIMES = frozenset({"timestamp", "stamp", "header", "host_time"})
+_HEADINGS: dict[str, dict[str, str]] = {
+    "flagdata.WindSample": {
+        name: f"{channel} ({CHANNELS[channel].unit})" for channel, (name, _) in WIND_FIELDS.items()
+    },
+    "sensor_msgs/msg/Temperature": {"temperature": "air_temperature (degC)"},
+    "sensor_msgs/msg/FluidPressure": {"fluid_pressure": "air_pressure (Pa)"},
+    "sensor_msgs/msg/RelativeHumidity": {"relative_humidity": "relative_humidity (1)"},
+}  # fmt: skip
+"""Type of messages → field → heading."""
+
+
+def of_numbers(path: Path, found: Sequence[Topic]) -> tuple[Topic, ...]:
+    """Those topics, not of pictures, whose first message can be read and holds a number beside its time."""
+    kept: list[Topic] = []
+    for topic in found:
+        if topic.schema in PICTURES:
+            continue
+        try:
+            first = next(messages(path, topic.name), None)
+        except Exception:  # noqa: BLE001 - a damaged or foreign message is no number; it is named where it is chosen
+            continue
+        if first is not None and any(True for _ in _numbers(first.values)):
+            kept.append(topic)
+    return tuple(kept)
+
+
+def open_topic(path: Path, name: str | None, *, limits: Limits) -> TableText:
+    """The numbers of a topic over time.
+
+    Args:
+        name: of the topic; `None` takes the only one.
+
+    Raises:
+        UnknownNameError: no topic of numbers has that name.
+        InputError: there is none, or there are several and none is named.
+        LimitError: more messages than `limits` allow.
+        CorruptError: the file is damaged.
+    """
+    where = str(path)
+    topic = choose(of_numbers(path, topics(path)), name, where=where, noun="numbers")
+    if topic.count > limits.rows:
+        raise LimitError(f"more than {limits.rows} messages", where=where, fix="cut the file")
+    headings = _HEADINGS.get(topic.schema, {})
+    names: dict[str, int] = {}
+    rows: list[tuple[int, dict[str, str]]] = []
+    for message in messages(path, topic.name):
+        row = dict(_numbers(message.values))
+        for one in row:
+            if one not in names and len(names) < _WIDEST:
+                names[one] = len(names)
+        rows.append((message.stamp, row))
+    lines = [",".join(["time", *(headings.get(one, one) for one in names)])]
+    lines += [",".join([iso(stamp), *(row.get(one, "") for one in names)]) for stamp, row in rows]
+    what = f"the topic {topic.name}: {topic.count} messages of {topic.schema or topic.encoding}, a row each"
+    found = (Finding(kind="topic-read", severity=Severity.NOTE, what=what, count=topic.count),)
+    return TableText(path=path, encoding="utf-8", lines=len(lines), findings=found, text=tuple(lines))
+
+
+def _numbers(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
+    """Path and text of each number, those within messages and short lists too; times apart."""
+    for name, value in values.items():
+        if not before and name in _TIMES:
+            continue
+        path = f"{before}{name}"
+        if isinstance(value, Mapping):
+            yield from _numbers(value, f"{path}.")
+        elif isinstance(value, list | tuple):
+            if len(value) <= _LONGEST:
+                yield from _numbers({f"{path}.{k}": part for k, part in enumerate(value)})
+        elif isinstance(value, bool | int):
+            yield path, str(int(value))
+        elif isinstance(value, float):
+            yield path, "" if value != value else repr(value)

@@ -1,0 +1,254 @@
+"""A topic of pictures in an MCAP file as a camera's source: compressed images, compressed video, plain pixels.
+
+Sources: Foxglove's schemas CompressedImage, CompressedVideo and RawImage (https://docs.foxglove.dev/docs/sdk/schemas);
+ROS 2's sensor_msgs, whose Image states the bytes of a row as `step`.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from fractions import Fraction
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import Any, cast
+
+import av
+import av.error
+import numpy as np
+from PIL import Image
+
+from flagdata.errors import InputError, LimitError, TimeError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.geometry import Orientation
+from flagdata.ingest.camera.luma import Luma, luma_of_frame, luma_of_image
+from flagdata.ingest.camera.options import CameraOptions
+from flagdata.ingest.camera.source import Picture, SourceFacts
+from flagdata.ingest.camera.stamps import survey
+from flagdata.ingest.mcap.topics import MOVING, PICTURES, RAW, STILL, Decoded, Topic, choose, messages, topics
+
+_NANOSECOND = Fraction(1, 1_000_000_000)
+_VIDEO = {"h264": "h264", "h265": "hevc", "hevc": "hevc", "av1": "av1", "vp9": "vp9"}
+_PLAIN = {  # encoding → (mode for Pillow, how the bytes of a pixel lie)
+    "mono8": ("L", "L"), "8uc1": ("L", "L"), "rgb8": ("RGB", "RGB"), "8uc3": ("RGB", "BGR"), "bgr8": ("RGB", "BGR"),
+    "rgba8": ("RGB", "RGBX"), "bgra8": ("RGB", "BGRX"),
+}  # fmt: skip
+_BYTES_OF = {"L": 1, "RGB": 3, "BGR": 3, "RGBX": 4, "BGRX": 4}
+_BROKEN = (OSError, ValueError, SyntaxError, EOFError, Image.DecompressionBombError)
+
+
+def of_pictures(found: Sequence[Topic]) -> tuple[Topic, ...]:
+    """Those topics that hold pictures."""
+    return tuple(topic for topic in found if topic.schema in PICTURES)
+
+
+class TopicSource:
+    """The pictures of one topic. See `flagdata.ingest.camera.source.Source`.
+
+    A picture's instant is the one that its message states, else the one at which it was logged.
+
+    Raises:
+        InputError: no topic of pictures, several and none is named, or none that can be decoded.
+        UnknownNameError: no such topic.
+        LimitError: more frames or pixels than `options.limits`.
+        TimeError: a rate for pictures that have stamps.
+    """
+
+    def __init__(self, path: Path, options: CameraOptions) -> None:
+        self._path = path
+        self._limits = options.limits
+        where = str(path)
+        present = topics(path)
+        self._topic = choose(of_pictures(present), options.topic, where=where, noun="pictures")
+        if options.sequence_fps is not None:
+            raise TimeError("pictures of a topic have stamps of their own", where=where, fix="leave out --sequence-fps")
+        if self._topic.count > options.limits.frames:
+            raise LimitError(
+                f"{self._topic.count} pictures are beyond the limit of {options.limits.frames}", where=where,
+                fix="cut the file, or raise the limit",
+            )  # fmt: skip
+        self._kind = PICTURES[self._topic.schema]
+        self._broken = self._resized = 0
+        stamps, logged = self._instants()
+        self._log_times = logged
+        findings = list(_others(present, self._topic))
+        timing = survey(np.sort(stamps), tick=_NANOSECOND, missing=0, fallback_rate=Fraction(1), where=where)
+        decoded = self._decoded(messages(path, self._topic.name))
+        first = next(decoded, None)
+        if first is None:
+            raise InputError(
+                f"none of {self._topic.count} pictures of {self._topic.name} can be decoded", where=where,
+                fix="choose another topic: --topic NAME",
+            )  # fmt: skip
+        self._pictures = decoded
+        self._head = first
+        _, width, height, codec, pixel_format, _ = first
+        self.facts = SourceFacts(
+            container=f"mcap {self._topic.schema}", codec=codec, pixel_format=pixel_format, width=width, height=height,
+            aspect=Fraction(1), orientation=Orientation(), interlaced=False, timing=timing, metadata={}, recorded=None,
+            sequence=False, findings=tuple(findings), stamped=timing.origin,
+        )  # fmt: skip
+
+    def _instants(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) instants of the pictures and of their logging [UTC ns], in order of logging."""
+        pairs = [(one.stamp, one.log_time) for one in messages(self._path, self._topic.name)]
+        if not pairs:
+            raise InputError(f"{self._topic.name} has no messages", where=str(self._path), fix="choose another topic")
+        both = np.array(pairs, dtype=np.int64)
+        return both[:, 0], both[:, 1]
+
+    def pictures(self) -> Iterator[Picture]:
+        yield _picture(self._head)
+        for one in self._pictures:
+            if one[1:3] != (self.facts.width, self.facts.height):
+                self._resized += 1
+                continue
+            yield _picture(one)
+
+    def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
+        length = len(self._log_times)
+        first = 0
+        for run in range(runs):
+            start = max(first, length * run // runs)
+            first = min(start + count * stride, length)
+            if start >= length:
+                return
+            part = messages(self._path, self._topic.name, since=int(self._log_times[start]))
+            sound = (
+                one for one in self._decoded(part, tally=False) if one[1:3] == (self.facts.width, self.facts.height)
+            )
+            pictures = [_picture(one) for one in islice(sound, 0, count * stride, stride)]
+            if pictures:
+                yield pictures
+
+    def damage(self) -> list[Finding]:
+        found = []
+        if self._broken:
+            found.append(
+                Finding(
+                    kind="corrupt-frames", severity=Severity.ERROR, count=self._broken,
+                    what=f"{self._broken} of {len(self._log_times)} pictures cannot be decoded and were left out",
+                )
+            )  # fmt: skip
+        if self._resized:
+            found.append(
+                Finding(
+                    kind="size-changed", severity=Severity.ERROR, count=self._resized,
+                    what=f"{self._resized} pictures have another size than the first and were left out",
+                )
+            )  # fmt: skip
+        return found
+
+    def close(self) -> None:
+        """The file is open only while pictures are read."""
+
+    def _decoded(self, found: Iterator[Decoded], *, tally: bool = True) -> Iterator[_Shown]:
+        decode = {STILL: self._stills, MOVING: self._moving, RAW: self._plain}[self._kind]
+        for one in decode(found):
+            if one is None:
+                self._broken += tally
+                continue
+            if one[1] * one[2] > self._limits.frame_pixels:
+                raise LimitError(
+                    f"a picture of {one[1]} × {one[2]} px is beyond the limit of {self._limits.frame_pixels} px",
+                    where=str(self._path), fix="raise the limit if the file is to be trusted",
+                )  # fmt: skip
+            yield one
+
+    def _stills(self, found: Iterator[Decoded]) -> Iterator[_Shown | None]:
+        for one in found:
+            try:
+                image = Image.open(io.BytesIO(_data(one.values)), formats=("JPEG", "PNG", "WEBP"))
+                if image.width * image.height <= self._limits.frame_pixels:
+                    image.load()
+            except _BROKEN:
+                yield None
+                continue
+            yield (
+                one.stamp, image.width, image.height, str(image.format).lower(), image.mode,
+                partial(luma_of_image, image),
+            )  # fmt: skip
+
+    def _plain(self, found: Iterator[Decoded]) -> Iterator[_Shown | None]:
+        for one in found:
+            values = one.values
+            encoding = str(values.get("encoding", "")).lower()
+            if encoding not in _PLAIN:
+                raise InputError(
+                    f"pixels of the encoding {encoding!r} are not read", where=f"{self._path}, {self._topic.name}",
+                    fix=f"record one of {', '.join(_PLAIN)}, or compressed images",
+                )  # fmt: skip
+            mode, layout = _PLAIN[encoding]
+            width, height, step = (int(values.get(name, 0)) for name in ("width", "height", "step"))
+            step = step or width * _BYTES_OF[layout]
+            data = _data(values)
+            if width < 1 or height < 1 or len(data) < step * height or step < width * _BYTES_OF[layout]:
+                yield None
+                continue
+            image = Image.frombytes(mode, (width, height), data[: step * height], "raw", layout, step, 1)
+            yield one.stamp, width, height, "raw", encoding, partial(luma_of_image, image)
+
+    def _moving(self, found: Iterator[Decoded]) -> Iterator[_Shown | None]:
+        """Frames of a video, each by the stamp of the message that it came in; there are no B-frames."""
+        context: Any = None
+        stamps: dict[int, int] = {}
+        name = ""
+        for number, one in enumerate(found):
+            if context is None:
+                name = _VIDEO.get(str(one.values.get("format", "")).lower(), "")
+                if not name:
+                    raise InputError(
+                        f"video of the format {one.values.get('format')!r} is not read",
+                        where=f"{self._path}, {self._topic.name}", fix=f"record one of {', '.join(_VIDEO)}",
+                    )  # fmt: skip
+                context = av.CodecContext.create(name, "r")
+                context.thread_count, context.flags = 1, context.flags | 0x00080000  # low delay
+            stamps[number] = one.stamp
+            packet = av.Packet(_data(one.values))
+            packet.pts = packet.dts = number
+            yield from self._frames(context, packet, stamps, name)
+        if context is not None:
+            yield from self._frames(context, None, stamps, name)
+
+    def _frames(self, context: Any, packet: Any, stamps: Mapping[int, int], name: str) -> Iterator[_Shown | None]:
+        try:
+            frames = context.decode(packet)
+        except av.error.FFmpegError:
+            if packet is not None:
+                yield None
+            return
+        for frame in frames:
+            frame = cast(av.VideoFrame, frame)
+            if frame.is_corrupt or frame.pts is None or frame.pts not in stamps:
+                yield None
+                continue
+            yield (
+                stamps[frame.pts], frame.width, frame.height, name, frame.format.name,
+                partial(luma_of_frame, frame, codec=name),
+            )  # fmt: skip
+
+
+_Shown = tuple[int, int, int, str, str, Callable[[], Luma]]
+"""A picture: stamp [UTC ns], width, height, codec, pixel format, and what gives its luma."""
+
+
+def _picture(one: _Shown) -> Picture:
+    return Picture(stamp=one[0], luma=one[5])
+
+
+def _data(values: Mapping[str, Any]) -> bytes:
+    """The bytes of a picture's message; in JSON they are base64."""
+    data = values.get("data", b"")
+    return base64.b64decode(data) if isinstance(data, str) else bytes(data)
+
+
+def _others(present: tuple[Topic, ...], chosen: Topic) -> Iterator[Finding]:
+    others = [topic for topic in present if topic.name != chosen.name]
+    if others:
+        yield Finding(
+            kind="topics-not-read", severity=Severity.NOTE, count=len(others),
+            what=f"{chosen.name} was read, {len(others)} other topics were not: {', '.join(map(str, others[:8]))}",
+            fix="ingest the file again with --topic NAME for another",
+        )  # fmt: skip

@@ -1,0 +1,102 @@
+"""Pictures of a topic: their grays and instants are those that were written, however they are coded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.errors import CorruptError, InputError, UnknownNameError, UsageError
+from flagdata.ingest.camera import CameraOptions, open_camera
+from flagdata.ingest.classify import classify, guesses
+from flagdata.ingest.mcap.pictures import TopicSource
+from flagdata.ingest.store import CameraIngest, ingest_camera
+from flagdata.lake import Lake
+from flagdata.record import salvage
+from tests.flagdata.ingest.mcap.conftest import FRAMES, NOON, STEP
+
+
+def options(topic: str | None = None) -> CameraOptions:
+    return CameraOptions(topic=topic, rate="native", size=64)
+
+
+@pytest.mark.parametrize(("topic", "error"), [("/png", 0), ("/jpeg", 1), ("/raw", 0), ("/video", 2)])
+def test_each_picture_has_its_gray_and_the_instant_that_its_message_states(drive: Path, topic: str, error: int) -> None:
+    assert classify(drive, topic=topic).kind == "camera"
+    with open_camera(drive, options(topic)) as stream:
+        frames = list(stream)
+    assert [frame.time for frame in frames] == [NOON + k * STEP for k in range(FRAMES)]
+    grays = np.array([frame.image[32].mean() for frame in frames])
+    # JPEG and H.264 of one gray round it; H.264's range is the limited one.
+    np.testing.assert_allclose(grays, 40 + 3 * np.arange(FRAMES), atol=error)
+    assert {finding.kind for finding in stream.findings} >= {"topics-not-read"}
+    assert not [finding for finding in stream.findings if finding.kind == "corrupt-frames"]
+
+
+def test_several_topics_of_pictures_are_named_and_none_is_guessed(drive: Path) -> None:
+    with pytest.raises(InputError, match="4 topics hold pictures") as raised:
+        open_camera(drive, options())
+    assert "--topic" in raised.value.fix
+    with pytest.raises(UnknownNameError, match="/pngs") as unknown:
+        classify(drive, topic="/pngs")
+    assert "/png" in unknown.value.fix
+    assert [guess.kind for guess in guesses(drive)] == ["camera"] * 4
+
+
+def test_a_topic_becomes_a_camera_of_the_lake_once(drive: Path, lake: Lake) -> None:
+    ingest = CameraIngest(camera=options("/png"))
+    result = ingest_camera(lake, drive, ingest)
+    assert result.created
+    assert result.artifact.frame_count == FRAMES
+    assert result.artifact.start == NOON
+    assert not ingest_camera(lake, drive, ingest).created
+    assert ingest_camera(lake, drive, CameraIngest(camera=options("/raw"))).created
+
+
+def test_runs_are_spread_over_the_topic_whatever_its_coding(drive: Path) -> None:
+    for topic in ("/png", "/video"):
+        runs = list(TopicSource(drive, options(topic)).samples(3, 4, 2))
+        firsts = [NOON + k * STEP for k in (0, 16, 33)]
+        late = 10 * STEP if topic == "/video" else 0  # the next key frame
+        assert [len(run) for run in runs] == [4, 4, 4]
+        assert all(first <= (run[0].stamp or 0) <= first + late for run, first in zip(runs, firsts, strict=True))
+        for run in runs:
+            assert [int((one.stamp or 0) - (run[0].stamp or 0)) for one in run] == [2 * k * STEP for k in range(4)]
+            for one in run:
+                gray = one.luma()
+                level = (np.asarray(gray.image).mean() - gray.black) / (gray.white - gray.black) * 255
+                assert level == pytest.approx(40 + 3 * ((one.stamp or 0) - NOON) / STEP, abs=2)
+
+
+def test_a_topic_of_a_video_file_is_refused(video: Path) -> None:
+    with pytest.raises(UsageError, match="no MCAP"):
+        open_camera(video, options("/png"))
+
+
+def test_a_file_that_was_cut_off_is_refused_with_the_command_that_salvages_it(drive: Path, tmp_path: Path) -> None:
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(drive.read_bytes()[:-2000])
+    with pytest.raises(CorruptError) as raised:
+        open_camera(cut, options("/png"))
+    assert "flagdata recover" in raised.value.fix
+    salvaged = tmp_path / "salvaged.mcap"
+    salvage(cut, salvaged)
+    assert classify(salvaged, topic="/png").kind == "camera"
+    with open_camera(salvaged, options("/png")) as stream:
+        assert [frame.time for frame in stream] == [NOON + k * STEP for k in range(FRAMES)]
+
+
+def test_pictures_that_cannot_be_decoded_are_counted_and_left_out(write_json: Callable[..., Path], drive: Path) -> None:
+    import base64
+
+    from tests.flagdata.ingest.mcap.conftest import encoded, pictures
+
+    good = [base64.b64encode(encoded(image, "PNG")).decode() for image in pictures()[:4]]
+    data = [good[0], good[1][: len(good[1]) // 2], good[2], good[3]]
+    path = write_json({"/foxglove.CompressedImage": [{"format": "png", "data": one} for one in data]})
+    with open_camera(path, options()) as stream:
+        times = [frame.time for frame in stream]
+    assert times == [NOON, NOON + 200_000_000, NOON + 300_000_000]
+    assert [finding.count for finding in stream.findings if finding.kind == "corrupt-frames"] == [1]
