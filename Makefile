@@ -22,6 +22,13 @@ MUJOCO := $(CURDIR)/$(MUJOCO_VENV)/bin/python
 VTK_VENV := .venv-vtk
 VTK_STAMP := $(VTK_VENV)/.installed
 
+# Other programs' readers of what `flagdata export` writes: tests read it back by them, and skip where they are absent.
+# LeRobot needs Python 3.12.
+LEROBOT_VENV := .venv-lerobot
+LEROBOT_STAMP := $(LEROBOT_VENV)/.installed
+DATASETS_VENV := .venv-datasets
+DATASETS_STAMP := $(DATASETS_VENV)/.installed
+
 # The oldest dependencies that pyproject.toml admits.
 OLDEST_VENV := .venv-oldest
 OLDEST_STAMP := $(OLDEST_VENV)/.installed
@@ -39,7 +46,7 @@ IN_TWO := -n 2 --dist loadfile --no-loadscope-reorder
 # Tests start the program many times: without its bytecode each start would compile the package anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-oldest blender mujoco vtk system lint docs bench validate clean
+.PHONY: demo test test-oldest blender mujoco vtk lerobot datasets system lint docs bench validate clean
 
 demo: $(STAMP)
 	$(BIN)/flagdata demo --out $(OUT)/demo
@@ -56,6 +63,10 @@ blender: $(BLENDER_STAMP)
 mujoco: $(MUJOCO_STAMP)
 
 vtk: $(VTK_STAMP)
+
+lerobot: $(LEROBOT_STAMP)
+
+datasets: $(DATASETS_STAMP)
 
 system:
 	$(SUDO) apt-get install --yes --no-install-recommends $(SYSTEM)
@@ -90,6 +101,14 @@ $(MUJOCO_STAMP): tests/validation/environments.py | $(STAMP)
 	$(BIN)/python -m tests.validation.environments mujoco $(MUJOCO_VENV)
 	touch $@
 
+$(LEROBOT_STAMP): tests/validation/environments.py | $(STAMP)
+	$(BIN)/python -m tests.validation.environments lerobot $(LEROBOT_VENV)
+	touch $@
+
+$(DATASETS_STAMP): tests/validation/environments.py | $(STAMP)
+	$(BIN)/python -m tests.validation.environments datasets $(DATASETS_VENV)
+	touch $@
+
 $(VTK_STAMP): tests/validation/environments.py | $(STAMP)
 	$(BIN)/python -m tests.validation.environments vtk $(VTK_VENV)
 	touch $@
@@ -104,4 +123,4 @@ touch $(1)/.installed
 endef
 
 clean:
-	rm -rf $(VENV) $(BLENDER_VENV) $(MUJOCO_VENV) $(VTK_VENV) $(OLDEST_VENV) $(OUT) build site *.egg-info
+	rm -rf $(VENV) $(BLENDER_VENV) $(MUJOCO_VENV) $(VTK_VENV) $(LEROBOT_VENV) $(DATASETS_VENV) $(OLDEST_VENV) $(OUT) build site *.egg-info

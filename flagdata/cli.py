@@ -40,7 +40,7 @@ VERBS: dict[str, tuple[str, str]] = {
     "query": ("flagdata.commands.query:query", "Select rows of the catalog by filter or SQL."),
     "export": (
         "flagdata.commands.export:export",
-        "Write WebDataset, Parquet, MP4 + CSV, MCAP, CSV of the wind or OBJ folders.",
+        "Write WebDataset, Parquet, LeRobot, Zarr, MP4 + CSV, MCAP, CSV of the wind or OBJ folders.",
     ),
     "verify": ("flagdata.commands.upkeep:verify", "Re-hash every object."),
     "doctor": ("flagdata.commands.upkeep:doctor", "Find and explain what is wrong with a lake."),

@@ -17,7 +17,11 @@ from flagdata.errors import UsageError
 @click.option("--at", metavar="REF", help="Tag, branch, version number or commit; the head of main by default.")
 @click.option("--split", metavar="SIDE", help="Only this side of the leakage-safe split: train, validation or test.")
 @click.option("--salt", default="", metavar="TEXT", help="Another text gives another split.")
-@click.option("--frames", metavar="FORM", help="webdataset: jpg (default) or npy; parquet: none (default) or jpg.")
+@click.option(
+    "--frames",
+    metavar="FORM",
+    help="webdataset: jpg (default) or npy; parquet: none (default) or jpg; lerobot: av1 (default) or png.",
+)
 @click.option("--shard-bytes", type=click.IntRange(min=1), help="webdataset, parquet: size of a file at most.")
 @click.option("--shuffle", type=int, metavar="SEED", help="webdataset: order the samples at random.")
 @click.option("--crf", type=int, help="mp4: constant rate factor, 0 (lossless) to 51; 18 by default.")
@@ -37,14 +41,16 @@ def export(
     as_json: bool,
     lake_path: str,
 ) -> None:
-    """Write a selection as WebDataset shards, Parquet, MP4 + CSV, MCAP subsets, CSV of the wind or OBJ folders.
+    """Write a selection as WebDataset, Parquet, LeRobot, Zarr, MP4 + CSV, MCAP, CSV of the wind or OBJ folders.
 
-    FORMAT is webdataset, parquet, mp4, mcap, csv for every sample of an anemometer or, for mesh sequences, obj. The
-    folder appears whole or not at all, and its manifest.json names the version, the filter and the hash of every file:
+    FORMAT is webdataset, parquet, lerobot, zarr, mp4, mcap, csv for every sample of an anemometer or, for mesh
+    sequences, obj. The folder appears whole or not at all, and its manifest.json names the version, the filter and the
+    hash of every file:
 
     \b
       flagdata export webdataset --where "kind = 'clip'" --at v1 --split train --to shards/train
       flagdata export parquet --to catalog
+      flagdata export lerobot --where "kind = 'clip'" --split train --to lerobot
       flagdata export csv --where "kind = 'wind'" --to winds
       flagdata export obj --where "kind = 'meshes' and wind > 5" --to meshes
     """

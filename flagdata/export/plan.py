@@ -29,6 +29,8 @@ FORMATS = Registry(
         "mcap": "flagdata.export.mcap:Mcap",
         "csv": "flagdata.export.wind_csv:WindCsv",
         "obj": "flagdata.export.obj:ObjFolders",
+        "lerobot": "flagdata.export.lerobot:LeRobot",
+        "zarr": "flagdata.export.zarr_groups:ZarrGroups",
     },
 )
 

@@ -4,7 +4,9 @@ What users run depends on none of them, and `sim` and `measure` know nothing of 
 the only one that is implicit for a flex, appeared in 4.0 and is announced to change; the constants of a flex's
 stiffness changed with 4.0. Pictures by VTK change a little with its version.
 
-`python -m tests.validation.environments NAME [FOLDER]` makes one (`make mujoco`, `make vtk`).
+`python -m tests.validation.environments NAME [FOLDER]` makes one (`make mujoco`, `make vtk`, `make lerobot`,
+`make datasets`). The last two hold other programs' readers, by which tests read what `flagdata export` writes; without
+them these tests skip, with the reason.
 """
 
 from __future__ import annotations
@@ -38,6 +40,7 @@ class Environment:
         version: of it.
         probe: Python that prints its version.
         others: further requirements.
+        python: that makes it, where the program needs another than this one.
     """
 
     title: str
@@ -45,6 +48,7 @@ class Environment:
     version: str
     probe: str
     others: tuple[str, ...]
+    python: str = sys.executable
 
     @property
     def setting(self) -> str:
@@ -89,7 +93,7 @@ class Environment:
         """
         wanted = (f"{self.package}=={self.version}", *self.others)
         for command in (
-            (sys.executable, "-m", "venv", str(folder)),
+            (self.python, "-m", "venv", str(folder)),
             (str(interpreter(folder)), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *wanted),
         ):
             done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -110,7 +114,16 @@ VTK = Environment(
     probe="from vtkmodules.vtkCommonCore import vtkVersion; print(vtkVersion.GetVTKVersion())",
     others=("numpy>=2,<3",),
 )  # fmt: skip
-ENVIRONMENTS = {one.package: one for one in (MUJOCO, VTK)}
+LEROBOT = Environment(
+    title="LeRobot", package="lerobot", version="0.6.1", probe="import lerobot; print(lerobot.__version__)",
+    others=("torch==2.13.0", "lerobot[dataset]"), python="python3.12",
+)  # fmt: skip
+DATASETS = Environment(
+    title="Hugging Face datasets", package="datasets", version="5.2.0",
+    probe="import datasets; print(datasets.__version__)",
+    others=("pillow", "xarray", "zarr", "netCDF4", "rerun-sdk", "pandas"),
+)  # fmt: skip
+ENVIRONMENTS = {one.package: one for one in (MUJOCO, VTK, LEROBOT, DATASETS)}
 
 if __name__ == "__main__":
     chosen = ENVIRONMENTS[sys.argv[1]]
