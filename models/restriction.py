@@ -31,7 +31,7 @@ from torch import Tensor
 from flagdata.errors import InputError
 from flagdata.stated import Stated
 from models.mixture import Mixture
-from models.targets import ASPECT, Scaling
+from models.targets import ASPECT, Scaling, Target
 
 CELLS = {1: 1024, 2: 96}
 """Cells of the grid along each axis, by how many quantities are stated inexactly; more than two are refused."""
@@ -108,6 +108,13 @@ def stated_aspect(length: float, height: float) -> Stated:
     """What a flag's size states of the logarithm of its length over its height."""
     middle = math.log(length / height)
     return Stated(low=middle - ASPECT_SLACK, high=middle + ASPECT_SLACK)
+
+
+def usable_aspect(targets: Sequence[Target], length: float, height: float) -> Stated | None:
+    """The same for a model of these targets; None where it estimates no aspect, or none so large or small."""
+    own = stated_aspect(length, height)
+    known = next((target for target in targets if target.name == ASPECT), None)
+    return own if known is not None and known.low <= own.low and own.high <= known.high else None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,7 +10,7 @@ from flagdata.errors import UsageError
 from flagdata.stated import Stated
 from measure.estimate.similarity import POWERS, FlagSize, Sizes
 from models.estimator import Estimator
-from models.restriction import Known, stated_aspect
+from models.restriction import Known, usable_aspect
 from models.targets import ASPECT
 
 
@@ -61,11 +61,8 @@ class Options:
         """What is stated about quantities, by their names: the weight that was given, and of a model that
         estimates a flag's aspect that of the size that was given, where it is one that the model knows."""
         found = {} if self.area_weight is None else {"density": self.area_weight}
-        aspect = next((target for target in model.targets if target.name == ASPECT), None)
-        if aspect is not None and self.size is not None:
-            own = stated_aspect(self.size.length, self.size.height)
-            if aspect.low <= own.low and own.high <= aspect.high:
-                found[ASPECT] = own
+        if self.size is not None and (own := usable_aspect(model.targets, self.size.length, self.size.height)):
+            found[ASPECT] = own
         return found
 
     def known(self, sizes: Sizes, model: Estimator) -> tuple[Known, ...]:

@@ -19,7 +19,7 @@ from measure.estimate.source import Subject
 from measure.refine.command import Clip, run
 from measure.refine.refinement import Interval, Refinement
 from models.estimator import Estimator
-from models.targets import Cloth
+from models.targets import ASPECT, Cloth
 
 
 def refined(
@@ -50,6 +50,7 @@ def refined(
     found = run(
         [clip], model, budget=budget, seed=options.seed, level=options.level, cache=cache,
         area_weight=None if known is None else _searched(known, s),
+        aspect=None if options.size is None or ASPECT not in options.stated(model) else options.size.aspect,
     )  # fmt: skip
     return scaled(found, s)
 

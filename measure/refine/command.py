@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,14 +24,31 @@ from sim.render.prior import named
 from sim.run import load
 from sim.run.recipe import Recipe
 
-SCENES = {"density": ("flag-wide",), "fabric_density": ("flag-fabrics", "flag-fabrics-damped")}
-"""Recipes that are simulated, and whose ranges are searched, by the area weight that a model estimates."""
-LEARNED = {
-    "density": {"flag-wide": 3600},
-    "fabric_density": {"flag-wide": 3600, "flag-fabrics": 800, "flag-fabrics-damped": 800},
+
+@dataclass(frozen=True, kw_only=True)
+class Learned:
+    """What a model of flags learned from (`catalogs/datasets`).
+
+    Attributes:
+        scenes: recipes that are simulated to refine its estimates, and whose ranges are searched.
+        films: how many films of which scene: the prior of its answer, and so of the refined one (decision 020).
+    """
+
+    scenes: tuple[str, ...]
+    films: Mapping[str, int]
+
+
+LEARNED: Mapping[tuple[str, str], Learned] = {
+    ("wind_speed", "density"): Learned(scenes=("flag-wide",), films={"flag-wide": 3600}),
+    ("wind_speed", "fabric_density"): Learned(
+        scenes=("flag-fabrics", "flag-fabrics-damped"),
+        films={"flag-wide": 3600, "flag-fabrics": 800, "flag-fabrics-damped": 800},
+    ),
+    ("outdoor_wind", "fabric_density"): Learned(
+        scenes=("flag-outdoor", "flag-outdoor-damped"), films={"flag-outdoor": 960, "flag-outdoor-damped": 1856}
+    ),
 }
-"""How many films of which scene such a model learned from (`catalogs/datasets`): the prior of its answer, and so of the
-refined one (decision 020)."""
+"""By the wind and the area weight that a model estimates."""
 RENDERS = "flags"
 """Prior of ζ, where a target's own is not known."""
 
@@ -52,13 +69,19 @@ class Clip:
     recording: Artifact | None = None
 
 
-def scenes_of(estimator: Estimator) -> tuple[Recipe, ...]:
+def scenes_of(estimator: Estimator, *, aspect: float | None = None) -> tuple[Recipe, ...]:
     """Recipes that are simulated to refine a model's estimates.
+
+    Args:
+        aspect: length over height of the flag, for a model that knows several; None for the recipes' own.
 
     Raises:
         InputError: a model of another kind of cloth.
     """
-    return tuple(load(name) for name in SCENES[_weighed(estimator)])
+    recipes = tuple(load(name) for name in _learned(estimator).scenes)
+    if aspect is None:
+        return recipes
+    return tuple(replace(one, scene=replace(one.scene, height=one.scene.width / aspect)) for one in recipes)
 
 
 def space_of(estimator: Estimator) -> Space:
@@ -67,17 +90,19 @@ def space_of(estimator: Estimator) -> Space:
     Raises:
         InputError: a model of another kind of cloth.
     """
-    parts = [(Space.of(load(name)), float(films)) for name, films in LEARNED[_weighed(estimator)].items()]
-    return Space.of(scenes_of(estimator)[0]).learned(parts)
+    own = _learned(estimator)
+    return Space.of(load(own.scenes[0])).learned(
+        [(Space.of(load(name)), float(films)) for name, films in own.films.items()]
+    )
 
 
-def _weighed(estimator: Estimator) -> str:
-    """The area weight that a model of flags estimates, a key of `SCENES`."""
+def _learned(estimator: Estimator) -> Learned:
+    """What a model of flags learned from, by its targets."""
     names = estimator.learners[0].scaling.names
-    found = [target for target in SCENES if target in names]
+    found = [own for targets, own in LEARNED.items() if set(targets) <= set(names)]
     if not found:
         raise InputError(
-            f"the model estimates {', '.join(names) or 'nothing'}, but no area weight of a flag",
+            f"the model estimates {', '.join(names) or 'nothing'}, but no wind and area weight of a flag",
             where=f"model {estimator.name!r}", fix="take the model of flags that comes with the package",
         )  # fmt: skip
     return found[0]
@@ -85,7 +110,7 @@ def _weighed(estimator: Estimator) -> str:
 
 def run(
     clips: Sequence[Clip], estimator: Estimator, *, budget: int, seed: int, level: float, cache: Path | None = None,
-    view: View | None = None, area_weight: tuple[float, float] | None = None,
+    view: View | None = None, area_weight: tuple[float, float] | None = None, aspect: float | None = None,
 ) -> Refinement:  # fmt: skip
     """Refine clips of one flag, with a progress bar.
 
@@ -96,11 +121,12 @@ def run(
             anew for each simulated clip.
         area_weight: range in which it is known to lie, of a flag of 1.5 m [kg/m²], any value of it alike; None for the
             prior that the model learned.
+        aspect: see `scenes_of`.
 
     Raises:
         InputError: see `measure.refine.procedure.refine`.
     """
-    recipes, space = scenes_of(estimator), space_of(estimator)
+    recipes, space = scenes_of(estimator, aspect=aspect), space_of(estimator)
     if area_weight is not None:
         density = Range(low=area_weight[0], high=area_weight[1])
         recipes = tuple(replace(one, material=replace(one.material, density=density)) for one in recipes)

@@ -150,10 +150,9 @@ class _Run:
         begun = time.perf_counter()
         embedded = [e.embed(t.clip[None])[0] for e, t in zip(self.evaluators, self.targets, strict=True)]
         observed = [start.summaries(self.estimator, row[None])[0] for row in embedded]
+        seed, aspect = child_seed(self.settings.seed, "amortised"), self.evaluators[0].simulator.aspect
         estimates = [
-            start.amortised(
-                self.estimator, target.clip, self.space, seed=child_seed(self.settings.seed, "amortised"), draws=400
-            )
+            start.amortised(self.estimator, target.clip, self.space, aspect=aspect, seed=seed, draws=400)
             for target in self.targets
         ]
         points: list[NDArray[np.float64]] = []  # (clip, θ, 17) of each round

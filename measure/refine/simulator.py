@@ -118,6 +118,12 @@ class Simulator:
         return self.scenes[0].space
 
     @property
+    def aspect(self) -> float:
+        """Length over height of the flags."""
+        scene = self.scenes[0].recipe.scene
+        return scene.width / scene.height
+
+    @property
     def draws_damping(self) -> bool:
         """Whether the damping differs among replicates."""
         return any(isinstance(scene.recipe.material.damping, Range) for scene in self.scenes)

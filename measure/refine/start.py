@@ -18,7 +18,8 @@ from flagdata.rng import stream
 from flagdata.stated import Stated
 from measure.refine.space import DENSITY, DIMENSION, WIND, Space
 from models.estimator import Estimator
-from models.restriction import Known
+from models.restriction import Known, usable_aspect
+from models.targets import ASPECT
 
 TARGETS = ("wind_speed", "density", "bending_scale", "anisotropy")
 """Targets that a network must estimate for a refinement to start from it."""
@@ -67,14 +68,18 @@ def summaries(estimator: Estimator, embedding: NDArray[np.float64]) -> NDArray[n
 
 
 def amortised(
-    estimator: Estimator, clip: NDArray[np.uint8], space: Space, *, seed: int, draws: int
+    estimator: Estimator, clip: NDArray[np.uint8], space: Space, *, aspect: float, seed: int, draws: int
 ) -> NDArray[np.float64]:  # fmt: skip
     """Draws of `TARGETS` for a clip (frame, height, width): (draw, 4), in the targets' units. Where the space's area
-    weights are fewer than the network's, they stand for the clip."""
+    weights are fewer than the network's, they hold for the clip, as does the aspect (length over height) for a network
+    that estimates it.
+    """
     target = next(target for target in estimator.targets if target.name == "density")
     low, high = max(space.density.low, target.low), min(space.density.high, target.high)
     fewer = low > target.low or high < target.high
     known = [Known.everywhere("density", Stated(low=low, high=high), count=1)] if fewer else []
+    if (shape := usable_aspect(estimator.targets, aspect, 1.0)) is not None:
+        known.append(Known.everywhere(ASPECT, shape, count=1))
     found = estimator.estimate(estimator.inputs(clip[None]), seed=seed, draws=draws, known=known)
     names = [target.name for target in found.targets]
     return found.draws[0][:, [names.index(name) for name in TARGETS]].astype(np.float64)

@@ -219,7 +219,7 @@ def _peer(method: str, evaluator: Evaluator, target: Target, *, budget: int, see
 
 def _regression(target: Target, estimator: Estimator, space: Space, seed: int) -> Score:
     begun = time.perf_counter()
-    draws = start.amortised(estimator, target.clip, space, seed=seed, draws=models.DRAWS)
+    draws = start.amortised(estimator, target.clip, space, aspect=1.5, seed=seed, draws=models.DRAWS)
     seconds = time.perf_counter() - begun
     low, middle, high = np.quantile(draws, [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2], axis=0)
     wind, density = target.truth["wind_speed"], target.truth["density"]

@@ -27,9 +27,9 @@ def test_completed_points_have_the_given_wind_and_area_weight(recipe: Recipe) ->
 def test_an_area_weight_that_is_known_is_what_the_refinement_starts_from(estimator: Estimator, recipe: Recipe) -> None:
     known = replace(recipe, material=replace(recipe.material, density=Range(low=0.12, high=0.125)))
     clip = stream(0, "clip").integers(0, 255, (8, 48, 48), dtype=np.uint8)
-    draws = start.amortised(estimator, clip, Space.of(known), seed=1, draws=200)
+    draws = start.amortised(estimator, clip, Space.of(known), aspect=1.5, seed=1, draws=200)
     assert 0.12 <= draws[:, 1].min() <= draws[:, 1].max() <= 0.125 + 1e-6
-    free = start.amortised(estimator, clip, Space.of(recipe), seed=1, draws=200)
+    free = start.amortised(estimator, clip, Space.of(recipe), aspect=1.5, seed=1, draws=200)
     assert np.ptp(free[:, 1]) > 0.01
 
 
