@@ -11,6 +11,7 @@ from flagdata.findings import Finding, Severity
 from measure.gate.reasons import REASONS
 from measure.gate.watch import FilmWatch
 from models.conditioning import Conditioning, Follower
+from models.conditioning.whole import CUT, SIDES
 
 COUNTED = frozenset({"scene-cut", "low-frame-rate", "repeated-frames", "too-dark", "moving-camera", "cut-off", "scale"})
 """Kinds of faults that are counted here, and while the frames are read: no statistic of a window need look for them."""
@@ -24,9 +25,8 @@ _LOST = 0.1
 """Share of frames in which the background is not found, above which the camera's motion is unknown."""
 _RESTING = 100
 """Pixels of the small copies with an edge at rest, below which nothing in the picture stands still."""
-_AT_EDGE, _AT_EDGE_MOVING = 0.08, 0.3
-"""Share of the frames in which cloth moves at one edge of the picture, above which it is cut off; and of a camera that
-moves, along whose edges the background moves too."""
+_AT_EDGE = 0.08
+"""Share of the film in which one edge of the picture cuts the cloth off, above which it cannot be measured."""
 _GRAIN = 0.38
 """See `FilmWatch.grain`: of nine films of whole flags the least was 0.51, of a tree 0.28."""
 _SMALL = 40.0
@@ -74,9 +74,8 @@ def _all(watch: FilmWatch, found: Conditioning, follower: Follower) -> Iterator[
     if follower.lost > _LOST * total:
         what = f"in {follower.lost} of {total} frames the background was not found"
         yield _reason("moving-camera", follower.lost / total, what)
-    least = _AT_EDGE_MOVING if found.camera.moves else _AT_EDGE
-    edges = {name: share for name, share in watch.at_edges(region.mask).items() if share > least}
-    if edges:
+    shares_cut = dict(zip(SIDES, (found.cut > CUT).mean(axis=0).tolist(), strict=True))
+    if edges := {name: share for name, share in shares_cut.items() if share > _AT_EDGE}:
         what = ", ".join(f"at the {name} edge in {share:.0%} of the frames" for name, share in edges.items())
         yield _reason("cut-off", max(edges.values()), what)
     elif not len(found.camera.corners) and watch.resting() < _RESTING:  # cloth that is cut off hides what stands still

@@ -1,7 +1,7 @@
-"""What is counted of a film while it is read: cuts, loops, light, and how often cloth reaches the picture's edge.
+"""What is counted of a film while it is read: cuts, loops, light, and what stands still.
 
-It looks at small copies of whole frames, some 25 a second, and keeps of each what is small: a thumbnail, and strips
-along the picture's four edges. What it counts can be checked by eye on the film.
+It looks at small copies of whole frames, some 25 a second, and keeps of each a thumbnail. What it counts can be checked
+by eye on the film.
 """
 
 from __future__ import annotations
@@ -19,8 +19,6 @@ SIDE = 240
 """Longer side [px] of the small copies."""
 _RATE = 25.0
 """Frames a second that are looked at, about."""
-_STRIP = 2
-"""Width [px] of the strips along the edges."""
 _THUMB = 40
 """Longer side [px] of the thumbnails."""
 _COMPARED = 500
@@ -72,7 +70,6 @@ class FilmWatch:
     _fine: NDArray[np.float32] | None = None
     _coarse: NDArray[np.float32] | None = None
     _thumbs: list[NDArray[np.float32]] = field(default_factory=list)
-    _strips: list[NDArray[np.uint8]] = field(default_factory=list)
     _sample: list[Picture] = field(default_factory=list)
     _bright: list[float] = field(default_factory=list)
     _noise: list[float] = field(default_factory=list)
@@ -88,7 +85,6 @@ class FilmWatch:
         self.times.append(time)
         self._thumbs.append(_averaged(small.astype(np.float32), _THUMB))
         self._change(small.astype(np.float32))
-        self._strips.append(_edges(small))
         if len(self.times) % _SAMPLED == 1 and len(self._sample) < _KEPT:
             self._sample.append(small)
             self._bright.append(float(np.quantile(picture[::4, ::4], 0.99)))
@@ -184,38 +180,11 @@ class FilmWatch:
         spot = found[1 + int(np.argmax(found[1:, cv2.CC_STAT_AREA]))]
         return float(max(spot[cv2.CC_STAT_WIDTH], spot[cv2.CC_STAT_HEIGHT]) * max(self.shape) / max(self.small))
 
-    def at_edges(self, mask: NDArray[np.bool_]) -> dict[str, float]:
-        """Share of the frames in which cloth moves at the picture's left, top, right and lower edge.
-
-        Args:
-            mask: (height, width) all places that the cloth visits, in any scale.
-        """
-        height, width = self.small
-        wide = _resized(mask, (height, width)).astype(np.uint8)
-        size = max(float(np.ptp(np.flatnonzero(wide.any(axis=k)))) if wide.any() else 0.0 for k in (0, 1))
-        near = np.asarray(cv2.dilate(wide, np.ones((5, 5), np.uint8)), dtype=np.uint8)
-        strips = np.stack(self._strips).astype(np.int16)
-        away = np.abs(strips - np.median(strips, axis=0)) > max(_EDGE_NOISES * self.noise / 2, _EDGE_CHANGE)
-        moving = away & (_edges(near)[None] > 0)
-        least = max(3.0, _EDGE_SHARE * size)
-        found, begin = {}, 0
-        for name, length in (("left", height), ("top", width), ("right", height), ("lower", width)):
-            own = moving[:, begin : begin + length].sum(axis=1)
-            found[name] = float((own >= least).mean())
-            begin += length
-        return found
-
     def resting(self) -> int:
         """Pixels of the small copies in which an edge stays where it is for two seconds, as those of background, pole
         and hoist do: the median over the film, of which a camera may drift."""
         counts = [_resting(self._sample[k : k + _TOGETHER]) for k in range(0, len(self._sample) - 2, _TOGETHER)]
         return int(np.median(counts)) if counts else 0
-
-
-_EDGE_CHANGE, _EDGE_NOISES = 8.0, 5.0
-"""Gray levels, and deviations of the noise, from the median in time from which on a pixel at the edge shows cloth."""
-_EDGE_SHARE = 0.05
-"""Share of the cloth's size that has to move along an edge."""
 
 
 def _averaged(picture: NDArray[_Gray], side: int) -> NDArray[_Gray]:
@@ -227,12 +196,6 @@ def _averaged(picture: NDArray[_Gray], side: int) -> NDArray[_Gray]:
 
 def _resized(mask: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.bool_]:
     return cv2.resize(mask.astype(np.uint8), shape[::-1], interpolation=cv2.INTER_NEAREST).astype(bool)
-
-
-def _edges(small: Picture) -> NDArray[np.uint8]:
-    """Means over the strips along the left, top, right and lower edge, one after the other."""
-    parts = (small[:, :_STRIP].mean(1), small[:_STRIP].mean(0), small[:, -_STRIP:].mean(1), small[-_STRIP:].mean(0))
-    return np.concatenate(parts).round().astype(np.uint8)
 
 
 def _resting(sample: list[Picture]) -> int:
