@@ -89,7 +89,8 @@ def test_cloth_at_an_edge_is_counted_by_frames_and_named_by_its_edge(plain: Fram
     middle = FLAG[0] + FLAG[2] // 2
     (fault,) = counted(np.ascontiguousarray(plain[:, :, :middle]))
     assert fault.kind == "cut-off"
-    assert fault.value is not None and fault.value > 0.8  # in some frames the cloth moves little there
+    assert fault.value is not None
+    assert fault.value > 0.8
     assert f"at the right edge in {fault.value:.0%} of the frames" in fault.what
     (mirrored,) = counted(np.ascontiguousarray(plain[:, :, :middle][:, :, ::-1]))
     assert "at the left edge in" in mirrored.what
