@@ -1,4 +1,4 @@
-"""Who computes the forces: torch, which defines them, or the compiled kernel."""
+"""Who computes the steps: torch, which defines them, the compiled kernel, or Warp's."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import torch
 
 from flagdata.errors import UsageError
 from sim.kernel.fused import Kernel
+from sim.kernel_warp.batch import WarpKernel
 from sim.state import State
 from sim.system import System
 
@@ -20,17 +21,23 @@ class Backend(StrEnum):
     kernel cannot be built."""
     TORCH = "torch"
     KERNEL = "kernel"
+    WARP = "warp"
+    """The Warp kernel, for graphics processors; never taken unless it is asked for."""
 
 
 def kernel_for(system: System, state: State, backend: Backend) -> Kernel | None:
     """The compiled kernel where the backend allows it and it can run; None where torch is to do the work.
 
     Raises:
-        UsageError: the kernel was asked for and cannot run this system, or gradients are wanted from it.
+        UsageError: the kernel was asked for and cannot run this system, or gradients are wanted from it; the Warp
+            kernel was asked for where steps are not leapfrog's.
     """
-    differentiated = torch.is_grad_enabled() and any(
-        tensor.requires_grad for tensor in (state.position, state.velocity, *system.tensors())
-    )
+    if backend is Backend.WARP:
+        raise UsageError(
+            "the Warp kernel has only leapfrog steps, no implicit integration",
+            where="integrator", fix="use the integrator symplectic, or another backend",
+        )  # fmt: skip
+    differentiated = _differentiated(system, state)
     if backend is Backend.TORCH or (backend is Backend.AUTO and differentiated):
         return None
     kernel = Kernel.of(system)
@@ -41,3 +48,20 @@ def kernel_for(system: System, state: State, backend: Backend) -> Kernel | None:
             fix="it needs a C++ compiler, a CPU, float32 or 64 and no gradients; or leave the choice to AUTO",
         )
     return kernel
+
+
+def warp_kernel_for(system: System, state: State) -> WarpKernel:
+    """The Warp kernel for a system.
+
+    Raises:
+        UsageError: it cannot run this system (see `WarpKernel.of`), or gradients are wanted from it.
+    """
+    if _differentiated(system, state):
+        raise UsageError("the Warp kernel gives no gradients", where="integrator", fix="use the backend torch")
+    return WarpKernel.of(system)
+
+
+def _differentiated(system: System, state: State) -> bool:
+    return torch.is_grad_enabled() and any(
+        tensor.requires_grad for tensor in (state.position, state.velocity, *system.tensors())
+    )

@@ -24,7 +24,7 @@ from weakref import WeakKeyDictionary
 from torch import Tensor
 
 from flagdata.errors import UsageError
-from sim.integrate.backend import Backend, kernel_for
+from sim.integrate.backend import Backend, kernel_for, warp_kernel_for
 from sim.integrate.stability import outer_limit, stable_step
 from sim.kernel.fused import Kernel
 from sim.state import State
@@ -113,14 +113,17 @@ def advance(
         outer: equal outer steps, each of the same number of steps; None for as many as there are steps.
 
     Raises:
-        UsageError: the kernel was asked for and cannot run this system, or gradients are wanted from it; steps that
-            do not divide into the outer ones; an outer step beyond its limit.
+        UsageError: a kernel was asked for and cannot run this system, or gradients are wanted from it; steps that do
+            not divide into the outer ones; an outer step beyond its limit.
     """
     drive = system.drive(state.time, state.time + duration)
     x, v = state.position, state.velocity
     if system.clamped:
         v = v.index_copy(0, system.held, drive.rate)
     start = State(position=x, velocity=v, time=state.time, memory=state.memory)
+    if backend is Backend.WARP:
+        x, v = warp_kernel_for(system, start).advance(drive, x, v, duration / steps, steps)
+        return State(position=x, velocity=v, time=state.time + duration)
     if not system.extra:
         x, v = _base(system, drive, state.time, x, v, duration / steps, steps, kernel_for(system, start, backend))
         return State(position=x, velocity=v, time=state.time + duration)

@@ -15,9 +15,11 @@ from flagdata.errors import LimitError
 from flagdata.lake.meshes import MeshSequence
 from flagdata.timebase import NANOSECONDS
 from sim.integrate import Integrator
+from sim.integrate.backend import Backend
 from sim.integrate.implicit import BackwardEuler
 from sim.integrate.stability import stiffest
 from sim.integrate.symplectic import Symplectic, advance
+from sim.kernel_warp.batch import WarpKernel
 from sim.run.diagnostics import Diagnosis, Monitor
 from sim.run.members import Crew, Member, Parameter
 from sim.run.recipe import Recipe
@@ -70,7 +72,8 @@ class Stepper:
         """The method and the steps of a recipe for the members of one of its materials, by its place among them.
 
         Raises:
-            UsageError: a forced step beyond the stability limit of a member at the ends of the recipe's ranges.
+            UsageError: a forced step beyond the stability limit of a member at the ends of the recipe's ranges; a
+                backend that cannot run such a member.
             InputError: no step is stable.
             LimitError: more than `STEPS_LIMIT` steps a frame.
         """
@@ -78,9 +81,11 @@ class Stepper:
         frame = 1 / recipe.time.rate
         if spec.name == "implicit":
             step = spec.step or 5e-3
-            method = BackwardEuler(step=step, air_shape=spec.air_shape)
+            method = BackwardEuler(step=step, air_shape=spec.air_shape, backend=spec.backend)
             return cls(recipe=recipe, method=method, steps=max(1, math.ceil(frame / step - 1e-9)))
         system, _ = crew.corners(base)
+        if spec.backend is Backend.WARP:
+            WarpKernel.of(system)
         with torch.no_grad():
             return cls(recipe=recipe, method=None, steps=Symplectic(step=spec.step).steps(system, frame))
 
@@ -94,7 +99,7 @@ class Stepper:
         frame = 1 / self.recipe.time.rate
         if self.method is not None:
             return self.method.advance(system, state, frame)
-        return advance(system, state, frame, steps=self.steps)
+        return advance(system, state, frame, steps=self.steps, backend=self.recipe.integrator.backend)
 
     def unstable(self, system: System) -> Tensor:
         """(batch,) whether a member's own limit is below the step."""

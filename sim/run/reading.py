@@ -15,7 +15,8 @@ which each member draws its own value.
                  quantities; vertical [m/s]; force = "quadratic-normal" | "stokes"; density, drag | viscosity
     [contact]    thickness, stiffness, friction; without the table, layers pass through each other
     [limits]     low, high, sweeps; without the table, strain has no limits
-    [integrator] name = "symplectic" | "implicit"; step; air-shape (of the implicit)
+    [integrator] name = "symplectic" | "implicit"; step; air-shape (of the implicit); backend = "auto" | "torch" |
+                 "kernel" | "warp"
     [time]       settle, frames, rate
     [effects.NAME]  parameters of an effect (quantities, or "prior" for its prior range)
 
@@ -43,6 +44,7 @@ from sim.contact import Contact
 from sim.effects import EFFECTS
 from sim.handles import ARCSIM_STIFFNESS
 from sim.integrate import INTEGRATORS
+from sim.integrate.backend import Backend
 from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
 from sim.material import Material
@@ -291,8 +293,14 @@ def _integrator(table: Table) -> IntegratorSpec:
     if name == "implicit":
         step = 5e-3 if step is None else step
         air_shape = table.choice("air-shape", AirShape.CURRENT)
+    backend = table.choice("backend", Backend.AUTO)
+    if name == "implicit" and backend is Backend.WARP:
+        raise UsageError(
+            "the Warp kernel has only leapfrog steps, no implicit integration",
+            where=table.where, fix='name = "symplectic", or another backend',
+        )  # fmt: skip
     table.done()
-    return IntegratorSpec(name=name, step=step, air_shape=air_shape)
+    return IntegratorSpec(name=name, step=step, air_shape=air_shape, backend=backend)
 
 
 def _effects(table: Table) -> dict[str, EffectSpec]:

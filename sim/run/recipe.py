@@ -20,6 +20,7 @@ from sim.air import AIR_FORCES, AirForce, QuadraticNormal
 from sim.arcsim import ArcsimScene
 from sim.contact import Contact
 from sim.handles import ARCSIM_STIFFNESS
+from sim.integrate.backend import Backend
 from sim.integrate.implicit import AirShape
 from sim.limits import StrainLimits
 from sim.material import Material
@@ -156,11 +157,15 @@ class WindSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class IntegratorSpec:
-    """A method of `sim.integrate.INTEGRATORS`; `step` None lets the symplectic one take its stable step [s]."""
+    """A method of `sim.integrate.INTEGRATORS`; `step` None lets the symplectic one take its stable step [s].
+
+    `backend` is what computes the steps.
+    """
 
     name: str = "symplectic"
     step: float | None = None
     air_shape: AirShape = AirShape.CURRENT
+    backend: Backend = Backend.AUTO
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -278,7 +283,7 @@ class Recipe:
             **({} if self.limits is None else {"limits": vars(self.limits).copy()}),
             "integrator": {
                 "name": self.integrator.name, "step": self.integrator.step,
-                "air_shape": self.integrator.air_shape.value,
+                "air_shape": self.integrator.air_shape.value, **_chosen(self.integrator.backend),
             },
             "time": vars(self.time).copy(),
             "effects": {
@@ -289,6 +294,11 @@ class Recipe:
                 for name, effect in self.effects.items()
             },
         }  # fmt: skip
+
+
+def _chosen(backend: Backend) -> dict[str, Any]:
+    """The backend, where it is not the usual one: results are another's to rounding."""
+    return {} if backend is Backend.AUTO else {"backend": backend.value}
 
 
 def _held(scene: SceneSpec) -> dict[str, Any]:

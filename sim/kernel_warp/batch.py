@@ -1,0 +1,175 @@
+"""Hands a system's tensors to the Warp kernel, on whatever device they are."""
+
+from __future__ import annotations
+
+import importlib
+import weakref
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from flagdata.errors import UsageError
+from sim.mesh import Mesh
+from sim.system import Drive, System
+from sim.tables import Evaluation
+
+_WHERE = "backend warp"
+
+
+def lacking(system: System) -> list[str]:
+    """What acts in a system that the Warp kernel does not have, in words."""
+    found = {
+        "effects": system.effects,
+        "effects on the wind": system.flows,
+        "added mass": system.loads,
+        "ties beside the handles": system.ties,
+        "hysteresis": system.frictions,
+        "contact": system.contact is not None,
+        "strain limits": system.limits is not None,
+        "bending stiffness that differs along the cloth": system.cloth.stiffening is not None,
+        f"the wind force {type(system.air).__name__}": system.air is not system.air.plain,
+    }
+    return [name for name, acts in found.items() if acts]
+
+
+@dataclass(frozen=True, kw_only=True)
+class WarpKernel:
+    """The kernel for one system.
+
+    Attributes:
+        code: the module `sim.kernel_warp.leapfrog`.
+        sheet, members: its arguments of that name; the tensors they point to are `alive`.
+    """
+
+    code: ModuleType
+    system: System
+    sheet: Any
+    members: Any
+    alive: tuple[Tensor, ...]
+
+    @classmethod
+    def of(cls, system: System) -> WarpKernel:
+        """The kernel for a system.
+
+        Raises:
+            UsageError: warp-lang is not installed, or has no such device; numbers that are not float32; a system with
+                more than the base model, which is named.
+        """
+        if system not in _KERNELS:
+            _KERNELS[system] = cls._build(system)
+        return _KERNELS[system]
+
+    @classmethod
+    def _build(cls, system: System) -> WarpKernel:
+        if more := lacking(system):
+            raise UsageError(
+                f"the Warp kernel has only the base model, not {', '.join(more)}", where=_WHERE,
+                fix="leave them out, or use another backend",
+            )  # fmt: skip
+        cloth = system.cloth
+        if cloth.dtype != torch.float32:
+            raise UsageError(f"numbers of type {cloth.dtype}", where=_WHERE, fix="use float32, or another backend")
+        code = _code(cloth.device)
+        alive: list[Tensor] = []
+
+        def array(values: NDArray[Any] | Tensor, dtype: Any = None) -> Any:
+            tensor = torch.as_tensor(values).to(cloth.device).contiguous()
+            alive.append(tensor)
+            return code.wp.from_torch(tensor, dtype=dtype)
+
+        sheet = code.Sheet()
+        for name, values in _sheet(cloth.mesh, system.held).items():
+            setattr(sheet, name, array(values.astype(np.int32)))
+        sheet.gradient = array(cloth.gradients[:, :, 1:].permute(2, 1, 0).flatten())
+        sheet.area = array(cloth.areas)
+        sheet.column, sheet.shape, sheet.row = (
+            array(cloth.hinge_column), array(cloth.hinge_shape), array(cloth.hinge_rows.T.flatten())
+        )  # fmt: skip
+        members = code.Members()
+        members.samples = array(cloth.samples.reshape(-1, 4), code.wp.vec4)
+        members.table = array(cloth.table_of.int())
+        members.counts = code.wp.vec3i(*cloth.grid.counts)
+        members.origin, members.spacing = cloth.grid.origin, cloth.grid.spacing
+        bending = np.stack([material.bending for material in cloth.materials], axis=-1)
+        members.bending = array(torch.tensor(bending, dtype=torch.float32).reshape(15, -1))
+        members.symmetric = int(cloth.evaluation is Evaluation.CORRECTED)
+        members.damping = array(cloth.damping)
+        inverse = 1 / cloth.mass
+        members.inverse_mass = array(inverse.index_fill(0, system.held, 0.0) if system.clamped else inverse)
+        members.gravity = array(system.gravity)
+        members.density, members.drag = system.air.plain.density, system.air.plain.drag
+        members.stiffness = system.handles.stiffness if system.sprung else 0.0
+        return cls(code=code, system=system, sheet=sheet, members=members, alive=tuple(alive))
+
+    def advance(self, drive: Drive, x: Tensor, v: Tensor, h: float, steps: int) -> tuple[Tensor, Tensor]:
+        """Leapfrog: positions and velocities (vertex, 3, batch) after `steps` steps of `h` [s]."""
+        wp, mesh = self.code.wp, self.system.cloth.mesh
+        given = [torch.stack(drive.wind), torch.stack(drive.targets), drive.rate.contiguous()]
+        after = (x.clone(memory_format=torch.contiguous_format), v.clone(memory_format=torch.contiguous_format))
+        motion = self.code.Motion()
+        motion.wind, motion.targets, motion.rate = (wp.from_torch(tensor) for tensor in given)
+        kernel = self.code.kernel(mesh.vertex_count, len(mesh.faces), len(mesh.hinges))
+        where = wp.device_from_torch(x.device)
+        wp.launch_tiled(
+            kernel, dim=[self.system.cloth.batch], block_dim=self.code.THREADS, device=where,
+            inputs=[self.sheet, self.members, motion, *(wp.from_torch(tensor) for tensor in after), h, steps],
+            stream=wp.stream_from_torch(torch.cuda.current_stream(x.device)) if where.is_cuda else None,
+        )  # fmt: skip
+        return after
+
+
+_KERNELS: weakref.WeakKeyDictionary[System, WarpKernel] = weakref.WeakKeyDictionary()
+
+
+def _code(device: torch.device) -> ModuleType:
+    """The kernel's module.
+
+    Raises:
+        UsageError: warp-lang is not installed, or does not know the device.
+    """
+    try:
+        code = importlib.import_module("sim.kernel_warp.leapfrog")
+    except ModuleNotFoundError as error:
+        if error.name != "warp":
+            raise
+        raise UsageError(
+            "warp-lang is not installed", where=_WHERE, fix="pip install 'flagdata[gpu]', or use another backend"
+        ) from None
+    known = [str(device) for device in code.wp.get_devices()]
+    name = "cpu" if device.type == "cpu" else f"{device.type}:{device.index or 0}"
+    if name not in known:
+        raise UsageError(
+            f"Warp has no device {name!r}, only {', '.join(known)}", where=_WHERE,
+            fix="install the driver of the graphics processor, or use one of these",
+        )  # fmt: skip
+    return code
+
+
+def _sheet(mesh: Mesh, held: Tensor) -> dict[str, NDArray[np.int64]]:
+    """The index arrays of `leapfrog.Sheet`."""
+    faces, hinges = mesh.faces, mesh.hinges
+    count = len(faces)
+    corner_of = {  # directed edge → the slot of the corner opposite
+        (int(face[(c + 1) % 3]), int(face[(c + 2) % 3])): c * count + e
+        for e, face in enumerate(faces)
+        for c in range(3)
+    }
+    left = [corner_of[int(i), int(j)] for i, j, *_ in hinges]
+    right = [corner_of[int(j), int(i)] for i, j, *_ in hinges]
+    edge = np.full(3 * count, len(hinges))
+    edge[left] = edge[right] = np.arange(len(hinges))
+    vertex = faces.T.ravel()
+    order = np.lexsort((np.arange(3 * count) // count, vertex))  # by vertex, then by corner
+    at = np.searchsorted(vertex[order] * 3 + order // count, np.arange(3 * mesh.vertex_count + 1))
+    begin = np.stack([at[:-1:3], at[1::3], at[2::3], at[3::3]])
+    hold = np.full(mesh.vertex_count, -1)
+    hold[held.cpu().numpy()] = np.arange(len(held))
+    return {
+        "corner": vertex, "edge": edge, "end": hinges[:, :2].T.ravel(), "side": np.array([*left, *right]),
+        "around": order % count, "begin": begin.ravel(), "hold": hold,
+    }  # fmt: skip
