@@ -10,12 +10,13 @@ if TYPE_CHECKING:
     from flagdata.dataset.source import Source
     from flagdata.measured import Measured
     from flagdata.stated import Stated
+    from flagdata.storage import Place
 
 __all__ = ["measure", "open"]
 
 
-def open(path: Path | str) -> Source:  # noqa: A001 — read as flagdata.open
-    """The lake in the folder `path` as a source of typed pairs; `.lake` is the lake itself.
+def open(path: Place | str) -> Source:  # noqa: A001 — read as flagdata.open
+    """The lake in the folder `path`, or at `s3://bucket/prefix`, as a source of typed pairs; `.lake` is the lake.
 
     Raises:
         NotFoundError: no lake there.

@@ -1,7 +1,7 @@
 """The one place where text becomes a path: an address of a storage, stream or machine is refused as what it is.
 
-A path library takes `s3://bucket/lake` for a folder `s3:` here; the user meant a service that flagdata does not
-read or write.
+A path library takes `s3://bucket/lake` for a folder `s3:` here. A lake may be there; all else is read and written on a
+local disk.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import re
 from pathlib import Path
 
 from flagdata.errors import UsageError
+from flagdata.storage import Place, RemotePath
 
 _ADDRESS = re.compile(r"([\w.-]+@)?(?P<scheme>[A-Za-z][\w.+-]+):(?P<rest>/.*)", re.DOTALL)  # a drive has one letter
 _STORAGE = "object storage", "copy it to a local disk with the storage's own client, and give that path"
@@ -41,3 +42,14 @@ def local_path(text: Path | str) -> Path:
         noun, fix = _KINDS.get(scheme, _ELSEWHERE)
         what = f"the address of {noun}, not a local path"
     raise UsageError(what, where=str(text), fix=fix)
+
+
+def lake_place(text: Place | str) -> Place:
+    """Where a lake is: a folder of this machine, or `s3://bucket/prefix`.
+
+    Raises:
+        UsageError: any other address.
+    """
+    if str(text).lower().startswith("s3://"):
+        return RemotePath.parse(str(text))
+    return local_path(text if isinstance(text, Path) else str(text))

@@ -39,6 +39,15 @@ def files_of(path: Path) -> list[Path]:
     return found
 
 
+def size_of(path: Path) -> int:
+    """Bytes of a file, or of all files in a folder.
+
+    Raises:
+        InputError: as `files_of`.
+    """
+    return sum(file.stat().st_size for file in files_of(path))
+
+
 def content_hash(path: Path) -> str:
     """SHA-256 of a file; of a folder, SHA-256 over the lines "<file sha256>  <relative path>\\n" sorted by path.
 
@@ -50,7 +59,24 @@ def content_hash(path: Path) -> str:
     """
     if files_of(path) == [path]:
         return file_hash(path)
-    return hashlib.sha256(_lines({name: file_hash(file) for name, file in _named(path).items()}).encode()).hexdigest()
+    return hashlib.sha256(sums_of(path).encode()).hexdigest()
+
+
+def sums_of(folder: Path) -> str:
+    """The lines of a folder whose SHA-256 is its `content_hash`."""
+    return _lines({name: file_hash(file) for name, file in _named(folder).items()})
+
+
+def read_sums(text: str) -> dict[str, str]:
+    """Relative path → SHA-256, as `sums_of` wrote them.
+
+    Raises:
+        ValueError: a line that is none.
+    """
+    found = [_LINE.fullmatch(line) for line in text.splitlines()]
+    if not all(found):
+        raise ValueError("a line is not what sha256sum prints")
+    return {match[2]: match[1] for match in found if match is not None}
 
 
 def write_sums(folder: Path) -> None:
@@ -117,11 +143,10 @@ def _lines(sums: dict[str, str]) -> str:
 def _stated(folder: Path, *, fix: str) -> dict[str, str]:
     path = folder / SUMS
     try:
-        found = [_LINE.fullmatch(line) for line in path.read_text(encoding="utf-8").splitlines()]
+        return read_sums(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise CorruptError("there are no checksums of its files", where=str(path), fix=fix) from None
     except (OSError, UnicodeDecodeError) as error:
         raise CorruptError(f"the checksums cannot be read: {error}", where=str(path), fix=fix) from None
-    if not all(found):
-        raise CorruptError("a line is not what sha256sum prints", where=str(path), fix=fix)
-    return {match[2]: match[1] for match in found if match is not None}
+    except ValueError as error:
+        raise CorruptError(str(error), where=str(path), fix=fix) from None

@@ -12,8 +12,9 @@ from typing import Any, TypeVar
 
 import click
 
-from flagdata.addresses import local_path
+from flagdata.addresses import lake_place, local_path
 from flagdata.errors import FlagdataError, LimitError, UnforeseenError
+from flagdata.storage import Place, StoreError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -32,6 +33,15 @@ class LocalPath(click.Path):
         return super().convert(path, param, ctx)
 
 
+class LakePlace(click.ParamType):
+    """A lake's folder or address on the command line, a `Path` or `RemotePath` afterwards."""
+
+    name = "lake"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Place:
+        return lake_place(value)
+
+
 def json_option(command: F) -> F:
     """Adds `--json` (argument `as_json`); errors are then printed as JSON too."""
     return click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")(command)
@@ -41,7 +51,7 @@ def lake_option(command: F) -> F:
     """Adds `--lake DIR` (argument `lake_path`), also read from the environment variable FLAGDATA_LAKE."""
     return click.option(
         "--lake", "lake_path", envvar="FLAGDATA_LAKE", default=".", show_default=True, metavar="DIR",
-        help="The lake's folder; also FLAGDATA_LAKE.",
+        help="The lake's folder, or s3://bucket/prefix; also FLAGDATA_LAKE.",
     )(command)  # fmt: skip
 
 
@@ -108,7 +118,8 @@ def foreseen(error: Exception) -> FlagdataError:
         what = " ".join((error.strerror or str(error)).split())  # without strerror where a library of C++ raised it
         return FlagdataError(
             f"the system refused: {what}", where=None if error.filename is None else str(error.filename),
-            fix="check that the file is there, its permissions and the space on the disk",
+            fix=error.fix if isinstance(error, StoreError)
+            else "check that the file is there, its permissions and the space on the disk",
         )  # fmt: skip
     if isinstance(error, MemoryError):
         return LimitError("there is not enough memory for this", fix="ask for less at a time, or use a larger machine")

@@ -5,10 +5,11 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from io import BufferedReader
+from io import BufferedIOBase, BytesIO
 from pathlib import Path
 
 from flagdata.errors import InputError, LimitError, NotFoundError
+from flagdata.storage import Place, RemotePath
 
 MCAP = b"\x89MCAP0\r\n"
 """First bytes of an MCAP file."""
@@ -63,12 +64,14 @@ def check_input(path: Path, *, noun: str = "file", limit: int | None = None) -> 
         raise LimitError(f"a {noun} of {status.st_size} bytes", where=shown, fix=f"at most {limit} are read")
 
 
-def open_regular(path: Path) -> BufferedReader:
-    """A regular file, opened to read its bytes.
+def open_regular(path: Place) -> BufferedIOBase:
+    """A regular file, opened to read its bytes; of a bucket, an object's bytes.
 
     Raises:
         OSError: what the system refused; or a folder, pipe or device, from which one may read without an end.
     """
+    if isinstance(path, RemotePath):
+        return BytesIO(path.read_bytes())
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # a pipe that nobody writes to would wait
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.files import open_regular
+from flagdata.storage import Place
 
 _CHUNK = 1 << 20
 
@@ -30,7 +31,7 @@ def recipe_hash(recipe: Mapping[str, Any]) -> str:
     return digest(canonical(recipe))
 
 
-def file_hash(path: Path) -> str:
+def file_hash(path: Place) -> str:
     """SHA-256 of a file's bytes, hex.
 
     Raises:

@@ -31,7 +31,7 @@ at_option = click.option(
 @lake_option
 @click.pass_context
 def init(context: click.Context, folder: str | None, as_json: bool, lake_path: str) -> None:
-    """Create an empty lake in FOLDER, or where --lake says."""
+    """Create an empty lake in FOLDER, which may be s3://bucket/prefix, or where --lake says."""
     from flagdata.lake import Lake
     from flagdata.schema import FORMAT_VERSION
 

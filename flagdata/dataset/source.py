@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from flagdata.dataset.cache import DecodedCache
 from flagdata.dataset.pairs import Pairs
 from flagdata.dataset.resolve import SideSize, resolve, side_sizes
@@ -11,6 +9,7 @@ from flagdata.dataset.splits import ExplicitSplit, HashedSplit
 from flagdata.dataset.tolerance import Tolerance
 from flagdata.errors import UsageError
 from flagdata.lake import Lake
+from flagdata.storage import Place
 
 
 class Source:
@@ -24,8 +23,8 @@ class Source:
         self.lake = lake
 
     @classmethod
-    def open(cls, path: Path | str) -> Source:
-        """The lake in the folder `path`.
+    def open(cls, path: Place | str) -> Source:
+        """The lake in the folder `path`, or at `s3://bucket/prefix`.
 
         Raises:
             NotFoundError: no lake there.

@@ -1,6 +1,7 @@
 """The lake: immutable objects under their content hash, a Delta catalog whose one commit publishes them, and refs.
 
-A lake is a folder of a local disk, or of a network file system that carries hard links and flock. Its layout:
+A lake is a folder of a local disk or of a network file system that carries hard links and flock, or a prefix of a
+bucket, `s3://bucket/prefix` (see docs/decisions/040-object-storage.md). Its layout:
 
     lake.json            format version and identity of the lake
     catalog/             the Delta table; one row an artifact (schema.CATALOG)

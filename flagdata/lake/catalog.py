@@ -16,6 +16,8 @@ can keep of its pages: the hash covers the whole file, footer too, costs readers
 
 from __future__ import annotations
 
+import errno
+import hashlib
 import json
 import os
 import random
@@ -36,11 +38,12 @@ from deltalake.exceptions import CommitFailedError, DeltaError
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.files import open_regular
-from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder
+from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder, put_if_absent, write_durably
 from flagdata.lake.log import FILE_HASH, PREVIOUS_HASH, Log
 from flagdata.lake.older_rows import with_data_sets
-from flagdata.provenance import file_hash
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
+from flagdata.storage import Place, RemotePath, StoreError
+from flagdata.storage.connection import delta_options, plain
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -86,7 +89,7 @@ def _one_at_a_time(method: Callable[Concatenate[Catalog, P], T]) -> Callable[Con
     return guarded
 
 
-def persist(attempt: Callable[[], T], *, where: Path) -> T:
+def persist(attempt: Callable[[], T], *, where: Place) -> T:
     """Run `attempt` until it does not raise `Moved`, with random waits that grow.
 
     Raises:
@@ -112,7 +115,7 @@ class Catalog:
     `marks` is the folder where the newest version is noted, see `flagdata.lake.log`.
     """
 
-    def __init__(self, path: Path, marks: Path) -> None:
+    def __init__(self, path: Place, marks: Place) -> None:
         self.path = path
         self._marks = marks
         self._log = path / "_delta_log"
@@ -123,7 +126,7 @@ class Catalog:
         self._rows: tuple[int, pa.Table] | None = None
         self._history: tuple[int, list[dict[str, Any]]] | None = None
 
-    def __reduce__(self) -> tuple[type[Catalog], tuple[Path, Path]]:
+    def __reduce__(self) -> tuple[type[Catalog], tuple[Place, Place]]:
         return (Catalog, (self.path, self._marks))
 
     @_one_at_a_time
@@ -139,10 +142,11 @@ class Catalog:
                 catalog_schema(),
                 mode="error",
                 configuration=_CONFIGURATION,
+                storage_options=self._options(),
                 commit_properties=_properties(info),
             )
         except DeltaError as error:
-            raise OSError(str(error)) from error
+            raise self._refused(error) from None
         self._flush_log(0)
 
     @_one_at_a_time
@@ -209,6 +213,33 @@ class Catalog:
         self._commit(table, rows, removed=files, rows_change=True, info=info)
         return base + 1
 
+    def entry(self, version: int) -> tuple[bytes, dict[str, Place]]:
+        """A version's entry of the log, and where the files are that it adds, by name.
+
+        Raises:
+            CorruptError: it cannot be read.
+        """
+        entry, files = self._entries.entry(version)
+        return entry, {name: self.path / name for name in files}
+
+    def adopt(self, version: int, entry: bytes, files: Mapping[str, Place]) -> None:
+        """Publish a version of another lake, whose versions before are this one's; what is there stays.
+
+        Raises:
+            ConflictError: another version of that number is there.
+        """
+        for name, file in files.items():
+            with open_regular(file) as stream:
+                put_if_absent(self.path / name, stream.read())
+        if not self._entries.adopt(version, entry):
+            raise ConflictError(
+                f"version {version} was committed here by another", where=str(self.path), fix="try again"
+            )
+
+    def acknowledge(self, version: int) -> None:
+        """Note that a version that was adopted, and those before it, are there for good."""
+        self._entries.acknowledge(version)
+
     def is_due_for_tidying(self) -> bool:
         """Whether `tidy` would do anything: `_TIDY_EVERY` versions after it last did."""
         return self.head() - self._checkpoint() >= _TIDY_EVERY
@@ -227,18 +258,19 @@ class Catalog:
         try:
             table.create_checkpoint()
         except DeltaError as error:
-            raise OSError(str(error)) from error
-        flush_file(self._log / f"{version:020d}{_CHECKPOINT}")
-        if (hint := self._log / _HINT).exists():
-            flush_file(hint)
-        flush_folder(self._log)
+            raise self._refused(error) from None
+        if isinstance(self._log, Path):
+            flush_file(self._log / f"{version:020d}{_CHECKPOINT}")
+            if (hint := self._log / _HINT).exists():
+                flush_file(hint)
+            flush_folder(self._log)
         small = [name for name in self._names(version) if (self.path / name).stat().st_size < _SMALL]
         if len(small) > 1:
             rows = pa.concat_tables(self._read(name) for name in small)
             info = {"message": f"merge {len(small)} files of the catalog; no row changed"}
             self._commit(table, rows, removed=small, rows_change=False, info=info)
 
-    def unpublished_files(self) -> list[Path]:
+    def unpublished_files(self) -> Sequence[Place]:
         """What is left by processes that died before, or while, they put their log entry: no version refers to it.
 
         Raises:
@@ -247,9 +279,9 @@ class Catalog:
         tracked = self._entries.files()
         rows = [path for path in self.path.glob("*.parquet") if path.name not in tracked]
         entries = self._log.glob("*#*")  # the Delta library's own name for an entry it has not linked yet
-        return sorted([*rows, *entries])
+        return sorted([*rows, *entries])  # type: ignore[type-var]
 
-    def file_hashes(self) -> dict[Path, str | None]:
+    def file_hashes(self) -> dict[Place, str | None]:
         """Each file that some version is made of → its SHA-256 when it was written, `None` if that was not noted.
 
         Raises:
@@ -257,7 +289,7 @@ class Catalog:
         """
         return {self.path / name: digest for name, digest in self._entries.files().items()}
 
-    def changed_entries(self) -> list[Path]:
+    def changed_entries(self) -> list[Place]:
         """Entries of the log whose bytes are not those that were committed, as far as that was noted.
 
         Raises:
@@ -300,18 +332,19 @@ class Catalog:
         if (protocol := table.protocol()).min_writer_version > _WRITER:
             raise newer(f"writing to it takes version {protocol.min_writer_version} of Delta's protocol", self.path)
         path = self.path / f"{uuid.uuid4().hex}.parquet"
+        sink = pa.BufferOutputStream()
         # The Arrow schema is schema.py's, and most values occur once: without both, a row's file has 6 kB, not 15.
-        pq.write_table(rows, path, compression="zstd", store_schema=False, use_dictionary=False)
-        flush_file(path)
-        flush_folder(self.path)
+        pq.write_table(rows, sink, compression="zstd", store_schema=False, use_dictionary=False)
+        content = sink.getvalue().to_pybytes()
+        write_durably(path, content)
         now = time.time_ns() // 1_000_000
         written = {
             "timestamp": now, "operation": "WRITE", "operationParameters": {"mode": "Append", "partitionBy": "[]"},
             "engineInfo": "flagdata", **{f"{_INFO_PREFIX}{key}": value for key, value in info.items()},
-            FILE_HASH: file_hash(path), PREVIOUS_HASH: file_hash(self._entries.path(version - 1)),
+            FILE_HASH: hashlib.sha256(content).hexdigest(), PREVIOUS_HASH: self._entries.hash(version - 1),
         }  # fmt: skip
         added = {
-            "path": path.name, "partitionValues": {}, "size": path.stat().st_size, "modificationTime": now,
+            "path": path.name, "partitionValues": {}, "size": len(content), "modificationTime": now,
             "dataChange": rows_change, "stats": json.dumps({"numRecords": rows.num_rows}),
         }  # fmt: skip
         dropped = [{"path": name, "dataChange": rows_change, "deletionTimestamp": now} for name in removed]
@@ -323,11 +356,15 @@ class Catalog:
         with confirming(f"version {version}", self._entries.path(version)):
             self._entries.acknowledge(version)
 
+    def _options(self) -> dict[str, str] | None:
+        """What the Delta library needs to reach the table; nothing on a disk."""
+        return delta_options() if isinstance(self.path, RemotePath) else None
+
     def _checkpoint(self) -> int:
         """The version of the newest, by the files' names: a process may die before `_last_checkpoint` is written."""
         return max((int(path.name.removesuffix(_CHECKPOINT)) for path in self._checkpoints()), default=0)
 
-    def _checkpoints(self) -> list[Path]:
+    def _checkpoints(self) -> list[Place]:
         return list(self._log.glob(f"*{_CHECKPOINT}"))
 
     def _open(self, version: int) -> DeltaTable:
@@ -335,7 +372,7 @@ class Catalog:
             if self._table is not None and self._table.version() < version:
                 self._table.update_incremental()
             if self._table is None or self._table.version() != version:
-                self._table = DeltaTable(self.path.as_uri(), version=version)
+                self._table = DeltaTable(self.path.as_uri(), version=version, storage_options=self._options())
         unknown = [f.name for f in self._table.schema().fields if f.name not in CATALOG]
         if unknown:
             raise newer(f"the catalog has the columns {', '.join(unknown)}", self.path)
@@ -347,6 +384,8 @@ class Catalog:
         try:
             yield
         except (DeltaError, OSError) as error:
+            if isinstance(self._log, RemotePath):
+                raise self._unreachable(error) from None
             if _SYSTEM_ERROR in str(error):
                 with disk_errors("reading the catalog", self._log):
                     raise OSError(str(error).splitlines()[0]) from error
@@ -361,6 +400,18 @@ class Catalog:
                 if self._checkpoints()
                 else restore,
             ) from None
+
+    def _refused(self, error: DeltaError) -> OSError:
+        """What the Delta library could not write, as an error of the system."""
+        return StoreError(errno.EREMOTEIO, plain(error), str(self.path)) if self._options() else OSError(str(error))
+
+    def _unreachable(self, error: Exception) -> FlagdataError:
+        """The error for a log in a bucket that the Delta library cannot read: without what it says of credentials."""
+        self._entries.files()  # raises, where an entry is to blame
+        return FlagdataError(
+            f"the catalog's log cannot be read: {plain(error)}", where=str(self._log),
+            fix="check the network and the store; then run flagdata doctor",
+        )  # fmt: skip
 
     def _names(self, version: int) -> list[str]:
         table = self._open(version)
@@ -409,12 +460,13 @@ class Catalog:
         except CommitFailedError:
             raise Moved from None
         except DeltaError as error:
-            raise OSError(str(error)) from error
+            raise self._refused(error) from None
         self._flush_log(version)
 
     def _flush_log(self, version: int) -> None:
-        flush_file(self._entries.path(version))
-        flush_folder(self._log)
+        if isinstance(self._log, Path):
+            flush_file(self._log / self._entries.path(version).name)
+            flush_folder(self._log)
         self._entries.acknowledge(version)
 
 
@@ -431,7 +483,7 @@ def _properties(info: Mapping[str, str]) -> CommitProperties:
     )
 
 
-def newer(why: str, where: Path) -> ConflictError:
+def newer(why: str, where: Place) -> ConflictError:
     """The error for a lake of a later format."""
     return ConflictError(
         f"the lake was written by a newer flagdata than this one, which reads formats up to {FORMAT_VERSION}: {why}",

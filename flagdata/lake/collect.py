@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 from flagdata.errors import CorruptError
 from flagdata.findings import Severity
@@ -20,6 +19,7 @@ from flagdata.lake.layout import check_own
 from flagdata.lake.leases import collecting, last_written, leases, unleased
 from flagdata.lake.marking import catalog_files, mark
 from flagdata.lake.objects import Objects, bytes_at
+from flagdata.storage import Place
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +27,7 @@ class Garbage:
     """What can go: names of objects, other paths (staging folders, unpublished files), and their size [B] in all."""
 
     objects: tuple[str, ...]
-    leftovers: tuple[Path, ...]
+    leftovers: tuple[Place, ...]
     size: int
 
 
@@ -51,11 +51,13 @@ def collect(lake: Lake, *, grace: timedelta) -> Garbage:
         CorruptError: a ref cannot be read or the catalog is damaged, so what it needs is unknown; nothing was deleted.
     """
     lake.check_writable()
-    with collecting(lake.staging), disk_errors("collecting", lake.path):
+    with collecting(lake.staging) as check, disk_errors("collecting", lake.path):
         found = _find(lake, grace)
         for name in found.objects:
+            check()
             lake.objects.remove(lake.objects.path(name))
         for path in found.leftovers:
+            check()
             Objects.remove(path)
     return found
 
@@ -75,7 +77,7 @@ def _find(lake: Lake, grace: timedelta) -> Garbage:
     held = {name for state in states if state.alive for name in state.objects}
     limit = (datetime.now(UTC) - grace).timestamp()
     objects = [o for o in lake.objects if o.name not in marked.objects and o.name not in held and o.modified <= limit]
-    leftovers = [state.folder for state in states if state.leased and not state.alive]
+    leftovers: list[Place] = [state.folder for state in states if state.leased and not state.alive]
     leftovers += [path for path in unleased(lake.staging) if last_written(path) <= limit]
     leftovers += [path for path in lake.unpublished_files() if path.lstat().st_mtime <= limit]
     return Garbage(

@@ -16,6 +16,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from flagdata.errors import FlagdataError
+from flagdata.storage import Place, RemotePath, StoreError
 
 SCRATCH = re.compile(r"\.[0-9a-f]{32}")
 """Names of files that are written before they are linked under their own."""
@@ -36,7 +37,15 @@ def flush_folder(path: Path) -> None:
     flush_file(path)
 
 
-def put_if_absent(path: Path, data: bytes, *, what: str | None = None) -> bool:
+def write_durably(path: Place, data: bytes) -> None:
+    """Write a new file; its bytes and its name are on the disk when this returns."""
+    path.write_bytes(data)
+    if isinstance(path, Path):
+        flush_file(path)
+        flush_folder(path.parent)
+
+
+def put_if_absent(path: Place, data: bytes, *, what: str | None = None) -> bool:
     """Create `path` with all of `data`, or leave what is there; False when the name was taken.
 
     The bytes are written and flushed beside it under another name, then linked: the name appears whole or not at all.
@@ -47,6 +56,8 @@ def put_if_absent(path: Path, data: bytes, *, what: str | None = None) -> bool:
     Raises:
         OSError: what the disk refused; the name was not taken.
     """
+    if isinstance(path, RemotePath):
+        return path.create(data)
     scratch = path.with_name(f".{uuid.uuid4().hex}")
     try:
         scratch.write_bytes(data)
@@ -68,7 +79,7 @@ def put_if_absent(path: Path, data: bytes, *, what: str | None = None) -> bool:
 
 
 @contextmanager
-def confirming(what: str, where: Path) -> Iterator[None]:
+def confirming(what: str, where: Place) -> Iterator[None]:
     """Work on `what` after it was published: what the disk refuses is a warning, since it stays published."""
     try:
         yield
@@ -83,7 +94,7 @@ def confirming(what: str, where: Path) -> Iterator[None]:
 
 
 @contextmanager
-def disk_errors(doing: str, where: Path) -> Iterator[None]:
+def disk_errors(doing: str, where: Place) -> Iterator[None]:
     """Turn what the operating system refuses (no space, no permission, read-only) into a clear error.
 
     Raises:
@@ -94,10 +105,9 @@ def disk_errors(doing: str, where: Path) -> Iterator[None]:
     except OSError as error:
         text = " ".join(_COLOUR.sub("", error.strerror or str(error)).split())
         number = error.errno or (int(found[1] or found[2]) if (found := _NUMBER.search(text)) else 0)
+        fix = error.fix if isinstance(error, StoreError) else _FIXES.get(number, "check the disk")
         raise FlagdataError(
-            f"{doing} failed: {text}",
-            where=str(error.filename or where),
-            fix=f"{_FIXES.get(number, 'check the disk')}, then do it again",
+            f"{doing} failed: {text}", where=str(error.filename or where), fix=f"{fix}, then do it again"
         ) from error
 
 

@@ -20,6 +20,7 @@ from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import StoredObject
 from flagdata.lake.removals import removals
 from flagdata.schema import FORMAT_VERSION
+from flagdata.storage import Place
 
 GRACE = timedelta(hours=24)
 """How long what nothing refers to is left alone."""
@@ -35,8 +36,10 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
     foreign = _foreign(lake)
     stored = list(lake.objects)
     states: list[LeaseState] = []
-    unowned: list[tuple[Path, float]] = []
-    if lake.staging not in foreign and any(lake.staging.glob("*")):  # in an empty one, a lock would have to be made
+    unowned: list[tuple[Place, float]] = []
+    if not _is_among(lake.staging, foreign) and any(
+        lake.staging.glob("*")
+    ):  # in an empty one, a lock would have to be made
         with collecting(lake.staging):
             states = leases(lake.staging)
             unowned = [(path, last_written(path)) for path in unleased(lake.staging)]
@@ -107,11 +110,18 @@ def is_healthy(findings: Sequence[Finding]) -> bool:
 
 def _foreign(lake: Lake) -> list[Path]:
     """What is a link or special file, sorted; for what lies in an object, the object."""
+    root = lake.path
+    if not isinstance(root, Path):
+        return []
     found = set()
-    for path in foreign_entries(lake.path):
-        parts = path.relative_to(lake.path).parts
-        found.add(lake.path.joinpath(*parts[:2]) if parts[0] in STORES else path)
+    for path in foreign_entries(root):
+        parts = path.relative_to(root).parts
+        found.add(root.joinpath(*parts[:2]) if parts[0] in STORES else path)
     return sorted(found)
+
+
+def _is_among(path: Place, foreign: Collection[Path]) -> bool:
+    return isinstance(path, Path) and path in foreign
 
 
 def _linked(path: Path) -> Finding:
@@ -168,12 +178,11 @@ def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign:
         findings.append(error("parent-missing", f"its recording {artifact.recording} is not there", "align it again"))
     if artifact.object is not None:
         again = "ingest its source again, or restore the object from a copy"
-        path = lake.objects.path(artifact.object)
-        if not path.exists():
+        if not lake.objects.has(artifact.object):
             findings.append(error("dangling-row", f"its object {artifact.object} is missing", again))
         elif (
             artifact.object_bytes is not None
-            and path not in foreign  # of which a finding says more
+            and not _is_among(lake.objects.path(artifact.object), foreign)  # of which a finding says more
             and (size := lake.objects.size(artifact.object)) != artifact.object_bytes
         ):
             what = f"its object has {size} bytes instead of {artifact.object_bytes}"
@@ -225,8 +234,8 @@ def _later(grace: timedelta) -> str:
 
 
 def _strays(lake: Lake, foreign: Collection[Path]) -> list[Finding]:
-    known = {stored.path for stored in lake.objects} | set(foreign)
-    strays = [p for store in STORES for p in sorted((lake.path / store).glob("*")) if p not in known]
+    known: set[Place] = {stored.path for stored in lake.objects} | set(foreign)
+    strays = [p for store in STORES for p in (lake.path / store).glob("*") if p not in known]
     return [
         Finding(
             kind="stray-file",
@@ -236,7 +245,7 @@ def _strays(lake: Lake, foreign: Collection[Path]) -> list[Finding]:
             fix="flagdata did not put it there: move it out of the lake (and flagdata ingest it from there, if it is"
             " a recording)",
         )
-        for path in strays
+        for path in sorted(strays)  # type: ignore[type-var]
     ]
 
 
@@ -252,7 +261,7 @@ def _abandoned(state: LeaseState) -> Finding:
     )
 
 
-def _unleased(path: Path, written: float, grace: timedelta) -> Finding:
+def _unleased(path: Place, written: float, grace: timedelta) -> Finding:
     old = written <= (datetime.now(UTC) - grace).timestamp()
     return Finding(
         kind="staging-unleased",
@@ -265,7 +274,7 @@ def _unleased(path: Path, written: float, grace: timedelta) -> Finding:
     )
 
 
-def _unpublished(path: Path, grace: timedelta) -> Finding:
+def _unpublished(path: Place, grace: timedelta) -> Finding:
     old = path.lstat().st_mtime <= (datetime.now(UTC) - grace).timestamp()
     return Finding(
         kind="write-left",

@@ -5,30 +5,32 @@ from __future__ import annotations
 import json
 import re
 import uuid
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from urllib.parse import unquote
 
 from flagdata import provenance
-from flagdata.addresses import local_path
+from flagdata.addresses import lake_place
 from flagdata.documents import from_json
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
 from flagdata.files import open_regular
 from flagdata.lake.catalog import newer
 from flagdata.lake.deletion import check_reuse, delete
 from flagdata.lake.durable import disk_errors, put_if_absent
-from flagdata.lake.layout import STORES, scratch_files
+from flagdata.lake.layout import FOLDERS, STORES, scratch_files
 from flagdata.lake.leases import collecting
 from flagdata.lake.merging import MergeResult, merge
 from flagdata.lake.objects import Objects
 from flagdata.lake.refs import MAIN, Ref
+from flagdata.lake.remote_leases import MADE
 from flagdata.lake.removals import explained
 from flagdata.lake.store import Store
 from flagdata.lake.transaction import Transaction
 from flagdata.lake.withdrawal import Withdrawal, descendants, withdraw
 from flagdata.schema import FORMAT_VERSION
+from flagdata.storage import Place, RemotePath
 
 _MARKER = "lake.json"
 _MARKER_SCHEMA = "flagdata.lake/1"
@@ -42,44 +44,66 @@ class Lake(Store):
     """
 
     @classmethod
-    def create(cls, path: Path | str) -> Lake:
-        """Make an empty lake in the folder `path`, which may exist if it is empty.
+    def create(cls, path: Place | str) -> Lake:
+        """Make an empty lake in the folder `path`, which may exist if it is empty, or at `s3://bucket/prefix`.
 
         Raises:
             ConflictError: a lake, or anything else, is there.
-            UsageError: an address, or a path that the Delta library cannot work in.
+            UsageError: any other address, or a path that the Delta library cannot work in.
+            RefusedError: a store that ignores the conditions of puts.
         """
+        return cls._make(path, cls._fill)
+
+    @classmethod
+    def _make(cls, path: Place | str, fill: Callable[[Lake], None]) -> Lake:
         lake = cls(_usable(path))
         with disk_errors("creating a lake", lake.path):
-            if lake.path.exists() and (not lake.path.is_dir() or any(lake.path.iterdir())):
+            there = lake.path.exists() and not lake.path.is_dir()
+            if there or (lake.path.is_dir() and any(True for _ in lake.path.iterdir())):
                 what = "a lake" if (lake.path / _MARKER).exists() else "something else"
                 raise ConflictError(
                     f"there is {what} already", where=str(lake.path), fix="choose an empty or new folder"
                 )
-            lake.path.mkdir(parents=True, exist_ok=True)
+            if not lake._claim():
+                raise ConflictError("another process is making a lake there", where=str(lake.path), fix="open that one")
             try:
-                lake.staging.mkdir()  # the process that succeeds makes the lake
-            except FileExistsError:
-                raise ConflictError(
-                    "another process is making a lake there", where=str(lake.path), fix="open that one"
-                ) from None
-            try:
-                lake._fill()
+                fill(lake)
             except BaseException:
                 for entry in lake.path.iterdir():
                     Objects.remove(entry)
                 raise
         return lake
 
+    def _claim(self) -> bool:
+        """Whether this process makes the lake: the one that succeeds in making its staging."""
+        if isinstance(self.staging, RemotePath):
+            self.check_writable()
+            return (self.staging / MADE).create(uuid.uuid4().hex.encode())
+        self.path.mkdir(parents=True, exist_ok=True)
+        try:
+            self.staging.mkdir()
+        except FileExistsError:
+            return False
+        return True
+
     @classmethod
-    def open(cls, path: Path | str) -> Lake:
-        """The lake in the folder `path`.
+    def adopt(cls, path: Place | str, source: Lake) -> Lake:
+        """Make a lake at `path` whose history begins as that of `source`: its first version, nothing in it yet.
+
+        Raises:
+            ConflictError, UsageError, RefusedError: as `create`.
+        """
+        return cls._make(path, lambda lake: lake._begin_as(source))
+
+    @classmethod
+    def open(cls, path: Place | str) -> Lake:
+        """The lake in the folder `path`, or at `s3://bucket/prefix`.
 
         Raises:
             NotFoundError: no lake there.
             ConflictError: written by a newer format.
             CorruptError: its marker cannot be read.
-            UsageError: an address, or a path that the Delta library cannot work in.
+            UsageError: any other address, or a path that the Delta library cannot work in.
         """
         lake = cls(_usable(path))
         marker = lake.path / _MARKER
@@ -98,6 +122,14 @@ class Lake(Store):
         if version > FORMAT_VERSION:
             raise newer(f"it has format {version}", lake.path)
         return lake
+
+    def _begin_as(self, source: Lake) -> None:
+        for folder in FOLDERS:
+            (self.path / folder).mkdir(parents=True, exist_ok=True)
+        self.catalog.adopt(0, *source.catalog.entry(0))
+        self.catalog.acknowledge(0)
+        with open_regular(source.path / _MARKER) as stream:
+            put_if_absent(self.path / _MARKER, stream.read())
 
     def _fill(self) -> None:
         for store in STORES:
@@ -142,9 +174,10 @@ class Lake(Store):
             LinkError: it is, or holds, a link or special file.
             CorruptError: its bytes are not what its name says.
         """
-        path = self.object_path(object)
-        self.objects.check(object)
-        return path
+        try:
+            return self.objects.whole(object)
+        except NotFoundError as error:
+            raise explained(self, object, error) from None
 
     def resolve(self, at: str | None) -> int:
         """The Delta version a ref stands for (for a tag of a branch, the branch's).
@@ -235,13 +268,13 @@ class Lake(Store):
         """Ids of all rows at a ref that were made from `artifacts` (full ids), directly or not; without these."""
         return descendants(self.table(self.view(at)), artifacts)
 
-    def unpublished_files(self) -> list[Path]:
+    def unpublished_files(self) -> list[Place]:
         """Files that a process left which died while it wrote to the catalog or the refs, or made the lake."""
         return [*self.catalog.unpublished_files(), *scratch_files(self.path)]
 
 
 @contextmanager
-def _readable(marker: Path) -> Iterator[None]:
+def _readable(marker: Place) -> Iterator[None]:
     """What the system refuses, but that the marker is absent, is a clear error."""
     try:
         yield
@@ -252,9 +285,12 @@ def _readable(marker: Path) -> Iterator[None]:
             raise
 
 
-def _usable(path: Path | str) -> Path:
+def _usable(path: Place | str) -> Place:
     try:
-        whole = local_path(path).resolve()
+        place = lake_place(path)
+        if isinstance(place, RemotePath):
+            return place
+        whole = place.resolve()
     except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a null byte
         raise UsageError(f"not a path: {error}", where=repr(str(path)), fix="name another folder") from None
     if _UNUSABLE.search(str(whole)):

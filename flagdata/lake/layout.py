@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 
 from flagdata.errors import CorruptError, FlagdataError
 from flagdata.lake.durable import SCRATCH, disk_errors
+from flagdata.lake.probe import probe
+from flagdata.storage import Place, RemotePath
 
 STORES = {"mcap": ".mcap", "zarr": ".zarr", "model": ".model"}
 STAGING = "staging"
@@ -28,12 +30,14 @@ class LinkError(CorruptError):
     kind = "link"
 
 
-def check_own(root: Path) -> None:
+def check_own(root: Place) -> None:
     """Whether all folders of the lake at `root`, a path without links, are folders of the lake itself.
 
     Raises:
         LinkError: one is a link, or no folder.
     """
+    if isinstance(root, RemotePath):  # a bucket has neither folders nor links
+        return
     for path in (root / name for name in FOLDERS):
         if os.path.lexists(path) and not stat.S_ISDIR(path.lstat().st_mode):
             raise LinkError(
@@ -43,13 +47,17 @@ def check_own(root: Path) -> None:
             )
 
 
-def check_writable(root: Path) -> None:
-    """Whether this process may write in the lake at `root`, as far as that can be said without writing.
+def check_writable(root: Place) -> None:
+    """Whether this process may write in the lake at `root`: of a disk, as far as that can be said without writing; of
+    a bucket, see `flagdata.lake.probe`.
 
     Raises:
         LinkError: as `check_own`.
-        FlagdataError: the disk is mounted read-only, or a permission is missing.
+        FlagdataError: the disk is mounted read-only, a permission is missing, or a store does not keep conditions.
     """
+    if isinstance(root, RemotePath):
+        probe(root / STAGING)
+        return
     check_own(root)
     for path in (root / name for name in FOLDERS):
         folder = path if path.exists() else path.parent
@@ -64,14 +72,18 @@ def check_writable(root: Path) -> None:
             )
 
 
-def scratch_files(root: Path) -> list[Path]:
+def scratch_files(root: Place) -> Sequence[Place]:
     """What a process left that died while it put a file: the marker, a ref, a mark."""
+    if isinstance(root, RemotePath):
+        return []
     folders = [root, *(root / name for name in _NOTES)]
     return sorted(path for folder in folders for path in folder.glob(".*") if SCRATCH.fullmatch(path.name))
 
 
-def foreign_entries(root: Path) -> Iterator[Path]:
+def foreign_entries(root: Place) -> Iterator[Path]:
     """Links and special files anywhere in the lake at `root`, but what lies in its staging; no link is followed."""
+    if isinstance(root, RemotePath):
+        return
     inside = [root]
     while inside:
         folder = inside.pop()

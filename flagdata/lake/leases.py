@@ -8,6 +8,7 @@ then the catalog, and deletes. A collector therefore either sees the lease, or f
 the transaction looked for the object.
 
 Locks work between processes of one machine, and over file systems that carry flock between machines (NFS 4, Lustre).
+For a lake in a bucket, `flagdata.lake.remote_leases` has locks and leases of the same meaning.
 """
 
 from __future__ import annotations
@@ -19,16 +20,19 @@ import os
 import shutil
 import socket
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO
 
+from flagdata.caches import user_cache
 from flagdata.documents import from_json
+from flagdata.lake import remote_leases
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.layout import LinkError
+from flagdata.storage import Place, RemotePath
 
 _LEASE = "lease"
 _COLLECT = ".collect"
@@ -43,11 +47,15 @@ class LeaseState:
         leased: whether there is a lease at all; without, nothing proves that the process that made the folder is dead.
     """
 
-    folder: Path
+    folder: Place
     leased: bool
     alive: bool
     owner: str
     objects: frozenset[str]
+
+
+Check = Callable[[], None]
+"""Raises ConflictError where a lock may have been lost meanwhile, which that of a disk never is."""
 
 
 class Lease:
@@ -67,14 +75,15 @@ class Lease:
                 raise
 
     def hold(self, object_name: str) -> None:
-        """Note that the transaction relies on the object; called while collectors are kept out."""
-        self._line(object_name)
+        """Note that the transaction relies on the object; no collection that has not seen it runs afterwards."""
+        with self.keeping_collectors_out():
+            self._line(object_name)
 
     @contextmanager
-    def keeping_collectors_out(self) -> Iterator[None]:
+    def keeping_collectors_out(self) -> Iterator[Check]:
         """No collection runs during the block."""
-        with keeping_collectors_out(self.folder.parent):
-            yield
+        with keeping_collectors_out(self.folder.parent) as check:
+            yield check
 
     def close(self) -> None:
         """Give everything up and remove the folder; what cannot be removed is left to a collection."""
@@ -89,52 +98,122 @@ class Lease:
         self._file.write(f"{text}\n".encode())
 
 
+class RemoteLease:
+    """The lease of one running transaction of a lake in a bucket; its folder is on this machine."""
+
+    def __init__(self, staging: RemotePath) -> None:
+        self._staging = staging
+        self._local = Lease(_scratch())
+        self.folder = self._local.folder
+        self._held = remote_leases.new_lease(staging)
+
+    def hold(self, object_name: str) -> None:
+        """Note that the transaction relies on the object; no collection that has not seen it runs afterwards."""
+        self._held.append(object_name)
+        remote_leases.await_collectors(self._staging)
+
+    @contextmanager
+    def keeping_collectors_out(self) -> Iterator[Check]:
+        """As `Lease.keeping_collectors_out`; the check is of the lease, too."""
+        with keeping_collectors_out(self._staging) as check:
+
+            def check_both() -> None:
+                check()
+                self._held.check()
+
+            yield check_both
+
+    def close(self) -> None:
+        """As `Lease.close`."""
+        self._held.close()
+        self._local.close()
+
+
+def open_lease(staging: Place) -> Lease | RemoteLease:
+    """The lease of a transaction that begins."""
+    return RemoteLease(staging) if isinstance(staging, RemotePath) else Lease(staging)
+
+
+def _scratch() -> Path:
+    """Where this machine's transactions write what goes into buckets; what those left that died is deleted."""
+    folder = user_cache() / "staging"
+    folder.mkdir(parents=True, exist_ok=True)
+    with collecting(folder):
+        for state in leases(folder):
+            if state.leased and not state.alive:
+                shutil.rmtree(state.folder, ignore_errors=True)  # type: ignore[arg-type]
+    return folder
+
+
 @contextmanager
-def keeping_collectors_out(staging: Path) -> Iterator[None]:
+def keeping_collectors_out(staging: Place) -> Iterator[Check]:
     """No collection runs during the block; any number of writers may."""
-    with _locked(staging, fcntl.LOCK_SH):
-        yield
+    if isinstance(staging, RemotePath):
+        with remote_leases.sharing(staging) as held:
+            yield held.check
+    else:
+        with _locked(staging, fcntl.LOCK_SH):
+            yield _sure
 
 
 @contextmanager
-def collecting(staging: Path) -> Iterator[None]:
+def collecting(staging: Place) -> Iterator[Check]:
     """No transaction starts, puts an object, commits or ends, and no ref is made, during the block."""
-    with _locked(staging, fcntl.LOCK_EX):
-        yield
+    if isinstance(staging, RemotePath):
+        with remote_leases.alone(staging) as held:
+            yield held.check
+    else:
+        with _locked(staging, fcntl.LOCK_EX):
+            yield _sure
 
 
-def leases(staging: Path) -> list[LeaseState]:
+def _sure() -> None:
+    """The kernel keeps a lock until it is given up."""
+
+
+def leases(staging: Place) -> list[LeaseState]:
     """All staging folders, by name."""
     states = []
-    for folder in sorted(p for p in staging.iterdir() if _is_folder(p)):
+    for folder in sorted(p for p in staging.iterdir() if _is_folder(p)):  # type: ignore[type-var]
+        if folder.name == remote_leases.SHARED:
+            continue
         leased = True
         try:
-            with _plain(folder / _LEASE) as file:
-                alive = not _try_lock(file.fileno())
-                lines = file.read().splitlines()
+            lines, alive = _lines_of(folder)
         except (FileNotFoundError, IsADirectoryError, LinkError):
             leased, alive, lines = False, False, []
-            if not folder.exists():
+            if not _is_folder(folder):
                 continue
         owner = _owner(lines[0]) if lines else "owner unknown"
         states.append(LeaseState(folder=folder, leased=leased, alive=alive, owner=owner, objects=frozenset(lines[1:])))
     return states
 
 
-def unleased(staging: Path) -> list[Path]:
+def _lines_of(folder: Place) -> tuple[list[str], bool]:
+    """The lines of a lease, and whether its owner lives."""
+    if isinstance(folder, RemotePath):
+        return remote_leases.lease_lines(folder)
+    with _plain(folder / _LEASE) as file:
+        alive = not _try_lock(file.fileno())
+        return file.read().splitlines(), alive
+
+
+def unleased(staging: Place) -> list[Place]:
     """Entries of staging without a lease: folders without one, and files, by name."""
+    own = (_COLLECT, _TURN, remote_leases.COLLECT, remote_leases.MADE)
     folders = [state.folder for state in leases(staging) if not state.leased]
-    files = [path for path in staging.iterdir() if not _is_folder(path) and path.name not in (_COLLECT, _TURN)]
-    return sorted([*folders, *files])
+    files = [path for path in staging.iterdir() if not _is_folder(path) and path.name not in own]
+    return sorted([*folders, *files])  # type: ignore[type-var]
 
 
-def last_written(path: Path) -> float:
+def last_written(path: Place) -> float:
     """When a file, or anything in a folder, was written last [s since 1970]."""
     inside = path.rglob("*") if _is_folder(path) else ()
-    return max(entry.lstat().st_mtime for entry in (path, *inside))
+    own = () if isinstance(path, RemotePath) and inside else (path,)
+    return max(entry.lstat().st_mtime for entry in (*own, *inside))
 
 
-def _is_folder(path: Path) -> bool:
+def _is_folder(path: Place) -> bool:
     return path.is_dir() and not path.is_symlink()
 
 

@@ -21,7 +21,8 @@ from flagdata.documents import from_json
 from flagdata.errors import CorruptError
 from flagdata.files import open_regular
 from flagdata.lake.durable import put_if_absent
-from flagdata.provenance import file_hash
+from flagdata.provenance import digest, file_hash
+from flagdata.storage import Place
 
 FILE_HASH = "flagdata.file_sha256"
 """Key of a commit's info: SHA-256 of the one file of rows that the commit added."""
@@ -44,12 +45,13 @@ class LogGapError(CorruptError):
 class Log:
     """The entries in `folder` (`_delta_log`), and the marks of the newest acknowledged one in the folder `marks`."""
 
-    def __init__(self, folder: Path, marks: Path) -> None:
+    def __init__(self, folder: Place, marks: Place) -> None:
         self.folder = folder
         self.marks = marks
         self._filled: set[int] = set()
+        self._put = (-1, "")
 
-    def path(self, version: int) -> Path:
+    def path(self, version: int) -> Place:
         """Where the entry of a version is."""
         return self.folder / _NAME.format(version)
 
@@ -69,8 +71,9 @@ class Log:
         missing = [v for v in range(max(newest, acknowledged) + 1) if v not in present and not self.path(v).exists()]
         if missing:
             raise self._gap(missing, newest=newest)
-        for version in sorted(present - self._filled):
-            self._text(version)
+        if isinstance(self.folder, Path):  # a store shows an entry whole or not at all
+            for version in sorted(present - self._filled):
+                self._text(version)
         self._filled = present
         return max(newest, acknowledged)
 
@@ -87,7 +90,7 @@ class Log:
                 files.setdefault(name, info.get(FILE_HASH))
         return files
 
-    def changed(self) -> list[Path]:
+    def changed(self) -> list[Place]:
         """Entries that are not any more what the next entry, or the mark, says they were; of older lakes' none.
 
         Raises:
@@ -114,7 +117,29 @@ class Log:
             OSError: what the disk refused; there is no such entry.
         """
         text = "\n".join(json.dumps(action, ensure_ascii=False, separators=(",", ":")) for action in actions)
-        return put_if_absent(self.path(version), text.encode(), what=f"version {version}")
+        if not put_if_absent(self.path(version), text.encode(), what=f"version {version}"):
+            return False
+        self._put = (version, digest(text))
+        return True
+
+    def hash(self, version: int) -> str:
+        """SHA-256 of an entry, which is not read if this process has just put it."""
+        return self._put[1] if self._put[0] == version else file_hash(self.path(version))
+
+    def entry(self, version: int) -> tuple[bytes, list[str]]:
+        """The bytes of an entry, and the names of the files that it adds.
+
+        Raises:
+            CorruptError: it cannot be read.
+        """
+        return self._text(version).encode(), self._content(version)[0]
+
+    def adopt(self, version: int, entry: bytes) -> bool:
+        """Put an entry of another lake of the same history; False where there is another one of that version."""
+        path = self.path(version)
+        if put_if_absent(path, entry, what=f"version {version}"):
+            return True
+        return _content_of(path).encode() == entry
 
     def _content(self, version: int) -> tuple[list[str], dict[str, str]]:
         """Names of the files that an entry adds, and its commit info."""
@@ -148,7 +173,7 @@ class Log:
     def acknowledge(self, version: int) -> None:
         """Note for good that the entry of `version` is on the disk; durable when it returns."""
         self.marks.mkdir(exist_ok=True)
-        put_if_absent(self.marks / str(version), f"{file_hash(self.path(version))}\n".encode())
+        put_if_absent(self.marks / str(version), f"{self.hash(version)}\n".encode())
         for lower in self._marks():
             if lower < version:
                 (self.marks / str(lower)).unlink(missing_ok=True)
@@ -174,7 +199,7 @@ class Log:
         )
 
 
-def _names_in(folder: Path) -> list[str]:
+def _names_in(folder: Place) -> list[str]:
     """Names in a folder, none if it is not there."""
     try:
         return [path.name for path in folder.iterdir()]
@@ -184,7 +209,7 @@ def _names_in(folder: Path) -> list[str]:
         raise _unreadable(folder, error) from None
 
 
-def _content_of(path: Path) -> str:
+def _content_of(path: Place) -> str:
     """The text of a file, which is damaged if it is not UTF-8.
 
     Raises:
@@ -200,7 +225,7 @@ def _content_of(path: Path) -> str:
         raise _unreadable(path, error) from None
 
 
-def _unreadable(path: Path, error: OSError) -> CorruptError:
+def _unreadable(path: Place, error: OSError) -> CorruptError:
     return CorruptError(
         f"{path.name} of the catalog's log cannot be read: {error.strerror}",
         where=str(path),

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 import pyarrow as pa
 
@@ -17,6 +16,7 @@ from flagdata.lake.log import LogGapError
 from flagdata.lake.refs import MAIN, Slice
 from flagdata.lake.store import Store
 from flagdata.provenance import file_hash
+from flagdata.storage import Place
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +75,7 @@ def catalog_files(lake: Store) -> tuple[Finding, ...]:
             Finding(kind="log-damaged", severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix),
         )
     findings = [_damaged("log-damaged", "an entry of the catalog's log has changed", path) for path in changed]
-    for path, noted in sorted(hashes.items()):
+    for path, noted in sorted(hashes.items(), key=lambda item: str(item[0])):
         try:
             found = file_hash(path)
         except FileNotFoundError:
@@ -102,7 +102,7 @@ def catalog_files(lake: Store) -> tuple[Finding, ...]:
     return tuple(findings)
 
 
-def _damaged(kind: str, what: str, path: Path) -> Finding:
+def _damaged(kind: str, what: str, path: Place) -> Finding:
     return Finding(kind=kind, severity=Severity.ERROR, what=what, where=str(path), fix="restore it from a copy")
 
 

@@ -135,7 +135,8 @@ def _decided(
 
 def _check_objects(lake: Store, rows: pa.Table) -> None:
     for name in sorted(set(rows["object"].drop_null().to_pylist())):
-        lake.objects.existing(name)
+        if not lake.objects.has(name):
+            raise lake.objects.missing(name)
 
 
 def _check_parents(

@@ -10,11 +10,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from flagdata.checksums import content_hash, files_of
+from flagdata.checksums import content_hash, files_of, size_of
 from flagdata.errors import CorruptError, InputError, NotFoundError
 from flagdata.lake.artifact import OBJECT_NAME
 from flagdata.lake.durable import flush_file, flush_folder
 from flagdata.lake.layout import STORES, LinkError
+from flagdata.storage import Place, RemotePath
 
 _READ_ONLY = 0o444
 _ATTEMPTS = 5
@@ -26,7 +27,7 @@ class StoredObject:
     """An object in the store: its name in the catalog, where it is, and its size [B]."""
 
     name: str
-    path: Path
+    path: Place
     size: int
     modified: float
 
@@ -38,20 +39,20 @@ class Objects:
     def __init__(self, root: Path) -> None:
         self.root = root
 
-    def path(self, name: str) -> Path:
+    def path(self, name: str) -> Place:
         """Where the object called `name` is, whether or not it is there.
 
         Raises:
             InputError: not an object name; nothing outside the stores can be named.
         """
-        if not OBJECT_NAME.fullmatch(name):
-            raise InputError(
-                f"{name!r} is not an object name",
-                where=str(self.root),
-                fix="give mcap/<sha256>, zarr/<treehash> or model/<treehash>",
-            )
-        store, _, digest = name.partition("/")
-        return self.root / store / f"{digest}{STORES[store]}"
+        return self._file(name)
+
+    def _file(self, name: str) -> Path:
+        return self.root / path_in_lake(name)
+
+    def has(self, name: str) -> bool:
+        """Whether the object is there."""
+        return self.path(name).exists()
 
     def existing(self, name: str) -> Path:
         """Where the object is.
@@ -59,10 +60,14 @@ class Objects:
         Raises:
             NotFoundError: it is not there.
         """
-        path = self.path(name)
+        path = self._file(name)
         if not path.exists():
-            raise NotFoundError(f"object {name} is missing", where=str(path), fix="run flagdata doctor")
+            raise self.missing(name)
         return path
+
+    def missing(self, name: str) -> NotFoundError:
+        """The error for an object that is not there."""
+        return NotFoundError(f"object {name} is missing", where=str(self.path(name)), fix="run flagdata doctor")
 
     def size(self, name: str) -> int:
         """Bytes of the object.
@@ -100,7 +105,7 @@ class Objects:
         if staged.is_dir():
             for folder in [staged, *(p for p in staged.rglob("*") if p.is_dir())]:
                 flush_folder(folder)
-        target = self.path(name)
+        target = self._file(name)
         target.parent.mkdir(exist_ok=True)
         for attempt in range(_ATTEMPTS):
             if os.path.lexists(target):
@@ -144,6 +149,11 @@ class Objects:
         if not whole:
             raise CorruptError(f"the bytes of {name} have changed since they were written", where=str(path), fix=fix)
 
+    def whole(self, name: str) -> Path:
+        """Where the object is, once its bytes have been compared with its name; raises as `check`."""
+        self.check(name)
+        return self.existing(name)
+
     def __iter__(self) -> Iterator[StoredObject]:
         """Everything in the stores that has an object's name; a link counts for itself, not for what it leads to."""
         for store, suffix in STORES.items():
@@ -153,20 +163,32 @@ class Objects:
                     yield StoredObject(name=name, path=path, size=bytes_at(path), modified=path.lstat().st_mtime)
 
     @staticmethod
-    def remove(path: Path) -> None:
+    def remove(path: Place) -> None:
         """Delete a file or folder of the store or of staging; of a link, the link."""
-        if path.is_dir() and not path.is_symlink():
+        if isinstance(path, RemotePath):
+            path.remove_tree()
+        elif path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
         else:
             path.unlink(missing_ok=True)
 
 
-def size_of(path: Path) -> int:
-    """Bytes of a file, or of all files in a folder."""
-    return sum(f.stat().st_size for f in files_of(path))
+def path_in_lake(name: str) -> Path:
+    """Where the object called `name` is in a lake, from its root.
+
+    Raises:
+        InputError: not an object name; nothing outside the stores can be named.
+    """
+    if not OBJECT_NAME.fullmatch(name):
+        raise InputError(
+            f"{name!r} is not an object name", where="lake",
+            fix="give mcap/<sha256>, zarr/<treehash> or model/<treehash>",
+        )  # fmt: skip
+    store, _, digest = name.partition("/")
+    return Path(store) / f"{digest}{STORES[store]}"
 
 
-def bytes_at(path: Path) -> int:
+def bytes_at(path: Place) -> int:
     """Bytes of whatever lies at a path; a link counts for itself, not for what it leads to."""
     inside = path.rglob("*") if path.is_dir() and not path.is_symlink() else ()
     return sum(entry.lstat().st_size for entry in (path, *inside) if entry.is_symlink() or entry.is_file())

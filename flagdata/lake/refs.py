@@ -20,6 +20,7 @@ from flagdata.documents import from_json
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
 from flagdata.files import open_regular
 from flagdata.lake.durable import confirming, disk_errors, flush_folder, put_if_absent
+from flagdata.storage import Place
 
 MAIN = "main"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
@@ -99,7 +100,7 @@ def check_name(name: str, *, noun: str) -> str:
 class Refs:
     """The folder `refs/` of a lake."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Place) -> None:
         self.root = root
 
     def make_folders(self) -> None:
@@ -143,6 +144,21 @@ class Refs:
                 )
         return ref
 
+    def stored(self) -> dict[tuple[str, str], bytes]:
+        """The bytes of each ref by its kind ("tags" or "branches") and name."""
+        found: dict[tuple[str, str], bytes] = {}
+        for kind, known in (("tags", self.tags()), ("branches", self.branches())):
+            for name in known:
+                with open_regular(self.root / kind / f"{name}.json") as stream:
+                    found[kind, name] = stream.read()
+        return found
+
+    def adopt(self, kind: str, name: str, stored: bytes) -> None:
+        """Put a ref of another lake of the same history, unless it is there."""
+        path = self.root / kind / f"{name}.json"
+        with disk_errors(f"creating the ref {name}", path):
+            put_if_absent(path, stored)
+
     def view(self, branch: str, head: int) -> View:
         """What a branch shows when the table is at version `head`.
 
@@ -164,14 +180,15 @@ class Refs:
         """
         path = self.root / kind / f"{name}.json"
         path.unlink()
-        with confirming(f"the deletion of {name}", path):
-            flush_folder(path.parent)
+        if isinstance(path, Path):
+            with confirming(f"the deletion of {name}", path):
+                flush_folder(path.parent)
 
     def _all(self, kind: str) -> dict[str, Ref]:
-        return {path.stem: self._read(path) for path in sorted((self.root / kind).glob("[!.]*.json"))}
+        return {path.stem: self._read(path) for path in sorted((self.root / kind).glob("[!.]*.json"))}  # type: ignore[type-var]
 
     @staticmethod
-    def _read(path: Path) -> Ref:
+    def _read(path: Place) -> Ref:
         try:
             with open_regular(path) as stream:
                 content: dict[str, Any] = from_json(stream.read())

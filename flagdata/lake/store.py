@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -17,7 +16,9 @@ from flagdata.lake.lineage import Lineage
 from flagdata.lake.matching import Where, matching
 from flagdata.lake.objects import Objects
 from flagdata.lake.refs import Refs, Slice, View
+from flagdata.lake.remote_objects import RemoteObjects
 from flagdata.schema import CATALOG
+from flagdata.storage import Place, RemotePath
 
 _ORDER = ", ".join(ROW_ORDER)
 
@@ -26,14 +27,14 @@ class Store:
     """A lake's catalog, objects and refs, and the rows that a ref shows. `Lake` adds what changes them.
 
     Attributes:
-        path: the lake's folder.
+        path: the lake's folder, or its place in a bucket.
         staging: the folder in it in which new objects are written.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Place) -> None:
         self.path = path
         self.catalog = Catalog(path / "catalog", path / "refs" / "newest")
-        self.objects = Objects(path)
+        self.objects = RemoteObjects(path) if isinstance(path, RemotePath) else Objects(path)
         self.refs = Refs(path / "refs")
         self.staging = path / STAGING
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import secrets
 import shutil
 import uuid
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -24,7 +24,7 @@ from flagdata.errors import ConflictError, FlagdataError, NotFoundError, UsageEr
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Moved, persist
 from flagdata.lake.durable import disk_errors
-from flagdata.lake.leases import Lease, collecting
+from flagdata.lake.leases import Lease, RemoteLease, collecting, open_lease
 from flagdata.lake.store import Store
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
@@ -76,13 +76,13 @@ class Transaction:
         self._pending: dict[str, Artifact] = {}
         self._existing: dict[str, None] = {}
         self._sizes: dict[str, int] = {}  # of the objects that the lease holds
-        self._held: Lease | None = None
+        self._held: Lease | RemoteLease | None = None
 
     def __enter__(self) -> Transaction:
         self._lake.check_writable()
         self._known = _identities(self._look()[1])
         with disk_errors("starting a transaction", self._lake.staging):
-            self._held = Lease(self._lake.staging)
+            self._held = open_lease(self._lake.staging)
         return self
 
     def __exit__(
@@ -140,11 +140,25 @@ class Transaction:
             if lease.folder not in path.parents:
                 path = self._copy(path)
             name = self._lake.objects.name_of(path)
-            with lease.keeping_collectors_out():
-                lease.hold(name)
-                self._lake.objects.publish(path, name)
+            lease.hold(name)
+            self._lake.objects.publish(path, name)  # a collection leaves alone what a lease holds
             self._sizes[name] = self._lake.objects.size(name)
         return name
+
+    def hold(self, name: str) -> int:
+        """Rely on an object that is stored; its size [B]. No collection takes it before the transaction ends.
+
+        Raises:
+            NotFoundError: it is not there.
+        """
+        return self._sizes[name] if name in self._sizes else self._hold(name)
+
+    @contextmanager
+    def keeping_collectors_out(self) -> Iterator[None]:
+        """No collection runs during the block, and nobody takes this process for dead as it begins."""
+        with self._lease.keeping_collectors_out() as check:
+            check()
+            yield
 
     def add(self, artifact: Artifact) -> bool:
         """Publish a row with this transaction; False when its identity is on the branch, or in this transaction.
@@ -162,7 +176,7 @@ class Transaction:
             return False
         size = None
         if artifact.object is not None:
-            size = self._sizes[artifact.object] if artifact.object in self._sizes else self._hold(artifact.object)
+            size = self.hold(artifact.object)
         self._check_parents([artifact], self._known)
         self._pending[identity] = replace(artifact, branch=self.branch, object_bytes=size)
         return True
@@ -174,7 +188,7 @@ class Transaction:
         return self._lake.artifact(artifact_id, at=self.branch) if artifact_id in self._known else None
 
     @property
-    def _lease(self) -> Lease:
+    def _lease(self) -> Lease | RemoteLease:
         if self._held is None:
             raise UsageError("the transaction is not open", fix="use it inside its with-block")
         return self._held
@@ -214,7 +228,7 @@ class Transaction:
                 "rows": str(len(fresh)),
                 "code_version": code_version(),
             }
-            with self._lease.keeping_collectors_out():
+            with self.keeping_collectors_out():
                 version = self._lake.catalog.append(rows, base=version, info=info)
                 self._result = CommitResult(
                     version=version, commit=commit, added=tuple(fresh), existing=existing, artifacts=artifacts
@@ -224,9 +238,8 @@ class Transaction:
         return persist(attempt, where=self._lake.catalog.path)
 
     def _hold(self, name: str) -> int:
-        with self._lease.keeping_collectors_out():
-            self._lease.hold(name)
-            self._sizes[name] = self._lake.objects.size(name)
+        self._lease.hold(name)
+        self._sizes[name] = self._lake.objects.size(name)
         return self._sizes[name]
 
     def _check_parents(self, artifacts: Iterable[Artifact], known: frozenset[str]) -> None:

@@ -15,9 +15,10 @@ import click
 from click.core import ParameterSource
 
 from flagdata.commands.confirm import on_command_line
-from flagdata.console import LocalPath, document, in_steps, json_option, say
+from flagdata.console import LakePlace, LocalPath, document, in_steps, json_option, say
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.findings import Finding
+from flagdata.storage import Place
 from measure.closing.command_line import finding_text, null_options, nulls_given, refuse, stage_bars
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
     help="Standard deviation of a marker's coordinate [m]; by default it is estimated.",
 )
 @null_options(level="Significance level of the global test; 0.05 by default.")
-@click.option("--lake", "lake_path", type=LocalPath(), envvar="FLAGDATA_LAKE",
+@click.option("--lake", "lake_path", type=LakePlace(), envvar="FLAGDATA_LAKE",
               help="Lake that artifacts are read from and results are written to; also FLAGDATA_LAKE.")  # fmt: skip
 @click.option("--branch", default="main", show_default=True, help="Branch of the lake to commit on.")
 @click.option("--name", help="Name of the measurement and its models; by default that of the first source.")
@@ -126,7 +127,7 @@ def close_loop(
     level: float | None,
     seed: int,
     workers: int | None,
-    lake_path: Path | None,
+    lake_path: Place | None,
     branch: str,
     name: str | None,
     out: Path,

@@ -14,9 +14,10 @@ import click
 
 from flagdata.commands.durations import DURATION
 from flagdata.commands.statements import STATED
-from flagdata.console import LocalPath, document, following, json_option, progress, say
+from flagdata.console import LakePlace, LocalPath, document, following, json_option, progress, say
 from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
+from flagdata.storage import Place
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -61,7 +62,7 @@ if TYPE_CHECKING:
 @click.option("--zarr", "zarr_path", type=LocalPath(), metavar="FOLDER",
               help="Write draws and series as a Zarr data set.")  # fmt: skip
 @click.option("--csv", "as_csv", is_flag=True, help="The windows as comma-separated values on stdout.")
-@click.option("--lake", "lake_path", type=LocalPath(), envvar="FLAGDATA_LAKE",
+@click.option("--lake", "lake_path", type=LakePlace(), envvar="FLAGDATA_LAKE",
               help="Where artifacts are, and where measurements go; also FLAGDATA_LAKE.")  # fmt: skip
 @click.option(
     "--at", metavar="REF", help="Tag, branch or version of the lake to look at; by default the branch's head."
@@ -92,7 +93,7 @@ def measure(
     report: Path | None,
     zarr_path: Path | None,
     as_csv: bool,
-    lake_path: Path | None,
+    lake_path: Place | None,
     at: str | None,
     branch: str,
     read_only: bool,

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.console import LocalPath, document, json_option, say
+from flagdata.console import LakePlace, LocalPath, document, json_option, say
+from flagdata.storage import Place
 from measure.closing.command_line import null_options, nulls_given, refuse, stage_bars
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     "--known", multiple=True, metavar="EFFECT.STRENGTH", help="Effect that the model has already; may be repeated."
 )
 @null_options(level="Significance level of the test of every term; 0.05 by default.")
-@click.option("--lake", "lake_path", type=LocalPath(), envvar="FLAGDATA_LAKE",
+@click.option("--lake", "lake_path", type=LakePlace(), envvar="FLAGDATA_LAKE",
               help="Lake that artifacts are read from; also FLAGDATA_LAKE.")  # fmt: skip
 @click.option("--out", type=LocalPath(), default=Path("out/close-loop"), show_default=True,
               help="Folder in which proposal/ is written: the effect file, its tests and proposals.json.")  # fmt: skip
@@ -36,7 +37,7 @@ def propose(
     level: float | None,
     seed: int,
     workers: int | None,
-    lake_path: Path | None,
+    lake_path: Place | None,
     out: Path,
     as_json: bool,
 ) -> None:

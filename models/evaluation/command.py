@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from flagdata.addresses import lake_place
+from flagdata.caches import beside
 from flagdata.commands.statements import STATED
 from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
 from flagdata.errors import InputError
@@ -97,7 +99,7 @@ def evaluate(
 
     report.check(out, name=name)
     source = flagdata.open(lake_path)
-    folder = cache if cache is not None else Path(f"{lake_path.rstrip('/')}.inputs")
+    folder = cache if cache is not None else beside(lake_place(lake_path), ".inputs")
     desk = _Desk(source, dataset, at, folder, workers or os.cpu_count() or 1, seed, area_weight)
     found = desk.evaluation(
         models, side=side, reference=reference, tsne=tsne, handmade=handmade, frames=frames, linear=linear

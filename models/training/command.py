@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flagdata.addresses import local_path
+from flagdata.addresses import lake_place
+from flagdata.caches import beside
 from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
 from flagdata.errors import ConflictError
+from flagdata.storage import Place
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -68,8 +70,8 @@ def train(
         loaded = replace(loaded, seed=seed)
     if sequences is not None:
         loaded = replace(loaded, data=replace(loaded.data, sequences=sequences))
-    lake = local_path(lake_path)
-    folder = cache if cache is not None else Path(f"{lake_path.rstrip('/')}.inputs")
+    lake = lake_place(lake_path)
+    folder = cache if cache is not None else beside(lake, ".inputs")
     report = trained(
         loaded, lake, at=at, cache=folder, run=run, workers=workers or os.cpu_count() or 1, device=device,
         branch=branch, bars=progress,
@@ -87,7 +89,7 @@ def train(
 
 def trained(
     recipe: TrainingRecipe,
-    lake_path: Path,
+    lake_path: Place,
     *,
     at: str | None,
     cache: Path,

@@ -17,8 +17,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from flagdata.caches import user_cache
 from flagdata.errors import FlagdataError, NotFoundError
-from sim.kernel.build import cache_folder
 
 SETTING = "FLAGDATA_BLENDER"
 SERIES = "4.5"
@@ -73,7 +73,7 @@ class Environment:
 
 def default_folder() -> Path:
     """Where `flagdata blender-setup` makes the environment: `blender` in flagdata's cache folder."""
-    return cache_folder() / "blender"
+    return user_cache() / "blender"
 
 
 def interpreter(folder: Path) -> Path:

@@ -22,6 +22,7 @@ from flagdata.provenance import canonical, code_version
 from flagdata.record import Record
 from flagdata.rng import stream
 from flagdata.schema import Kind
+from flagdata.storage import Place
 from sim.datasets.cast import casts
 from sim.datasets.recipe import DatasetRecipe
 
@@ -56,7 +57,7 @@ def check(path: Path | None) -> None:
         check_file(path, command=_COMMAND)
 
 
-def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path: Path | None = None) -> Path:
+def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path: Path | None = None) -> Place:
     """Write the card of a data set, read off the lake.
 
     Args:
@@ -84,7 +85,10 @@ def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path:
         write_file(path, text, command=_COMMAND)
         return path
     target = lake.path / "cards" / f"{recipe.name}-{recipe.hash[:12]}.html"
-    rewrite(target, text)
+    if isinstance(target, Path):
+        rewrite(target, text)
+    else:
+        target.write_bytes(text.encode())
     return target
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.addresses import local_path
+from flagdata.addresses import lake_place
 from flagdata.console import LocalPath, document, following, in_steps, json_option, lake_option, progress, say, table
 
 if TYPE_CHECKING:
@@ -112,8 +112,8 @@ def _lake(path: str) -> Lake | None:
     """The lake at a path, None where nothing is there."""
     from flagdata.lake import Lake
 
-    place = local_path(path)
-    if not place.exists() or (place.is_dir() and not any(place.iterdir())):
+    place = lake_place(path)
+    if not (any(True for _ in place.iterdir()) if place.is_dir() else place.exists()):
         return None
     return Lake.open(place)
 

@@ -19,6 +19,7 @@ import warnings
 from importlib.resources import files
 from pathlib import Path
 
+from flagdata.caches import user_cache
 from flagdata.errors import UsageError
 
 _FLAGS = (
@@ -26,13 +27,6 @@ _FLAGS = (
 )  # fmt: skip
 
 _SOURCES = ("kernel.cpp", "block.hpp", "contact.hpp", "on_mesh.hpp", "implicit.hpp")
-
-
-def cache_folder() -> Path:
-    """Where compiled kernels are kept: FLAGDATA_CACHE, or `flagdata` in the user's cache folder."""
-    if chosen := os.environ.get("FLAGDATA_CACHE"):
-        return Path(chosen)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flagdata"
 
 
 def compiler() -> str | None:
@@ -82,7 +76,7 @@ def _built(path: str, package: str, names: tuple[str, ...]) -> Path:
     name = hashlib.sha256(
         b"\0".join([*sources.values(), version, " ".join(_FLAGS).encode(), _processor()])
     ).hexdigest()[:20]
-    folder = cache_folder()
+    folder = user_cache()
     target = folder / f"{Path(names[0]).stem}-{name}.so"
     _make(folder)
     check_owned(folder)
@@ -122,7 +116,7 @@ def check_owned(path: Path) -> None:
         )
         if foreign or (writable and not sticky):
             raise UsageError(
-                f"another user could have written the compiled kernels in {str(cache_folder())!r}", where=str(part),
+                f"another user could have written the compiled kernels in {str(user_cache())!r}", where=str(part),
                 fix="set FLAGDATA_CACHE to a folder that only you can write (chmod go-w), on a path of such folders",
             )  # fmt: skip
 

@@ -1,0 +1,248 @@
+"""Leases and locks of a lake in a bucket, where no kernel drops a lock of a process that ends.
+
+Each is an object in `staging/` that its holder writes anew every few seconds; the store's own clock says when it was
+written last. One that was not for `life` seconds is void. A process that finds one made on its own machine by a process
+that has ended need not wait for that.
+
+    staging/collect       the exclusive lock: taken by `create`, or from a dead holder by a conditional put
+    staging/shared/ID     a holder of the shared lock
+    staging/ID/lease      a running transaction: its owner, and the objects it holds, a line each
+
+Who wants the shared lock puts an object and then looks for the exclusive one; who wants that puts it and then looks for
+shared ones. A store answers each read with what was put before, so of two that come at once at least one sees the
+other, and the one who shares withdraws. A transaction that relies on an object puts its lease so, and then waits until
+nobody has the exclusive lock: a collection that begins later sees the lease.
+
+A holder that could not write for half of `life` does not publish and deletes nothing more: see `Held.check`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import threading
+import time
+import uuid
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from flagdata.documents import from_json
+from flagdata.errors import ConflictError
+from flagdata.storage import RemotePath
+
+LIFE = 240.0
+"""How long what is not written anew counts [s]: longer than all retries of one request."""
+_FIRST_WAIT = 0.02  # s
+_LONGEST_WAIT = 1.0  # s
+LEASE = "lease"
+COLLECT = "collect"
+MADE = "made"
+"""What the process put that made the lake."""
+SHARED = "shared"
+_ENDED = ("Z", "X")  # states of a process whose parent has not asked for its result yet
+
+
+def owner() -> dict[str, Any]:
+    """Who writes: for people, and for other processes of this machine."""
+    return {
+        "pid": os.getpid(), "host": socket.gethostname(), "since": datetime.now(UTC).isoformat(), "life": LIFE,
+        "machine": _machine(), "started": _started(os.getpid()),
+    }  # fmt: skip
+
+
+class Held:
+    """An object that is written anew until it is closed.
+
+    Args:
+        place: of the object.
+        e_tag: its version, if only that may be replaced: then it is lost where another has replaced it.
+    """
+
+    def __init__(self, place: RemotePath, text: str, *, e_tag: str | None = None) -> None:
+        self.place = place
+        self._text = text
+        self._e_tag = e_tag
+        self._written = _now()
+        self._lost = False
+        self._guard = threading.Lock()
+        self._ended = threading.Event()
+        threading.Thread(target=self._renew, name="flagdata lease", daemon=True).start()
+
+    def append(self, line: str) -> None:
+        """Add a line; it is there when this returns."""
+        with self._guard:
+            self._text += f"{line}\n"
+            self._write()
+
+    def check(self) -> None:
+        """Whether others still see this.
+
+        Raises:
+            ConflictError: it may not be so, since it could not be written for long.
+        """
+        if self._lost or _now() - self._written > LIFE / 2:
+            raise ConflictError(
+                "the store could not be reached for so long that others may take this process for dead",
+                where=str(self.place), fix="check the network, then do it again",
+            )  # fmt: skip
+
+    def close(self) -> None:
+        """Take the object away, unless another has replaced it."""
+        self._ended.set()
+        with self._guard, suppress(OSError):  # what is left is void before long
+            if self._e_tag is not None:
+                self._write()
+            if not self._lost:
+                self.place.unlink()
+
+    def _renew(self) -> None:
+        while not self._ended.wait(LIFE / 12):
+            with self._guard:
+                if not self._ended.is_set():
+                    with suppress(OSError):  # it is tried again; `check` counts the time
+                        self._write()
+
+    def _write(self) -> None:
+        begun = _now()
+        data = self._text.encode()
+        if self._e_tag is None:
+            self.place.write_bytes(data)
+        else:
+            tag = self.place.replace_if(self._e_tag, data)
+            self._lost = tag is None
+            self._e_tag = tag or self._e_tag
+        self._written = begun
+
+
+@contextmanager
+def sharing(staging: RemotePath) -> Iterator[Held]:
+    """Nobody collects during the block."""
+    text = _line(owner())
+    wait = _FIRST_WAIT
+    while True:
+        held = Held(_put(staging / SHARED / uuid.uuid4().hex, text), text)
+        try:
+            if _living(staging / COLLECT, staging) is None:
+                yield held
+                return
+        finally:
+            held.close()
+        time.sleep(wait)
+        wait = min(2 * wait, _LONGEST_WAIT)
+
+
+@contextmanager
+def alone(staging: RemotePath) -> Iterator[Held]:
+    """Nobody else has the shared or the exclusive lock during the block."""
+    place = staging / COLLECT
+    text = _line({**owner(), "id": uuid.uuid4().hex})
+    wait = _FIRST_WAIT
+    with ExitStack() as stack:
+        while True:
+            if place.create(text.encode()):
+                tag = place.stat().e_tag
+                break
+            if _living(place, staging) is None:
+                with suppress(FileNotFoundError):
+                    tag = place.replace_if(place.stat().e_tag, text.encode())
+                    if tag is not None:
+                        break
+            time.sleep(wait)
+            wait = min(2 * wait, _LONGEST_WAIT)
+        held = Held(place, text, e_tag=tag)
+        stack.callback(held.close)
+        wait = _FIRST_WAIT
+        while any(_living(shared, staging) is not None for shared in (staging / SHARED).rglob("*")):
+            time.sleep(wait)
+            wait = min(2 * wait, _LONGEST_WAIT)
+        held.check()
+        yield held
+
+
+def await_collectors(staging: RemotePath) -> None:
+    """Wait until nobody collects who may have read the leases before."""
+    wait = _FIRST_WAIT
+    while _living(staging / COLLECT, staging) is not None:
+        time.sleep(wait)
+        wait = min(2 * wait, _LONGEST_WAIT)
+
+
+def lease_lines(folder: RemotePath) -> tuple[list[str], bool]:
+    """The lines of the lease in a transaction's folder, and whether its owner lives.
+
+    Raises:
+        FileNotFoundError: there is none.
+    """
+    lease = folder / LEASE
+    living = _living(lease, folder.parent)
+    return lease.read_bytes().decode(errors="replace").splitlines(), living is not None
+
+
+def new_lease(staging: RemotePath) -> Held:
+    """The lease of a transaction that begins."""
+    text = _line(owner())
+    return Held(_put(staging / uuid.uuid4().hex / LEASE, text), text)
+
+
+def _put(place: RemotePath, text: str) -> RemotePath:
+    place.write_bytes(text.encode())
+    return place
+
+
+def _line(content: dict[str, Any]) -> str:
+    return json.dumps(content) + "\n"
+
+
+def _living(place: RemotePath, staging: RemotePath) -> dict[str, Any] | None:
+    """The owner of a lock or lease if it counts; None where it is not there, void, or its process has ended."""
+    try:
+        content = from_json(place.read_bytes().decode().split("\n")[0])
+        life, machine, pid, started = float(content["life"]), content["machine"], content["pid"], content["started"]
+    except FileNotFoundError:
+        return None
+    except (ValueError, KeyError, TypeError):
+        content, life, machine, pid, started = {}, LIFE, None, 0, None
+    if machine is not None and machine == _machine() and _started(pid) != started:
+        return None
+    with suppress(FileNotFoundError):
+        written = RemotePath(place.bucket, place.key).stat().st_mtime
+        if time.time() - _ahead(staging) - written <= life:
+            return content
+    return None
+
+
+def _ahead(staging: RemotePath) -> float:
+    """By how much this machine's clock is ahead of the store's, which gives whole seconds [s]."""
+    place = staging / f"clock-{uuid.uuid4().hex}"
+    place.write_bytes(b"")
+    ahead = time.time() - place.stat().st_mtime
+    place.unlink()
+    return ahead
+
+
+def _now() -> float:
+    """Seconds that go on while the machine sleeps."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME)
+
+
+@cache
+def _machine() -> str | None:
+    """This machine since it was started, and the processes that it numbers together; None where it does not say."""
+    with suppress(OSError):
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+        return f"{boot} {Path('/proc/self/ns/pid').readlink()}"
+    return None
+
+
+def _started(pid: int) -> int | None:
+    """When a process was started, in ticks since this machine was; None if it has ended."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        return None if fields[0] in _ENDED else int(fields[19])
+    except (OSError, ValueError, IndexError):
+        return None

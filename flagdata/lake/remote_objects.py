@@ -1,0 +1,179 @@
+"""Immutable objects in a bucket: `mcap/<sha256>.mcap`, and folders as `zarr/<treehash>.zarr/…`.
+
+A folder's files are put first and `.sums`, the lines whose SHA-256 is its name, last: without it the folder is not
+there. It is deleted first. Objects are read from a local copy, see `flagdata.storage.cache`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+
+from flagdata.checksums import content_hash, files_of, read_sums, sums_of
+from flagdata.errors import CorruptError
+from flagdata.lake.artifact import OBJECT_NAME
+from flagdata.lake.layout import STORES
+from flagdata.lake.objects import Objects, StoredObject, path_in_lake
+from flagdata.storage import Place, RemotePath
+from flagdata.storage.cache import copy_of, fetched, forget
+
+SUMS = ".sums"
+_AT_ONCE = 8
+"""Files of a folder that are moved at the same time."""
+
+
+class RemoteObjects(Objects):
+    """The stores of a lake in a bucket."""
+
+    def __init__(self, root: RemotePath) -> None:
+        self._root = root
+
+    def path(self, name: str) -> RemotePath:
+        """Where the object called `name` is in the bucket, whether or not it is there.
+
+        Raises:
+            InputError: not an object name.
+        """
+        return self._root / path_in_lake(name)
+
+    def has(self, name: str) -> bool:
+        return self._whole_by(name).exists()
+
+    def existing(self, name: str) -> Path:
+        """A local copy of the object.
+
+        Raises:
+            NotFoundError: it is not there.
+            CorruptError: its bytes are not what its name says.
+        """
+        place = self.path(name)
+        if (copy := copy_of(name, place.suffix)) is not None:
+            return copy
+        size = self.size(name)
+        return fetched(name, place.suffix, size=size, fetch=partial(self._fetch, name), where=str(place))
+
+    def whole(self, name: str) -> Path:
+        """A local copy, whose bytes are compared with its name again."""
+        path = self.existing(name)
+        if content_hash(path) != name.partition("/")[2]:
+            forget(name, path.suffix)
+            path = self.existing(name)
+        return path
+
+    def size(self, name: str) -> int:
+        place = self.path(name)
+        try:
+            if place.suffix == ".mcap":
+                return place.stat().st_size
+            found = {key: status.st_size for key, status in place.names()}
+        except FileNotFoundError:
+            raise self.missing(name) from None
+        if found.pop(SUMS, None) is None:
+            raise self.missing(name)
+        return sum(found.values())
+
+    def publish(self, staged: Path, name: str) -> None:
+        """Put `staged`, whose name was computed by `name_of`; durable when it returns.
+
+        What is there under that name has the same bytes, unless it was damaged, and is put anew: so it counts as young,
+        and ingesting again heals a lake.
+        """
+        place = self.path(name)
+        if staged.is_file():
+            place.upload(staged)
+        else:
+            with ThreadPoolExecutor(_AT_ONCE) as pool:
+                uploads = [pool.submit((place / file.relative_to(staged)).upload, file) for file in files_of(staged)]
+                for upload in uploads:
+                    upload.result()
+            (place / SUMS).write_bytes(sums_of(staged).encode())
+        self.remove(staged)
+
+    def check(self, name: str) -> None:
+        place = self.path(name)
+        if not self.has(name):
+            raise self.missing(name)
+        try:
+            whole = self._hash(name) == name.partition("/")[2]
+        except FileNotFoundError:
+            whole = False
+        if not whole:
+            raise CorruptError(
+                f"the bytes of {name} have changed since they were written", where=str(place),
+                fix="ingest the source again (it replaces the object), or restore it from a copy",
+            )  # fmt: skip
+
+    def __iter__(self) -> Iterator[StoredObject]:
+        for store, suffix in STORES.items():
+            sizes: dict[str, int] = {}
+            modified: dict[str, float] = {}
+            for key, status in (self._root / store).names():
+                name = f"{store}/{key.partition('/')[0].removesuffix(suffix)}"
+                if OBJECT_NAME.fullmatch(name) and key.startswith(path_in_lake(name).name):
+                    sizes[name] = sizes.get(name, 0) + (0 if key.endswith(f"/{SUMS}") else status.st_size)
+                    modified[name] = max(modified.get(name, 0.0), status.st_mtime)
+            for name, size in sorted(sizes.items()):
+                yield StoredObject(name=name, path=self.path(name), size=size, modified=modified[name])
+
+    @staticmethod
+    def remove(path: Place) -> None:
+        if isinstance(path, RemotePath):
+            path.remove_tree(first=None if path.suffix == ".mcap" else SUMS)
+        else:
+            Objects.remove(path)
+
+    def _whole_by(self, name: str) -> RemotePath:
+        """What was put last of an object."""
+        place = self.path(name)
+        return place if place.suffix == ".mcap" else place / SUMS
+
+    def _fetch(self, name: str, target: Path) -> None:
+        place = self.path(name)
+        if place.suffix == ".mcap":
+            _download(place, target)
+            return
+        target.mkdir()
+        files = self._sums(place)
+        for file in files:
+            (target / file).parent.mkdir(parents=True, exist_ok=True)
+        with ThreadPoolExecutor(_AT_ONCE) as pool:
+            list(pool.map(lambda file: _download(place / file, target / file), files))
+
+    def _sums(self, place: RemotePath) -> dict[str, str]:
+        """Relative path → SHA-256 of a folder's files.
+
+        Raises:
+            CorruptError: they cannot be read, or name files outside the folder.
+        """
+        try:
+            sums = read_sums((place / SUMS).read_bytes().decode())
+        except (ValueError, UnicodeDecodeError):
+            sums = {"/": ""}
+        if any(file.startswith("/") or ".." in Path(file).parts for file in sums):
+            raise CorruptError(
+                "the sums of its files are damaged", where=str(place / SUMS), fix="ingest the source again"
+            )
+        return sums
+
+    def _hash(self, name: str) -> str:
+        place = self.path(name)
+        if place.suffix == ".mcap":
+            return _digest(place)
+        text = "".join(f"{_digest(place / file)}  {file}\n" for file in sorted(self._sums(place)))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _download(source: RemotePath, target: Path) -> None:
+    with target.open("wb") as stream:
+        for block in source.blocks():
+            stream.write(block)
+
+
+def _digest(path: RemotePath) -> str:
+    digest = hashlib.sha256()
+    for block in path.blocks():
+        digest.update(block)
+    return digest.hexdigest()

@@ -1,0 +1,151 @@
+"""Moving versions between lakes of one history: `flagdata push`, `pull` and `clone`.
+
+A clone has the log of its source, entry by entry, so that versions, commits, tags and branches mean the same in both.
+Each entry states the hash of the one before it: where two lakes have the same entry, they have the same history up to
+it. Versions are only added, in order, each by the conditional put that publishes a commit, after the objects that refs
+need; what is there is not moved again. So a transfer that was stopped goes on where it was, and of two at once one
+finds the work done, or is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from datetime import timedelta
+
+from flagdata.errors import ConflictError, CorruptError
+from flagdata.lake.durable import disk_errors
+from flagdata.lake.lake import Lake
+from flagdata.lake.marking import mark
+from flagdata.lake.transaction import Transaction
+from flagdata.storage import Place
+
+_NOUNS = {"tags": "tag", "branches": "branch"}
+Bars = Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Transfer:
+    """What was moved.
+
+    Attributes:
+        versions: how many the target did not have.
+        head: the newest one of both lakes now.
+        objects: names of those that the target did not have, sorted.
+        size: of these [B].
+        refs: names of the tags and branches that it did not have, sorted.
+    """
+
+    versions: int
+    head: int
+    objects: tuple[str, ...]
+    size: int
+    refs: tuple[str, ...]
+
+
+def clone(source: Lake, target: Place | str, *, bars: Bars) -> tuple[Lake, Transfer]:
+    """Make a lake with all versions, tags and branches of another.
+
+    Where the making was stopped, `transfer` goes on with it.
+
+    Raises:
+        ConflictError: something is there already.
+    """
+    source.catalog.head()
+    lake = Lake.adopt(target, source)
+    return lake, transfer(source, lake, bars=bars)
+
+
+def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
+    """Bring a lake to the newest version of another one.
+
+    Args:
+        bars: makes a progress bar.
+
+    Raises:
+        ConflictError: the target has versions, or a tag or branch of a name, that the source has otherwise.
+        CorruptError: the source is damaged; nothing is published of it.
+    """
+    target.check_writable()
+    marked = mark(source, grace=timedelta(0))
+    if marked.findings:
+        first = marked.findings[0]
+        raise CorruptError(first.what, where=first.where, fix=first.fix or "run flagdata doctor")
+    head, there = source.catalog.head(), target.catalog.head()
+    _check_history(source, target, head=head, there=there)
+    refs = _missing_refs(source, target)
+    missing = [name for name in sorted(marked.objects) if not target.objects.has(name)]
+    size = 0
+    with (
+        disk_errors("moving versions", target.path),
+        target.transaction(f"versions of {source.path}") as transaction,
+        bars(len(missing), "objects", "object") as advance,
+    ):
+        for name in sorted(marked.objects.difference(missing)):
+            transaction.hold(name)
+        for name in missing:
+            if transaction.put(source.objects.whole(name)) != name:
+                raise CorruptError(
+                    f"the bytes of {name} have changed", where=str(source.path), fix="run flagdata verify"
+                )
+            size += transaction.hold(name)
+            advance(1)
+        _adopt(source, target, transaction, versions=range(there + 1, head + 1), bars=bars)
+        for (kind, name), stored in refs.items():
+            target.refs.adopt(kind, name, stored)
+    names = tuple(sorted(name for _, name in refs))
+    return Transfer(versions=head - there, head=head, objects=tuple(missing), size=size, refs=names)
+
+
+def _adopt(source: Lake, target: Lake, transaction: Transaction, *, versions: range, bars: Bars) -> None:
+    deleted = [entry["deleted"] for entry in source.catalog.history(len(versions)) if "deleted" in entry]
+    with bars(len(versions), "versions", "version") as advance:
+        for version in versions:
+            with transaction.keeping_collectors_out():
+                target.catalog.adopt(version, *source.catalog.entry(version))
+            advance(1)
+    if versions:
+        target.catalog.acknowledge(versions[-1])
+    for kind, noun, there in (("tags", "tag", target.refs.tags()), ("branches", "branch", target.refs.branches())):
+        known = source.refs.tags() if kind == "tags" else source.refs.branches()
+        for name in there:
+            if f"{noun} {name}" in deleted and name not in known:
+                target.refs.remove(kind, name)
+
+
+def _check_history(source: Lake, target: Lake, *, head: int, there: int) -> None:
+    """Whether all versions of the target are versions of the source.
+
+    Raises:
+        ConflictError: they are not.
+    """
+    common = min(head, there)
+    if source.catalog.entry(common)[0] != target.catalog.entry(common)[0]:
+        same = source.catalog.entry(0)[0] == target.catalog.entry(0)[0]
+        raise ConflictError(
+            "each of the two lakes has versions that the other lacks" if same else "the lakes share no history",
+            where=f"{source.path} and {target.path}",
+            fix="clone the lake to a new place, and commit there what it lacks; or write to it directly with --lake",
+        )
+    if there > head:
+        raise ConflictError(
+            f"{target.path} is ahead: it has versions up to {there}, {source.path} up to {head}",
+            where=str(target.path), fix="move them the other way: flagdata pull for push, or push for pull",
+        )  # fmt: skip
+
+
+def _missing_refs(source: Lake, target: Lake) -> dict[tuple[str, str], bytes]:
+    """The refs that the target lacks.
+
+    Raises:
+        ConflictError: it has another one of the same name.
+    """
+    stored, there = source.refs.stored(), target.refs.stored()
+    for key, content in stored.items():
+        if there.get(key, content) != content:
+            raise ConflictError(
+                f"both lakes have a {_NOUNS[key[0]]} {key[1]!r}, and not the same",
+                where=str(target.path), fix="delete one of the two",
+            )  # fmt: skip
+    return {key: content for key, content in stored.items() if key not in there}

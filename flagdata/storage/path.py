@@ -1,0 +1,314 @@
+"""A place in a bucket, with the part of `Path` that a lake uses.
+
+A bucket has no folders: one is there as long as something lies in it. Each put shows whole or not at all, and is
+durable when it returns. `create` takes a name only if it is free. A request that fails is repeated, so a `create`
+may find the name taken by its own first try: then the bytes are there, and it has succeeded.
+"""
+
+from __future__ import annotations
+
+import errno
+import fnmatch
+import posixpath
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from flagdata.errors import UsageError
+from flagdata.storage import connection
+
+if TYPE_CHECKING:
+    from obstore.store import S3Store
+
+SCHEME = "s3://"
+BLOCK = 8 << 20
+"""Bytes that one request reads or writes of a larger object."""
+_ADDRESS = re.compile(r"s3://([a-z0-9][a-z0-9.-]{1,61}[a-z0-9])(?:/(.*))?", re.DOTALL)
+_KEY = re.compile(r"[A-Za-z0-9._=+-]+(?:/[A-Za-z0-9._=+-]+)*")
+
+T = TypeVar("T")
+
+
+class StoreError(OSError):
+    """What a store refused or did not answer; its message shows no credentials.
+
+    Attributes:
+        fix: what can be done about it.
+    """
+
+    fix = "check the network and the store"
+
+
+class DeniedError(StoreError, PermissionError):
+    """The credentials do not permit it, or there are none."""
+
+    fix = "check the credentials (AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or AWS_PROFILE) and what they permit"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Status:
+    """Size [B], when it was written [s since 1970, by the store's clock], and the version that conditions name."""
+
+    st_size: int
+    st_mtime: float
+    e_tag: str | None = None
+
+
+class RemotePath:
+    """A key of a bucket.
+
+    Args:
+        bucket: its name.
+        key: without a slash at either end; "" is the bucket itself.
+        status: as a listing gave it; what `stat` returns.
+    """
+
+    __slots__ = ("_status", "bucket", "key")
+
+    def __init__(self, bucket: str, key: str, *, status: Status | None = None) -> None:
+        self.bucket = bucket
+        self.key = key
+        self._status = status
+
+    @classmethod
+    def parse(cls, address: str) -> RemotePath:
+        """The place at an address "s3://bucket/prefix".
+
+        Raises:
+            UsageError: not such an address, or a prefix that not every client writes in the same way.
+        """
+        found = _ADDRESS.fullmatch(address)
+        if found is None:
+            shown = address if "@" not in address else "s3://…"  # it may hold what it must not
+            raise UsageError(
+                "not the address of a bucket", where=shown, fix="write s3://bucket/prefix; credentials are read from"
+                " the environment or a profile"
+            )  # fmt: skip
+        key = (found[2] or "").rstrip("/")
+        if key and (not _KEY.fullmatch(key) or {".", ".."} & set(key.split("/"))):
+            raise UsageError(
+                "the prefix of a lake has letters, digits and . _ = + - only, between single slashes", where=address,
+                fix="choose another prefix",
+            )  # fmt: skip
+        return cls(found[1], key)
+
+    def __reduce__(self) -> tuple[type[RemotePath], tuple[str, str]]:
+        return (RemotePath, (self.bucket, self.key))
+
+    def __str__(self) -> str:
+        return f"{SCHEME}{self.bucket}/{self.key}" if self.key else f"{SCHEME}{self.bucket}"
+
+    def __repr__(self) -> str:
+        return f"RemotePath({str(self)!r})"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, RemotePath) and (self.bucket, self.key) == (other.bucket, other.key)
+
+    def __hash__(self) -> int:
+        return hash((self.bucket, self.key))
+
+    def __lt__(self, other: RemotePath) -> bool:
+        return (self.bucket, self.key) < (other.bucket, other.key)
+
+    def __truediv__(self, name: str | Path) -> RemotePath:
+        return RemotePath(self.bucket, posixpath.join(self.key, str(name)))
+
+    def joinpath(self, *names: str) -> RemotePath:
+        return RemotePath(self.bucket, posixpath.join(self.key, *names))
+
+    @property
+    def name(self) -> str:
+        return posixpath.basename(self.key)
+
+    @property
+    def stem(self) -> str:
+        return posixpath.splitext(self.name)[0]
+
+    @property
+    def suffix(self) -> str:
+        return posixpath.splitext(self.name)[1]
+
+    @property
+    def parent(self) -> RemotePath:
+        return RemotePath(self.bucket, posixpath.dirname(self.key))
+
+    def as_uri(self) -> str:
+        return str(self)
+
+    def exists(self) -> bool:
+        """Whether there is an object of this key; what only has others beneath it is none."""
+        try:
+            self.stat()
+        except FileNotFoundError:
+            return False
+        return True
+
+    def is_file(self) -> bool:
+        return self.exists()
+
+    def is_dir(self) -> bool:
+        """Whether there is anything beneath."""
+        return next(iter(self.rglob("*")), None) is not None
+
+    def is_symlink(self) -> bool:
+        return False
+
+    def stat(self) -> Status:
+        """Its size and age.
+
+        Raises:
+            FileNotFoundError: no object of this key.
+            StoreError: the store did not say.
+        """
+        if self._status is not None:
+            return self._status
+        return _status(self._ask(lambda obstore, store: obstore.head(store, self.key)))
+
+    lstat = stat
+
+    def read_bytes(self) -> bytes:
+        """The object.
+
+        Raises:
+            FileNotFoundError: no object of this key.
+            StoreError: it could not be read.
+        """
+        return self._ask(lambda obstore, store: bytes(obstore.get(store, self.key).bytes()))
+
+    def read_range(self, offset: int, length: int) -> bytes:
+        """At most `length` bytes at `offset`, fewer at the end of the object."""
+        if length == 0:
+            return b""
+        return self._ask(lambda obstore, store: bytes(obstore.get_range(store, self.key, start=offset, length=length)))
+
+    def read_ranges(self, offsets: Sequence[int], lengths: Sequence[int]) -> list[bytes]:
+        """Several ranges; those that lie within 1 MiB of each other are read together."""
+        return self._ask(
+            lambda obstore, store: [
+                bytes(part) for part in obstore.get_ranges(store, self.key, starts=offsets, lengths=lengths)
+            ]
+        )
+
+    def blocks(self) -> Iterator[bytes]:
+        """The object, block after block."""
+        size = self.stat().st_size
+        for offset in range(0, size, BLOCK):
+            yield self.read_range(offset, min(BLOCK, size - offset))
+
+    def write_bytes(self, data: bytes) -> None:
+        """Put an object, in place of another or not."""
+        self._ask(lambda obstore, store: obstore.put(store, self.key, data))
+
+    def upload(self, file: Path) -> None:
+        """Put a file's bytes; of a large file in parts, which show together."""
+        self._ask(lambda obstore, store: obstore.put(store, self.key, file, chunk_size=BLOCK, max_concurrency=4))
+
+    def create(self, data: bytes) -> bool:
+        """Put an object if its key is free; False where it was taken.
+
+        Raises:
+            StoreError: the store did not say whether it took it; it may yet appear.
+        """
+        try:
+            self._ask(lambda obstore, store: obstore.put(store, self.key, data, mode="create"))
+        except FileExistsError:
+            return self._holds(data)
+        except DeniedError:
+            raise
+        except StoreError:
+            if self._holds(data):
+                return True
+            raise
+        return True
+
+    def replace_if(self, e_tag: str | None, data: bytes) -> str | None:
+        """Put an object in place of the one of that version; the new one's version, or None where it was not that."""
+        try:
+            mode: Any = {"e_tag": e_tag}
+            return self._ask(lambda obstore, store: obstore.put(store, self.key, data, mode=mode))["e_tag"]
+        except (FileExistsError, FileNotFoundError):
+            return None
+
+    def unlink(self, missing_ok: bool = False) -> None:
+        self._ask(lambda obstore, store: obstore.delete(store, self.key))
+
+    def mkdir(self, *, parents: bool = False, exist_ok: bool = False) -> None:
+        """Nothing: what is put makes the folders that it is in."""
+
+    def names(self, *, after: str | None = None) -> Iterator[tuple[str, Status]]:
+        """Keys beneath, from this one on, and their status, in order.
+
+        Args:
+            after: only those that come after this name.
+        """
+        prefix = f"{self.key}/" if self.key else ""
+        offset = None if after is None else prefix + after
+        stream = self._ask(lambda obstore, store: obstore.list(store, self.key or None, offset=offset, chunk_size=1000))
+        while True:
+            chunk = self._ask(lambda obstore, store: next(stream, None))
+            if chunk is None:
+                return
+            for meta in chunk:
+                yield meta["path"].removeprefix(prefix), _status(meta)
+
+    def rglob(self, pattern: str) -> Iterator[RemotePath]:
+        """All objects beneath whose last name fits; folders are none."""
+        for name, status in self.names():
+            if fnmatch.fnmatchcase(posixpath.basename(name), pattern):
+                yield RemotePath(self.bucket, posixpath.join(self.key, name), status=status)
+
+    def iterdir(self) -> Iterator[RemotePath]:
+        """What lies directly beneath: objects, and folders."""
+        found = self._ask(lambda obstore, store: obstore.list_with_delimiter(store, self.key or None))
+        for key in found["common_prefixes"]:
+            yield RemotePath(self.bucket, key.rstrip("/"))
+        for meta in found["objects"]:
+            yield RemotePath(self.bucket, meta["path"], status=_status(meta))
+
+    def glob(self, pattern: str) -> Iterator[RemotePath]:
+        """What lies directly beneath and has a name that fits."""
+        return (path for path in self.iterdir() if fnmatch.fnmatchcase(path.name, pattern))
+
+    def relative_to(self, other: RemotePath) -> Path:
+        """The rest of the key behind that of `other`."""
+        return Path(self.key).relative_to(other.key)
+
+    def remove_tree(self, *, first: str | None = None) -> None:
+        """Delete the object and all beneath, the one called `first` before all others."""
+        if first is not None:
+            (self / first).unlink()
+        keys = [path.key for path in self.rglob("*")]
+        self._ask(lambda obstore, store: obstore.delete(store, [self.key, *keys]))
+
+    def _holds(self, data: bytes) -> bool:
+        try:
+            return self.read_bytes() == data
+        except FileNotFoundError:
+            return False
+
+    def _ask(self, request: Callable[[Any, S3Store], T]) -> T:
+        """The answer of the store; what it refuses is an error of the system that shows no credentials."""
+        store = connection.client(self.bucket)
+        import obstore
+        from obstore import exceptions
+
+        try:
+            return request(obstore, store)
+        except (FileNotFoundError, exceptions.NotFoundError):
+            raise FileNotFoundError(errno.ENOENT, "there is no such object", str(self)) from None
+        except (exceptions.AlreadyExistsError, exceptions.PreconditionError):
+            raise FileExistsError(
+                errno.EEXIST, "there is such an object, or another version of it", str(self)
+            ) from None
+        except (exceptions.PermissionDeniedError, exceptions.UnauthenticatedError) as error:
+            raise DeniedError(errno.EACCES, connection.plain(error), str(self)) from None
+        except (exceptions.BaseError, OSError) as error:
+            denied = "status code: 403" in str(error) or "status code: 401" in str(error)
+            kind = DeniedError if denied else StoreError
+            raise kind(errno.EACCES if denied else errno.EREMOTEIO, connection.plain(error), str(self)) from None
+
+
+def _status(meta: Any) -> Status:
+    return Status(st_size=meta["size"], st_mtime=meta["last_modified"].timestamp(), e_tag=meta["e_tag"])

@@ -1,0 +1,278 @@
+"""A lake in a bucket: the same protocol as in a folder, by conditional puts and leases that their holders renew."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import pickle
+import subprocess
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+
+from flagdata.errors import FlagdataError, NotFoundError, RefusedError, UsageError
+from flagdata.lake import Artifact, Lake, remote_leases
+from flagdata.lake.collect import collect
+from flagdata.lake.health import doctor, object_names, verify, verify_catalog
+from flagdata.lake.leases import collecting, leases
+from flagdata.lake.transaction import Transaction
+from flagdata.schema import Kind
+from flagdata.storage import RemotePath
+from tests.program import invoke
+from tests.s3 import SECRETS, Careless, Denying, serving
+
+NOW = timedelta(0)
+Put = Callable[..., Artifact]
+Use = Callable[[str], None]
+
+
+def put_folder(lake: Lake, text: str) -> Artifact:
+    with lake.transaction(f"ingest {text}") as tx:
+        path = tx.staging(".zarr")
+        (path / "positions" / "c").mkdir(parents=True)
+        (path / "positions" / "c" / "0").write_text(text)
+        (path / "zarr.json").write_text("{}")
+        name = tx.put(path)
+        artifact = Artifact(kind=Kind.MESHES, name=text, object=name, source_hash=name.partition("/")[2])
+        tx.add(artifact)
+    return artifact
+
+
+def test_rows_and_objects_of_a_bucket_are_found_whole_by_a_fresh_handle(remote_lake: Lake, put_text: Put) -> None:
+    record, folder = put_text(remote_lake, "gusts"), put_folder(remote_lake, "sheet")
+    again = Lake.open(str(remote_lake.path))
+    assert set(again.rows()["name"].to_pylist()) == {"gusts", "sheet"}
+    assert again.object_path(str(record.object)).read_text() == "gusts"
+    local = again.whole_object(str(folder.object))
+    files = {file.relative_to(local).as_posix(): file.read_text() for file in local.rglob("*") if file.is_file()}
+    assert files == {"positions/c/0": "sheet", "zarr.json": "{}"}
+    assert again.artifact(folder.id).object_bytes == len("sheet{}")
+    assert verify(again, object_names(again)) == verify_catalog(again) == doctor(again, grace=NOW) == ()
+
+
+def test_what_is_withdrawn_is_collected_and_tags_keep_theirs(remote_lake: Lake, put_text: Put) -> None:
+    kept, gone = put_text(remote_lake, "kept"), put_folder(remote_lake, "gone")
+    remote_lake.tag("v1")
+    put_text(remote_lake, "later")
+    remote_lake.withdraw([kept.id, gone.id], "withdrawn")
+    assert collect(remote_lake, grace=NOW).objects == ()
+    remote_lake.delete_tag("v1", discard=True)
+    assert set(collect(remote_lake, grace=NOW).objects) == {kept.object, gone.object}
+    assert not any(str(gone.object)[5:] in str(path) for path in remote_lake.path.rglob("*"))
+    assert [finding.kind for finding in doctor(remote_lake, grace=NOW)] == ["withdrawn-collected"]
+
+
+def test_two_writers_at_once_lose_no_commit(remote_lake: Lake, put_text: Put) -> None:
+    def write(writer: int) -> list[str]:
+        own = Lake.open(remote_lake.path)
+        return [put_text(own, f"{writer}-{i}").id for i in range(3)]
+
+    with ThreadPoolExecutor(2) as pool:
+        acknowledged = [identity for ids in pool.map(write, range(2)) for identity in ids]
+    assert sorted(remote_lake.rows()["artifact"].to_pylist()) == sorted(acknowledged)
+    assert len(set(acknowledged)) == 6
+    assert doctor(remote_lake, grace=NOW) == ()
+
+
+def test_an_object_that_changed_in_the_bucket_is_found_and_healed_by_ingesting_again(
+    remote_lake: Lake, put_text: Put, tmp_path: Path
+) -> None:
+    artifact = put_text(remote_lake, "gusts")
+    name = str(artifact.object)
+    place = remote_lake.objects.path(name)
+    place.write_bytes(b"gustz")
+    assert [finding.kind for finding in verify(remote_lake, [name])] == ["object-changed"]
+    with pytest.raises(FlagdataError, match="have changed"):
+        remote_lake.object_path(name)
+    assert list((tmp_path / "cache" / "objects").glob("mcap-*")) == []
+    with remote_lake.transaction("again") as tx:
+        again = tx.staging(".mcap")
+        again.write_text("gusts")
+        tx.put(again)
+    assert remote_lake.object_path(name).read_text() == "gusts"
+
+
+def test_a_store_that_ignores_conditions_is_refused_before_anything_is_written(use_store: Use) -> None:
+    with serving(Careless) as address:
+        use_store(address)
+        with pytest.raises(RefusedError, match="ignores the conditions"):
+            Lake.create("s3://bucket/lake")
+        assert not any("lake.json" in key or "catalog" in key for key in Careless.objects)
+
+
+def test_credentials_show_nowhere(
+    remote_lake: Lake, put_text: Put, use_store: Use, capsys: pytest.CaptureFixture[str],
+    caplog: pytest.LogCaptureFixture,
+) -> None:  # fmt: skip
+    with caplog.at_level(logging.DEBUG):
+        put_text(remote_lake, "gusts")
+        shown = [invoke(capsys, command, "--lake", remote_lake.path, "--json").out for command in ("ls", "log")]
+        shown += [repr(remote_lake.path), pickle.dumps(remote_lake).decode(errors="replace")]
+        shown += [path.read_bytes().decode(errors="replace") for path in remote_lake.path.rglob("*")]
+        assert len(shown) > 8  # of the bucket, too
+        with serving(Denying) as address:
+            use_store(address)
+            for arguments in (("ls",), ("ls", "--json"), ("--debug", "verify"), ("gc",), ("tag", "v1")):
+                ended = invoke(capsys, *arguments, "--lake", remote_lake.path)
+                assert ended.code == 1
+                shown += [ended.out, ended.err]
+            with pytest.raises(FlagdataError) as caught:
+                remote_lake.catalog.history()
+            shown.append(str(caught.value))
+    for text in (*shown, caplog.text):
+        for secret in SECRETS.values():
+            assert secret not in text
+
+
+def test_an_address_with_credentials_is_refused_without_repeating_them() -> None:
+    with pytest.raises(UsageError) as caught:
+        Lake.open("s3://key:secret@bucket/lake")
+    assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize("address", ["s3://", "s3://b", "s3://bucket//x", "s3://bucket/../x", "s3://bucket/a%41"])
+def test_an_address_that_clients_write_in_several_ways_is_refused(address: str) -> None:
+    with pytest.raises(UsageError):
+        Lake.create(address)
+
+
+@pytest.mark.parametrize("address", ["gs://bucket/lake", "az://bucket/lake", "hdfs://host/lake"])
+def test_a_lake_at_another_storage_is_refused_and_makes_no_folder(
+    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UsageError, match="object storage"):
+        Lake.create(address)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_where_no_lake_is_in_a_bucket_it_says_so(bucket_folder: str) -> None:
+    with pytest.raises(NotFoundError, match="no lake"):
+        Lake.open(bucket_folder)
+
+
+def test_the_credentials_of_a_profile_are_used(
+    s3_server: str, use_store: Use, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    use_store(s3_server)
+    for name in (*SECRETS, "AWS_ENDPOINT_URL", "AWS_REGION"):
+        monkeypatch.delenv(name)
+    (tmp_path / "credentials").write_text("[lab]\naws_access_key_id = profilekey\naws_secret_access_key = hidden\n")
+    (tmp_path / "config").write_text(f"[profile lab]\nendpoint_url = {s3_server}\nregion = us-east-1\n")
+    monkeypatch.setenv("AWS_CONFIG_FILE", str(tmp_path / "config"))
+    monkeypatch.setenv("AWS_SHARED_CREDENTIALS_FILE", str(tmp_path / "credentials"))
+    monkeypatch.setenv("AWS_PROFILE", "lab")
+    assert Lake.create(f"s3://bucket/profile-{time.time_ns()}").rows().num_rows == 0
+    monkeypatch.setenv("AWS_PROFILE", "nobody")
+    use_store(s3_server)
+    monkeypatch.setenv("AWS_PROFILE", "nobody")
+    with pytest.raises(UsageError, match="no profile 'nobody'"):
+        Lake.open("s3://bucket/lake")
+
+
+def test_a_put_whose_bytes_are_there_has_succeeded_however_often_it_was_sent(bucket_folder: str) -> None:
+    place = RemotePath.parse(bucket_folder) / "entry"
+    assert place.create(b"mine")
+    assert place.create(b"mine")  # as when the answer to the first was lost
+    assert not place.create(b"another")
+    assert place.read_bytes() == b"mine"
+
+
+def dead_owner() -> dict[str, object]:
+    """What a process of this machine noted that has ended."""
+    with subprocess.Popen(["sleep", "60"]) as process:
+        started = remote_leases._started(process.pid)
+        process.kill()
+    return {**remote_leases.owner(), "pid": process.pid, "started": started}
+
+
+def test_locks_of_a_process_that_was_killed_hold_nobody_up(remote_lake: Lake, put_text: Put) -> None:
+    text = json.dumps(dead_owner()).encode() + b"\n"
+    (remote_lake.staging / "collect").write_bytes(text)
+    (remote_lake.staging / "shared" / "a").write_bytes(text)
+    (remote_lake.staging / ("0" * 32) / "lease").write_bytes(text)
+    put_text(remote_lake, "gusts")
+    remote_lake.tag("v1")
+    assert [state.alive for state in leases(remote_lake.staging)] == [False]
+    collect(remote_lake, grace=NOW)
+    assert doctor(remote_lake, grace=NOW) == ()
+
+
+def test_a_lease_of_another_machine_counts_until_it_was_not_renewed_for_its_life(bucket_folder: str) -> None:
+    staging = RemotePath.parse(bucket_folder)
+    owner = {**remote_leases.owner(), "machine": "another", "pid": 1, "started": 1}
+    for life, folder in ((60.0, "0" * 32), (-60.0, "1" * 32)):
+        (staging / folder / "lease").write_bytes(json.dumps({**owner, "life": life}).encode() + b"\nmcap/x\n")
+    assert [(state.alive, state.objects) for state in leases(staging)] == [
+        (True, frozenset({"mcap/x"})), (False, frozenset({"mcap/x"})),
+    ]  # fmt: skip
+
+
+def test_a_collection_leaves_what_a_running_transaction_has_put(remote_lake: Lake) -> None:
+    with remote_lake.transaction("ingest") as tx:
+        path = tx.staging(".mcap")
+        path.write_text("running")
+        name = tx.put(path)
+        assert collect(Lake.open(remote_lake.path), grace=NOW).objects == ()
+        tx.add(Artifact(kind=Kind.WIND, name="running", object=name))
+    assert remote_lake.object_path(name).read_text() == "running"
+
+
+def test_who_was_cut_off_for_long_publishes_nothing(
+    remote_lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put = Transaction.put
+
+    def slow(transaction: Transaction, path: Path) -> str:
+        name = put(transaction, path)
+        monkeypatch.setattr(remote_leases, "LIFE", 0.0)  # has passed since the lease was renewed
+        return name
+
+    monkeypatch.setattr(Transaction, "put", slow)
+    with pytest.raises(FlagdataError, match="take this process for dead"):
+        put_text(remote_lake, "late")
+    monkeypatch.undo()
+    assert remote_lake.rows().num_rows == 0
+
+
+def test_the_exclusive_lock_keeps_writers_waiting(remote_lake: Lake, put_text: Put) -> None:
+    with ThreadPoolExecutor(1) as pool:
+        with collecting(remote_lake.staging):
+            written = pool.submit(put_text, Lake.open(remote_lake.path), "waits")
+            time.sleep(0.5)
+            assert remote_lake.rows().num_rows == 0
+        written.result()
+    assert remote_lake.rows().num_rows == 1
+
+
+def test_a_forked_child_says_that_it_cannot_use_the_store(remote_lake: Lake) -> None:
+    reading, writing = os.pipe()
+    if (child := os.fork()) == 0:
+        try:
+            remote_lake.path.exists()
+        except FlagdataError as error:
+            os.write(writing, error.what.encode())
+        finally:
+            os._exit(0)
+    os.close(writing)
+    os.waitpid(child, 0)
+    with os.fdopen(reading) as said:
+        assert "forked" in said.read()
+
+
+def test_the_cache_gives_up_what_was_used_least_recently(
+    remote_lake: Lake, put_text: Put, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = [str(put_text(remote_lake, text).object) for text in ("a" * 100, "b" * 100, "c" * 100)]
+    monkeypatch.setenv("FLAGDATA_CACHE_LIMIT", "250")
+    first, second = (remote_lake.object_path(name) for name in names[:2])
+    long_ago = time.time() - 3600
+    os.utime(first, (long_ago, long_ago))
+    third = remote_lake.object_path(names[2])
+    assert [path.exists() for path in (first, second, third)] == [False, True, True]
+    assert remote_lake.object_path(names[0]).read_text() == "a" * 100  # fetched again

@@ -1,0 +1,107 @@
+"""Servers of object storage on loopback: moto's, which keeps what it promises, and one that does not."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from threading import Thread
+from typing import ClassVar
+from urllib.request import Request, urlopen
+
+BUCKET = "bucket"
+_SERVER = """
+import logging, threading
+from moto.server import ThreadedMotoServer
+logging.getLogger("werkzeug").setLevel(logging.ERROR)
+server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+server.start()
+print("http://%s:%d" % server.get_host_and_port(), flush=True)
+threading.Event().wait()
+"""
+SECRETS = {
+    "AWS_ACCESS_KEY_ID": "AKIAEXAMPLEEXAMPLE01",
+    "AWS_SECRET_ACCESS_KEY": "secret/of/nobody+0123456789",
+    "AWS_SESSION_TOKEN": "token-of-nobody-0123456789",
+}
+"""Credentials that a server on loopback takes."""
+
+
+@contextmanager
+def moto() -> Iterator[str]:
+    """The address of moto's server, with an empty bucket; in a process of its own, since the Delta library keeps
+    Python's lock while it waits for an answer."""
+    with subprocess.Popen([sys.executable, "-c", _SERVER], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        address = process.stdout.readline().decode().strip()
+        try:
+            urlopen(Request(f"{address}/{BUCKET}", method="PUT")).close()
+            yield address
+        finally:
+            process.kill()
+
+
+class Careless(BaseHTTPRequestHandler):
+    """A store that takes the conditions of puts and ignores them, as `rclone serve s3` does."""
+
+    objects: ClassVar[dict[str, bytes]] = {}
+
+    def do_PUT(self) -> None:
+        self.objects[self.path] = self.rfile.read(int(self.headers["Content-Length"]))
+        self._answer(200, b"")
+
+    def do_GET(self) -> None:
+        if "list-type" in self.path:
+            self._answer(200, b"<ListBucketResult><IsTruncated>false</IsTruncated></ListBucketResult>")
+        elif self.path in self.objects:
+            self._answer(200, self.objects[self.path])
+        else:
+            self._answer(404, b"")
+
+    do_HEAD = do_GET  # noqa: N815
+
+    def do_POST(self) -> None:
+        asked = self.rfile.read(int(self.headers["Content-Length"]))
+        keys = re.findall(rb"<Key>.*?</Key>", asked)
+        self._answer(200, b"<DeleteResult><Deleted>%s</Deleted></DeleteResult>" % b"</Deleted><Deleted>".join(keys))
+
+    def _answer(self, status: int, content: bytes) -> None:
+        self.send_response(status)
+        self.send_header("Content-Length", str(len(content)))
+        self.send_header("Last-Modified", "Fri, 27 Nov 2026 10:00:00 GMT")
+        self.send_header("ETag", '"1"')
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(content)
+
+    def log_message(self, format: str, *args: object) -> None:  # noqa: A002 — as the library names it
+        pass
+
+
+class Denying(Careless):
+    """A store that refuses every request, and repeats in its answer what was sent to it."""
+
+    def do_PUT(self) -> None:
+        sent = self.headers.get("Authorization", "") + self.headers.get("x-amz-security-token", "")
+        self._answer(
+            403,
+            f"<Error><Code>SignatureDoesNotMatch</Code><Message>The signature of {sent} does not match</Message>"
+            f"<AWSAccessKeyId>{sent}</AWSAccessKeyId></Error>".encode(),
+        )
+
+    do_GET = do_HEAD = do_POST = do_PUT  # noqa: N815
+
+
+@contextmanager
+def serving(handler: type[BaseHTTPRequestHandler]) -> Iterator[str]:
+    """The address of a server."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        yield f"http://127.0.0.1:{server.server_address[1]}"
+    finally:
+        server.shutdown()
+        server.server_close()
