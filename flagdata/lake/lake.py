@@ -52,7 +52,7 @@ class Lake(Store):
             UsageError: any other address, or a path that the Delta library cannot work in.
             RefusedError: a store that ignores the conditions of puts.
         """
-        return cls._make(path, cls._fill)
+        return cls._make(path, lambda lake: lake._fill())
 
     @classmethod
     def _make(cls, path: Place | str, fill: Callable[[Lake], None]) -> Lake:
