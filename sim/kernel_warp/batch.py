@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import UsageError
+from sim.cloth import incidence
 from sim.mesh import Mesh
 from sim.system import Drive, System
 from sim.tables import Evaluation
@@ -84,17 +85,16 @@ class WarpKernel:
 
         sheet = code.Sheet()
         for name, values in _sheet(cloth.mesh, system.held).items():
-            setattr(sheet, name, array(values.astype(np.int32)))
+            setattr(sheet, name, array(values.astype(np.uint32).view(np.int32)))
         sheet.gradient = array(cloth.gradients[:, :, 1:].permute(2, 1, 0).flatten())
         sheet.area = array(cloth.areas)
-        sheet.column, sheet.shape, sheet.row = (
-            array(cloth.hinge_column), array(cloth.hinge_shape), array(cloth.hinge_rows.T.flatten())
-        )  # fmt: skip
+        sheet.column, sheet.shape = array(cloth.hinge_column), array(cloth.hinge_shape)
+        sheet.row = array(cloth.hinge_rows[:, 1] + 2 * cloth.hinge_rows[:, 2])
         members = code.Members()
         members.samples = array(cloth.samples.reshape(-1, 4), code.wp.vec4)
         members.table = array(cloth.table_of.int())
         members.counts = code.wp.vec3i(*cloth.grid.counts)
-        members.origin, members.spacing = cloth.grid.origin, cloth.grid.spacing
+        members.origin, members.fineness = cloth.grid.origin, 1 / cloth.grid.spacing
         bending = np.stack([material.bending for material in cloth.materials], axis=-1)
         members.bending = array(torch.tensor(bending, dtype=torch.float32).reshape(15, -1))
         members.symmetric = int(cloth.evaluation is Evaluation.CORRECTED)
@@ -153,23 +153,25 @@ def _code(device: torch.device) -> ModuleType:
 def _sheet(mesh: Mesh, held: Tensor) -> dict[str, NDArray[np.int64]]:
     """The index arrays of `leapfrog.Sheet`."""
     faces, hinges = mesh.faces, mesh.hinges
-    count = len(faces)
-    corner_of = {  # directed edge → the slot of the corner opposite
-        (int(face[(c + 1) % 3]), int(face[(c + 2) % 3])): c * count + e
-        for e, face in enumerate(faces)
-        for c in range(3)
+    place_of = {  # directed edge → face and the corner opposite
+        (int(face[(c + 1) % 3]), int(face[(c + 2) % 3])): (e, c) for e, face in enumerate(faces) for c in range(3)
     }
-    left = [corner_of[int(i), int(j)] for i, j, *_ in hinges]
-    right = [corner_of[int(j), int(i)] for i, j, *_ in hinges]
-    edge = np.full(3 * count, len(hinges))
-    edge[left] = edge[right] = np.arange(len(hinges))
-    vertex = faces.T.ravel()
-    order = np.lexsort((np.arange(3 * count) // count, vertex))  # by vertex, then by corner
-    at = np.searchsorted(vertex[order] * 3 + order // count, np.arange(3 * mesh.vertex_count + 1))
-    begin = np.stack([at[:-1:3], at[1::3], at[2::3], at[3::3]])
-    hold = np.full(mesh.vertex_count, -1)
-    hold[held.cpu().numpy()] = np.arange(len(held))
+    left = np.array([place_of[int(i), int(j)] for i, j, *_ in hinges]).reshape(-1, 2)
+    right = np.array([place_of[int(j), int(i)] for i, j, *_ in hinges]).reshape(-1, 2)
+    edge = np.full(faces.shape, len(hinges))
+    edge[tuple(left.T)] = edge[tuple(right.T)] = np.arange(len(hinges))
+    around = incidence(faces, mesh.vertex_count)
+    hold = np.zeros(mesh.vertex_count, dtype=np.int64)
+    hold[held.cpu().numpy()] = 1 + np.arange(len(held))
+
+    def pair(lower: NDArray[np.int64], upper: NDArray[np.int64]) -> NDArray[np.int64]:
+        return lower | upper << 16
+
+    (a, b, c), (ea, eb, ec) = faces.T, edge.T
     return {
-        "corner": vertex, "edge": edge, "end": hinges[:, :2].T.ravel(), "side": np.array([*left, *right]),
-        "around": order % count, "begin": begin.ravel(), "hold": hold,
-    }  # fmt: skip
+        "corner": np.concatenate([pair(a, b), pair(c, ea), pair(eb, ec)]),
+        "end": pair(hinges[:, 0], hinges[:, 1]),
+        "side": pair(left @ [4, 1], right @ [4, 1]),
+        "around": around.ravel(),
+        "vertex": pair((around < faces.size).sum(0), hold),
+    }

@@ -37,44 +37,41 @@ THREADS = 256
 BLOCKS = 3
 """Blocks that a multiprocessor is to hold at once: 68 kB of shared memory each for 651 vertices, and 80 registers a
 thread."""
-OPTIONS = {"fast_math": False}
-"""Of the compiler: divisions and roots are rounded as IEEE 754 has it."""
+OPTIONS = {"fast_math": True}
+"""Of the compiler: divisions and roots are right to two or three units of the last place."""
 
 _MIN_ALTITUDE = wp.constant(1e-3)  # see sim.bending
 _TINY = wp.constant(1e-30)
 
-Vector9 = wp.types.vector(length=9, dtype=wp.float32)
-
 
 @wp.struct
 class Sheet:
-    """A mesh. What has a corner or a component is flat, that index first.
+    """A mesh. What has a corner or a component is flat, that index first; two indices share a number, the second in its
+    upper half.
 
     Attributes:
-        corner: (3, face) vertices.
+        corner: (3, face) the vertices a and b; c and the hinge of the edge opposite a; the hinges of those opposite b
+            and c. An edge of the cloth has the number of hinges.
         gradient: (4, face) ∂/∂u and ∂/∂v of the second corner's shape function, then of the third's [1/m].
         area: (face,) at rest [m²].
-        edge: (3, face) hinge of the edge opposite each corner; their number where the edge is the cloth's.
-        end: (2, hinge) vertices i and j.
-        side: (2, hinge) the corner opposite, as corner · faces + face, of the face on the left and on the right of i→j.
-        column, shape, row: see `sim.cloth.Cloth`; the last is (3, hinge).
-        around: faces at the vertices, of a vertex those whose first corner it is, then those whose second, then third.
-        begin: (4, vertex) where each of the three starts in `around`, and where the last ends.
-        hold: (vertex,) which handle holds it; -1 for none.
+        end: (hinge,) vertices i and j.
+        side: (hinge,) 4 · face + the corner opposite, of the face on the left and of that on the right of i→j.
+        column, shape: (hinge,) see `sim.cloth.Cloth`.
+        row: (hinge,) place among the bending rows, 0 to 2.
+        around: (k, vertex) corner · faces + face, of the faces at each vertex.
+        vertex: (vertex,) how many these are, and which handle holds it, counted from 1; 0 for none.
     """
 
     corner: wp.array(dtype=wp.int32)
     gradient: wp.array(dtype=wp.float32)
     area: wp.array(dtype=wp.float32)
-    edge: wp.array(dtype=wp.int32)
     end: wp.array(dtype=wp.int32)
     side: wp.array(dtype=wp.int32)
     column: wp.array(dtype=wp.float32)
     shape: wp.array(dtype=wp.float32)
     row: wp.array(dtype=wp.float32)
     around: wp.array(dtype=wp.int32)
-    begin: wp.array(dtype=wp.int32)
-    hold: wp.array(dtype=wp.int32)
+    vertex: wp.array(dtype=wp.int32)
 
 
 @wp.struct
@@ -85,7 +82,7 @@ class Members:
         samples: (table · node,) stretching stiffness k0 to k3 [N/m].
         table: (batch,) of each member.
         counts: nodes of a table along G00, G11 and |G01|.
-        origin, spacing: of its nodes.
+        origin, fineness: of its nodes: where the first is, and how many there are in a unit of strain.
         bending: (15, batch) nodes of the three bending rows [N·m].
         symmetric: 1 where bending looks up |curvature|.
         damping: (batch,) d [s].
@@ -99,7 +96,7 @@ class Members:
     table: wp.array(dtype=wp.int32)
     counts: wp.vec3i
     origin: float
-    spacing: float
+    fineness: float
     bending: wp.array2d(dtype=wp.float32)
     symmetric: int
     damping: wp.array(dtype=wp.float32)
@@ -126,33 +123,48 @@ class Motion:
 
 
 @wp.func
-def located(value: float, origin: float, spacing: float, count: int):
-    """Cell and share of a coordinate of the stretching grid."""
-    place = wp.clamp((value - origin) / spacing, 0.0, float(count - 1))
-    cell = wp.clamp(int(place), 0, count - 2)
-    return cell, place - float(cell)
+def lower(pair: int):
+    return pair & 0xFFFF
 
 
 @wp.func
-def along(samples: wp.array(dtype=wp.vec4), at: int, share: float):
-    low = samples[at]
-    return low + share * (samples[at + 1] - low)
+def upper(pair: int):
+    return (pair >> 16) & 0xFFFF
+
+
+@wp.func
+def located(place: float, count: int):
+    """Cell and share of a coordinate of the stretching grid."""
+    inside = wp.clamp(place, 0.0, float(count - 1))
+    cell = wp.clamp(int(inside), 0, count - 2)
+    return cell, inside - float(cell)
 
 
 @wp.func
 def stretching(members: Members, first: int, g00: float, g11: float, g01: float):
     """k0 to k3 at a strain."""
-    c0, w0 = located(g00, members.origin, members.spacing, members.counts[0])
-    c1, w1 = located(g11, members.origin, members.spacing, members.counts[1])
-    c2, w2 = located(wp.abs(g01), 0.0, members.spacing, members.counts[2])
+    c0, w0 = located((g00 - members.origin) * members.fineness, members.counts[0])
+    c1, w1 = located((g11 - members.origin) * members.fineness, members.counts[1])
+    c2, w2 = located(wp.abs(g01) * members.fineness, members.counts[2])
     line = members.counts[2]
     plane = members.counts[1] * line
     at = first + c0 * plane + c1 * line + c2
-    low = along(members.samples, at, w2)
-    low += w1 * (along(members.samples, at + line, w2) - low)
-    high = along(members.samples, at + plane, w2)
-    high += w1 * (along(members.samples, at + plane + line, w2) - high)
+    both = w1 * w2
+    last = w1 - both
+    middle = w2 - both
+    none = 1.0 - w1 - middle
+    low = none * members.samples[at] + middle * members.samples[at + 1]
+    low += last * members.samples[at + line] + both * members.samples[at + line + 1]
+    high = none * members.samples[at + plane] + middle * members.samples[at + plane + 1]
+    high += last * members.samples[at + plane + line] + both * members.samples[at + plane + line + 1]
     return low + w0 * (high - low)
+
+
+@wp.func
+def chosen(each: wp.vec3, index: int):
+    """A component."""
+    value = wp.where(index == 1, each[1], each[0])
+    return wp.where(index == 2, each[2], value)
 
 
 @functools.cache
@@ -164,7 +176,7 @@ def kernel(vertices: int, faces: int, hinges: int) -> Any:
     no graphics processor a block has one thread, unless `warp.config.enable_cpu_blocks` is set.
     """
     count, sides, folds = wp.constant(vertices), wp.constant(faces), wp.constant(hinges)
-    places = wp.constant(hinges + 1)
+    corners, places = wp.constant(3 * faces), wp.constant(hinges + 1)
 
     @wp.kernel(module="unique", module_options=OPTIONS, enable_backward=False, launch_bounds=(THREADS, BLOCKS))
     def leapfrog(
@@ -181,7 +193,8 @@ def kernel(vertices: int, faces: int, hinges: int) -> Any:
         x = wp.tile_empty(shape=count, dtype=wp.vec3, storage="shared")
         v = wp.tile_empty(shape=count, dtype=wp.vec3, storage="shared")
         inverse_mass = wp.tile_empty(shape=count, dtype=float, storage="shared")
-        face = wp.tile_empty(shape=sides, dtype=Vector9, storage="shared")
+        # Of the faces: normals, rates of folds, inverse altitudes; later forces on the three corners.
+        face = wp.tile_empty(shape=corners, dtype=wp.vec3, storage="shared")
         moment = wp.tile_zeros(shape=places, dtype=float, storage="shared")
         bending = wp.tile_empty(shape=15, dtype=float, storage="shared")
 
@@ -210,9 +223,10 @@ def kernel(vertices: int, faces: int, hinges: int) -> Any:
             for first in range(0, sides, lanes):
                 here = first + lane < sides
                 e = wp.min(first + lane, sides - 1)
-                a = sheet.corner[e]
-                b = sheet.corner[sides + e]
-                c = sheet.corner[2 * sides + e]
+                ab = sheet.corner[e]
+                a = lower(ab)
+                b = upper(ab)
+                c = lower(sheet.corner[sides + e])
                 xa = wp.tile_extract(x, a)
                 xb = wp.tile_extract(x, b)
                 xc = wp.tile_extract(x, c)
@@ -234,35 +248,22 @@ def kernel(vertices: int, faces: int, hinges: int) -> Any:
                 ra = pa * (qa - qb + wp.dot(ea, ec) / la * (qc - qb))
                 rb = pb * (qb - qc + wp.dot(eb, ea) / lb * (qa - qc))
                 rc = pc * (qc - qa + wp.dot(ec, eb) / lc * (qb - qa))
-                wp.tile_scatter_masked(face, e, Vector9(n[0], n[1], n[2], ra, rb, rc, pa, pb, pc), here)
+                wp.tile_scatter_masked(face, e, n, here)
+                wp.tile_scatter_masked(face, sides + e, wp.vec3(ra, rb, rc), here)
+                wp.tile_scatter_masked(face, 2 * sides + e, wp.vec3(pa, pb, pc), here)
 
             for first in range(0, folds, lanes):
                 here = first + lane < folds
                 h = wp.min(first + lane, folds - 1)
-                edge = wp.tile_extract(x, sheet.end[folds + h]) - wp.tile_extract(x, sheet.end[h])
-                left = sheet.side[h]
-                right = sheet.side[folds + h]
-                rate = float(0.0)  # noqa: UP018  a variable, in Warp's language
-                fl = left
-                if left < sides:
-                    rate += wp.tile_extract(face, fl, 3)
-                elif left < 2 * sides:
-                    fl = left - sides
-                    rate += wp.tile_extract(face, fl, 4)
-                else:
-                    fl = left - 2 * sides
-                    rate += wp.tile_extract(face, fl, 5)
-                fr = right
-                if right < sides:
-                    rate += wp.tile_extract(face, fr, 3)
-                elif right < 2 * sides:
-                    fr = right - sides
-                    rate += wp.tile_extract(face, fr, 4)
-                else:
-                    fr = right - 2 * sides
-                    rate += wp.tile_extract(face, fr, 5)
-                nl = wp.vec3(wp.tile_extract(face, fl, 0), wp.tile_extract(face, fl, 1), wp.tile_extract(face, fl, 2))
-                nr = wp.vec3(wp.tile_extract(face, fr, 0), wp.tile_extract(face, fr, 1), wp.tile_extract(face, fr, 2))
+                ends = sheet.end[h]
+                edge = wp.tile_extract(x, upper(ends)) - wp.tile_extract(x, lower(ends))
+                side = sheet.side[h]
+                left = lower(side)
+                right = upper(side)
+                nl = wp.tile_extract(face, left >> 2)
+                nr = wp.tile_extract(face, right >> 2)
+                rate = chosen(wp.tile_extract(face, sides + (left >> 2)), left & 3)
+                rate += chosen(wp.tile_extract(face, sides + (right >> 2)), right & 3)
                 angle = wp.atan2(-wp.dot(edge, wp.cross(nl, nr)) / wp.length(edge), wp.dot(nl, nr))
                 column = angle * sheet.column[h]
                 if members.symmetric == 1:
@@ -270,22 +271,26 @@ def kernel(vertices: int, faces: int, hinges: int) -> Any:
                 column = wp.min(column, 4.0)
                 knot = wp.clamp(int(column), 0, 3)
                 column -= float(knot)
-                stiffness = float(0.0)  # noqa: UP018
-                for r in range(3):
-                    weight = sheet.row[r * folds + h]
-                    if weight != 0.0:
-                        low = wp.tile_extract(bending, 5 * r + knot)
-                        high = wp.tile_extract(bending, 5 * r + knot + 1)
-                        stiffness += weight * (low + column * (high - low))
+                row = sheet.row[h]
+                upon = wp.min(int(row), 1)
+                at = 5 * upon + knot
+                one = wp.tile_extract(bending, at)
+                one += column * (wp.tile_extract(bending, at + 1) - one)
+                other = wp.tile_extract(bending, at + 5)
+                other += column * (wp.tile_extract(bending, at + 6) - other)
+                stiffness = one + (row - float(upon)) * (other - one)
                 stiffness = wp.max(stiffness, 0.0) * sheet.shape[h] * 0.5
                 wp.tile_scatter_masked(moment, h, -stiffness * (angle + damping * rate), here)
 
             for first in range(0, sides, lanes):
                 here = first + lane < sides
                 e = wp.min(first + lane, sides - 1)
-                a = sheet.corner[e]
-                b = sheet.corner[sides + e]
-                c = sheet.corner[2 * sides + e]
+                ab = sheet.corner[e]
+                c_and = sheet.corner[sides + e]
+                others = sheet.corner[2 * sides + e]
+                a = lower(ab)
+                b = upper(ab)
+                c = lower(c_and)
                 xa = wp.tile_extract(x, a)
                 xb = wp.tile_extract(x, b)
                 xc = wp.tile_extract(x, c)
@@ -320,24 +325,26 @@ def kernel(vertices: int, faces: int, hinges: int) -> Any:
                 fc = -(uc * pu + wc * pw)
                 fa = -(fb + fc)
 
-                n = wp.vec3(wp.tile_extract(face, e, 0), wp.tile_extract(face, e, 1), wp.tile_extract(face, e, 2))
+                n = wp.tile_extract(face, e)
+                p = wp.tile_extract(face, 2 * sides + e)
                 third = area / 3.0
                 relative = wind - (va + vb + vc) / 3.0
                 across = wp.dot(relative, n)
                 drag = members.drag * third
                 push = (members.density * third * wp.abs(across) * across - drag * across) * n + drag * relative
 
-                ma = wp.tile_extract(moment, sheet.edge[e]) * wp.tile_extract(face, e, 6)
-                mb = wp.tile_extract(moment, sheet.edge[sides + e]) * wp.tile_extract(face, e, 7)
-                mc = wp.tile_extract(moment, sheet.edge[2 * sides + e]) * wp.tile_extract(face, e, 8)
+                ma = wp.tile_extract(moment, upper(c_and)) * p[0]
+                mb = wp.tile_extract(moment, lower(others)) * p[1]
+                mc = wp.tile_extract(moment, upper(others)) * p[2]
                 oa = -wp.dot(ea, ec) / wp.dot(ea, ea) * ma
                 ob = -wp.dot(eb, ea) / wp.dot(eb, eb) * mb
                 oc = -wp.dot(ec, eb) / wp.dot(ec, ec) * mc
                 fa += push + (ma - ob - (mc - oc)) * n
                 fb += push + (mb - oc - (ma - oa)) * n
                 fc += push + (mc - oa - (mb - ob)) * n
-                whole = Vector9(fa[0], fa[1], fa[2], fb[0], fb[1], fb[2], fc[0], fc[1], fc[2])
-                wp.tile_scatter_masked(face, e, whole, here)
+                wp.tile_scatter_masked(face, e, fa, here)
+                wp.tile_scatter_masked(face, sides + e, fb, here)
+                wp.tile_scatter_masked(face, 2 * sides + e, fc, here)
 
             kick = step
             if s == 0 or s == steps:
@@ -351,24 +358,10 @@ def kernel(vertices: int, faces: int, hinges: int) -> Any:
                 xi = wp.tile_extract(x, i)
                 vi = wp.tile_extract(v, i)
                 force = wp.vec3(0.0, 0.0, 0.0)
-                second = sheet.begin[count + i]
-                last = sheet.begin[2 * count + i]
-                for q in range(sheet.begin[i], second):
-                    f = sheet.around[q]
-                    force += wp.vec3(
-                        wp.tile_extract(face, f, 0), wp.tile_extract(face, f, 1), wp.tile_extract(face, f, 2)
-                    )
-                for q in range(second, last):
-                    f = sheet.around[q]
-                    force += wp.vec3(
-                        wp.tile_extract(face, f, 3), wp.tile_extract(face, f, 4), wp.tile_extract(face, f, 5)
-                    )
-                for q in range(last, sheet.begin[3 * count + i]):
-                    f = sheet.around[q]
-                    force += wp.vec3(
-                        wp.tile_extract(face, f, 6), wp.tile_extract(face, f, 7), wp.tile_extract(face, f, 8)
-                    )
-                handle = sheet.hold[i]
+                about = sheet.vertex[i]
+                for q in range(lower(about)):
+                    force += wp.tile_extract(face, sheet.around[q * count + i])
+                handle = upper(about) - 1
                 if handle >= 0 and members.stiffness > 0.0:
                     for axis in range(3):
                         start = motion.targets[0, handle, axis, member]
