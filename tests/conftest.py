@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import uuid
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import hypothesis
 import pytest
 
 from flagdata.errors import NotFoundError
+from flagdata.lake import probe as probing
+from flagdata.storage import connection
 from sim.blender import environment
 from tests.evidence import REFERENCE
+from tests.s3 import BUCKET, SECRETS, moto
 
 # A busy machine is no defect: what may take how long is the claim of tests of its own (pytest-timeout ends a hang).
 hypothesis.settings.register_profile("whatever-the-load", deadline=None)
@@ -58,3 +62,40 @@ def blender() -> Iterator[environment.Environment]:
                 raise
             pytest.skip(f"{error.what}: make .venv-blender")
         yield environment.check(python)
+
+
+@pytest.fixture(scope="session")
+def s3_server() -> Iterator[str]:
+    """The address of an S3 server on loopback."""
+    with moto() as address:
+        yield address
+
+
+@pytest.fixture
+def use_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], None]]:
+    """Directs this process to a server, with credentials that it takes and a cache of its own."""
+
+    def forget() -> None:
+        connection.settings.cache_clear()
+        connection._client.cache_clear()
+        probing.probe.cache_clear()
+
+    def use(address: str) -> None:
+        forget()
+        for variable in [name for name in os.environ if name.startswith("AWS_")]:
+            monkeypatch.delenv(variable)
+        for name, value in (*SECRETS.items(), ("AWS_ENDPOINT_URL", address), ("AWS_REGION", "us-east-1")):
+            monkeypatch.setenv(name, value)
+        monkeypatch.setenv("AWS_CONFIG_FILE", str(tmp_path / "no-config"))
+        monkeypatch.setenv("AWS_SHARED_CREDENTIALS_FILE", str(tmp_path / "no-credentials"))
+        monkeypatch.setenv("FLAGDATA_CACHE", str(tmp_path / "cache"))
+
+    yield use
+    forget()
+
+
+@pytest.fixture
+def bucket_folder(s3_server: str, use_store: Callable[[str], None]) -> str:
+    """The address of an empty prefix of a bucket."""
+    use_store(s3_server)
+    return f"s3://{BUCKET}/{uuid.uuid4().hex}"

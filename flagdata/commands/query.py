@@ -38,7 +38,9 @@ VIEWS: dict[str | None, tuple[str, ...]] = {
         "wind", "wind_sigma", "wind_coverage", "wind_staleness", "quality",
     ),
     "meshes": ("artifact", "name", "frame_count", "rate", "seed", "wind", "quality"),
+    "markers": ("artifact", "name", "frame_count", "rate", "quality"),
     "model": ("artifact", "name", "created", "code_version", "quality"),
+    "network": ("artifact", "name", "seed", "created", "code_version", "quality"),
     "measurement": ("artifact", "name", "created", "wind", "wind_sigma", "quality"),
     None: ("artifact", "kind", "name", "start_time", "duration", "wind", "wind_sigma", "quality"),
 }  # fmt: skip

@@ -25,7 +25,7 @@ import threading
 import time
 import uuid
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
@@ -113,7 +113,7 @@ class Held:
         if self._e_tag is None:
             self.place.write_bytes(data)
         else:
-            tag = self.place.replace_if(self._e_tag, data)
+            tag = _replaced(self.place, self._e_tag, data)
             self._lost = tag is None
             self._e_tag = tag or self._e_tag
         self._written = begun
@@ -142,26 +142,56 @@ def alone(staging: RemotePath) -> Iterator[Held]:
     place = staging / COLLECT
     text = _line({**owner(), "id": uuid.uuid4().hex})
     wait = _FIRST_WAIT
-    with ExitStack() as stack:
-        while True:
-            if place.create(text.encode()):
-                tag = place.stat().e_tag
-                break
-            if _living(place, staging) is None:
-                with suppress(FileNotFoundError):
-                    tag = place.replace_if(place.stat().e_tag, text.encode())
-                    if tag is not None:
-                        break
-            time.sleep(wait)
-            wait = min(2 * wait, _LONGEST_WAIT)
-        held = Held(place, text, e_tag=tag)
-        stack.callback(held.close)
+    while (tag := _taken(place, text, staging)) is None:
+        time.sleep(wait)
+        wait = min(2 * wait, _LONGEST_WAIT)
+    held = Held(place, text, e_tag=tag)
+    try:
         wait = _FIRST_WAIT
-        while any(_living(shared, staging) is not None for shared in (staging / SHARED).rglob("*")):
+        while _sharers(staging):
             time.sleep(wait)
             wait = min(2 * wait, _LONGEST_WAIT)
         held.check()
         yield held
+    finally:
+        held.close()
+
+
+def _taken(place: RemotePath, text: str, staging: RemotePath) -> str | None:
+    """The version of the exclusive lock if it is this process's now: it was free, or its holder is dead."""
+    data = text.encode()
+    with suppress(FileNotFoundError):  # somebody gives it up in this moment
+        if place.create(data):
+            return place.stat().e_tag
+        tag = place.stat().e_tag
+        if _living(place, staging) is None:
+            return _replaced(place, tag, data)
+    return None
+
+
+def _replaced(place: RemotePath, tag: str | None, data: bytes) -> str | None:
+    """The new version of an object that is replaced if it has that version; `None` where it had another one.
+
+    A request that is sent again because its first answer was lost finds what itself has put, and counts as done.
+    """
+    if (new := place.replace_if(tag, data)) is not None:
+        return new
+    with suppress(FileNotFoundError):
+        now = place.stat().e_tag
+        if place.read_bytes() == data:
+            return now
+    return None
+
+
+def _sharers(staging: RemotePath) -> bool:
+    """Whether anybody has the shared lock; what dead processes left of it is deleted."""
+    living = False
+    for place in (staging / SHARED).rglob("*"):
+        if _living(place, staging) is not None:
+            living = True
+        else:
+            place.unlink()
+    return living
 
 
 def await_collectors(staging: RemotePath) -> None:

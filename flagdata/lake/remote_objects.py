@@ -18,7 +18,7 @@ from flagdata.lake.artifact import OBJECT_NAME
 from flagdata.lake.layout import STORES
 from flagdata.lake.objects import Objects, StoredObject, path_in_lake
 from flagdata.storage import Place, RemotePath
-from flagdata.storage.cache import copy_of, fetched, forget
+from flagdata.storage.cache import copy_of, fetched, forget, kept
 
 SUMS = ".sums"
 _AT_ONCE = 8
@@ -90,7 +90,7 @@ class RemoteObjects(Objects):
                 for upload in uploads:
                     upload.result()
             (place / SUMS).write_bytes(sums_of(staged).encode())
-        self.remove(staged)
+        kept(name, place.suffix, staged)
 
     def check(self, name: str) -> None:
         place = self.path(name)

@@ -70,6 +70,17 @@ def fetched(name: str, suffix: str, *, size: int, fetch: Callable[[Path], None],
     return path
 
 
+def kept(name: str, suffix: str, finished: Path) -> None:
+    """Make the local copy of an object out of the file or folder that was stored, which is moved."""
+    path = _place(name, suffix)
+    _take_room(path.parent, size_of(finished))
+    os.utime(finished)  # it was used last now
+    try:
+        finished.rename(path)
+    except OSError:  # there is one already, or on another disk
+        _remove(finished)
+
+
 def forget(name: str, suffix: str) -> None:
     """Delete the local copy of an object, if there is one."""
     _remove(_place(name, suffix))

@@ -27,7 +27,7 @@ from tests.models.conftest import fill
 
 OF_INFERENCE = {"closing-the-loop.md", "proposals.md"}
 """Pages whose commands take minutes each; tests/docs/test_loop_pages.py runs them without the inference."""
-AFTER_START = ("alignment.md", "measure.md", "versions-and-recovery.md", "exports.md")
+AFTER_START = ("alignment.md", "measure.md", "versions-and-recovery.md", "object-storage.md", "exports.md")
 ALONE = ("sensors.md", "simulator.md", "models.md", "datasets.md")
 RECIPE = FieldRecipe(seed=2026, duration=150, frame_rate=25)
 
@@ -103,11 +103,13 @@ def test_the_python_of_the_five_minute_start_runs(
 
 @pytest.mark.parametrize("page", AFTER_START)
 def test_every_command_of_a_page_that_goes_on_from_the_start_runs(
-    page: str, started: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    page: str, started: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
     folder = tmp_path / "copy"
     shutil.copytree(started, folder)
     enter(folder, monkeypatch, page)
+    if page == "object-storage.md":
+        request.getfixturevalue("bucket_folder")
     assert any(run_page(page, monkeypatch))
 
 

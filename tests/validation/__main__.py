@@ -18,6 +18,7 @@ VALIDATIONS = {
     "hanging-cloth": "tests.validation.hanging_cloth",
     "hostile": "tests.validation.hostile",
     "measure-windows": "tests.validation.measure_windows",
+    "object-storage": "tests.validation.object_storage",
     "paper-flag": "tests.validation.paper_flag.validate",
     "real-flag": "tests.validation.real_flag",
     "refinement": "tests.validation.refinement",

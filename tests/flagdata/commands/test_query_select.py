@@ -11,10 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flagdata import query
+from flagdata.commands.query import VIEWS
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.lake.refs import Slice, View
 from flagdata.query import COLUMNS, Request, Selection, select
-from flagdata.schema import CATALOG, catalog_schema
+from flagdata.schema import CATALOG, Kind, catalog_schema
 from tests.refusals import unrefused
 
 NOON = 1_777_636_800_000_000_000  # 2026-05-01T12:00:00Z: date -u -d @1777636800
@@ -194,3 +195,8 @@ def test_requests_that_contradict_themselves_are_refused() -> None:
 def test_every_column_says_what_it_is() -> None:
     assert all(field.about for field in COLUMNS.values())
     assert set(CATALOG) < set(COLUMNS)
+
+
+def test_rows_of_any_kind_have_columns_for_people() -> None:
+    assert VIEWS.keys() == {*Kind, None}
+    assert all(COLUMNS.keys() >= set(columns) for columns in VIEWS.values())

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+import flagdata
 from flagdata.errors import FlagdataError, NotFoundError, RefusedError, UsageError
 from flagdata.lake import Artifact, Lake, remote_leases
 from flagdata.lake.collect import collect
@@ -276,3 +277,39 @@ def test_the_cache_gives_up_what_was_used_least_recently(
     third = remote_lake.object_path(names[2])
     assert [path.exists() for path in (first, second, third)] == [False, True, True]
     assert remote_lake.object_path(names[0]).read_text() == "a" * 100  # fetched again
+
+
+def test_an_exclusive_lock_whose_renewal_was_answered_to_nobody_is_still_its_holders(
+    remote_lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace = RemotePath.replace_if
+
+    def unanswered(place: RemotePath, e_tag: str | None, data: bytes) -> str | None:
+        replace(place, e_tag, data)
+        return None  # what a second try finds after the first has acted
+
+    with collecting(remote_lake.staging) as check:
+        monkeypatch.setattr(RemotePath, "replace_if", unanswered)
+    check()
+    assert not (remote_lake.staging / "collect").exists()
+
+
+def test_a_film_and_a_log_are_ingested_aligned_exported_and_loaded(
+    remote_lake: Lake, write_video: Callable[..., Path], wind_log: Path, confirmed_drafts: None, tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    film = write_video(tmp_path / "field.mp4", frames=130, creation_time="2026-05-01T10:01:10Z")
+    place = ("--lake", remote_lake.path)
+    came = invoke(capsys, "ingest", film, wind_log, "--session", "field-1", "--json", *place).document
+    camera, wind = (result["artifact"] for result in came["results"])
+    given = ("--by", "given", "--offset", "0", "--offset-sigma", "0.1")
+    aligned = invoke(capsys, "align", camera, wind, *given, "--json", *place).document
+    assert len(aligned["clips"]) == 2  # 130 frames at 50 Hz are 65 at 25 Hz
+    assert invoke(capsys, "tag", "v1", *place).code == 0
+    exported = invoke(capsys, "export", "csv", "--where", "kind = 'recording'", "--to", tmp_path / "csv", *place)
+    assert exported.code == 0
+    assert len(list((tmp_path / "csv").rglob("*.csv"))) == 1
+    pairs = flagdata.open(str(remote_lake.path)).pairs(at="v1")
+    assert [pairs[index].clip.shape[:2] for index in range(len(pairs))] == [(1, 30), (1, 30)]
+    assert [sample.recording for sample in pairs] == [aligned["recording"]] * 2
+    assert doctor(remote_lake, grace=NOW) == ()
