@@ -94,7 +94,7 @@ class Metamodel:
         """Logarithms (m,) of the density of a summary (k,), or of one each (m, k), at regressors (m, p − 1)."""
         k, freedom = observed.shape[-1], self.freedom
         x = _design(regressors, self.centre, self.spread)
-        stretch = 1 + np.einsum("mi,ij,mj->m", x, self.inverse, x, optimize=True)
+        stretch = 1 + ((x @ self.inverse) * x).sum(axis=1)
         offset = observed - x @ self.coefficients
         factor = np.linalg.cholesky(self.scatter / freedom)
         white = np.linalg.solve(factor, offset.T)
@@ -106,6 +106,15 @@ class Metamodel:
             - 0.5 * k * np.log(stretch)
             - 0.5 * (freedom + k) * np.log1p(distance / freedom)
         )
+
+    def draw(self, regressors: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.float64]:
+        """(m, k) one draw of that density at each of regressors (m, p − 1)."""
+        x = _design(regressors, self.centre, self.spread)
+        stretch = 1 + ((x @ self.inverse) * x).sum(axis=1)
+        factor = np.linalg.cholesky(self.scatter / self.freedom)
+        normal = rng.standard_normal((len(x), len(factor))) @ factor.T
+        heavy = np.sqrt(self.freedom / rng.chisquare(self.freedom, len(x)))
+        return x @ self.coefficients + normal * (np.sqrt(stretch) * heavy)[:, None]
 
 
 def least(regressors: int, summaries: int) -> int:

@@ -1,0 +1,76 @@
+"""A calibration in the lake: the answer, draws of the posterior, and the recordings, in one commit.
+
+Its identity is a hash of what went in: the recordings, the options and the seed.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from flagdata.findings import quality_flags
+from flagdata.lake import Artifact, Lake
+from flagdata.lake.meshes import write_plain
+from flagdata.provenance import canonical
+from flagdata.schema import Kind
+from measure.calibrate.calibrate import ANSWER, Calibration
+from measure.calibrate.simulation import OBSERVED, VERSION
+
+_FORMAT = 1
+_HEAD = "flagdata_calibration"
+
+
+def artifact(found: Calibration, parents: tuple[str, ...], *, stored: str | None = None) -> Artifact:
+    """The row of a calibration.
+
+    Args:
+        parents: artifacts that the recordings were read from; none for tables.
+    """
+    values = {q.name: q.value for q in found.cloth if q.value is not None}
+    sources = [one.observed.source for one in found.recordings]
+    spans = [[one.observed.log.times[0].item(), one.observed.duration] for one in found.recordings]
+    return Artifact(
+        kind=Kind.MEASUREMENT, name=", ".join(one.observed.name for one in found.recordings), object=stored,
+        parents=parents, seed=found.options.seed, parameters=canonical(values),
+        recipe={
+            "calibrate": ANSWER, "simulations": VERSION, "sources": sources, "spans": spans, **found.options.recipe()
+        },
+        quality=quality_flags(found.findings),
+        report=canonical({"schema": "flagdata.calibrate-report/1", **found.as_dict()}),
+    )  # fmt: skip
+
+
+def keep(lake: Lake, found: Calibration, parents: tuple[str, ...], *, branch: str) -> bool:
+    """Commit a calibration and return whether it is new; the same one again adds nothing.
+
+    Raises:
+        FlagdataError: as `Lake.transaction`.
+    """
+    wanted = artifact(found, parents)
+    with lake.transaction(f"calibrate {wanted.name}", branch=branch) as transaction:
+        if transaction.find(wanted.id) is not None:
+            return False
+        staged = transaction.staging(".zarr")
+        write(staged, found)
+        transaction.add(artifact(found, parents, stored=transaction.put(staged)))
+    return wanted.id in transaction.result.added
+
+
+def write(path: Path, found: Calibration) -> None:
+    """A new Zarr folder: `cloth` (draw, quantity), and for each recording `readings-N` (window, observable) and
+    `wind-N` (window)."""
+    import zarr
+
+    group = zarr.open_group(path, mode="w-", zarr_format=3)
+    names = [q.name for q in found.cloth]
+    group.update_attributes(
+        {_HEAD: {"format": _FORMAT}, "quantities": names, "observables": list(OBSERVED), "answer": found.as_dict()}
+    )
+    cloth = np.stack([found.draws.cloth[name] for name in names], axis=1)
+    write_plain(group, "cloth", cloth.astype(np.float32), ("draw", "quantity"))
+    for number, one in enumerate(found.recordings):
+        write_plain(
+            group, f"readings-{number}", one.observed.readings.astype(np.float32), (f"window-{number}", "observable")
+        )
+        write_plain(group, f"wind-{number}", one.observed.speed.astype(np.float32), (f"window-{number}",))

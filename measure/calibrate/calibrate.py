@@ -1,0 +1,359 @@
+"""From recordings of one flag to its cloth: simulated, emulated, weighed, and checked on simulations left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.findings import Finding, Severity
+from flagdata.rng import child_seed, stream
+from measure.calibrate import numerics
+from measure.calibrate.design import FAR, Design, simulated
+from measure.calibrate.emulator import SOUGHT, Emulator, Posterior, Sight, posterior, weighed
+from measure.calibrate.observed import Observed
+from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Floats, Uncertain
+from measure.calibrate.simulation import OBSERVED, Flag
+from measure.calibrate.summary import shown
+
+ANSWER = 1
+"""Raised when the same recordings and options get another answer."""
+DETERMINED = 0.8
+"""Share of the prior's spread, in ranks, below which a posterior is an answer: above it, it is the prior."""
+_FOLDS = 8
+_CHECKED = 48
+"""Simulations left out that are weighed to check the intervals."""
+_UNUSUAL = 1e-3
+"""Tail probability of a recording's summary among simulated ones from which on a warning is given."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """How a flag is calibrated.
+
+    Attributes:
+        flag: its size and attachment.
+        azimuth, elevation: of the camera's axis to the wind, as far as they are known.
+        distance: of the camera [m].
+        simulations: for each recording.
+        level: of the intervals.
+        seed: of all draws.
+    """
+
+    flag: Flag
+    azimuth: Uncertain = AZIMUTH
+    elevation: Uncertain = ELEVATION
+    distance: float = FAR
+    simulations: int = 128
+    level: float = 0.9
+    seed: int = 0
+
+    def recipe(self) -> dict[str, Any]:
+        """JSON values."""
+        return {
+            "flag_size": [self.flag.length, self.flag.height], "attachment": self.flag.attachment,
+            "azimuth": self.azimuth.prior.as_dict(), "elevation": self.elevation.prior.as_dict(),
+            "distance": self.distance, "simulations": self.simulations, "level": self.level, "seed": self.seed,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """One quantity of the answer.
+
+    Attributes:
+        name, unit: as in tables.
+        value: the posterior's median; None where the film does not determine it.
+        sigma: its standard deviation.
+        interval: at the level.
+        assumed: the prior's interval at the same level.
+    """
+
+    name: str
+    unit: str
+    value: float | None
+    sigma: float
+    interval: tuple[float, float]
+    assumed: tuple[float, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return {
+            "unit": self.unit, "value": self.value, "sigma": self.sigma, "interval": list(self.interval),
+            "assumed": list(self.assumed), "determined": self.value is not None,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """What the same procedure says of simulations that it was not fitted to.
+
+    Attributes:
+        count: of them.
+        held: intervals of the area weight that hold it.
+        error: median error of its value, as a share.
+    """
+
+    count: int
+    held: int
+    error: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return {"count": self.count, "held": self.held, "median_error": self.error}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fitted:
+    """A recording with what simulations of the answer look like.
+
+    Attributes:
+        observed: the recording.
+        low, middle, high: (window, observable) of simulated flags of the posterior at the level, by the emulator.
+        used: (observable,) those that the answer rests on.
+        misfit: tail probability of its summary among those that the answer predicts.
+        failed: simulations that diverged or hardly show the flag.
+    """
+
+    observed: Observed
+    low: Floats
+    middle: Floats
+    high: Floats
+    used: NDArray[np.bool_]
+    misfit: float
+    failed: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Calibration:
+    """The answer.
+
+    Attributes:
+        options: how it was calibrated.
+        draws: of the posterior.
+        cloth: area weight, bending and damping.
+        places: for each recording gain, azimuth and elevation.
+        recordings: in order.
+        check: on simulations left out.
+        findings: what a reader has to know.
+    """
+
+    options: Options
+    draws: Posterior
+    cloth: tuple[Quantity, ...]
+    places: tuple[tuple[Quantity, ...], ...]
+    recordings: tuple[Fitted, ...]
+    check: Check
+    findings: tuple[Finding, ...] = field(default_factory=tuple)
+
+    @property
+    def weight(self) -> Quantity:
+        """The area weight."""
+        return self.cloth[0]
+
+    @property
+    def stated(self) -> str | None:
+        """The area weight as `flagdata measure --area-weight` takes it; None where it is not determined."""
+        weight = self.weight
+        return None if weight.value is None else f"{weight.value:.4g}±{weight.sigma:.2g}"
+
+    @property
+    def sentence(self) -> str:
+        """The answer in words."""
+        weight = self.weight
+        level = f"{self.options.level * 100:.3g} %"
+        windows = sum(len(one.observed.readings) for one in self.recordings)
+        if weight.value is None:
+            low, high = weight.assumed
+            return f"area weight: not determined by {windows} windows (assumed: {low:.3f} to {high:.3f} kg/m²)"
+        low, high = weight.interval
+        return f"area weight {weight.value:.3f} kg/m² [{low:.3f}, {high:.3f}] {level}, n = {windows} windows"
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        weight = self.weight
+        return {
+            "sentence": self.sentence, "cloth": {q.name: q.as_dict() for q in self.cloth},
+            "recordings": [
+                {
+                    "name": one.observed.name, "source": one.observed.source, "windows": len(one.observed.readings),
+                    "wind_speed": float(one.observed.speed.mean()), "misfit": one.misfit, "failed": one.failed,
+                    "observables": [name for name, there in zip(OBSERVED, one.used, strict=True) if there],
+                    "place": {q.name: q.as_dict() for q in place},
+                }
+                for one, place in zip(self.recordings, self.places, strict=True)
+            ],
+            "area_weight_stated": self.stated,
+            "close_loop": None if weight.value is None else {
+                "density": weight.value, "density-uncertainty": weight.sigma / weight.value
+            },
+            "check": self.check.as_dict(), "options": self.options.recipe(), "level": self.options.level,
+            "findings": [finding.as_dict() for finding in self.findings],
+        }  # fmt: skip
+
+
+def calibrate(
+    recordings: Sequence[Observed],
+    options: Options,
+    *,
+    folder: Path,
+    workers: int = 1,
+    advance: Callable[[int], object] | None = None,
+) -> Calibration:
+    """Weigh the cloth of one flag.
+
+    Args:
+        recordings: of it, each cut to what is to be used.
+        folder: where simulations are kept.
+        workers: processes that simulate.
+        advance: called with the number of flags that were simulated or found.
+
+    Raises:
+        InputError: see `Observed` and `Emulator.fit`.
+    """
+    made: list[tuple[Observed, Mapping[str, Floats], Floats, NDArray[np.bool_]]] = []
+    sights: list[Sight] = []
+    for one in recordings:
+        design = Design(
+            flag=options.flag, log=one.log, duration=one.duration, azimuth=options.azimuth,
+            elevation=options.elevation, count=options.simulations, seed=options.seed, distance=options.distance,
+        )  # fmt: skip
+        readings = simulated(design, folder=folder, workers=workers, advance=advance)
+        summaries = with_errors(one, readings, seed=options.seed)
+        used = np.tile(shown(one.readings), 2 if one.projection.changes else 1)
+        emulator = Emulator.fit(design.values(), summaries, used)
+        made.append((one, design.values(), summaries, used))
+        sights.append(
+            Sight(emulator=emulator, observed=one.summary, azimuth=options.azimuth, elevation=options.elevation)
+        )
+    found = posterior(sights, seed=options.seed)
+    fitted = tuple(
+        _fitted(one, sight, summaries, found, place, options)
+        for place, ((one, _, summaries, _), sight) in enumerate(zip(made, sights, strict=True))
+    )
+    calibration = Calibration(
+        options=options, draws=found, recordings=fitted, check=left_out(made, options),
+        cloth=tuple(quantity(q, found.cloth[q.name], options.level) for q in CLOTH),
+        places=tuple(
+            tuple(quantity(q, place[q.name], options.level) for q in _placed(options)) for place in found.places
+        ),
+    )  # fmt: skip
+    return replace(calibration, findings=_findings(calibration))
+
+
+def with_errors(observed: Observed, readings: Floats, *, seed: int) -> Floats:
+    """(simulation, summary) of readings (simulation, window, observable) with what numerics and pixels may add to them.
+
+    The error of pixels is taken as the same in all windows of a film, since what segmentation leaves depends on the
+    flag's look more than on the moment.
+    """
+    summaries = observed.projection.of(readings)
+    rng = stream(seed, "calibrate", "errors")
+    size = summaries.shape[1]
+    drawn = rng.standard_normal((2, *summaries.shape))
+    coarse = numerics.SIGMA[:size] * drawn[0] + numerics.BIAS[:size]
+    pixels = np.zeros_like(summaries)
+    pixels[:, 0] = observed.sigma * drawn[1][:, 0]
+    return (summaries + coarse + pixels).reshape(len(summaries), -1)
+
+
+def quantity(about: Uncertain, draws: Floats, level: float) -> Quantity:
+    """What draws of the posterior say of a quantity."""
+    tails = [(1 - level) / 2, (1 + level) / 2]
+    low, high = np.quantile(draws, tails).tolist()
+    assumed = about.at(np.array(tails)).tolist()
+    shares = np.linspace(0.0, 1.0, 1001)
+    ranks = np.interp(draws, about.at(shares), shares)
+    determined = float(ranks.std()) < DETERMINED / math.sqrt(12)
+    return Quantity(
+        name=about.name, unit=about.unit, value=float(np.median(draws)) if determined else None,
+        sigma=float(draws.std()), interval=(low, high), assumed=(assumed[0], assumed[1]),
+    )  # fmt: skip
+
+
+def left_out(
+    made: Sequence[tuple[Observed, Mapping[str, Floats], Floats, NDArray[np.bool_]]], options: Options
+) -> Check:
+    """Weigh simulations of the first recording's log, an eighth at a time, by emulators fitted to the others."""
+    _, values, summaries, used = made[0]
+    complete = np.flatnonzero(np.isfinite(summaries[:, used]).all(axis=1))
+    rng = stream(options.seed, "calibrate", "check")
+    chosen = rng.permutation(complete)[:_CHECKED]
+    errors: list[float] = []
+    held = 0
+    for fold in range(_FOLDS):
+        own = chosen[fold::_FOLDS]
+        rest = np.setdiff1d(np.arange(len(summaries)), own)
+        emulator = Emulator.fit({name: v[rest] for name, v in values.items()}, summaries[rest], used)
+        if not len(own):
+            continue
+        sight = Sight(
+            emulator=emulator, observed=summaries[own[0]], azimuth=options.azimuth, elevation=options.elevation
+        )
+        weight = weighed(sight, summaries[own], seed=child_seed(options.seed, "check", fold))[SOUGHT[0]]
+        truth = values[SOUGHT[0]][own]
+        low, middle, high = np.quantile(weight, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=1)
+        held += int(((low <= truth) & (truth <= high)).sum())
+        errors.extend(np.abs(middle / truth - 1).tolist())
+    return Check(count=len(errors), held=held, error=float(np.median(errors)))
+
+
+def _placed(options: Options) -> tuple[Uncertain, ...]:
+    return (*(q for q in NUISANCES if q.name == "gain"), options.azimuth, options.elevation)
+
+
+def _fitted(
+    one: Observed, sight: Sight, summaries: Floats, found: Posterior, place: int, options: Options
+) -> Fitted:  # fmt: skip
+    """What the emulator says that flags of the posterior show."""
+    values = {**found.cloth, **found.places[place]}
+    predicted = sight.emulator.predict(values, seed=options.seed)
+    used = sight.emulator.used
+    count = len(OBSERVED)
+    whole = np.full((len(predicted), used.size), np.nan)
+    whole[:, used] = predicted
+    windows = one.projection.at(whole.reshape(len(predicted), -1, count))
+    low, middle, high = np.quantile(windows, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=0)
+    centre, covariance = predicted.mean(axis=0), np.cov(predicted.T)
+    distance = np.einsum("ni,ij,nj->n", predicted - centre, np.linalg.pinv(covariance), predicted - centre)
+    offset = one.summary[used] - centre
+    own = float(offset @ np.linalg.pinv(covariance) @ offset)
+    return Fitted(
+        observed=one, low=low, middle=middle, high=high, used=used[:count],
+        misfit=float((1 + (distance >= own).sum()) / (1 + len(distance))),
+        failed=int((~np.isfinite(summaries[:, used]).all(axis=1)).sum()),
+    )  # fmt: skip
+
+
+def _findings(calibration: Calibration) -> tuple[Finding, ...]:
+    found: list[Finding] = []
+    for one in calibration.recordings:
+        found.extend(one.observed.noticed())
+        if one.misfit < _UNUSUAL:
+            what = (
+                f"no simulated flag looks like {one.observed.name} (p = {one.misfit:.1g}): something acts on it that "
+                "the model lacks, or its size, attachment or place is another than stated; do not rely on the weight"
+            )
+            fix = "check --flag-size, --attachment and --azimuth; flagdata close-loop looks for what is missing"
+            found.append(Finding(kind="unlike-simulations", severity=Severity.WARNING, what=what, fix=fix))
+        if one.failed > 0.1 * calibration.options.simulations:
+            what = f"{one.failed} of {calibration.options.simulations} simulations of {one.observed.name} were left out"
+            found.append(Finding(kind="failed-simulations", severity=Severity.WARNING, what=what))
+    check, level = calibration.check, calibration.options.level
+    if check.held < check.count * level - 2.6 * math.sqrt(check.count * level * (1 - level)):
+        what = (
+            f"of {check.count} simulations left out, the intervals of {check.held} hold the area weight, where "
+            f"{check.count * level:.0f} are expected: they are too narrow"
+        )
+        fix = "give more simulations with --simulations"
+        found.append(Finding(kind="narrow-intervals", severity=Severity.WARNING, what=what, fix=fix))
+    undetermined = [q.name.replace("_", " ") for q in calibration.cloth if q.value is None]
+    if undetermined:
+        what = f"{', '.join(undetermined)}: the posterior is the prior's, so that no value is given"
+        found.append(Finding(kind="not-determined", severity=Severity.NOTE, what=what))
+    return tuple(found)

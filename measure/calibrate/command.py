@@ -1,0 +1,180 @@
+"""`flagdata calibrate`: the cloth of a filmed flag weighed with the log of the wind beside it."""
+
+from __future__ import annotations
+
+import math
+import os
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from flagdata.commands.durations import DURATION
+from flagdata.commands.statements import STATED
+from flagdata.console import LocalPath, document, following, json_option, progress, say
+from flagdata.errors import UsageError
+from flagdata.stated import Stated
+
+if TYPE_CHECKING:
+    from measure.calibrate.calibrate import Calibration
+    from measure.calibrate.prior import Uncertain
+
+
+@click.command()
+@click.argument("sources", nargs=-1, required=True, metavar="RECORDING...")
+@click.option("--flag-size", metavar="LxH", help="Length along the wind and height along the pole [m], as in 1.5x1.0.")
+@click.option("--attachment", type=click.Choice(["corners", "hoist"]), default="corners", show_default=True,
+              help="How the flag is held: at both ends of its hoist, or along all of it.")  # fmt: skip
+@click.option("--azimuth", type=STATED, metavar="DEGREES",
+              help="Of the camera's axis to the wind, 90 from the side, as in 70±7; by default 30:150.")  # fmt: skip
+@click.option("--elevation", type=STATED, metavar="DEGREES", help="Of the camera's axis, upwards; by default 0±5.")
+@click.option("--distance", type=click.FloatRange(min=1.0), default=15.0, show_default=True, metavar="M",
+              help="From the camera to the flag [m].")  # fmt: skip
+@click.option("--start", "first", type=DURATION, default="0s", metavar="TIME", help="Where to begin, as in 12s.")
+@click.option("--end", "last", type=DURATION, metavar="TIME", help="Where to end; two minutes are used at most.")
+@click.option("--simulations", type=click.IntRange(min=64), default=128, show_default=True,
+              help="Simulated flags for each recording.")  # fmt: skip
+@click.option("--workers", type=click.IntRange(min=1), default=lambda: os.cpu_count() or 1, show_default="all cores",
+              help="Number of processes that simulate.")  # fmt: skip
+@click.option("--cache", type=LocalPath(), metavar="FOLDER",
+              help="Where simulations are kept, so that an interrupted calibration goes on; by default the user's "
+              "cache folder.")  # fmt: skip
+@click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.9, show_default=True,
+              help="Level of the intervals.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of all draws.")
+@click.option("--report", type=LocalPath(), metavar="FILE.html", help="Write a page that needs no other.")
+@click.option("--lake", "lake_path", type=LocalPath(), envvar="FLAGDATA_LAKE",
+              help="Where recordings are, and where calibrations go; also FLAGDATA_LAKE.")  # fmt: skip
+@click.option("--branch", default="main", show_default=True, help="Branch of the lake to read and commit on.")
+@click.option("--read-only", is_flag=True, help="Read the lake, commit nothing.")
+@json_option
+def calibrate(
+    sources: tuple[str, ...],
+    flag_size: str | None,
+    attachment: str,
+    azimuth: Stated | None,
+    elevation: Stated | None,
+    distance: float,
+    first: float,
+    last: float | None,
+    simulations: int,
+    workers: int,
+    cache: Path | None,
+    level: float,
+    seed: int,
+    report: Path | None,
+    lake_path: Path | None,
+    branch: str,
+    read_only: bool,
+    as_json: bool,
+) -> None:
+    """Weigh the cloth of a flag from its motion and the log of the wind beside it: area weight, bending and damping,
+    with intervals.
+
+    RECORDING is a table of observables, comma-separated, one row a window of 2.5 s: its columns are `time` [s],
+    `wind-speed`, the logged mean over the window [m/s], and observables by their names (droop, extension,
+    middle-speed, frequency, bandwidth, amplitude-up, amplitude-across, area), each perhaps with NAME-sigma, what it is
+    off by. Several recordings are of one flag.
+
+    \b
+      flagdata calibrate monday.csv --flag-size 1.5x1.0 --azimuth 70±7 --report monday.html
+      flagdata calibrate monday.csv tuesday.csv --flag-size 1.5x1.0 --lake lake --json
+    """
+    if flag_size is None:
+        raise UsageError(
+            "the flag's size is missing: what is simulated is a flag of its size", where="--flag-size",
+            fix="give length x height in metres, as in 1.5x1.0",
+        )  # fmt: skip
+    from flagdata.lake import Lake
+    from flagdata.outputs import check_file, write_file
+    from measure.calibrate.artifact import artifact, keep
+    from measure.calibrate.calibrate import Options
+    from measure.calibrate.calibrate import calibrate as calibrated
+    from measure.calibrate.observed import cut, of_table
+    from measure.calibrate.page import page
+    from measure.calibrate.prior import AZIMUTH, ELEVATION
+    from measure.calibrate.simulation import Flag
+    from measure.estimate.similarity import parse_size
+    from sim.kernel.build import cache_folder
+
+    if report is not None:
+        check_file(report, command="calibrate")
+    lake = None if lake_path is None else Lake.open(lake_path)
+    if lake is not None and not read_only:
+        lake.check_writable()
+    size = parse_size(flag_size)
+    options = Options(
+        flag=Flag(length=size.length, height=size.height, attachment=attachment),
+        azimuth=AZIMUTH if azimuth is None else known(AZIMUTH, azimuth, where="--azimuth"),
+        elevation=ELEVATION if elevation is None else known(ELEVATION, elevation, where="--elevation"),
+        distance=distance, simulations=simulations, level=level, seed=seed,
+    )  # fmt: skip
+    observed = [cut(of_table(Path(source)), first, last) for source in sources]
+    with progress(simulations * len(observed), label="calibrate", unit="flag") as advance:
+        found = calibrated(
+            observed, options, folder=(cache or cache_folder() / "calibrate"), workers=workers, advance=advance
+        )
+    parents: tuple[str, ...] = ()
+    wanted = None if lake is None or read_only else artifact(found, parents).id
+    text = None if report is None else page(found, _provenance(found, wanted))
+    new = lake is not None and wanted is not None and keep(lake, found, parents, branch=branch)
+    if wanted is not None:
+        say(f"{wanted[:12]}  measurement, {'committed' if new else 'there already'}")
+    if report is not None and text is not None:
+        with following(f"the calibration {wanted}", "writing its report") if new else nullcontext():
+            write_file(report, text, command="calibrate")
+            say(f"report: {report}")
+    if as_json:
+        document("calibrate", {**found.as_dict(), "artifact": wanted})
+    else:
+        _print(found)
+
+
+def known(about: Uncertain, stated: Stated, *, where: str) -> Uncertain:
+    """An angle as the user states it [°], an exact value with the uncertainty of a direction.
+
+    Raises:
+        UsageError: an azimuth that is not between 0 and 180, or an elevation beyond 60.
+    """
+    from dataclasses import replace
+
+    from flagdata.tables import Range
+    from measure.calibrate.prior import DIRECTION, Normal
+
+    least, most = (1.0, 179.0) if about.name == "azimuth" else (-60.0, 60.0)
+    if stated.low < least or stated.high > most:
+        raise UsageError(f"{stated.text}°", where=where, fix=f"give degrees from {least:g} to {most:g}, as in 70±7")
+    low, high = math.radians(stated.low), math.radians(stated.high)
+    if low < high:
+        return replace(about, prior=Range(low=low, high=high), source="stated")
+    sigma = math.radians(stated.sigma)
+    # An azimuth is to the wind, whose direction is not better known than it is lined up.
+    total = math.hypot(sigma, DIRECTION) if about.name == "azimuth" else max(sigma, math.radians(1.0))
+    return replace(about, prior=Normal(mean=low, sigma=total), source="stated")
+
+
+def _provenance(found: Calibration, artifact: str | None) -> dict[str, str]:
+    rows = {one.observed.name: f"SHA-256 {one.observed.source}" for one in found.recordings}
+    rows |= {name: str(value) for name, value in found.options.recipe().items()}
+    return rows if artifact is None else {**rows, "artifact": artifact}
+
+
+def _print(found: Calibration) -> None:
+    from measure.calibrate.page import shown
+
+    click.echo(found.sentence)
+    for one in found.cloth[1:]:
+        row = shown(one)
+        value = f"{row['value']} {row['interval']} {row['unit']}" if row["value"] else "not determined"
+        click.echo(f"{row['name']}: {value} (assumed: {row['assumed']})")
+    for recording, place in zip(found.recordings, found.places, strict=True):
+        told = ", ".join(f"{row['name']} {row['interval']} {row['unit']}".strip() for row in map(shown, place))
+        say(f"  {recording.observed.name}: {told}")
+    check = found.check
+    say(f"  intervals of {check.held} of {check.count} simulations left out hold their weight, median error "
+        f"{check.error:.1%}")  # fmt: skip
+    for finding in found.findings:
+        say(f"{finding.severity.value}: {finding.what}" + (f"; {finding.fix}" if finding.fix else ""))
+    if found.stated is not None:
+        say(f"for flagdata measure: --area-weight {found.stated}")

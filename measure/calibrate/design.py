@@ -1,0 +1,137 @@
+"""What is simulated for a recording: draws of cloth, place and anemometer, in batches, each kept under its hash.
+
+An interrupted calibration goes on where it was, and another one of the same film, log and seed simulates nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from io import BytesIO
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from flagdata.errors import CorruptError
+from flagdata.lake.durable import put_if_absent
+from flagdata.provenance import canonical, digest
+from flagdata.rng import child_seed
+from measure.calibrate.prior import (
+    AZIMUTH,
+    CLOTH,
+    DISTANCE,
+    ELEVATION,
+    NUISANCES,
+    Floats,
+    Uncertain,
+    draws,
+)
+from measure.calibrate.simulation import BATCH, Batch, Flag
+from measure.calibrate.wind import Log
+from measure.challenge.workers import single_threaded
+
+FAR = 15.0
+"""m from which a flag is filmed where nobody says: beyond some flag lengths the distance hardly matters."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Design:
+    """All simulations for one recording.
+
+    Attributes:
+        flag: that was filmed.
+        log: of the wind, from the film's first frame on.
+        duration: of the film, a whole number of windows [s].
+        azimuth, elevation: of the camera's axis, as far as they are known.
+        count: of simulations.
+        seed: of all draws.
+        distance: of the camera [m].
+    """
+
+    flag: Flag
+    log: Log
+    duration: float
+    azimuth: Uncertain = AZIMUTH
+    elevation: Uncertain = ELEVATION
+    count: int = 128
+    seed: int = 0
+    distance: float = FAR
+
+    def quantities(self) -> tuple[Uncertain, ...]:
+        """What differs among the simulations."""
+        known = self.log.distance is not None
+        return (*CLOTH, *NUISANCES, self.azimuth, self.elevation, *(() if known else (DISTANCE,)))
+
+    def values(self) -> Mapping[str, Floats]:
+        """Name → (count,), by ascending damping, so that batches can be simulated in long steps."""
+        drawn = dict(draws(self.quantities(), self.count, seed=self.seed, name="design"))
+        if self.log.distance is not None:
+            drawn[DISTANCE.name] = np.full(self.count, self.log.distance)
+        order = np.argsort(drawn["damping"], kind="stable")
+        return {name: own[order] for name, own in drawn.items()}
+
+    def batches(self) -> list[Batch]:
+        """In the order of `values`."""
+        values = self.values()
+        places = np.stack([values["azimuth"], values["elevation"], np.full(self.count, self.distance)], axis=1)
+        shared = {name: own for name, own in values.items() if name not in ("azimuth", "elevation")}
+        return [
+            Batch(
+                flag=self.flag, log=self.log, duration=self.duration,
+                values={name: own[first : first + BATCH] for name, own in shared.items()},
+                places=places[first : first + BATCH, None],
+                seeds=tuple(
+                    child_seed(self.seed, "calibrate", "flag", place)
+                    for place in range(first, min(first + BATCH, self.count))
+                ),
+            )
+            for first in range(0, self.count, BATCH)
+        ]  # fmt: skip
+
+
+def simulated(
+    design: Design, *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
+) -> Floats:
+    """(simulation, window, observable) in the order of the design's values; NaN where a flag diverged.
+
+    Args:
+        folder: where batches are kept.
+        advance: called with the number of flags that were simulated or found.
+
+    Raises:
+        CorruptError: a kept batch that cannot be read.
+    """
+    batches = design.batches()
+    paths = [folder / f"{digest(canonical(dict(batch.content())))[:32]}.npz" for batch in batches]
+    missing = [place for place, path in enumerate(paths) if not path.exists()]
+    if advance is not None and len(missing) < len(batches):
+        advance(sum(len(batch.seeds) for place, batch in enumerate(batches) if place not in set(missing)))
+    folder.mkdir(parents=True, exist_ok=True)
+    if missing:
+        with ProcessPoolExecutor(
+            min(workers, len(missing)), mp_context=get_context("spawn"), initializer=single_threaded
+        ) as pool:
+            running = {pool.submit(_make, batches[place], paths[place]): place for place in missing}
+            for done in as_completed(running):
+                done.result()
+                if advance is not None:
+                    advance(len(batches[running[done]].seeds))
+    return np.concatenate([_read(path) for path in paths])[:, 0]
+
+
+def _make(batch: Batch, path: Path) -> None:
+    buffer = BytesIO()
+    np.savez_compressed(buffer, readings=batch.read())
+    put_if_absent(path, buffer.getvalue())
+
+
+def _read(path: Path) -> Floats:
+    try:
+        with np.load(path, allow_pickle=False) as content:
+            return np.asarray(content["readings"], dtype=np.float64)
+    except (OSError, ValueError, KeyError) as error:
+        raise CorruptError(
+            f"kept simulations cannot be read: {error}", where=str(path), fix="delete the file: it is made anew"
+        ) from None

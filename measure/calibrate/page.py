@@ -1,0 +1,95 @@
+"""A calibration as one HTML file that refers to no other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from flagdata.pages.pictures import figure_url
+from flagdata.pages.render import render
+from flagdata.provenance import code_version
+from flagdata.tables import Range, Scale
+from measure.calibrate.calibrate import Calibration, Fitted, Quantity
+from measure.calibrate.prior import CLOTH
+from measure.calibrate.simulation import OBSERVED
+from measure.observables import OBSERVABLES
+
+_BLUE, _RUST = "#2b6f8f", "#c4622d"
+_DEGREES = ("azimuth", "elevation")
+
+
+def page(found: Calibration, provenance: Mapping[str, str]) -> str:
+    """The page.
+
+    Args:
+        provenance: rows of a table, in order.
+    """
+    check = found.check
+    values = {
+        "name": ", ".join(one.observed.name for one in found.recordings), "sentence": found.sentence,
+        "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in found.findings],
+        "level": f"{found.options.level * 100:.3g} %", "cloth": [shown(q) for q in found.cloth],
+        "stated": found.stated, "posterior": _posterior(found),
+        "recordings": [
+            {
+                "name": one.observed.name, "windows": len(one.observed.readings),
+                "wind": f"{one.observed.speed.mean():.1f}", "place": [shown(q) for q in place],
+                "picture": _windows(one),
+            }
+            for one, place in zip(found.recordings, found.places, strict=True)
+        ],
+        "check": {"count": check.count, "held": check.held, "error": f"{check.error:.1%}"},
+        "provenance": {**provenance, "code": code_version()},
+    }  # fmt: skip
+    return render("measure.calibrate", "page.html.j2", values)
+
+
+def shown(one: Quantity) -> dict[str, str]:
+    """A quantity as text: angles in degrees."""
+    turn = 180 / math.pi if one.name in _DEGREES else 1.0
+    (low, high), (least, most) = one.interval, one.assumed
+    return {
+        "name": one.name.replace("_", " "), "unit": "°" if one.name in _DEGREES else one.unit.replace("1", "", 1)
+        if one.unit == "1" else one.unit, "value": "" if one.value is None else f"{one.value * turn:.3g}",
+        "interval": f"[{low * turn:.3g}, {high * turn:.3g}]", "assumed": f"{least * turn:.3g} to {most * turn:.3g}",
+    }  # fmt: skip
+
+
+def _posterior(found: Calibration) -> str:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 2.6), layout="constrained")
+    for axes, about in zip(figure.subplots(1, len(CLOTH)), CLOTH, strict=True):
+        low, high = about.at(np.array([0.0, 1.0])).tolist()
+        logarithmic = isinstance(about.prior, Range) and about.prior.scale is Scale.LOG
+        edges = np.geomspace(low, high, 41) if logarithmic else np.linspace(low, high, 41)
+        axes.hist(found.draws.cloth[about.name], bins=edges, weights=None, color=_BLUE)
+        axes.axhline(len(found.draws.cloth[about.name]) / 40, color=_RUST)
+        axes.set_xscale("log" if logarithmic else "linear")
+        axes.set_xlabel(f"{about.name.replace('_', ' ')} [{about.unit}]")
+        axes.set_yticks([])
+    return figure_url(figure)
+
+
+def _windows(one: Fitted) -> str:
+    from matplotlib.figure import Figure
+
+    names = [name for name, used in zip(OBSERVED, one.used, strict=True) if used]
+    rows = math.ceil(len(names) / 4)
+    figure = Figure(figsize=(11.0, 2.5 * rows), layout="constrained")
+    cells = np.atleast_1d(figure.subplots(rows, 4, squeeze=False)).ravel()
+    speed = one.observed.speed
+    order = np.argsort(speed)
+    for axes, name in zip(cells, names, strict=False):
+        column = OBSERVED.index(name)
+        axes.fill_between(speed[order], one.low[order, column], one.high[order, column], color=_RUST, alpha=0.3)
+        axes.plot(speed[order], one.middle[order, column], color=_RUST)
+        axes.plot(speed, one.observed.readings[:, column], ".", color=_BLUE)
+        unit = OBSERVABLES[name].unit
+        axes.set_title(name if unit == "1" else f"{name} [{unit}]", fontsize=10)
+        axes.set_xlabel("wind [m/s]")
+    for axes in cells[len(names) :]:
+        axes.remove()
+    return figure_url(figure)

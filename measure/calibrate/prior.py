@@ -1,0 +1,137 @@
+"""What is not known of a flag, its place and its anemometer before it is filmed, and draws of it.
+
+A draw is a row of numbers in [0, 1), one a quantity, which each distribution turns into a value. Rows come from a Sobol
+sequence (Owen's scrambling), so that few simulations cover all quantities evenly.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+from flagdata.errors import InputError
+from flagdata.rng import stream
+from flagdata.tables import Range, Scale
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Normal:
+    """A normal distribution.
+
+    Attributes:
+        mean, sigma: in the quantity's unit.
+
+    Raises:
+        InputError: a deviation that is not positive.
+    """
+
+    mean: float
+    sigma: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.mean) and self.sigma > 0):
+            raise InputError(f"{self.mean} ± {self.sigma}", where="prior", fix="give a finite mean and a deviation > 0")
+
+    def at(self, share: Floats) -> Floats:
+        """Quantiles of shares in (0, 1)."""
+        return self.mean + self.sigma * ndtri(np.clip(share, 1e-6, 1 - 1e-6))
+
+    def as_dict(self) -> dict[str, float | str]:
+        return {"mean": self.mean, "sigma": self.sigma}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Uncertain:
+    """One quantity.
+
+    Attributes:
+        name: as in tables.
+        unit: SI.
+        prior: its distribution.
+        source: what the prior is from.
+    """
+
+    name: str
+    unit: str
+    prior: Range | Normal
+    source: str
+
+    def at(self, share: Floats) -> Floats:
+        """Values of shares in [0, 1)."""
+        if isinstance(self.prior, Normal):
+            return self.prior.at(share)
+        low, high = self.prior.low, self.prior.high
+        if self.prior.scale is Scale.LOG:
+            return low * (high / low) ** share
+        return low + (high - low) * share
+
+
+def _log(low: float, high: float) -> Range:
+    return Range(low=low, high=high, scale=Scale.LOG)
+
+
+CLOTH = (
+    Uncertain(
+        name="area_weight", unit="kg/m²", prior=_log(0.05, 0.45),
+        source="flag cloths are sold from 50 g/m² (spun polyester) to 350 g/m² (denim, wool bunting: 150 to 240)",
+    ),
+    Uncertain(
+        name="bending", unit="N·m", prior=_log(3e-6, 6e-4),
+        source="mean coefficient of the fabrics of Wang et al. 2011, a tenth to ten times, as Runia et al. 2020 search",
+    ),
+    Uncertain(
+        name="damping", unit="s", prior=_log(2e-3, 4e-2),
+        source="hardly ever measured; the upper part of 0.25 to 40 ms, which the nulls of verdicts vary it by",
+    ),
+)  # fmt: skip
+"""What is sought."""
+NUISANCES = (
+    Uncertain(
+        name="stretching", unit="1", prior=_log(0.5, 2.0),
+        source="factor on the table of one fabric, as nulls of verdicts vary it",
+    ),
+    Uncertain(name="gain", unit="1", prior=Normal(mean=1.0, sigma=0.03), source="classes of cups, IEC 61400-12-1"),
+    Uncertain(
+        name="scale", unit="1", prior=Normal(mean=1.0, sigma=0.01),
+        source="a flag's size as sold or taped, one per cent",
+    ),
+    Uncertain(
+        name="eddies", unit="m", prior=_log(20.0, 120.0),
+        source="integral length along the wind, 50 to 100 m at 10 m height and less near the ground (ESDU 85020)",
+    ),
+)  # fmt: skip
+"""What a simulation needs beside, known only so far. Gain and scale are fitted, the others left to the scatter."""
+DISTANCE = Uncertain(
+    name="distance_constant", unit="m", prior=_log(1.5, 5.0), source="cups (ISO 17713-1; WMO-No. 8)",
+)  # fmt: skip
+"""Of an anemometer whose recipe states none."""
+DIRECTION = math.radians(5.0)
+"""Standard uncertainty of the logged wind's direction: north, or a tunnel's axis, lined up by eye and compass [rad]."""
+AZIMUTH = Uncertain(
+    name="azimuth", unit="rad", prior=Range(low=math.radians(30.0), high=math.radians(150.0)),
+    source="a camera that was not placed by a vane; within 30° of the wind's axis a flag shows no length",
+)  # fmt: skip
+"""Of the camera's axis to the wind where the user gives none."""
+ELEVATION = Uncertain(
+    name="elevation", unit="rad", prior=Normal(mean=0.0, sigma=math.radians(5.0)),
+    source="a camera held level at a flag a few metres up and ten or more away",
+)  # fmt: skip
+
+
+def draws(quantities: tuple[Uncertain, ...], count: int, *, seed: int, name: str) -> Mapping[str, Floats]:
+    """Name → (count,) values, from a scrambled Sobol sequence of the named stream.
+
+    Args:
+        count: a power of two covers best.
+    """
+    engine = qmc.Sobol(len(quantities), scramble=True, seed=stream(seed, "calibrate", name))
+    shares = np.asarray(engine.random_base2(max(0, math.ceil(math.log2(max(count, 1))))), dtype=np.float64)[:count]
+    return {quantity.name: quantity.at(shares[:, place]) for place, quantity in enumerate(quantities)}

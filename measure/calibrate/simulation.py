@@ -1,0 +1,228 @@
+"""Flags of drawn cloths simulated in the minutes of a log, each in its own turbulence, and what places see of them.
+
+A batch is simulated together and read at once: its meshes are not kept, only its observables, window by window. The
+mesh is coarse, since what is asked for are means over windows; what that costs is measured against finer ones and is
+part of what an answer's interval holds (`measure.calibrate.numerics`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.rng import child_seed, stream
+from measure.calibrate.prior import Floats
+from measure.calibrate.wind import RATE as WIND_RATE
+from measure.calibrate.wind import Log, blown
+from measure.forecasting.observer import SegmentWind
+from measure.observables import OBSERVABLES, Observable, View, seen_from
+from measure.observables.cloth import edges_of
+from measure.observables.observable import WINDOW
+from sim import handles as held
+from sim.handles import Handles
+from sim.integrate.implicit import BackwardEuler
+from sim.material import Material, named
+from sim.mesh import Mesh, grid
+from sim.scene import Scene, assemble
+from sim.system import System
+
+FABRIC = "camel-ponte-roma"
+"""Whose tables are multiplied; a measured jersey, in the middle of the catalog's fabrics."""
+COLUMNS = 12
+RATE = 12.5
+"""Frames of a simulation [Hz]: a flag of a metre flutters at 1 to 3 Hz, and drawing silhouettes costs as much as they
+do to simulate."""
+SETTLE = 4.0
+"""s before the film's first frame that are simulated and not looked at: two swings of a flag of 1.5 m."""
+BATCH = 16
+"""Flags that are simulated together: what a vector register holds in single precision."""
+VERSION = 1
+"""Raised where the same batch gives other numbers."""
+OBSERVED = (
+    "droop", "extension", "middle-speed", "frequency", "bandwidth", "amplitude-up", "amplitude-across", "area",
+)  # fmt: skip
+"""Observables that are asked for: a coarse mesh shows no travelling waves, and few windows show them."""
+_STEPS = (2e-3, 4e-3)
+"""Steps of backward Euler [s], which damps as much by itself; the least damping of a batch allows the step."""
+_TOLERANCE = 1e-3
+"""Relative residual of a step's solve."""
+_ROUGH = 1e-3
+"""Standard deviation of the free vertices' start [m]."""
+_AHEAD = 0.3
+"""rad from downwind, in which a flag starts."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flag:
+    """What is known of the flag that was filmed.
+
+    Attributes:
+        length, height: of the flat cloth, along the wind and along the pole [m].
+        attachment: "corners" or "hoist".
+    """
+
+    length: float
+    height: float
+    attachment: str = "corners"
+
+    def mesh(self, columns: int) -> Mesh:
+        """A regular mesh of it."""
+        rows = max(2, round(columns * self.height / self.length))
+        return grid(width=self.length, height=self.height, columns=columns, rows=rows)
+
+    def handles(self, mesh: Mesh) -> Handles:
+        """How it is held."""
+        own = held.full_hoist(mesh.rest) if self.attachment == "hoist" else held.corners(mesh.rest)
+        return Handles(vertices=own)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Batch:
+    """Flags that are simulated together, and where they are looked at from.
+
+    Attributes:
+        flag: that was filmed.
+        log: of the wind beside it.
+        duration: of the film, a whole number of windows [s].
+        values: name of a quantity → (flag,): area_weight, bending, damping, stretching, gain, scale, eddies,
+            distance_constant.
+        places: azimuth, elevation [rad] and distance [m] of each place, (flag, place, 3).
+        seeds: (flag,) of the start and the turbulence.
+        columns: of the mesh.
+        observables: names.
+    """
+
+    flag: Flag
+    log: Log
+    duration: float
+    values: Mapping[str, Floats]
+    places: Floats
+    seeds: tuple[int, ...]
+    columns: int = COLUMNS
+    observables: tuple[str, ...] = OBSERVED
+
+    @property
+    def windows(self) -> int:
+        """Windows of the film."""
+        return math.floor(self.duration / WINDOW + 1e-9)
+
+    def content(self) -> Mapping[str, object]:
+        """All that shapes what it gives, as JSON values."""
+        log = self.log
+        return {
+            "version": VERSION, "flag": [self.flag.length, self.flag.height, self.flag.attachment],
+            "log": [log.times.tolist(), log.speed.tolist(), None if log.turn is None else log.turn.tolist()],
+            "averaging": log.averaging,
+            "duration": self.duration, "values": {name: own.tolist() for name, own in sorted(self.values.items())},
+            "places": self.places.tolist(), "seeds": list(self.seeds), "columns": self.columns,
+            "observables": list(self.observables),
+        }  # fmt: skip
+
+    def read(self) -> Floats:
+        """(flag, place, window, observable), NaN where a window does not show one or a flag diverged."""
+        mesh = self.flag.mesh(self.columns)
+        positions = self._positions(mesh)
+        found = np.full((len(self.seeds), self.places.shape[1], self.windows, len(self.observables)), np.nan)
+        for place, flag in enumerate(np.moveaxis(positions, -1, 0)):
+            if np.isfinite(flag).all():
+                scale = float(self.values["scale"][place])
+                for number, (azimuth, elevation, distance) in enumerate(self.places[place].tolist()):
+                    view = View(azimuth=azimuth, elevation=elevation, distance=distance)
+                    found[place, number] = windows(
+                        flag * scale, mesh=mesh, flag=self.flag, view=view, rate=RATE, observables=self.observables
+                    )
+        return found
+
+    def _positions(self, mesh: Mesh) -> Floats:
+        """(frame, vertex, 3, flag) [m] of the film's frames."""
+        system, state = assemble(self._scenes(mesh))
+        system = replace(system, wind=self._wind(system))
+        integrator = BackwardEuler(step=self.step, tolerance=_TOLERANCE)
+        frames: list[Floats] = []
+        with torch.no_grad():
+            for frame in range(round((SETTLE + self.duration) * RATE)):
+                state = integrator.advance(system, state, 1 / RATE)
+                if frame >= round(SETTLE * RATE):
+                    frames.append(state.position.double().numpy().copy())
+        return np.stack(frames)
+
+    def _scenes(self, mesh: Mesh) -> list[Scene]:
+        handles = self.flag.handles(mesh)
+        own = []
+        for place, seed in enumerate(self.seeds):
+            rough = stream(seed, "calibrate", "start").normal(0.0, _ROUGH, (mesh.vertex_count, 3))
+            rough[list(handles.vertices)] = 0.0
+            along = mesh.rest[:, 0]
+            start = np.stack([along * math.cos(_AHEAD), along * math.sin(_AHEAD), mesh.rest[:, 1]], axis=1)
+            own.append(Scene(mesh=mesh, position=start + rough, material=self._material(place), handles=handles))
+        return own
+
+    def _material(self, place: int) -> Material:
+        own = {name: float(values[place]) for name, values in self.values.items()}
+        return cloth(
+            own["area_weight"], own["bending"], max(own["damping"] - self.step, 0.0), stretching=own["stretching"]
+        )
+
+    def _wind(self, system: System) -> SegmentWind:
+        made = []
+        for place, seed in enumerate(self.seeds):
+            own = {name: float(values[place]) for name, values in self.values.items()}
+            velocity = blown(
+                self.log, before=SETTLE, duration=self.duration, distance=own["distance_constant"],
+                eddies=own["eddies"], seed=child_seed(seed, "calibrate", "wind"),
+            )  # fmt: skip
+            made.append(velocity * own["gain"])
+        samples = torch.as_tensor(np.stack(made, axis=-1), dtype=system.cloth.dtype)
+        return SegmentWind(period=1 / WIND_RATE, samples=samples)
+
+    @property
+    def step(self) -> float:
+        """Of backward Euler, which damps as much by itself [s]."""
+        least = float(self.values["damping"].min())
+        return max((step for step in _STEPS if step <= least), default=min(_STEPS))
+
+
+def cloth(area_weight: float, bending: float, damping: float, *, stretching: float = 1.0) -> Material:
+    """A cloth of an area weight [kg/m²], a mean bending coefficient [N·m] and a damping [s].
+
+    Args:
+        stretching: factor on `FABRIC`'s table.
+    """
+    base = named(FABRIC)
+    return replace(
+        base, density=area_weight, damping=damping, stretching=base.stretching * stretching,
+        bending=base.bending * (bending / mean_bending(base)),
+    )  # fmt: skip
+
+
+def mean_bending(material: Material) -> float:
+    """Geometric mean of the bending coefficients [N·m], which takes a coefficient of 0 for a thousandth of the mean."""
+    table = np.maximum(material.bending, 1e-3 * float(material.bending.mean()))
+    return float(np.exp(np.log(table).mean()))
+
+
+def windows(
+    positions: NDArray[np.floating], *, mesh: Mesh, flag: Flag, view: View, rate: float, observables: Sequence[str]
+) -> Floats:
+    """(window, observable) of a flag (frame, vertex, 3) [m] in the wind along +x, seen from a place.
+
+    Args:
+        rate: frames a second [Hz].
+    """
+    hoist, free = edges_of(mesh.rest)
+    size = round(WINDOW * rate)
+    own: list[Observable] = [OBSERVABLES[name] for name in observables]
+    times = np.arange(size) / rate
+    rows = []
+    for first in range(0, len(positions) - size + 1, size):
+        window = seen_from(
+            view, positions[first : first + size], times=times, faces=mesh.faces, hoist=hoist, free=free,
+            length=flag.length, height=flag.height,
+        )  # fmt: skip
+        rows.append([one.of_cloth(window).value for one in own])
+    return np.array(rows)

@@ -1,0 +1,126 @@
+"""The statistics of a calibration, on simulations whose law is known."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.errors import InputError
+from measure.calibrate import calibrate as module
+from measure.calibrate.calibrate import Calibration, Options, calibrate
+from measure.calibrate.design import Design
+from measure.calibrate.observed import Observed
+from measure.calibrate.prior import CLOTH, Floats, Normal, Uncertain, draws
+from measure.calibrate.simulation import OBSERVED, Flag
+from measure.calibrate.wind import Log
+from tests.measure.calibrate.conftest import readings
+
+_AZIMUTH = Uncertain(
+    name="azimuth", unit="rad", prior=Normal(mean=math.radians(70), sigma=math.radians(7)), source="stated"
+)
+_OPTIONS = Options(flag=Flag(length=1.5, height=1.0), azimuth=_AZIMUTH, simulations=128, seed=4)
+_GUSTY = 5.0 + 1.5 * np.sin(np.arange(-60.0, 130.0) / 4)
+
+
+def _observed(weight: float, *, gain: float = 1.0, speed: Floats = _GUSTY, seed: int = 9) -> Observed:
+    log = Log(times=np.arange(-60.0, 130.0), speed=speed)
+    starts = np.arange(48) * 2.5
+    values = {
+        "area_weight": np.array([weight]), "gain": np.array([gain]), "damping": np.array([0.01]),
+        "azimuth": np.array([math.radians(70)]),
+    }  # fmt: skip
+    own = readings(values, log.mean_speed(starts, starts + 2.5), seed=seed)[0]
+    return Observed(name=f"flag {weight}", source=f"{weight}", readings=own, log=log)
+
+
+def _found(*recordings: Observed) -> Calibration:
+    return calibrate(recordings, _OPTIONS, folder=Path("unused"))
+
+
+@pytest.mark.usefixtures("cheap")
+def test_the_weight_is_known_as_well_as_twice_the_gain() -> None:
+    weight = _found(_observed(0.17)).weight
+    # The ratio is known to 1 % and the gain to 3 %: the weight to 6 %.
+    assert weight.value == pytest.approx(0.17, rel=0.05)
+    assert weight.sigma / 0.17 == pytest.approx(0.06, rel=0.3)
+
+
+@pytest.mark.usefixtures("cheap")
+def test_damping_is_told_and_bending_is_not() -> None:
+    found = _found(_observed(0.17))
+    _, bending, damping = found.cloth
+    assert bending.value is None
+    assert damping.value == pytest.approx(0.01, rel=0.15)
+    assert any(finding.kind == "not-determined" and "bending" in finding.what for finding in found.findings)
+
+
+@pytest.mark.usefixtures("cheap")
+def test_a_second_recording_with_an_error_of_its_own_narrows_the_weight() -> None:
+    one, two = _found(_observed(0.17)), _found(_observed(0.17), _observed(0.17, seed=10))
+    assert two.weight.sigma == pytest.approx(one.weight.sigma / math.sqrt(2), rel=0.3)
+    assert len(two.places) == 2
+
+
+@pytest.mark.usefixtures("cheap")
+def test_intervals_hold_the_weight_of_simulations_left_out() -> None:
+    check = _found(_observed(0.17)).check
+    assert check.count == 48
+    assert 38 <= check.held <= 48  # binomial: below 38 of 48 at 0.9 has a chance of 1 %
+    assert 0.01 < check.error < 0.08
+
+
+@pytest.mark.usefixtures("cheap")
+def test_a_flag_that_no_simulation_looks_like_is_warned_of() -> None:
+    plain = _observed(0.17)
+    strange = np.array(plain.readings)
+    strange[:, 3] += 1.0
+    other = Observed(name="strange", source="x", readings=strange, log=plain.log)
+    assert "unlike-simulations" in {finding.kind for finding in _found(other).findings}
+    assert "unlike-simulations" not in {finding.kind for finding in _found(plain).findings}
+
+
+@pytest.mark.usefixtures("cheap")
+def test_a_constant_wind_is_said_to_leave_weight_to_what_is_assumed() -> None:
+    (finding,) = [one for one in _found(_observed(0.17, speed=np.full(190, 5.0))).findings if "constant" in one.kind]
+    assert "gain and the weight act alike" in finding.what
+
+
+@pytest.mark.usefixtures("cheap")
+def test_an_error_of_pixels_widens_the_interval() -> None:
+    plain = _observed(0.17)
+    sigma = np.zeros(len(OBSERVED))
+    sigma[0] = 0.06  # of 0.3 ln weight: 20 %
+    other = Observed(name="film", source="x", readings=plain.readings, log=plain.log, sigma=sigma)
+    assert _found(other).weight.sigma / 0.17 == pytest.approx(math.hypot(0.06, 0.2), rel=0.35)
+
+
+def test_the_answer_is_stated_as_measure_takes_it(cheap: list[Design]) -> None:
+    from flagdata.stated import parse
+
+    found = _found(_observed(0.17))
+    assert found.stated is not None
+    stated = parse(found.stated)
+    assert stated.low == pytest.approx(found.weight.value, rel=1e-3)
+    assert stated.sigma == pytest.approx(found.weight.sigma, rel=0.05)
+    assert found.as_dict()["close_loop"]["density"] == found.weight.value
+    assert [design.count for design in cheap] == [128]
+
+
+def test_too_few_simulations_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failed(design: Design, **_: object) -> Floats:
+        return np.full((design.count, 48, len(OBSERVED)), np.nan)
+
+    monkeypatch.setattr(module, "simulated", failed)
+    with pytest.raises(InputError, match="0 of 128 simulations show what the film shows"):
+        _found(_observed(0.17))
+
+
+def test_draws_fill_the_priors_range_evenly() -> None:
+    found = draws(CLOTH, 64, seed=1, name="law")["area_weight"]
+    low, high = 0.05, 0.45
+    shares = np.sort(np.log(found / low) / np.log(high / low))
+    # A Sobol sequence of 64 has one point in each of 64 equal parts of every axis.
+    assert np.array_equal(np.floor(shares * 64), np.arange(64))

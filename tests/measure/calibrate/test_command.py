@@ -1,0 +1,97 @@
+"""`flagdata calibrate`: what it refuses, prints and keeps."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from flagdata.lake import Lake
+from measure.calibrate.command import calibrate
+from tests.measure.calibrate.conftest import readings
+
+
+def _table(path: Path, *, windows: int = 48, heading: str | None = None) -> Path:
+    speed = 5.0 + 1.5 * np.sin(np.arange(windows) / 1.7)
+    values = {
+        "area_weight": np.array([0.2]), "gain": np.array([1.0]), "damping": np.array([0.01]),
+        "azimuth": np.array([math.radians(70)]),
+    }  # fmt: skip
+    own = readings(values, speed, seed=3)[0, :, :3]
+    names = heading or "time,wind-speed,droop,extension,middle-speed"
+    rows = [
+        f"{2.5 * number},{u},{','.join(map(str, row))}"
+        for number, (u, row) in enumerate(zip(speed.tolist(), own.tolist(), strict=True))
+    ]
+    path.write_text("\n".join([names, *rows]) + "\n")
+    return path
+
+
+def _run(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(calibrate, [str(one) for one in arguments])
+
+
+@pytest.mark.usefixtures("cheap")
+def test_a_table_is_weighed_kept_and_shown(tmp_path: Path) -> None:
+    lake, page = tmp_path / "lake", tmp_path / "page.html"
+    Lake.create(lake)
+    table = _table(tmp_path / "monday.csv")
+    given = (table, "--flag-size", "1.5x1.0", "--azimuth", "70±7", "--lake", lake, "--report", page, "--json")
+    done = _run(*given)
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    assert found["schema"] == "flagdata.calibrate/1"
+    assert found["cloth"]["area_weight"]["value"] == pytest.approx(0.2, rel=0.08)
+    assert found["recordings"][0]["observables"] == ["droop", "extension", "middle-speed"]
+    row = Lake.open(lake).artifact(found["artifact"])
+    assert row.kind == "measurement"
+    assert json.loads(str(row.parameters))["area_weight"] == found["cloth"]["area_weight"]["value"]
+    text = page.read_text()
+    assert "area weight" in text
+    assert found["area_weight_stated"] in text
+    again = _run(*given[:-2], tmp_path / "other.html", "--json")
+    assert json.loads(again.stdout)["artifact"] == found["artifact"]
+    assert len(Lake.open(lake).rows({"kind": "measurement"})) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((), "the flag's size is missing"),
+        (("--flag-size", "1.5x1.0", "--azimuth", "190"), "give degrees from 1 to 179"),
+        (("--flag-size", "1.5x1.0", "--start", "110s"), "10 s of film with a log beside them"),
+    ],
+)
+@pytest.mark.usefixtures("cheap")
+def test_what_cannot_be_calibrated_is_refused_and_nothing_is_written(
+    tmp_path: Path, arguments: tuple[str, ...], said: str
+) -> None:
+    page = tmp_path / "page.html"
+    done = _run(_table(tmp_path / "t.csv"), *arguments, "--report", page)
+    assert done.exit_code != 0
+    assert said in f"{done.exception} {done.output}"
+    assert not page.exists()
+
+
+@pytest.mark.parametrize(
+    ("heading", "said"),
+    [
+        ("time,wind-speed,droop,extension,colour", "columns colour are not known"),
+        ("time,area,droop,extension,middle-speed", "no column wind-speed"),
+    ],
+)
+def test_a_table_of_other_columns_is_refused(tmp_path: Path, heading: str, said: str) -> None:
+    done = _run(_table(tmp_path / "t.csv", heading=heading), "--flag-size", "1.5x1.0")
+    assert said in f"{done.exception}"
+
+
+def test_a_table_without_a_flag_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "t.csv"
+    rows = [f"{2.5 * number},5.0," for number in range(20)]
+    path.write_text("\n".join(["time,wind-speed,droop", *rows]) + "\n")
+    done = _run(path, "--flag-size", "1.5x1.0")
+    assert "no flag is found" in f"{done.exception}"

@@ -1,0 +1,87 @@
+"""Flags simulated in a log's wind, read as a place sees them, and kept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from measure.calibrate.design import Design, simulated
+from measure.calibrate.prior import Floats
+from measure.calibrate.simulation import OBSERVED, Batch, Flag, cloth, mean_bending
+from measure.calibrate.wind import Log
+
+_LOG = Log(times=np.arange(-10.0, 20.0), speed=np.full(30, 5.0), distance=0.0)
+
+
+def _batch(weights: list[float]) -> Batch:
+    count = len(weights)
+    fixed = {
+        "bending": 4e-5, "damping": 8e-3, "stretching": 1.0, "gain": 1.0, "scale": 1.0, "eddies": 60.0,
+        "distance_constant": 0.0,
+    }  # fmt: skip
+    return Batch(
+        flag=Flag(length=1.5, height=1.0), log=_LOG, duration=5.0, columns=8, seeds=tuple(range(count)),
+        values={"area_weight": np.array(weights), **{name: np.full(count, value) for name, value in fixed.items()}},
+        places=np.tile([math.radians(80), 0.0, 15.0], (count, 1, 1)),
+    )  # fmt: skip
+
+
+def test_a_heavier_flag_droops_more_and_repeats() -> None:
+    found = _batch([0.08, 0.35]).read()
+    assert found.shape == (2, 1, 2, len(OBSERVED))
+    light, heavy = found[:, 0, :, OBSERVED.index("droop")].mean(axis=1)
+    assert heavy > light + 0.1
+    assert np.array_equal(found, _batch([0.08, 0.35]).read(), equal_nan=True)
+
+
+def test_a_cloth_has_the_bending_it_is_given() -> None:
+    assert mean_bending(cloth(0.2, 7e-5, 0.01)) == pytest.approx(7e-5)
+
+
+def test_kept_simulations_are_not_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+
+    def read(batch: Batch) -> Floats:
+        made.append(len(batch.seeds))
+        return batch.values["area_weight"][:, None, None, None] * np.ones((1, 1, 2, len(OBSERVED)))
+
+    monkeypatch.setattr(Batch, "read", read)
+    monkeypatch.setattr("measure.calibrate.design.ProcessPoolExecutor", _Here)
+    design = Design(flag=Flag(length=1.5, height=1.0), log=_LOG, duration=5.0, count=24, seed=1)
+    steps: list[int] = []
+    first = simulated(design, folder=tmp_path, advance=steps.append)
+    assert made == [16, 8]
+    assert sum(steps) == 24
+    assert np.array_equal(first[:, 0, 0], design.values()["area_weight"])
+    (path, *_) = sorted(tmp_path.glob("*.npz"))
+    path.unlink()  # interrupted before the last batch
+    again = simulated(design, folder=tmp_path, advance=steps.append)
+    assert len(made) == 3
+    assert sum(steps) == 48
+    assert np.array_equal(again, first)
+    simulated(replace(design, seed=2), folder=tmp_path)
+    assert len(made) == 5
+
+
+class _Here:
+    """A pool of this process."""
+
+    def __init__(self, *_: object, **__: object) -> None:
+        pass
+
+    def __enter__(self) -> _Here:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def submit(self, call: Callable[..., None], *given: object) -> Future[None]:
+        done: Future[None] = Future()
+        done.set_result(call(*given))
+        return done
