@@ -72,10 +72,10 @@ def calibrate(
     """Weigh the cloth of a flag from its motion and the log of the wind beside it: area weight, bending and damping,
     with intervals.
 
-    RECORDING is a table of observables, comma-separated, one row a window of 2.5 s: its columns are `time` [s],
-    `wind-speed`, the logged mean over the window [m/s], and observables by their names (droop, extension,
-    middle-speed, frequency, bandwidth, amplitude-up, amplitude-across, area), each perhaps with NAME-sigma, what it is
-    off by. Several recordings are of one flag.
+    RECORDING is a table of observables, Parquet or comma-separated, one row a window of 2.5 s: its columns are `time`
+    [s], `wind`, the logged mean over the window [m/s], and observables by their names (droop, extension, middle-speed,
+    frequency, bandwidth, amplitude-up, amplitude-across, area), each perhaps with NAME-sigma, what it is off by.
+    Several recordings are of one flag.
 
     \b
       flagdata calibrate monday.csv --flag-size 1.5x1.0 --azimuth 70±7 --report monday.html

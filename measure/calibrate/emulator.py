@@ -31,7 +31,7 @@ BESIDE = ("gain", "scale")
 """Nuisances that are fitted beside the place."""
 WALKERS, STEPS = 256, 600
 """Of the ensemble that draws from the posterior."""
-_CHECK = (48, 400)
+_CHECK = (64, 600)
 """The same of each simulation that is weighed to check the intervals, which need not be smooth."""
 
 
@@ -78,11 +78,12 @@ class Emulator:
         Raises:
             InputError: too few simulations show what the recording shows.
         """
-        used = used & (np.isfinite(summaries).mean(axis=0) > 0.8)
-        complete = np.isfinite(summaries[:, used]).all(axis=1)
+        there = np.isfinite(summaries)
+        used = used & (there.mean(axis=0) > 0.8)
+        complete = there[:, used].all(axis=1) & used.any()
         x, y = regressors(values)[complete], summaries[complete][:, used]
         needed = least(x.shape[1] + 1, y.shape[1]) + 8
-        if not used.any() or len(x) < needed:
+        if len(x) < needed:
             raise InputError(
                 f"{len(x)} of {len(complete)} simulations show what the film shows, and {needed} are needed",
                 where="emulator", fix="give more simulations with --simulations",

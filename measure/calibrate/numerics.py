@@ -1,8 +1,8 @@
-"""What a coarse mesh and long steps do to summaries, measured once: part of every answer's scatter.
+"""What a coarse mesh does to summaries, measured once: part of every answer's scatter.
 
-`python -m tests.validation weighed` simulates the same flags in the same winds on a mesh of 18 columns with steps half
-as long, and prints both tables: the mean of the differences, fine less coarse, and their standard deviation, which
-includes that no two runs of a flag show the same folds.
+`python -m tests.validation weighed` simulates sixteen of the same flags in the same winds on a mesh of 18 columns and
+reports both tables: the mean of the differences, fine less coarse, and their standard deviation, which includes that no
+two runs of a flag show the same folds.
 """
 
 from __future__ import annotations

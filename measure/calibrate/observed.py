@@ -24,7 +24,7 @@ from measure.observables.observable import WINDOW
 LONGEST = 120.0
 """s of a film that are simulated: two minutes cost minutes."""
 _TABLE_LIMIT = 1 << 26  # B
-_TIME, _SPEED = "time", "wind-speed"
+_TIME, _SPEED = "time", "wind"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -128,27 +128,27 @@ def cut(found: Observed, first: float, last: float | None) -> Observed:
 
 
 def of_table(path: Path) -> Observed:
-    """A table of observables: comma-separated, one row a window of `WINDOW` seconds, in the order of time.
+    """A table of observables, Parquet or comma-separated: one row a window of `WINDOW` seconds, in the order of time.
 
-    Its columns: `time`, when a window begins [s]; `wind-speed`, the logged mean over it [m/s]; and observables of
-    `flagdata observe` by their names, in their units, each perhaps with another column NAME-sigma, what it is off by.
-    Blank cells are windows that do not show one.
+    Its columns: `time`, the middle of a window [s]; `wind`, the logged mean over it [m/s]; and observables by their
+    names, in their units, each perhaps with another column NAME-sigma, what it is off by. Blank cells are windows that
+    do not show one. Columns NAME-reason, why not, are passed over.
 
     Raises:
         InputError: no such table.
         FlagdataError: a file that cannot be read.
     """
     check_input(path, limit=_TABLE_LIMIT)
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        rows = list(csv.reader(file))
     where = str(path)
-    heading = [cell.strip() for cell in rows[0]] if rows else []
+    heading, rows = _cells(path)
     known = {_TIME, _SPEED, *OBSERVABLES, *(f"{name}-sigma" for name in OBSERVABLES)}
-    if unknown := [name for name in heading if name not in known]:
+    if unknown := [name for name in heading if name not in known and not name.endswith("-reason")]:
         raise InputError(f"columns {', '.join(unknown)} are not known", where=where, fix=f"keep {', '.join(known)}")
     if missing := [name for name in (_TIME, _SPEED) if name not in heading]:
         raise InputError(f"no column {' or '.join(missing)}", where=where, fix="add it: see flagdata calibrate --help")
-    columns = {name: _numbers(rows[1:], place, name, where) for place, name in enumerate(heading)}
+    columns = {
+        name: _numbers(rows, place, name, where) for place, name in enumerate(heading) if not name.endswith("-reason")
+    }
     times = columns[_TIME]
     if len(times) < 2 or not np.allclose(np.diff(times), WINDOW, atol=0.05 * WINDOW):
         raise InputError(
@@ -165,6 +165,27 @@ def of_table(path: Path) -> Observed:
         sigma=np.array([float(np.nanmean(own)) if np.isfinite(own).any() else 0.0 for own in sigma]),
         log=Log(times=times - times[0] + WINDOW / 2, speed=speed, averaging=WINDOW),
     )  # fmt: skip
+
+
+def _cells(path: Path) -> tuple[list[str], list[list[str]]]:
+    """Heading and rows of a table as text.
+
+    Raises:
+        InputError: no table of that format.
+    """
+    if path.suffix.lower() == ".parquet":
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            table = pq.read_table(path)
+        except pa.ArrowException as error:
+            raise InputError(f"no Parquet table: {error}", where=str(path), fix="name a table") from None
+        columns = [["" if cell is None else str(cell) for cell in column.to_pylist()] for column in table.columns]
+        return table.column_names, [list(row) for row in zip(*columns, strict=True)]
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        rows = list(csv.reader(file))
+    return ([cell.strip() for cell in rows[0]] if rows else []), rows[1:]
 
 
 def _numbers(rows: Sequence[Sequence[str]], place: int, name: str, where: str) -> Floats:

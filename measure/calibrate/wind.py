@@ -132,7 +132,7 @@ class Log:
         parts = np.stack([self.speed * np.cos(turn), self.speed * np.sin(turn)], axis=1)
         return _undone(self.times, parts, lag=distance / float(self.speed.mean()))
 
-    def mean_speed(self, starts: Floats, ends: Floats) -> Floats:
+    def mean_speed(self, starts: NDArray[np.floating], ends: NDArray[np.floating]) -> Floats:
         """(k,) mean speed over windows [s], linear between samples [m/s]."""
         grid = np.arange(0, round((float(ends.max()) - float(starts.min())) * RATE) + 1) / RATE + float(starts.min())
         values = np.interp(grid, self.times, self.speed)

@@ -22,11 +22,12 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from flagdata.rng import stream
 from measure.calibrate.design import Design
 from measure.calibrate.prior import Floats, Normal, Uncertain
-from measure.calibrate.simulation import OBSERVED, RATE, Flag, windows
+from measure.calibrate.simulation import BATCH, OBSERVED, RATE, Flag, windows
 from measure.calibrate.wind import Log
 from measure.forecasting.observer import SegmentWind
 from measure.observables import View
@@ -44,6 +45,8 @@ TRUTHS = 16
 WEIGHTS = (0.08, 0.35)  # kg/m²
 DURATION = 60.0  # s
 SIMULATIONS = 64
+FINER = 18
+"""Columns of the mesh that the fit's is compared with."""
 _BEFORE, _SETTLE = 64.0, 4.0  # s
 _MEAN, _INTENSITY, _LENGTH = 5.0, 0.2, 60.0  # m/s, 1, m
 _AZIMUTH = Normal(mean=math.radians(70.0), sigma=math.radians(7.0))
@@ -162,3 +165,17 @@ def folder() -> Path:
     path = Path(os.environ.get("FLAGDATA_WEIGHED") or mkdtemp(prefix="weighed-"))
     path.mkdir(parents=True, exist_ok=True)
     return path
+
+
+def finer(design: Design) -> tuple[Floats, NDArray[np.int64]]:
+    """(flag, window, observable) of every third flag beyond the first batch on a finer mesh, and their places in the
+    design's order. The first batch is left out: its steps are shorter."""
+    places = np.arange(BATCH, design.count, 3)[:BATCH]
+    values, (first, *_) = design.values(), design.batches()
+    shared = {name: values[name][places] for name in first.values}
+    seen = np.stack([values["azimuth"], values["elevation"], np.full(design.count, design.distance)], axis=1)[places]
+    seeds = tuple(seed for batch in design.batches() for seed in batch.seeds)
+    batch = replace(
+        first, values=shared, places=seen[:, None], seeds=tuple(seeds[place] for place in places), columns=FINER
+    )
+    return batch.read()[:, 0], places

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from flagdata.rng import stream
-from measure.calibrate import calibrate
+from measure.calibrate import calibrate, emulator
 from measure.calibrate.design import Design
 from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
@@ -30,9 +31,9 @@ def readings(values: dict[str, Floats], speed: Floats, *, seed: int) -> Floats:
     return out
 
 
-@pytest.fixture
-def cheap(monkeypatch: pytest.MonkeyPatch) -> list[Design]:
-    """`simulated` replaced by `readings`; the designs that were asked for."""
+@pytest.fixture(scope="module")
+def cheap() -> Iterator[list[Design]]:
+    """`simulated` replaced by `readings`, and few walkers; the designs that were asked for."""
     asked: list[Design] = []
 
     def simulated(design: Design, *, folder: Path, workers: int, advance: object) -> Floats:
@@ -40,5 +41,9 @@ def cheap(monkeypatch: pytest.MonkeyPatch) -> list[Design]:
         starts = np.arange(round(design.duration / WINDOW)) * WINDOW
         return readings(dict(design.values()), design.log.mean_speed(starts, starts + WINDOW), seed=design.seed)
 
-    monkeypatch.setattr(calibrate, "simulated", simulated)
-    return asked
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(calibrate, "simulated", simulated)
+        patch.setattr(emulator, "WALKERS", 96)
+        patch.setattr(emulator, "STEPS", 300)
+        patch.setattr(emulator, "_CHECK", (32, 120))
+        yield asked

@@ -7,11 +7,15 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from click.testing import CliRunner, Result
+from pyarrow import csv
 
 from flagdata.lake import Lake
 from measure.calibrate.command import calibrate
+from measure.calibrate.observed import of_table
 from tests.measure.calibrate.conftest import readings
 
 
@@ -22,7 +26,7 @@ def _table(path: Path, *, windows: int = 48, heading: str | None = None) -> Path
         "azimuth": np.array([math.radians(70)]),
     }  # fmt: skip
     own = readings(values, speed, seed=3)[0, :, :3]
-    names = heading or "time,wind-speed,droop,extension,middle-speed"
+    names = heading or "time,wind,droop,extension,middle-speed"
     rows = [
         f"{2.5 * number},{u},{','.join(map(str, row))}"
         for number, (u, row) in enumerate(zip(speed.tolist(), own.tolist(), strict=True))
@@ -80,8 +84,8 @@ def test_what_cannot_be_calibrated_is_refused_and_nothing_is_written(
 @pytest.mark.parametrize(
     ("heading", "said"),
     [
-        ("time,wind-speed,droop,extension,colour", "columns colour are not known"),
-        ("time,area,droop,extension,middle-speed", "no column wind-speed"),
+        ("time,wind,droop,extension,colour", "columns colour are not known"),
+        ("time,area,droop,extension,middle-speed", "no column wind"),
     ],
 )
 def test_a_table_of_other_columns_is_refused(tmp_path: Path, heading: str, said: str) -> None:
@@ -89,9 +93,19 @@ def test_a_table_of_other_columns_is_refused(tmp_path: Path, heading: str, said:
     assert said in f"{done.exception}"
 
 
+def test_parquet_with_reasons_is_read_as_the_text(tmp_path: Path) -> None:
+    text = of_table(_table(tmp_path / "t.csv"))
+    table = csv.read_csv(tmp_path / "t.csv")
+    table = table.append_column("droop-reason", pa.array([None] * len(table), pa.string()))
+    pq.write_table(table, tmp_path / "t.parquet")
+    found = of_table(tmp_path / "t.parquet")
+    assert np.array_equal(found.readings, text.readings, equal_nan=True)
+    assert np.array_equal(found.log.speed, text.log.speed)
+
+
 def test_a_table_without_a_flag_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
     rows = [f"{2.5 * number},5.0," for number in range(20)]
-    path.write_text("\n".join(["time,wind-speed,droop", *rows]) + "\n")
+    path.write_text("\n".join(["time,wind,droop", *rows]) + "\n")
     done = _run(path, "--flag-size", "1.5x1.0")
     assert "no flag is found" in f"{done.exception}"
