@@ -95,7 +95,7 @@ class Check:
 
     Attributes:
         count: of them.
-        held: intervals of the area weight that hold it.
+        held: of them, those whose area weight lies in its interval.
         error: median error of its value, as a share.
     """
 

@@ -12,9 +12,10 @@ import click
 
 from flagdata.commands.durations import DURATION
 from flagdata.commands.statements import STATED
-from flagdata.console import LocalPath, document, following, json_option, progress, say
+from flagdata.console import LakePlace, LocalPath, document, following, json_option, progress, say
 from flagdata.errors import UsageError
 from flagdata.stated import Stated
+from flagdata.storage import Place
 
 if TYPE_CHECKING:
     from measure.calibrate.calibrate import Calibration
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
               help="Level of the intervals.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of all draws.")
 @click.option("--report", type=LocalPath(), metavar="FILE.html", help="Write a page that needs no other.")
-@click.option("--lake", "lake_path", type=LocalPath(), envvar="FLAGDATA_LAKE",
+@click.option("--lake", "lake_path", type=LakePlace(), envvar="FLAGDATA_LAKE",
               help="Where recordings are, and where calibrations go; also FLAGDATA_LAKE.")  # fmt: skip
 @click.option("--branch", default="main", show_default=True, help="Branch of the lake to read and commit on.")
 @click.option("--read-only", is_flag=True, help="Read the lake, commit nothing.")
@@ -64,7 +65,7 @@ def calibrate(
     level: float,
     seed: int,
     report: Path | None,
-    lake_path: Path | None,
+    lake_path: Place | None,
     branch: str,
     read_only: bool,
     as_json: bool,
@@ -86,6 +87,7 @@ def calibrate(
             "the flag's size is missing: what is simulated is a flag of its size", where="--flag-size",
             fix="give length x height in metres, as in 1.5x1.0",
         )  # fmt: skip
+    from flagdata.caches import user_cache
     from flagdata.lake import Lake
     from flagdata.outputs import check_file, write_file
     from measure.calibrate.artifact import artifact, keep
@@ -96,7 +98,6 @@ def calibrate(
     from measure.calibrate.prior import AZIMUTH, ELEVATION
     from measure.calibrate.simulation import Flag
     from measure.estimate.similarity import parse_size
-    from sim.kernel.build import cache_folder
 
     if report is not None:
         check_file(report, command="calibrate")
@@ -113,7 +114,7 @@ def calibrate(
     observed = [cut(of_table(Path(source)), first, last) for source in sources]
     with progress(simulations * len(observed), label="calibrate", unit="flag") as advance:
         found = calibrated(
-            observed, options, folder=(cache or cache_folder() / "calibrate"), workers=workers, advance=advance
+            observed, options, folder=(cache or user_cache() / "calibrate"), workers=workers, advance=advance
         )
     parents: tuple[str, ...] = ()
     wanted = None if lake is None or read_only else artifact(found, parents).id
@@ -169,8 +170,8 @@ def _print(found: Calibration) -> None:
         value = f"{row['value']} {row['interval']} {row['unit']}" if row["value"] else "not determined"
         click.echo(f"{row['name']}: {value} (assumed: {row['assumed']})")
     for recording, place in zip(found.recordings, found.places, strict=True):
-        told = ", ".join(f"{row['name']} {row['interval']} {row['unit']}".strip() for row in map(shown, place))
-        say(f"  {recording.observed.name}: {told}")
+        fitted = ", ".join(f"{row['name']} {row['interval']} {row['unit']}".strip() for row in map(shown, place))
+        say(f"  {recording.observed.name}: {fitted}")
     check = found.check
     say(f"  intervals of {check.held} of {check.count} simulations left out hold their weight, median error "
         f"{check.error:.1%}")  # fmt: skip

@@ -80,7 +80,7 @@ class Emulator:
         """
         there = np.isfinite(summaries)
         used = used & (there.mean(axis=0) > 0.8)
-        complete = there[:, used].all(axis=1) & used.any()
+        complete = np.asarray(there[:, used].all(axis=1) & used.any(), dtype=np.bool_)
         x, y = regressors(values)[complete], summaries[complete][:, used]
         needed = least(x.shape[1] + 1, y.shape[1]) + 8
         if len(x) < needed:

@@ -96,7 +96,7 @@ class Observed:
         return self.projection.of(self.readings).ravel()
 
     def noticed(self) -> tuple[Finding, ...]:
-        """What was found on it, with what its wind cannot tell."""
+        """What was found on it, with what its wind leaves open."""
         if not self.steady:
             return self.findings
         what = (

@@ -132,6 +132,6 @@ def draws(quantities: tuple[Uncertain, ...], count: int, *, seed: int, name: str
     Args:
         count: a power of two covers best.
     """
-    engine = qmc.Sobol(len(quantities), scramble=True, seed=stream(seed, "calibrate", name))
+    engine = qmc.Sobol(len(quantities), scramble=True, rng=stream(seed, "calibrate", name))
     shares = np.asarray(engine.random_base2(max(0, math.ceil(math.log2(max(count, 1))))), dtype=np.float64)[:count]
     return {quantity.name: quantity.at(shares[:, place]) for place, quantity in enumerate(quantities)}

@@ -2,7 +2,7 @@
 
 A batch is simulated together and read at once: its meshes are not kept, only its observables, window by window. The
 mesh is coarse, since what is asked for are means over windows; what that costs is measured against finer ones and is
-part of what an answer's interval holds (`measure.calibrate.numerics`).
+part of an answer's interval (`measure.calibrate.numerics`).
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ _AHEAD = 0.3
 
 @dataclass(frozen=True, kw_only=True)
 class Flag:
-    """What is known of the flag that was filmed.
+    """The flag that was filmed, as it is stated.
 
     Attributes:
         length, height: of the flat cloth, along the wind and along the pole [m].

@@ -26,6 +26,7 @@ VALIDATIONS = {
     "robot-cloth": "tests.validation.robot_cloth",
     "stressors": "tests.validation.stressors",
     "transfer": "tests.validation.transfer",
+    "weighed": "tests.validation.weighed",
     "verification": "tests.validation.verification",
 }
 

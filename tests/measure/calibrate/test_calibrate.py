@@ -56,7 +56,7 @@ def test_the_weight_is_known_as_well_as_twice_the_gain(plain: Calibration) -> No
     assert weight.sigma / 0.17 == pytest.approx(0.06, rel=0.3)
 
 
-def test_damping_is_told_and_bending_is_not(plain: Calibration) -> None:
+def test_damping_is_determined_and_bending_is_not(plain: Calibration) -> None:
     _, bending, damping = plain.cloth
     assert bending.value is None
     assert damping.value == pytest.approx(0.01, rel=0.15)
@@ -70,7 +70,7 @@ def test_a_second_recording_with_an_error_of_its_own_narrows_the_weight(plain: C
     assert len(two.places) == 2
 
 
-def test_intervals_hold_the_weight_of_simulations_left_out(plain: Calibration) -> None:
+def test_simulations_left_out_lie_in_their_intervals(plain: Calibration) -> None:
     check = plain.check
     assert check.count == 48
     assert 34 <= check.held <= 48  # so few walkers leave 0.8 to 0.9
@@ -88,7 +88,7 @@ def test_a_flag_that_no_simulation_looks_like_is_warned_of(plain: Calibration) -
 
 
 @pytest.mark.usefixtures("cheap")
-def test_a_constant_wind_is_said_to_leave_weight_to_what_is_assumed() -> None:
+def test_a_constant_wind_is_reported_to_leave_weight_to_what_is_assumed() -> None:
     (finding,) = [one for one in _found(_observed(0.17, speed=np.full(190, 5.0))).findings if "constant" in one.kind]
     assert "gain and the weight act alike" in finding.what
 
