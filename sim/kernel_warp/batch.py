@@ -19,6 +19,8 @@ from sim.mesh import Mesh
 from sim.system import Drive, System
 from sim.tables import Evaluation
 
+FACES_LIMIT = 16_383
+"""Most faces: two indices share a number, and one of them is four times a face."""
 _WHERE = "backend warp"
 
 
@@ -58,8 +60,8 @@ class WarpKernel:
         """The kernel for a system.
 
         Raises:
-            UsageError: warp-lang is not installed, or has no such device; numbers that are not float32; a system with
-                more than the base model, which is named.
+            UsageError: warp-lang is not installed, or has no such device; numbers that are not float32; a mesh with too
+                many faces; a system with more than the base model, which is named.
         """
         if system not in _KERNELS:
             _KERNELS[system] = cls._build(system)
@@ -75,6 +77,11 @@ class WarpKernel:
         cloth = system.cloth
         if cloth.dtype != torch.float32:
             raise UsageError(f"numbers of type {cloth.dtype}", where=_WHERE, fix="use float32, or another backend")
+        if len(cloth.faces) > FACES_LIMIT:
+            raise UsageError(
+                f"a mesh of {len(cloth.faces)} faces", where=_WHERE,
+                fix=f"have at most {FACES_LIMIT}, or use another backend",
+            )  # fmt: skip
         code = _code(cloth.device)
         alive: list[Tensor] = []
 
@@ -156,8 +163,8 @@ def _sheet(mesh: Mesh, held: Tensor) -> dict[str, NDArray[np.int64]]:
     place_of = {  # directed edge → face and the corner opposite
         (int(face[(c + 1) % 3]), int(face[(c + 2) % 3])): (e, c) for e, face in enumerate(faces) for c in range(3)
     }
-    left = np.array([place_of[int(i), int(j)] for i, j, *_ in hinges]).reshape(-1, 2)
-    right = np.array([place_of[int(j), int(i)] for i, j, *_ in hinges]).reshape(-1, 2)
+    left = np.array([place_of[int(i), int(j)] for i, j, *_ in hinges], dtype=np.int64).reshape(-1, 2)
+    right = np.array([place_of[int(j), int(i)] for i, j, *_ in hinges], dtype=np.int64).reshape(-1, 2)
     edge = np.full(faces.shape, len(hinges))
     edge[tuple(left.T)] = edge[tuple(right.T)] = np.arange(len(hinges))
     around = incidence(faces, mesh.vertex_count)
@@ -171,7 +178,7 @@ def _sheet(mesh: Mesh, held: Tensor) -> dict[str, NDArray[np.int64]]:
     return {
         "corner": np.concatenate([pair(a, b), pair(c, ea), pair(eb, ec)]),
         "end": pair(hinges[:, 0], hinges[:, 1]),
-        "side": pair(left @ [4, 1], right @ [4, 1]),
+        "side": pair(4 * left[:, 0] + left[:, 1], 4 * right[:, 0] + right[:, 1]),
         "around": around.ravel(),
         "vertex": pair((around < faces.size).sum(0), hold),
     }

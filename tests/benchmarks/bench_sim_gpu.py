@@ -12,6 +12,7 @@ import statistics
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -81,8 +82,6 @@ def run(
             kind = "approximate" if fast else "ieee"
             result["rates"][kind] = {"threads": best["threads"], "blocks": best["blocks"], "by_flags": rows}
             _say(result["rates"][kind])
-        result["agreement"]["coarse_mesh_approximate"] = _agreement(device, 6)
-        result["agreement"]["fine_mesh_approximate"] = _agreement(device, columns)
     result["training_of_flow"] = [_training(batch, device) for batch in BATCHES]
     return result
 
@@ -104,6 +103,7 @@ def _named(device: str) -> dict[str, Any]:
     return {
         "name": found.name, "memory_gib": round(found.total_memory / 2**30, 1),
         "multiprocessors": found.multi_processor_count, "cuda_of_torch": torch.version.cuda,
+        "warp": version("warp-lang"),
     }  # fmt: skip
 
 

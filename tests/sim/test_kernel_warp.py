@@ -132,6 +132,12 @@ def test_implicit_steps_float64_and_gradients_are_refused(flapping, make_system,
         advance(double, begin, 0.002, steps=2, backend=Backend.WARP)
 
 
+def test_a_mesh_whose_indices_would_not_fit_is_refused(flapping, monkeypatch) -> None:
+    monkeypatch.setattr(batch, "FACES_LIMIT", 47)
+    with pytest.raises(UsageError, match="a mesh of 48 faces"):
+        advance(flapping[0], flapping[1], 0.002, steps=2, backend=Backend.WARP)
+
+
 def test_a_device_that_is_not_there_and_warp_that_is_not_installed_are_errors(flapping, monkeypatch) -> None:
     system, start = flapping
     with pytest.raises(UsageError, match="no device 'cuda:7'"):
