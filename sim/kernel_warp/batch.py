@@ -98,7 +98,7 @@ class WarpKernel:
         sheet.column, sheet.shape = array(cloth.hinge_column), array(cloth.hinge_shape)
         sheet.row = array(cloth.hinge_rows[:, 1] + 2 * cloth.hinge_rows[:, 2])
         members = code.Members()
-        members.samples = array(cloth.samples.reshape(-1, 4), code.wp.vec4)
+        members.samples = array(cloth.samples.flatten().view(torch.int64))
         members.table = array(cloth.table_of.int())
         members.counts = code.wp.vec3i(*cloth.grid.counts)
         members.origin, members.fineness = cloth.grid.origin, 1 / cloth.grid.spacing

@@ -79,7 +79,8 @@ class Members:
     """Materials and surroundings.
 
     Attributes:
-        samples: (table · node,) stretching stiffness k0 to k3 [N/m].
+        samples: (2 · table · node,) stretching stiffness k0 to k3 [N/m], two to a number: Warp reads vectors one
+            component at a time.
         table: (batch,) of each member.
         counts: nodes of a table along G00, G11 and |G01|.
         origin, fineness: of its nodes: where the first is, and how many there are in a unit of strain.
@@ -92,7 +93,7 @@ class Members:
         stiffness: of the handles [N/m]; 0 where none is a spring.
     """
 
-    samples: wp.array(dtype=wp.vec4)
+    samples: wp.array(dtype=wp.int64)
     table: wp.array(dtype=wp.int32)
     counts: wp.vec3i
     origin: float
@@ -141,6 +142,14 @@ def located(place: float, count: int):
 
 
 @wp.func
+def node(members: Members, at: int):
+    """k0 to k3 of a node."""
+    first = wp.cast(members.samples[2 * at], wp.vec2)
+    last = wp.cast(members.samples[2 * at + 1], wp.vec2)
+    return wp.vec4(first[0], first[1], last[0], last[1])
+
+
+@wp.func
 def stretching(members: Members, first: int, g00: float, g11: float, g01: float):
     """k0 to k3 at a strain."""
     c0, w0 = located((g00 - members.origin) * members.fineness, members.counts[0])
@@ -153,10 +162,11 @@ def stretching(members: Members, first: int, g00: float, g11: float, g01: float)
     last = w1 - both
     middle = w2 - both
     none = 1.0 - w1 - middle
-    low = none * members.samples[at] + middle * members.samples[at + 1]
-    low += last * members.samples[at + line] + both * members.samples[at + line + 1]
-    high = none * members.samples[at + plane] + middle * members.samples[at + plane + 1]
-    high += last * members.samples[at + plane + line] + both * members.samples[at + plane + line + 1]
+    low = none * node(members, at) + middle * node(members, at + 1)
+    low += last * node(members, at + line) + both * node(members, at + line + 1)
+    at += plane
+    high = none * node(members, at) + middle * node(members, at + 1)
+    high += last * node(members, at + line) + both * node(members, at + line + 1)
     return low + w0 * (high - low)
 
 

@@ -33,8 +33,8 @@ FLAGS = (256, 1024, 4096, 16384, 65536)
 BATCHES = (32, 64, 128, 256)
 LOOKED_AT = (1, 5, 10, 15, 20, 25)  # frames
 VARIANTS = (  # threads of a block, blocks of a multiprocessor, approximate divisions and roots
-    (192, 3, True), (256, 3, True), (320, 2, True), (320, 3, True), (352, 2, True), (416, 2, True),
-    (256, 3, False), (352, 2, False),
+    (192, 3, True), (256, 3, True), (320, 2, True), (320, 3, True), (416, 2, True), (512, 2, True),
+    (256, 3, False), (416, 2, False),
 )  # fmt: skip
 _DISTINCT = 256
 
