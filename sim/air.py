@@ -43,6 +43,11 @@ class AirForce(Protocol):
         """The quadratic-normal force nearest to it, of which the compiled kernel takes care."""
         ...
 
+    @property
+    def factors(self) -> tuple[object, ...] | None:
+        """What the normal part of `plain` is multiplied by; None where it has more than that."""
+        ...
+
     def beyond(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
         """What `force` has more than `plain`: (vertex, 3, batch) [N]."""
         ...
@@ -107,6 +112,11 @@ class QuadraticNormal:
         """Itself."""
         return self
 
+    @property
+    def factors(self) -> tuple[object, ...]:
+        """None of them."""
+        return ()
+
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
         """(vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
         seen = face_wind(cloth, position, velocity, wind)
@@ -142,6 +152,11 @@ class Stokes:
     def plain(self) -> QuadraticNormal:
         """None of it acts."""
         return NO_AIR
+
+    @property
+    def factors(self) -> None:
+        """It is another force."""
+        return None
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
         """(vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""

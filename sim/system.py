@@ -235,10 +235,15 @@ class System:
         """What the frictions remember after a step to a position (vertex, 3, batch) [m]."""
         return tuple(
             friction.update(self.cloth, past, position)
-            for friction, past in zip(self.frictions, self._memory(memory), strict=True)
+            for friction, past in zip(self.frictions, self.checked(memory), strict=True)
         )
 
-    def _memory(self, memory: tuple[Tensor, ...]) -> tuple[Tensor, ...]:
+    def checked(self, memory: tuple[Tensor, ...]) -> tuple[Tensor, ...]:
+        """What the frictions remember, as it is.
+
+        Raises:
+            UsageError: none of some, or too many.
+        """
         if len(memory) != len(self.frictions):
             raise UsageError(
                 f"a state with {len(memory)} memories for {len(self.frictions)} frictions",
@@ -300,7 +305,7 @@ class System:
     ) -> Tensor:
         for effect in self.effects:
             total = total + effect.force(self.cloth, time, position, velocity, wind)
-        for friction, past in zip(self.frictions, self._memory(memory), strict=True):
+        for friction, past in zip(self.frictions, self.checked(memory), strict=True):
             total = total + friction.force(self.cloth, past, position)
         return total
 
@@ -378,12 +383,12 @@ class System:
 
     @property
     def extra(self) -> bool:
-        """Whether anything acts that the compiled kernel does not know."""
+        """Whether anything acts beside the base model in the undisturbed wind, with ties and loads."""
         return bool((*self.effects, *self.flows, *self.frictions)) or self.air is not self.air.plain
 
     @cached_property
     def base(self) -> System:
-        """The part that the compiled kernel knows: the base model with ties and loads, in the undisturbed wind."""
+        """The base model with ties and loads, in the undisturbed wind."""
         return replace(self, air=self.air.plain, effects=(), flows=(), frictions=())
 
     @cached_property

@@ -17,6 +17,7 @@ from sim.air import QuadraticNormal, face_wind
 from sim.cloth import Cloth
 from sim.effects.geometry import origin
 from sim.effects.parameter import Parametrised
+from sim.kernel.given import Given
 from sim.state import State
 from sim.system import System
 from sim.wind import Wind
@@ -32,6 +33,10 @@ class Effect(Parametrised, ABC):
         Raises:
             UsageError: the effect does not fit the system.
         """
+
+    def given(self, cloth: Cloth) -> Given:
+        """What its C++ reads, if there is any beside its class: its parameters, in order."""
+        return Given(of=type(self), numbers=tuple(getattr(self, name) for name in self.parameters()))
 
 
 def apply(effects: Iterable[Effect], system: System, state: State) -> tuple[System, State]:
@@ -93,6 +98,11 @@ class FactoredNormal:
     def plain(self) -> QuadraticNormal:
         """Without the factors."""
         return self.base
+
+    @property
+    def factors(self) -> tuple[PressureEffect, ...]:
+        """All that it has more."""
+        return self.effects
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
         """(vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
@@ -158,6 +168,11 @@ class PlacedFlow:
     def field(self, time: float, position: Tensor, wind: Tensor) -> Tensor:
         """The air at the vertices: (vertex, 3, batch) [m/s]."""
         return self.effect.field(time, position - self.origin, wind)
+
+    def given(self, cloth: Cloth) -> Given:
+        """What its C++ reads: the place, and the effect's parameters."""
+        given = self.effect.given(cloth)
+        return replace(given, numbers=(*self.origin, *given.numbers))
 
 
 class ClothEffect(Effect):

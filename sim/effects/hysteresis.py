@@ -12,6 +12,7 @@ from sim import bending
 from sim.cloth import Cloth, gather_sum
 from sim.effects.effect import Effect
 from sim.effects.parameter import NOT_NEGATIVE, Value, shape, strength
+from sim.kernel.given import Given
 from sim.state import State
 from sim.system import System
 from sim.tables import CURVATURE_SPACING
@@ -69,10 +70,19 @@ class Hysteresis(Effect):
 
     def force(self, cloth: Cloth, memory: Tensor, position: Tensor) -> Tensor:
         """−½ l H z ∇θ on every hinge, as the elastic couple −½ l k α ∇θ: (vertex, 3, batch) [N]."""
-        lengths = torch.as_tensor(cloth.mesh.hinge_lengths, dtype=position.dtype, device=position.device)
-        moment = (-(lengths / 2)[:, None] * self.couple * memory[0]).unsqueeze(1)
+        moment = (-_half_lengths(cloth)[:, None] * self.couple * memory[0]).unsqueeze(1)
         return gather_sum([moment * g for g in bending.fold(cloth, position).gradient], cloth.hinge_slots)
+
+    def given(self, cloth: Cloth) -> Given:
+        """What its C++ reads: its parameters, and of each hinge its curvature per angle and half its length."""
+        own = torch.stack([CURVATURE_SPACING * cloth.hinge_column, _half_lengths(cloth)], dim=1)
+        return replace(super().given(cloth), own=own.unsqueeze(-1).expand(-1, -1, cloth.batch))
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
         memory = (*state.memory, self.start(system.cloth, state.position))
         return replace(system, frictions=(*system.frictions, self)), replace(state, memory=memory)
+
+
+def _half_lengths(cloth: Cloth) -> Tensor:
+    """(hinge,) [m]."""
+    return torch.as_tensor(cloth.mesh.hinge_lengths, dtype=cloth.dtype, device=cloth.device) / 2

@@ -12,6 +12,7 @@ from sim import bending
 from sim.cloth import Cloth, gather_sum
 from sim.effects.effect import Effect
 from sim.effects.parameter import Value, strength
+from sim.kernel.given import Given
 from sim.state import State
 from sim.system import System
 
@@ -60,3 +61,7 @@ class Curl:
         f = bending.fold(cloth, position)
         moment = (bending.stiffness(cloth, f.angle) * self.angle).unsqueeze(1)
         return gather_sum([moment * gradient for gradient in f.gradient], cloth.hinge_slots)
+
+    def given(self, cloth: Cloth) -> Given:
+        """What its C++ reads: the angle of each hinge."""
+        return Given(of=type(self), numbers=(), own=self.angle.unsqueeze(1))

@@ -5,12 +5,13 @@ from __future__ import annotations
 from enum import StrEnum
 
 import torch
+from torch import Tensor
 
 from flagdata.errors import UsageError
 from sim.kernel.fused import Kernel
 from sim.kernel_warp.batch import WarpKernel
 from sim.state import State
-from sim.system import System
+from sim.system import Drive, System
 
 
 class Backend(StrEnum):
@@ -65,3 +66,20 @@ def _differentiated(system: System, state: State) -> bool:
     return torch.is_grad_enabled() and any(
         tensor.requires_grad for tensor in (state.position, state.velocity, *system.tensors())
     )
+
+
+def extra_force(
+    kernel: Kernel | None,
+    system: System,
+    drive: Drive,
+    share: float,
+    time: float,
+    position: Tensor,
+    velocity: Tensor,
+    *,
+    memory: tuple[Tensor, ...],
+) -> Tensor:
+    """`System.extra_force`, by the kernel of the system where that has all that acts: (vertex, 3, batch) [N]."""
+    if kernel is None or kernel.beside is None:
+        return system.extra_force(drive, share, time, position, velocity, memory=memory)
+    return kernel.extra(drive, share, position, velocity, velocity, memory=system.checked(memory))

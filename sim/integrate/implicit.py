@@ -50,7 +50,7 @@ class BackwardEuler:
         tolerance: relative residual at which a member's solve stops.
         iterations: bound on conjugate-gradient steps. A member that has not converged by then gets NaN, which
             `State.healthy` reports; the others go on.
-        backend: what computes the step; the kernel knows the base model without contact.
+        backend: what computes the step; the kernel has all but contact, and but effects without C++.
     """
 
     step: float = 5e-3
@@ -71,7 +71,8 @@ class BackwardEuler:
         """The state `duration` seconds later."""
         steps = max(1, math.ceil(duration / self.step - 1e-9))
         h = duration / steps
-        if (kernel := self._kernel(system, state)) is not None and system.limits is None:
+        kernel = self._kernel(system, state)
+        if kernel is not None and system.limits is None and not system.frictions:
             return self._at_once(kernel, system, state, h, steps)
         for _ in range(steps):
             state = self.stepped(system, state, system.drive(state.time, state.time + h), h)
@@ -80,8 +81,8 @@ class BackwardEuler:
     def _kernel(self, system: System, state: State) -> Kernel | None:
         """Where it can take the step."""
         kernel = kernel_for(system, state, self.backend)
-        beyond = system.extra or system.loads or system.ties or system.contact is not None
-        return None if beyond else kernel
+        lacking = kernel is None or (system.extra and kernel.beside is None) or system.contact is not None
+        return None if lacking else kernel
 
     def _at_once(self, kernel: Kernel, system: System, state: State, h: float, steps: int) -> State:
         """Steps of `h` [s] in one call of the kernel."""
@@ -89,6 +90,7 @@ class BackwardEuler:
         x, v = kernel.implicit(
             [system.wind.velocity(time) for time in times[:-1]], [system.targets(time) for time in times[1:]],
             state.position, state.velocity, h, lag=self._lag(h), tolerance=self.tolerance, iterations=self.iterations,
+            offsets=[system.offset(time) for time in times[:-1]],
         )  # fmt: skip
         return State(position=x, velocity=v, time=times[-1])
 
@@ -102,10 +104,10 @@ class BackwardEuler:
         if (kernel := self._kernel(system, state)) is not None:
             x, v = kernel.implicit(
                 drive.wind[:1], drive.targets[1:], x, v, h, lag=self._lag(h), tolerance=self.tolerance,
-                iterations=self.iterations,
+                iterations=self.iterations, offsets=drive.offset[:1], memory=system.checked(state.memory),
             )  # fmt: skip
             x, v = system.limited(x, v, h)
-            return State(position=x, velocity=v, time=time + h)
+            return State(position=x, velocity=v, time=time + h, memory=system.remembered(state.memory, x))
         if system.clamped:
             v = v.index_copy(0, system.held, (drive.targets[1] - x[system.held]) / h)
         mass = cloth.mass.unsqueeze(1)

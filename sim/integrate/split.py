@@ -20,6 +20,7 @@ from torch import Tensor
 
 from flagdata.errors import UsageError
 from sim.inertia import effective, mean_normals
+from sim.integrate.backend import extra_force, kernel_for
 from sim.integrate.implicit import BackwardEuler
 from sim.integrate.joint_batch import JointBatch
 from sim.state import State
@@ -47,7 +48,7 @@ class SplitEuler:
             return self.base.advance(plain, state, duration)
         steps, h = self._steps(duration)
         for drive in system.drives(_times(state.time, h, steps)):
-            begun = replace(state, velocity=_pushed(system, state, drive, h), memory=())
+            begun = replace(state, velocity=self._pushed(system, state, drive, h), memory=())
             state = _carried(system, state, self.base.stepped(plain, begun, drive, h), h)
         return state
 
@@ -64,7 +65,7 @@ class SplitEuler:
             velocity = state.velocity.clone()
             for system, members, own in parts:
                 if system.extra or system.ties:
-                    velocity[..., members] = _pushed(system, own, drive.select(members), h)
+                    velocity[..., members] = self._pushed(system, own, drive.select(members), h)
             after = self.base.stepped(plain, replace(state, velocity=velocity, memory=()), drive, h)
             memory: list[Tensor] = []
             for system, members, own in parts:
@@ -81,22 +82,22 @@ class SplitEuler:
         steps = max(1, math.ceil(duration / self.base.step - 1e-9))
         return steps, duration / steps
 
+    def _pushed(self, system: System, state: State, drive: Drive, h: float) -> Tensor:
+        """Velocity (vertex, 3, batch) [m/s] that the base model's step begins with."""
+        x, v, time = state.position, state.velocity, state.time
+        mass = system.cloth.mass.unsqueeze(1)
+        kernel = kernel_for(system, state, self.base.backend)
+        impulse = h * extra_force(kernel, system, drive, 0.0, time, x, v, memory=state.memory)
+        stiffness = system.tied(time, x)
+        if stiffness is None:
+            return v + impulse / mass
+        pull = torch.stack([tie.force(system.cloth, time, x) for tie in system.ties]).sum(0)
+        return v + (impulse + h * pull - h * h * stiffness * v) / (mass + h * h * _pulling(stiffness))
+
 
 def _times(start: float, h: float, steps: int) -> list[float]:
     """Start and end of steps [s], added up as states are."""
     return list(accumulate([h] * steps, initial=start))
-
-
-def _pushed(system: System, state: State, drive: Drive, h: float) -> Tensor:
-    """Velocity (vertex, 3, batch) [m/s] that the base model's step begins with."""
-    x, v, time = state.position, state.velocity, state.time
-    mass = system.cloth.mass.unsqueeze(1)
-    impulse = h * system.extra_force(drive, 0.0, time, x, v, memory=state.memory)
-    stiffness = system.tied(time, x)
-    if stiffness is None:
-        return v + impulse / mass
-    pull = torch.stack([tie.force(system.cloth, time, x) for tie in system.ties]).sum(0)
-    return v + (impulse + h * pull - h * h * stiffness * v) / (mass + h * h * _pulling(stiffness))
 
 
 def _carried(system: System, before: State, after: State, h: float) -> State:

@@ -24,7 +24,7 @@ from weakref import WeakKeyDictionary
 from torch import Tensor
 
 from flagdata.errors import UsageError
-from sim.integrate.backend import Backend, kernel_for, warp_kernel_for
+from sim.integrate.backend import Backend, extra_force, kernel_for, warp_kernel_for
 from sim.integrate.stability import outer_limit, stable_step
 from sim.kernel.fused import Kernel
 from sim.state import State
@@ -128,7 +128,11 @@ def advance(
         x, v = _base(system, drive, state.time, x, v, duration / steps, steps, kernel_for(system, start, backend))
         return State(position=x, velocity=v, time=state.time + duration)
     if outer is None:
-        return _each_step(system, drive, start, duration, steps=steps, backend=backend)
+        kernel = kernel_for(system, start, backend)
+        if kernel is None or kernel.beside is None:
+            return _each_step(system, drive, start, duration, steps=steps, kernel=kernel)
+        x, v, memory = kernel.advance(drive, x, v, duration / steps, steps, memory=system.checked(state.memory))
+        return State(position=x, velocity=v, time=state.time + duration, memory=memory)
     if steps % outer:
         raise UsageError(
             f"{steps} steps do not divide into {outer} outer ones", where="integrator symplectic", fix="give a multiple"
@@ -141,7 +145,8 @@ def _base(
 ) -> tuple[Tensor, Tensor]:
     """Positions and velocities after steps of h [s] from a time, of a system that is its own base."""
     if kernel is not None:
-        return kernel.advance(drive, x, v, h, steps)
+        x, v, _ = kernel.advance(drive, x, v, h, steps)
+        return x, v
     inverse_mass = _inverse_mass(system)
     for index in range(steps + 1):
         share = index / steps
@@ -153,10 +158,12 @@ def _base(
     return x, v
 
 
-def _each_step(system: System, drive: Drive, state: State, duration: float, *, steps: int, backend: Backend) -> State:
+def _each_step(
+    system: System, drive: Drive, state: State, duration: float, *, steps: int, kernel: Kernel | None
+) -> State:
+    """With what acts beside the base model by torch."""
     h = duration / steps
     x, v, memory = state.position, state.velocity, state.memory
-    kernel = kernel_for(system, state, backend)
     inverse_mass, acceleration = _inverse_mass(system), 0.0 * v
     for index in range(steps + 1):
         share = index / steps
@@ -181,13 +188,14 @@ def _impulses(
     base, length = system.base, duration / outer
     _check_outer(system, state, drive, length)
     x, v, memory = state.position, state.velocity, state.memory
-    kernel = None if kernel_for(system, state, backend) is None else Kernel.of(base)
+    whole = kernel_for(system, state, backend)
+    kernel = None if whole is None else Kernel.of(base)
     inverse_mass, acceleration = _inverse_mass(system), 0.0 * v
     for index in range(outer + 1):
         share = index / outer
         level = v + length / 2 * acceleration
         time = state.time + share * duration
-        force = system.extra_force(drive, share, time, x, level, memory=memory)
+        force = extra_force(whole, system, drive, share, time, x, level, memory=memory)
         acceleration = inverse_mass * system.effective(x, force)
         v = v + (length / 2 if index in (0, outer) else length) * acceleration
         if index < outer:

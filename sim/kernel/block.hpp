@@ -1,141 +1,32 @@
 // The base model on a CPU: membrane, bending, gravity, quadratic-normal air, handle springs, contact, limits, leapfrog.
 //
 // The torch source (sim/membrane.py, bending.py, air.py, system.py, integrate/symplectic.py) is the definition; this file
-// repeats it for speed and is tested against it. One block holds LANES members of the batch side by side, in vector
+// repeats it for speed and is tested against it. One block holds L members of the batch side by side, in vector
 // registers; every lane does the same operations in the same order, so a member's result does not depend on the others.
 
 #pragma once
 
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <cstring>
-#include <limits>
 #include <vector>
 
-#include "contact.hpp"
+#include "acting.hpp"
 
 namespace {
-
-template <typename T, int L>
-struct Vector {
-  typedef T type __attribute__((vector_size(sizeof(T) * L)));
-  typedef int32_t index __attribute__((vector_size(4 * L)));
-};
-
-// Coefficients of atan(sqrt(u))/sqrt(u) in powers of 2u - 1 on [0, 1], by Chebyshev interpolation: largest error of
-// atan 1.5e-9 (degree 9) and 1.1e-16 (degree 20).
-template <typename T>
-struct Arctangent;
-template <>
-struct Arctangent<float> {
-  static constexpr int terms = 10;
-  static constexpr float c[] = {0.8704197533355914f,   -0.1018765429522826f,   0.02085175296811603f, -0.005030833614468352f,
-                                0.0013163640918424742f, -0.0003612200464794893f, 0.00010014512956245252f,
-                                -2.8998424551572838e-05f, 1.1063999869689915e-05f, -3.322597781383979e-06f};
-};
-template <>
-struct Arctangent<double> {
-  static constexpr int terms = 21;
-  static constexpr double c[] = {0.8704197513671031,      -0.10187654235021819,    0.02085185120710812,
-                                 -0.005030863660250071,   0.0013155859496292637,   -0.0003609820870537958,
-                                 0.00010227656112457649,  -2.9650040727272736e-05, 8.74493865928441e-06,
-                                 -2.6140726587443016e-06, 7.898643101492844e-07,   -2.4079970758706004e-07,
-                                 7.3946703181214e-08,     -2.2806127912204115e-08, 7.084749388337621e-09,
-                                 -2.268247878883474e-09,  7.111461799834528e-10,   -1.7840616846746431e-10,
-                                 5.614478327142391e-11,   -3.787822214408087e-11,  1.2046030455090929e-11};
-};
-
-// Field by field as in fused.py.
-template <typename T>
-struct Problem {
-  int64_t vertices, faces, hinges, held, ties;
-  int64_t counts[3];
-  int64_t fold;  // 1: bending looks up |curvature|
-  const int32_t* face;         // (faces, 3)
-  const T* gradients;          // (faces, 2, 3)
-  const T* areas;              // (faces)
-  const int32_t* hinge;        // (hinges, 4)
-  const T* hinge_shape;        // (hinges)
-  const T* hinge_column;       // (hinges)
-  const T* hinge_rows;         // (hinges, 3)
-  const int32_t* held_vertex;  // (held)
-  const int32_t* tie_vertex;   // (ties)
-  const T* samples;            // (tables, n0, n1, n2, 4)
-  double origin, spacing, air_density, air_drag, stiffness;
-  int64_t batch;  // members; lanes beyond are spare
-  contact::Settings<T> contact;
-  double lowest, highest;  // strain limits
-  int64_t sweeps;          // corrections a step; 0: no limits
-  const T* sweep_weights;  // (sweeps) of Chebyshev's recurrence, 1 for a plain sweep
-  const T* arms;           // (faces, 3, 2)
-  const T* vertex_areas;   // (vertices)
-  // One block's share of each of the following is contiguous, lanes innermost.
-  const T* mass;          // (blocks, vertices, L)
-  const T* inverse_mass;  // (blocks, vertices, L): 0 where held rigidly
-  const T* added_mass;    // (blocks, vertices, L) of air along the normals; or null
-  const T* segments;      // (blocks, 3, 5, L)
-  const T* stiffening;    // (blocks, hinges, L) bending stiffness on top, as a share; or null
-  const T* damping;       // (blocks, L)
-  const int32_t* table;   // (blocks, L)
-  const T* gravity;       // (blocks, 3, L)
-  const T* tie_share;     // (blocks, ties, L)
-  const T* tie_stiffness; // (blocks, ties, L)
-  const T* tie_slack;     // (blocks, ties, L)
-  const T* wind;          // (2, blocks, 3, L)
-  const T* targets;       // (2, blocks, held, 3, L)
-  const T* rate;          // (blocks, held, 3, L)
-  const T* tie_targets;   // (2, blocks, ties, 3, L)
-  const T* tie_rate;      // (blocks, 3, L)
-};
 
 template <typename T, int L>
 class Block {
  protected:
   using V = typename Vector<T, L>::type;
   using I = typename Vector<T, L>::index;
-  struct V3 {
-    V x, y, z;
-  };
+  using V3 = Vector3<V>;
 
   static V splat(T value) { return V{} + value; }
-  static V load(const T* p) {
-    V v;
-    std::memcpy(&v, p, sizeof v);
-    return v;
-  }
+  static V load(const T* p) { return ::load<V>(p); }
   static void store(T* p, V v) { std::memcpy(p, &v, sizeof v); }
   static V3 load3(const T* p) { return {load(p), load(p + L), load(p + 2 * L)}; }
   static void add3(T* p, V3 a) {
     store(p, load(p) + a.x);
     store(p + L, load(p + L) + a.y);
     store(p + 2 * L, load(p + 2 * L) + a.z);
-  }
-  static V maximum(V a, V b) { return a > b ? a : b; }
-  static V minimum(V a, V b) { return a < b ? a : b; }
-  static V absolute(V a) { return a < 0 ? -a : a; }
-  static V root(V a) {
-    V r;
-    for (int l = 0; l < L; ++l) r[l] = std::sqrt(a[l]);
-    return r;
-  }
-  static V dot(V3 a, V3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-  static V3 sub(V3 a, V3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-  static V3 scale(V3 a, V s) { return {a.x * s, a.y * s, a.z * s}; }
-  static V3 combine(V3 a, V s, V3 b, V t) { return {a.x * s + b.x * t, a.y * s + b.y * t, a.z * s + b.z * t}; }
-  static V3 cross(V3 a, V3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
-
-  // atan2 for arguments that are not both zero.
-  static V arctangent2(V y, V x) {
-    V ay = absolute(y), ax = absolute(x);
-    V t = minimum(ay, ax) / maximum(ay, ax);
-    V w = 2 * t * t - 1;
-    V p = splat(Arctangent<T>::c[Arctangent<T>::terms - 1]);
-    for (int i = Arctangent<T>::terms - 2; i >= 0; --i) p = p * w + Arctangent<T>::c[i];
-    V angle = p * t;
-    angle = ay > ax ? T(M_PI / 2) - angle : angle;
-    angle = x < 0 ? T(M_PI) - angle : angle;
-    return y < 0 ? -angle : angle;
   }
 
   const Problem<T>& p;
@@ -146,12 +37,13 @@ class Block {
   std::vector<contact::Point<T>> lane_, speed_;  // positions and velocities of one lane
   std::vector<T> near_;                          // and its near allowances
   T step_ = 0;            // of the time, where steps follow one another
-  std::vector<T> normals_;
+  Acting<T, L> acting_;
+  std::vector<T> level_;   // velocities at the full step, carried on by the last acceleration
   std::vector<T> before_;  // positions one sweep of the limits ago
 
  public:
   Block(const Problem<T>& problem, int64_t block, int64_t count, contact::Lists<T, L>* lists = nullptr)
-      : p(problem), b(block), blocks(count), damping(load(problem.damping + block * L)), lists_(lists) {
+      : p(problem), b(block), blocks(count), damping(load(problem.damping + block * L)), lists_(lists), acting_(problem, block) {
     for (int l = 0; l < L; ++l) base[l] = p.table[b * L + l] * int32_t(p.counts[0] * p.counts[1] * p.counts[2]);
   }
 
@@ -307,14 +199,17 @@ class Block {
     return p.stiffening ? k * (1 + load(p.stiffening + (b * p.hinges + e) * L)) : k;
   }
 
-  void hinges(const T* x, const T* v, T* f) const {
+  void hinges(const T* x, const T* v, bool moved, T* f) const {
+    const bool folds = acting_.folds();
     for (int64_t e = 0; e < p.hinges; ++e) {
       const int32_t* c = p.hinge + 4 * e;
       V3 g[4];
       V angle, rate = V{};
       fold(x, e, g, angle);
       for (int i = 0; i < 4; ++i) rate += dot(g[i], load3(v + 3 * L * int64_t(c[i])));
-      const V moment = -bending(e, angle) * (angle + damping * rate);
+      const V k = bending(e, angle);
+      V moment = -k * (angle + damping * rate);
+      if (folds) acting_.add_moments(e, angle, k, moved, moment);
       for (int i = 0; i < 4; ++i) add3(f + 3 * L * int64_t(c[i]), scale(g[i], moment));
     }
   }
@@ -386,39 +281,50 @@ class Block {
       const V3 start = load3(p.tie_targets + 3 * own), end = load3(p.tie_targets + 3 * (blocks * p.ties * L + own));
       const V3 target = combine(start, splat(1 - share), end, splat(share));
       const V3 stretch = sub(load3(x + at), target);
-      const V distance = maximum(root(dot(stretch, stretch)), splat(T(1e-6)));
-      const V taut = load(p.tie_share + own) - minimum(load(p.tie_slack + own) / distance, splat(1));
-      const V pull = -load(p.tie_stiffness + own) * taut;
-      add3(f + at, combine(stretch, pull, sub(load3(v + at), rate), pull * damping));
+      const V k = -pull(own, stretch);
+      add3(f + at, combine(stretch, k, sub(load3(v + at), rate), k * damping));
     }
   }
 
-  // Of a force on cloth and air, what gives the cloth's own mass its acceleration (sim/inertia.py).
-  void share_with_air(const T* x, T* f) {
-    normals_.assign(3 * L * p.vertices, T(0));
-    for (int64_t e = 0; e < p.faces; ++e) {
-      const int64_t at[3] = {3 * L * int64_t(p.face[3 * e]), 3 * L * int64_t(p.face[3 * e + 1]),
-                             3 * L * int64_t(p.face[3 * e + 2])};
-      const V3 x0 = load3(x + at[0]);
-      const V3 sixth = scale(cross(sub(load3(x + at[1]), x0), sub(load3(x + at[2]), x0)), splat(T(1) / 6));
-      for (int c = 0; c < 3; ++c) add3(normals_.data() + at[c], sixth);
-    }
-    const T *mass = p.mass + b * p.vertices * L, *added = p.added_mass + b * p.vertices * L;
-    for (int64_t i = 0; i < p.vertices; ++i) {
-      const V3 n = scale(load3(normals_.data() + 3 * L * i), splat(1 / p.vertex_areas[i]));
-      const V air = load(added + i * L), part = air / (load(mass + i * L) + air * dot(n, n));
-      add3(f + 3 * L * i, scale(n, -part * dot(n, load3(f + 3 * L * i))));
-    }
+  // Stiffness of a tie at a stretch.
+  V pull(int64_t own, V3 stretch) const {
+    const V distance = maximum(norm(stretch), splat(T(1e-6)));
+    const V taut = load(p.tie_share + own) - minimum(load(p.tie_slack + own) / distance, splat(1));
+    return load(p.tie_stiffness + own) * taut;
   }
 
-  // All forces at `share` of the way between the drive's start and end.
-  void forces(const T* x, const T* v, T share, T* f) {
-    weigh(f);
+  V3 wind_at(T share) const {
     const V3 start = load3(p.wind + b * 3 * L), end = load3(p.wind + (blocks + b) * 3 * L);
-    const V3 wind = {start.x + share * (end.x - start.x), start.y + share * (end.y - start.y),
-                     start.z + share * (end.z - start.z)};
+    return {start.x + share * (end.x - start.x), start.y + share * (end.y - start.y),
+            start.z + share * (end.z - start.z)};
+  }
+
+  // Adds what acts beside the base model; arguments as in acting.hpp.
+  void beside(const T* x, const T* v, const T* level, T lag, V3 wind, T* f) {
+    acting_.add_forces(x, v, level, lag, wind, f);
+    if (!acting_.folds()) return;
+    for (int64_t e = 0; e < p.hinges; ++e) {
+      V3 g[4];
+      V angle, moment = V{};
+      fold(x, e, g, angle);
+      acting_.add_moments(e, angle, bending(e, angle), false, moment);
+      for (int i = 0; i < 4; ++i) add3(f + 3 * L * int64_t(p.hinge[4 * e + i]), scale(g[i], moment));
+    }
+  }
+
+  // What acts beside the base model alone, at `share` of the way between the drive's start and end.
+  void extra(const T* x, const T* v, const T* level, T share, T* f) {
+    std::memset(f, 0, sizeof(T) * p.vertices * 3 * L);
+    beside(x, v, level, T(0), wind_at(share), f);
+  }
+
+  // All forces at `share` of the way between the drive's start and end; `moved` whether the cloth has since those before.
+  void forces(const T* x, const T* v, const T* level, T share, bool moved, T* f) {
+    weigh(f);
+    const V3 wind = wind_at(share);
     faces(x, v, wind, f);
-    hinges(x, v, f);
+    hinges(x, v, moved, f);
+    if (p.effects > 0) acting_.add_forces(x, v, level, T(0), wind, f);
     if (p.stiffness > 0) springs(x, v, share, f);
     if (p.ties > 0) ties(x, v, share, f);
     if (p.contact.thickness > 0) contacts(x, v, f);
@@ -480,10 +386,13 @@ class Block {
   // Leapfrog: half a kick, drift and kick in turn, half a kick.
   void advance(T* x, T* v, T* f, double h, int64_t steps) {
     const T* inverse = p.inverse_mass + b * p.vertices * L;
+    const bool levelled = acting_.levelled();
     step_ = T(h);
+    if (levelled) level_.assign(v, v + 3 * L * p.vertices);
     for (int64_t s = 0; s <= steps; ++s) {
-      forces(x, v, T(double(s) / double(steps)), f);
-      if (p.added_mass) share_with_air(x, f);
+      forces(x, v, levelled ? level_.data() : v, T(double(s) / double(steps)), s > 0, f);
+      if (p.added_mass) acting_.share_with_air(x, f);
+      if (levelled) hasten(f, T(h / 2));
       const T kick = T(s == 0 || s == steps ? h / 2 : h), drift = s < steps ? T(h) : T(0);
       for (int64_t i = 0; i < p.vertices; ++i) {
         const V w = kick * load(inverse + i * L);
@@ -494,7 +403,18 @@ class Block {
         }
       }
       if (s < steps) limit(x, v, T(h), f);
+      if (levelled)
+        for (int64_t c = 0; c < 3 * L * p.vertices; c += L) store(level_.data() + c, load(v + c) + load(level_.data() + c));
     }
+  }
+
+ private:
+  // Into `level_`, what a force changes the velocity by in a time.
+  void hasten(const T* f, T time) {
+    const T* inverse = p.inverse_mass + b * p.vertices * L;
+    for (int64_t i = 0; i < p.vertices; ++i)
+      for (int64_t c = 3 * L * i; c < 3 * L * (i + 1); c += L)
+        store(level_.data() + c, time * load(inverse + i * L) * load(f + c));
   }
 };
 

@@ -26,7 +26,11 @@ _FLAGS = (
     "-std=c++17", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC", "-Wno-psabi",
 )  # fmt: skip
 
-_SOURCES = ("kernel.cpp", "block.hpp", "contact.hpp", "on_mesh.hpp", "implicit.hpp")
+_EFFECT = ("effect.hpp", "vector.hpp")
+"""What the C++ of an effect is written with."""
+_SOURCES = (
+    "kernel.cpp", "block.hpp", "acting.hpp", "problem.hpp", "contact.hpp", "on_mesh.hpp", "implicit.hpp", *_EFFECT,
+)  # fmt: skip
 
 
 def compiler() -> str | None:
@@ -53,12 +57,29 @@ def compiled(package: str, sources: tuple[str, ...], *, without: str) -> ctypes.
     Raises:
         UsageError: another user could have written the library, or a folder that it lies in.
     """
+    return _loaded({name: (files(package) / name).read_bytes() for name in sources}, without)
+
+
+@functools.cache
+def of_effect(header: Path) -> ctypes.CDLL | None:
+    """The library of an effect's C++ (see effect.hpp); None, with one warning, where it cannot be built.
+
+    Args:
+        header: whose name ends in .hpp; its content when it is first asked for counts.
+    """
+    sources = {"acting.cpp": b'#include "given.hpp"\n', "given.hpp": header.read_bytes()}
+    sources |= {name: (files("sim.kernel") / name).read_bytes() for name in _EFFECT}
+    return _loaded(sources, f"{header.name} is left aside and its effect runs as plain torch, several times slower")
+
+
+def _loaded(sources: dict[str, bytes], without: str) -> ctypes.CDLL | None:
+    """The library that the first of the sources, by name, makes with the others."""
     path = compiler()
     if path is None:
         _warn("no C++ compiler found (CXX, g++, clang++, c++)", without)
         return None
     try:
-        return ctypes.CDLL(str(_built(path, package, sources)))
+        return ctypes.CDLL(str(_built(path, sources)))
     except subprocess.CalledProcessError as error:
         _warn(f"{path} failed: {error.stderr.strip()[-500:]}", without)
     except OSError as error:
@@ -67,24 +88,24 @@ def compiled(package: str, sources: tuple[str, ...], *, without: str) -> ctypes.
 
 
 def _warn(reason: str, without: str) -> None:
-    warnings.warn(f"{without}: {reason}. Install g++ to have its kernel compiled.", RuntimeWarning, stacklevel=4)
+    warnings.warn(f"{without}: {reason}. Install g++ to have its kernel compiled.", RuntimeWarning, stacklevel=5)
 
 
-def _built(path: str, package: str, names: tuple[str, ...]) -> Path:
-    sources = {name: (files(package) / name).read_bytes() for name in names}
+def _built(path: str, sources: dict[str, bytes]) -> Path:
+    main = next(iter(sources))
     version = subprocess.run([path, "--version"], capture_output=True, check=True).stdout
     name = hashlib.sha256(
         b"\0".join([*sources.values(), version, " ".join(_FLAGS).encode(), _processor()])
     ).hexdigest()[:20]
     folder = user_cache()
-    target = folder / f"{Path(names[0]).stem}-{name}.so"
+    target = folder / f"{Path(main).stem}-{name}.so"
     _make(folder)
     check_owned(folder)
     if target.exists():
         check_owned(target)
         return target
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
-        code, made = Path(scratch) / names[0], Path(scratch) / "made.so"
+        code, made = Path(scratch) / main, Path(scratch) / "made.so"
         for part, text in sources.items():
             (Path(scratch) / part).write_bytes(text)
         subprocess.run([path, *_FLAGS, "-o", str(made), str(code)], capture_output=True, check=True, text=True)

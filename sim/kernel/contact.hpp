@@ -21,13 +21,7 @@
 #include <immintrin.h>
 #endif
 
-// Bytes of the processor's vector registers. A block of members, and a group of points that a search looks at, are as
-// wide: a vector that is wider is kept in memory, and a member then takes three times as long.
-#ifdef __AVX512F__
-constexpr int REGISTER = 64;
-#else
-constexpr int REGISTER = 32;
-#endif
+#include "vector.hpp"
 
 namespace contact {
 

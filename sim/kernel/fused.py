@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from sim.contact import Contact, layers
+from sim.kernel.acting import Acting, Entry, acting
 from sim.kernel.build import library
 from sim.limits import chebyshev_weights
 from sim.system import Drive, System
@@ -48,7 +49,7 @@ class _Contact(ctypes.Structure):
 
 
 class _Problem(ctypes.Structure):
-    """Mirrors `Problem` of kernel.cpp field by field."""
+    """Mirrors `Problem` of problem.hpp field by field."""
 
     _fields_ = [
         *((name, ctypes.c_int64) for name in ("vertices", "faces", "hinges", "held", "ties")),
@@ -65,6 +66,8 @@ class _Problem(ctypes.Structure):
         ("arms", ctypes.c_void_p),
         ("vertex_areas", ctypes.c_void_p),
         *((name, ctypes.c_void_p) for name in _BLOCKED),
+        ("effects", ctypes.c_int64),
+        ("effect", ctypes.POINTER(Entry)),
     ]
 
 
@@ -94,6 +97,7 @@ class Kernel:
         tensors: what the kernel reads, kept alive here.
         tied: (tie, 3, batch) anchors of the springs beside the handles [m].
         lists: the contact's candidates.
+        beside: what acts beside the base model; None where the kernel does not have all of it.
     """
 
     code: ctypes.CDLL
@@ -105,11 +109,12 @@ class Kernel:
     tensors: dict[str, Tensor] = field(repr=False)
     tied: Tensor | None = field(repr=False)
     lists: _Lists = field(repr=False)
+    beside: Acting | None
 
     @classmethod
     def of(cls, system: System) -> Kernel | None:
-        """The kernel for the base of a system; None where there is none: not a CPU, not float32 or 64, or it cannot be
-        built."""
+        """The kernel for a system, or for its base where effects have no C++ (see `beside`); None where there is none:
+        not a CPU, not float32 or 64, or it cannot be built."""
         cloth = system.cloth
         if cloth.device.type != "cpu" or cloth.dtype not in (torch.float32, torch.float64):
             return None
@@ -185,12 +190,11 @@ class Kernel:
         return cls(
             code=code, batch=cloth.batch, kind=kind, lanes=lanes, blocks=blocks, problem=problem,
             tensors=tensors, tied=torch.cat([t.anchors for t in ties]) if ties else None,
-            lists=_Lists(code, kind, blocks),
+            lists=_Lists(code, kind, blocks), beside=acting(system, kind, lambda tensor: block(tensor).contiguous()),
         )  # fmt: skip
 
     def _drive(self, drive: Drive) -> tuple[_Problem, list[Tensor]]:
         """The problem with wind and handles set; the tensors must outlive the call it is made for."""
-
         given = {"wind": self._each(drive.wind), "targets": self._each(drive.targets), "rate": self.pack(drive.rate)}
         if self.tied is not None:
             start, end = drive.offset
@@ -217,14 +221,25 @@ class Kernel:
         """(block, …, lane) → (…, batch)."""
         return blocks.movedim(0, -2).flatten(-2)[..., : self.batch].contiguous()
 
-    def advance(self, drive: Drive, x: Tensor, v: Tensor, h: float, steps: int) -> tuple[Tensor, Tensor]:
-        """Leapfrog without effects: positions and velocities (vertex, 3, batch) after `steps` steps of `h` [s]."""
+    def advance(
+        self, drive: Drive, x: Tensor, v: Tensor, h: float, steps: int, *, memory: Sequence[Tensor] = ()
+    ) -> tuple[Tensor, Tensor, tuple[Tensor, ...]]:
+        """Leapfrog: positions and velocities (vertex, 3, batch) after `steps` steps of `h` [s], and the memory of
+        frictions. Where `beside` is None it is that of the base model."""
         problem, alive = self._drive(drive)
+        past = self._remember(problem, memory)
         xb, vb = self.pack(x), self.pack(v)
         scratch = torch.empty_like(xb[0])
         self._call("advance", problem, self.lists.place, xb, vb, scratch, ctypes.c_double(h), ctypes.c_int64(steps))
         del alive
-        return self.unpack(xb), self.unpack(vb)
+        return self.unpack(xb), self.unpack(vb), tuple(map(self.unpack, past))
+
+    def _remember(self, problem: _Problem, memory: Sequence[Tensor]) -> list[Tensor]:
+        """Set what acts beside the base model; returned is what frictions remember, which a call changes."""
+        past = [self.pack(tensor) for tensor in memory]
+        if self.beside is not None:
+            problem.effects, problem.effect = len(self.beside.entries), self.beside.remembering(past)
+        return past
 
     def forces(self, drive: Drive, share: float, x: Tensor, v: Tensor) -> Tensor:
         """The base's forces (vertex, 3, batch) [N]: what `System.extra_force` leaves."""
@@ -233,6 +248,22 @@ class Kernel:
         out = torch.empty_like(xb)
         self._call("forces", problem, self.lists.place, xb, vb, out, ctypes.c_double(share))
         del alive
+        return self.unpack(out)
+
+    def extra(
+        self, drive: Drive, share: float, x: Tensor, v: Tensor, level: Tensor, *, memory: Sequence[Tensor] = ()
+    ) -> Tensor:
+        """What `System.extra_force` is, where `beside` is not None: (vertex, 3, batch) [N].
+
+        Args:
+            level: the velocity that effects see (vertex, 3, batch) [m/s].
+        """
+        problem, alive = self._given(wind=self._each(drive.wind))
+        past = self._remember(problem, memory)
+        xb, vb, lb = self.pack(x), self.pack(v), self.pack(level)
+        out = torch.empty_like(xb)
+        self._call("extra", problem, xb, vb, lb, out, ctypes.c_double(share))
+        del alive, past
         return self.unpack(out)
 
     def implicit(
@@ -246,25 +277,32 @@ class Kernel:
         lag: float,
         tolerance: float,
         iterations: int,
+        offsets: Sequence[Tensor] = (),
+        memory: Sequence[Tensor] = (),
     ) -> tuple[Tensor, Tensor]:
-        """Backward Euler steps of `h` [s] without effects, contact and limits: positions and velocities (vertex, 3,
-        batch).
+        """Backward Euler steps of `h` [s] without contact and limits: positions and velocities (vertex, 3, batch).
 
         Args:
             winds: (3, batch) at the start of each step [m/s].
             targets: (held, 3, batch) of the handles at the end of each [m].
+            offsets: (3,) displacement of the ties' anchors at the start of each [m]; none where there are no ties.
+            memory: of the frictions, which is that of all steps.
             lag: the air sees the shape x − lag v [s].
 
         Returns:
             NaN for members whose solve did not converge.
         """
-        problem, alive = self._given(wind=self._each(winds), targets=self._each(targets))
+        given = {"wind": self._each(winds), "targets": self._each(targets)}
+        if self.tied is not None:
+            given["tie_targets"] = self._each([self.tied + offset[:, None] for offset in offsets])
+        problem, alive = self._given(**given)
+        past = self._remember(problem, memory)
         xb, vb = self.pack(x), self.pack(v)
         failed = torch.zeros((self.blocks, self.lanes), dtype=torch.int32)
         counts = (ctypes.c_int64(iterations), ctypes.c_int64(len(winds)))
         numbers = (ctypes.c_double(h), ctypes.c_double(lag), ctypes.c_double(tolerance), *counts)
         self._call("implicit", problem, xb, vb, failed, *numbers)
-        del alive
+        del alive, past
         after, lost = (self.unpack(xb), self.unpack(vb)), self.unpack(failed) != 0
         if bool(lost.any()):
             after = (after[0].masked_fill(lost, torch.nan), after[1].masked_fill(lost, torch.nan))

@@ -1,5 +1,6 @@
 // One linearised backward Euler step for one block, as sim/integrate/implicit.py defines it: the stiffness of every face
-// and hinge is kept for the step, and conjugate gradients solve each lane until it has converged by itself.
+// and hinge is kept for the step, and conjugate gradients solve each lane until it has converged by itself. What acts
+// beside the base model is explicit; air that moves with the cloth is mass, and ties are springs as handles are.
 
 #pragma once
 
@@ -12,8 +13,7 @@ class Implicit : Block<T, L> {
   using Base = Block<T, L>;
   using V = typename Base::V;
   using V3 = typename Base::V3;
-  using Base::add3, Base::b, Base::blocks, Base::combine, Base::cross, Base::damping, Base::dot, Base::load, Base::load3,
-      Base::maximum, Base::minimum, Base::p, Base::root, Base::scale, Base::splat, Base::store, Base::sub;
+  using Base::acting_, Base::add3, Base::b, Base::blocks, Base::damping, Base::load, Base::load3, Base::p, Base::splat, Base::store;
 
   struct Face {
     V3 xu, xv;
@@ -26,6 +26,8 @@ class Implicit : Block<T, L> {
   std::vector<Face> faces_;
   std::vector<Hinge> hinges_;
   std::vector<V> diagonal_, right_, residual_, direction_, image_, solution_;
+  std::vector<V> carried_;  // the root of the air's mass times the mean normal, at each vertex
+  std::vector<V> tied_;     // stiffness of each tie
 
   static V3 derive(V3 a, V3 b, V3 c, const T* d) {
     return {a.x * d[0] + b.x * d[1] + c.x * d[2], a.y * d[0] + b.y * d[1] + c.y * d[2],
@@ -112,6 +114,28 @@ class Implicit : Block<T, L> {
     if (p.stiffness > 0)
       for (int64_t h = 0; h < p.held; ++h)
         add(product, p.held_vertex[h], scale(get(field, p.held_vertex[h]), splat(T(p.stiffness))));
+    for (int64_t t = 0; t < p.ties; ++t) add(product, p.tie_vertex[t], scale(get(field, p.tie_vertex[t]), tied_[t]));
+  }
+
+  // Keeps the stiffness of ties at x, adds their force to f and their diagonal to d.
+  void linearise_ties(const T* x, V* f, V* d) {
+    tied_.resize(p.ties);
+    for (int64_t t = 0; t < p.ties; ++t) {
+      const int64_t i = p.tie_vertex[t], own = (b * p.ties + t) * L;
+      const V3 stretch = sub(load3(x + 3 * L * i), load3(p.tie_targets + 3 * own));
+      tied_[t] = this->pull(own, stretch);
+      add(f, i, scale(stretch, -tied_[t]));
+      add(d, i, {tied_[t], tied_[t], tied_[t]});
+    }
+  }
+
+  // Keeps what air moves along with each vertex at x.
+  void carry(const T* x) {
+    carried_.assign(p.added_mass ? 3 * p.vertices : 0, V{});
+    if (!p.added_mass) return;
+    acting_.orient(x);
+    for (int64_t i = 0; i < p.vertices; ++i)
+      add(carried_.data(), i, scale(acting_.mean_normal(i), root(load(p.added_mass + (b * p.vertices + i) * L))));
   }
 
  public:
@@ -131,6 +155,9 @@ class Implicit : Block<T, L> {
     for (auto* field : {&diagonal_, &right_, &residual_, &direction_, &image_, &solution_}) field->assign(n, V{});
     // Gravity and air go into right_ first; contact and elastic forces of the explicit step are not wanted here.
     this->external(x, v, lag, reinterpret_cast<T*>(right_.data()));
+    if (p.effects > 0) this->beside(x, v, v, lag, load3(p.wind + b * 3 * L), reinterpret_cast<T*>(right_.data()));
+    carry(x);
+    linearise_ties(x, right_.data(), diagonal_.data());
     linearise_faces(x, right_.data(), diagonal_.data());
     linearise_hinges(x, right_.data(), diagonal_.data());
     const T* mass = p.mass + b * p.vertices * L;
@@ -151,7 +178,8 @@ class Implicit : Block<T, L> {
       const V m = load(mass + i * L);
       for (int64_t k = 3 * i; k < 3 * i + 3; ++k) {
         residual_[k] = free * (h * right_[k] - factor * image_[k]);
-        diagonal_[k] = 1 / (m + factor * diagonal_[k]);
+        const V moved = carried_.empty() ? m : m + carried_[k] * carried_[k];
+        diagonal_[k] = 1 / (moved + factor * diagonal_[k]);
         direction_[k] = residual_[k] * diagonal_[k];
         product += residual_[k] * direction_[k];
       }
@@ -164,8 +192,10 @@ class Implicit : Block<T, L> {
       for (int64_t i = 0; i < p.vertices; ++i) {
         const V free = load(inverse + i * L) == 0 ? V{} : splat(1);
         const V m = load(mass + i * L);
+        const V along = carried_.empty() ? V{} : dot(get(carried_.data(), i), get(direction_.data(), i));
         for (int64_t k = 3 * i; k < 3 * i + 3; ++k) {
           image_[k] = free * (m * direction_[k] + factor * image_[k]);
+          if (!carried_.empty()) image_[k] += free * carried_[k] * along;
           curvature += direction_[k] * image_[k];
         }
       }

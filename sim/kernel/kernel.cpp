@@ -19,10 +19,17 @@ void forces(const Problem<T>* p, int64_t blocks, void* lists, const T* x, const 
   const int64_t size = p->vertices * 3 * L;
   auto* of_block = static_cast<contact::Lists<T, L>*>(lists);
   for (int64_t b = 0; b < blocks; ++b)
-    Block<T, L>(*p, b, blocks, of_block + b).forces(x + b * size, v + b * size, T(share), f + b * size);
+    Block<T, L>(*p, b, blocks, of_block + b).forces(x + b * size, v + b * size, v + b * size, T(share), false, f + b * size);
 }
 
-// Backward Euler steps, for each of which there are a wind and targets of the handles: (steps, blocks, ...). `failed`
+template <typename T, int L>
+void extra(const Problem<T>* p, int64_t blocks, const T* x, const T* v, const T* level, T* f, double share) {
+  const int64_t size = p->vertices * 3 * L;
+  for (int64_t b = 0; b < blocks; ++b)
+    Block<T, L>(*p, b, blocks).extra(x + b * size, v + b * size, level + b * size, T(share), f + b * size);
+}
+
+// Backward Euler steps, for each of which there are a wind and targets of the handles and ties: (steps, blocks, ...). `failed`
 // (blocks, L) tells which members' solves did not converge.
 template <typename T, int L>
 void implicit(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, double h, double lag, double tolerance,
@@ -35,6 +42,7 @@ void implicit(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, 
       block.step(x + b * size, v + b * size, failed + b * L, T(h), T(lag), tolerance, iterations);
       now.wind += blocks * 3 * L;
       now.targets += blocks * p->held * 3 * L;
+      now.tie_targets += blocks * p->ties * 3 * L;
     }
   }
 }
@@ -74,12 +82,13 @@ void implicit(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, 
   void forces_##name(const Problem<T>* p, int64_t blocks, void* lists, const T* x, const T* v, T* f, double share) { \
     forces<T, L>(p, blocks, lists, x, v, f, share);                                                                  \
   }                                                                                                                  \
+  void extra_##name(const Problem<T>* p, int64_t blocks, const T* x, const T* v, const T* level, T* f, double share) { \
+    extra<T, L>(p, blocks, x, v, level, f, share);                                                                   \
+  }                                                                                                                  \
   void implicit_##name(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, double h, double lag,       \
                        double tolerance, int64_t iterations, int64_t steps) {                                        \
     implicit<T, L>(p, blocks, x, v, failed, h, lag, tolerance, iterations, steps);                                   \
   }
-
-constexpr int SINGLES = REGISTER / sizeof(float), DOUBLES = REGISTER / sizeof(double);
 
 extern "C" {
 FOR(float, SINGLES, f32)

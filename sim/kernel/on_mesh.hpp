@@ -21,8 +21,7 @@ class Fields : Block<T, L> {
   using Base = Block<T, L>;
   using V = typename Base::V;
   using V3 = typename Base::V3;
-  using Base::arctangent2, Base::combine, Base::cross, Base::dot, Base::maximum, Base::root, Base::scale, Base::splat,
-      Base::sub;
+  using Base::splat;
 
   static V load(const T* p, size_t size) {
     V v{};

@@ -1,0 +1,9 @@
+#include "effect.hpp"
+
+struct Porosity {
+  template <typename V>
+  static void act(const V* number, Real<V>, const V&, V& factor) {
+    factor *= 1 - number[0];
+  }
+};
+EFFECT(PressureFactor, Porosity)

@@ -1,0 +1,129 @@
+"""Hands what acts beside the base model to the compiled kernel."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from flagdata.errors import UsageError
+from sim.cloth import Cloth
+from sim.kernel.build import of_effect
+from sim.kernel.given import Compilable, Given, header
+from sim.system import System
+
+
+class Kind(IntEnum):
+    """Where an effect enters the equations, as effect.hpp numbers it."""
+
+    PRESSURE_FACTOR = 0
+    FACE_FORCE = 1
+    FLOW = 2
+    SHEET_FORCE = 3
+    HINGE_MOMENT = 4
+
+
+_FORCES = (Kind.FACE_FORCE, Kind.SHEET_FORCE, Kind.HINGE_MOMENT)
+
+
+class Entry(ctypes.Structure):
+    """Mirrors `Effect` of problem.hpp field by field."""
+
+    _fields_ = [
+        ("kind", ctypes.c_int64),
+        ("act", ctypes.c_void_p),
+        ("numbers", ctypes.c_int64),
+        ("own", ctypes.c_int64),
+        ("number", ctypes.c_void_p),
+        ("of_element", ctypes.c_void_p),
+        ("memory", ctypes.c_void_p),
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Acting:
+    """All that acts beside the base model of a system.
+
+    Attributes:
+        entries: in the order of factors on the pressure, flows, forces and frictions.
+        frictions: how many of them, at the end, remember.
+        tensors: what the entries point to, kept alive here.
+    """
+
+    entries: Sequence[Entry]
+    frictions: int
+    tensors: list[Tensor] = field(repr=False)
+
+    def remembering(self, memory: Sequence[Tensor]) -> ctypes.Array[Entry]:
+        """The entries with the frictions' memories, which are changed in place and must outlive the entries."""
+        array = (Entry * len(self.entries))(*self.entries)
+        for entry, past in zip(array[len(array) - self.frictions :], memory, strict=True):
+            entry.memory = past.data_ptr()
+        return array
+
+
+def acting(system: System, kind: str, pack: Callable[[Tensor], Tensor]) -> Acting | None:
+    """What acts beside the base model; None where any of it has no C++ beside it, or that cannot be built.
+
+    Args:
+        kind: of the kernel's functions, by numbers and lanes.
+        pack: (…, batch) → (block, …, lane), contiguous.
+
+    Raises:
+        UsageError: C++ of a kind that does not fit where the effect enters the equations.
+    """
+    entries: list[Entry] = []
+    tensors: list[Tensor] = []
+    for part, fitting in _parts(system):
+        found = None if part is None else _compiled(part, system.cloth, kind, fitting)
+        if found is None:
+            return None
+        given, number, act = found
+        cloth = system.cloth
+        numbers = [torch.as_tensor(n, dtype=cloth.dtype).expand(cloth.batch) for n in given.numbers]
+        numbers = pack(torch.stack(numbers) if numbers else cloth.mass[:0])
+        entry = Entry(kind=number, act=act, numbers=numbers.shape[1], number=numbers.data_ptr())
+        tensors.append(numbers)
+        if given.own is not None:
+            own = pack(given.own)
+            entry.own, entry.of_element = own.shape[2], own.data_ptr()
+            tensors.append(own)
+        entries.append(entry)
+    return Acting(entries=entries, frictions=len(system.frictions), tensors=tensors)
+
+
+def _parts(system: System) -> Iterator[tuple[Compilable | None, tuple[Kind, ...]]]:
+    """What acts beside the base model, None for what certainly has no C++; each with the kinds that it may be of."""
+    factors = system.air.factors
+    placed: list[tuple[Sequence[Any], tuple[Kind, ...]]] = [
+        ((None,) if factors is None else factors, (Kind.PRESSURE_FACTOR,)),
+        (system.flows, (Kind.FLOW,)),
+        (system.effects, _FORCES),
+        (system.frictions, (Kind.HINGE_MOMENT,)),
+    ]
+    for parts, fitting in placed:
+        for part in parts:
+            yield part if isinstance(part, Compilable) else None, fitting
+
+
+def _compiled(part: Compilable, cloth: Cloth, kind: str, fitting: Sequence[Kind]) -> tuple[Given, int, int] | None:
+    """What it hands over, with the kind and the place of its function."""
+    given = part.given(cloth)
+    beside = header(given.of)
+    code = None if beside is None else of_effect(beside)
+    place = None if code is None else getattr(code, f"{given.of.__name__}_{kind}", None)
+    if place is None:
+        return None
+    number = Kind(getattr(code, f"{given.of.__name__}_kind")())
+    if number not in fitting:
+        raise UsageError(
+            f"C++ of the kind {number.name} for {given.of.__name__}", where=str(beside),
+            fix=f"make it one of {', '.join(entry.name for entry in fitting)}",
+        )  # fmt: skip
+    place.restype = ctypes.c_void_p
+    return given, number, place()
