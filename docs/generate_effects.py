@@ -22,10 +22,10 @@ field; and the source of that range. A *strength* switches the effect on; a *sha
 A recipe of a simulation names an effect by its table, for example `[effects.lift]` with `coefficient = 2.0`; the value
 `"prior"` draws one for each member. [Closing the loop](closing-the-loop.md) weighs the effects on the cloth one by one.
 
-An effect is defined in torch. Where a few lines of C++ stand beside its file, `NAME.hpp` beside `NAME.py`, they run in the
-simulator's compiled kernel, each in a library that is built when the effect is first used; gradients go by torch. That
-holds for an effect of your own too. Where anything that acts has no C++, all that acts beside the base model runs by
-torch, at three to ten times the base model's time.
+An effect is defined in torch. Where a few lines of C++ stand beside its file, `NAME.hpp` beside `NAME.py`, they run in
+the simulator's compiled kernel, each in a library that is built when the effect is first used; gradients go by torch.
+That holds for an effect of your own too. Where anything that acts has no C++, all that acts beside the base model runs
+by torch, at three to ten times the base model's time.
 """
 
 
