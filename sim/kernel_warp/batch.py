@@ -60,8 +60,8 @@ class WarpKernel:
         """The kernel for a system.
 
         Raises:
-            UsageError: warp-lang is not installed, or has no such device; numbers that are not float32; a mesh with too
-                many faces; a system with more than the base model, which is named.
+            UsageError: warp-lang is not installed, or has no such device; numbers that are not float32; a mesh that is
+                too large; a system with more than the base model, which is named.
         """
         if system not in _KERNELS:
             _KERNELS[system] = cls._build(system)
@@ -83,6 +83,9 @@ class WarpKernel:
                 fix=f"have at most {FACES_LIMIT}, or use another backend",
             )  # fmt: skip
         code = _code(cloth.device)
+        where = code.wp.device_from_torch(cloth.device)
+        if where.is_cuda:
+            _check_room(cloth.mesh, where.max_shared_memory_per_block)
         alive: list[Tensor] = []
 
         def array(values: NDArray[Any] | Tensor, dtype: Any = None) -> Any:
@@ -155,6 +158,20 @@ def _code(device: torch.device) -> ModuleType:
             fix="install the driver of the graphics processor, or use one of these",
         )  # fmt: skip
     return code
+
+
+def _check_room(mesh: Mesh, room: int) -> None:
+    """Whether a flag's state fits the shared memory of a thread block [bytes].
+
+    Raises:
+        UsageError: it does not.
+    """
+    taken = 28 * mesh.vertex_count + 36 * len(mesh.faces) + 4 * len(mesh.hinges) + 64  # see the tiles of the kernel
+    if taken > room:
+        raise UsageError(
+            f"a mesh of {mesh.vertex_count} vertices takes {taken} bytes of shared memory, of which there are {room}",
+            where=_WHERE, fix="take a coarser mesh, or another backend",
+        )  # fmt: skip
 
 
 def _sheet(mesh: Mesh, held: Tensor) -> dict[str, NDArray[np.int64]]:

@@ -20,6 +20,7 @@ from sim.integrate.symplectic import Symplectic, advance
 from sim.kernel_warp import batch
 from sim.limits import StrainLimits
 from sim.material import named
+from sim.mesh import grid
 from sim.run.reading import parse
 from sim.run.recipe import Recipe
 from sim.scene import assemble, flag
@@ -132,7 +133,11 @@ def test_implicit_steps_float64_and_gradients_are_refused(flapping, make_system,
         advance(double, begin, 0.002, steps=2, backend=Backend.WARP)
 
 
-def test_a_mesh_whose_indices_would_not_fit_is_refused(flapping, monkeypatch) -> None:
+def test_a_mesh_that_does_not_fit_is_refused(flapping, monkeypatch) -> None:
+    # 651 vertices, 1,200 faces and 1,750 hinges take 68,528 bytes as compiled for the H200, which has 232,448.
+    batch._check_room(grid(width=1.5, height=1.0, columns=30, rows=20), 68_528)
+    with pytest.raises(UsageError, match="bytes of shared memory"):
+        batch._check_room(grid(width=1.5, height=1.0, columns=60, rows=40), 232_448)
     monkeypatch.setattr(batch, "FACES_LIMIT", 47)
     with pytest.raises(UsageError, match="a mesh of 48 faces"):
         advance(flapping[0], flapping[1], 0.002, steps=2, backend=Backend.WARP)
