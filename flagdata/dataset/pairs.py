@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,8 @@ class Pairs(Batchable):
     """Pairs of a query, a map-style dataset. Made by `Source.pairs`.
 
     Workers, forked or spawned, get flat arrays and paths; they never touch the catalog. Each opens a record when it
-    first needs it. With a `torch.utils.data.DataLoader` of your own, pass `collate_fn=flagdata.dataset.collate`.
+    first needs it; of a lake in a bucket it fetches the object then, which forked workers cannot. With a
+    `torch.utils.data.DataLoader` of your own, pass `collate_fn=flagdata.dataset.collate`.
 
     Attributes:
         table: the pairs' numbers, as arrays.
@@ -47,7 +49,7 @@ class Pairs(Batchable):
         self,
         table: PairTable,
         *,
-        paths: tuple[Path, ...],
+        openers: tuple[Callable[[], Path], ...],
         refused: tuple[Refusal, ...],
         at: str | None,
         seed: int,
@@ -58,7 +60,7 @@ class Pairs(Batchable):
         self.at = at
         self.seed = seed
         self.fingerprint = table.fingerprint()
-        self._paths = paths
+        self._openers = openers
         self._cache = cache
         self._open = _OpenRecords()
 
@@ -166,7 +168,7 @@ class Pairs(Batchable):
         records = self._open.records
         record = records.get(number)
         if record is None:
-            record = records[number] = Record.open(self._paths[number])
+            record = records[number] = Record.open(self._openers[number]())
             if len(records) > OPEN_RECORDS:
                 records.popitem(last=False)
         else:

@@ -75,8 +75,8 @@ class Source:
             window=window,
             tolerance=tolerance or Tolerance(),
         )
-        paths = tuple(self.lake.object_path(str(name)) for name in resolved.table.objects)
-        return Pairs(resolved.table, paths=paths, refused=resolved.refused, at=at, seed=seed, cache=cache)
+        openers = self.lake.openers([str(name) for name in resolved.table.objects])
+        return Pairs(resolved.table, openers=openers, refused=resolved.refused, at=at, seed=seed, cache=cache)
 
     def sides(
         self,

@@ -166,6 +166,19 @@ class Lake(Store):
         except NotFoundError as error:
             raise explained(self, object, error) from None
 
+    def openers(self, objects: Sequence[str]) -> tuple[Callable[[], Path], ...]:
+        """For each object a function that gives its place as `object_path` does, when it is needed; workers that read
+        objects take these with them.
+
+        Raises:
+            NotFoundError: as `object_path`.
+        """
+        try:
+            return self.objects.openers(objects)
+        except NotFoundError as error:
+            name = next(name for name in objects if not self.objects.has(name))
+            raise explained(self, name, error) from None
+
     def whole_object(self, object: str) -> Path:  # noqa: A002 — the catalog's name for it
         """Where an object lies, once its bytes have been compared with its name.
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from flagdata.checksums import content_hash, files_of, size_of
@@ -64,6 +65,14 @@ class Objects:
         if not path.exists():
             raise self.missing(name)
         return path
+
+    def openers(self, names: Sequence[str]) -> tuple[Callable[[], Path], ...]:
+        """For each object a function that says where it is, which other processes may call, too.
+
+        Raises:
+            NotFoundError: one is not there.
+        """
+        return tuple(partial(Path, self.existing(name)) for name in names)
 
     def missing(self, name: str) -> NotFoundError:
         """The error for an object that is not there."""

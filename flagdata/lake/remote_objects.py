@@ -7,7 +7,7 @@ there. It is deleted first. Objects are read from a local copy, see `flagdata.st
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -54,6 +54,15 @@ class RemoteObjects(Objects):
             return copy
         size = self.size(name)
         return fetched(name, place.suffix, size=size, fetch=partial(self._fetch, name), where=str(place))
+
+    def openers(self, names: Sequence[str]) -> tuple[Callable[[], Path], ...]:
+        """As for a disk; each object is fetched when its function is called."""
+        if any(copy_of(name, self.path(name).suffix) is None for name in names):
+            there = {stored.name for stored in self}
+            for name in names:
+                if name not in there:
+                    raise self.missing(name)
+        return tuple(partial(self.existing, name) for name in names)
 
     def whole(self, name: str) -> Path:
         """A local copy, whose bytes are compared with its name again."""

@@ -140,6 +140,7 @@ def killed(address: str) -> dict[str, Any]:
             lost += len(acknowledged - set(found["rows"]))
             errors += len(found["errors"])
             assert len(set(found["rows"])) == len(found["rows"])
+            print(f"{trial + 1} trials, {len(acknowledged)} acknowledged, {lost} lost, {errors} findings", flush=True)  # noqa: T201
     return {
         "trials": KILLS, "killed": died, "beside, ended": survivors, "acknowledged": len(acknowledged),
         "acknowledged and lost": lost, "findings of doctor and verify": errors,

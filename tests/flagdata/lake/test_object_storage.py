@@ -6,6 +6,7 @@ import json
 import logging
 import os
 import pickle
+import shutil
 import subprocess
 import time
 from collections.abc import Callable
@@ -309,7 +310,9 @@ def test_a_film_and_a_log_are_ingested_aligned_exported_and_loaded(
     exported = invoke(capsys, "export", "csv", "--where", "kind = 'recording'", "--to", tmp_path / "csv", *place)
     assert exported.code == 0
     assert len(list((tmp_path / "csv").rglob("*.csv"))) == 1
+    shutil.rmtree(tmp_path / "cache" / "objects")
     pairs = flagdata.open(str(remote_lake.path)).pairs(at="v1")
+    assert list((tmp_path / "cache" / "objects").glob("mcap-*")) == []  # nothing is fetched before it is needed
     assert [pairs[index].clip.shape[:2] for index in range(len(pairs))] == [(1, 30), (1, 30)]
     assert [sample.recording for sample in pairs] == [aligned["recording"]] * 2
     assert doctor(remote_lake, grace=NOW) == ()
