@@ -22,6 +22,7 @@ import traceback
 import uuid
 from collections.abc import Callable
 from datetime import timedelta
+from functools import partial
 from http.client import HTTPConnection
 from http.server import BaseHTTPRequestHandler
 from pathlib import Path
@@ -45,6 +46,10 @@ _COMMITS = 8  # of each process beside faults
 Say = Callable[[object], None]
 
 
+def _write(pipe: int, said: object) -> None:
+    os.write(pipe, json.dumps(said).encode() + b"\n")
+
+
 class Child:
     """A forked process that uses the store, which its parent must not; what it says is read from a pipe."""
 
@@ -53,9 +58,9 @@ class Child:
         self.pid = os.fork()
         if self.pid == 0:
             try:
-                work(lambda said: os.write(writing, json.dumps(said).encode() + b"\n") and None)
+                work(partial(_write, writing))
             except BaseException:  # noqa: BLE001 — the process ends here whatever happened
-                os.write(writing, json.dumps({"raised": traceback.format_exc()}).encode() + b"\n")
+                _write(writing, {"raised": traceback.format_exc()})
             finally:
                 os._exit(0)
         os.close(writing)
