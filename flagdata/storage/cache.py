@@ -24,6 +24,7 @@ LIMIT = 20 * 10**9
 """Most bytes that are kept where FLAGDATA_CACHE_LIMIT does not say."""
 _IN_USE = 900.0  # s
 _PART = "part-"
+_TALLY = "tally"
 
 
 def copy_of(name: str, suffix: str) -> Path | None:
@@ -101,15 +102,27 @@ def _limit() -> int:
 
 def _take_room(folder: Path, size: int) -> None:
     """Delete the copies that were used least recently until there is room; parts that a killed process left, too."""
-    limit, old = _limit(), time.time() - _IN_USE
+    limit = _limit()
     with alone_in(folder, occupied=lambda: None):
-        entries = sorted((path.lstat().st_mtime, path) for path in folder.iterdir() if path.name != LOCK)
-        sizes = {path: size_of(path) for _, path in entries}
-        total = sum(sizes.values()) + size
-        for used, path in entries:
-            if used < old and (total > limit or path.name.startswith(_PART)):
-                _remove(path)
-                total -= sizes[path]
+        tally = folder / _TALLY  # counted before the copy is there: it is too high at worst
+        text = tally.read_text() if tally.exists() else ""
+        total = int(text) + size if text.isdecimal() else None
+        if total is None or total > limit:
+            total = _swept(folder, size, limit)
+        tally.write_text(str(total))
+
+
+def _swept(folder: Path, size: int, limit: int) -> int:
+    """Delete what was used least recently until there is room for `size` more; bytes that are there then, with it."""
+    old = time.time() - _IN_USE
+    entries = sorted((path.lstat().st_mtime, path) for path in folder.iterdir() if path.name not in (LOCK, _TALLY))
+    sizes = {path: size_of(path) for _, path in entries}
+    total = sum(sizes.values()) + size
+    for used, path in entries:
+        if used < old and (total > limit or path.name.startswith(_PART)):
+            _remove(path)
+            total -= sizes[path]
+    return total
 
 
 def _remove(path: Path) -> None:

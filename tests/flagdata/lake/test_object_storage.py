@@ -86,6 +86,8 @@ def test_an_object_that_changed_in_the_bucket_is_found_and_healed_by_ingesting_a
 ) -> None:
     artifact = put_text(remote_lake, "gusts")
     name = str(artifact.object)
+    assert remote_lake.object_path(name).read_text() == "gusts"  # what was put is kept, too
+    shutil.rmtree(tmp_path / "cache" / "objects")
     place = remote_lake.objects.path(name)
     place.write_bytes(b"gustz")
     assert [finding.kind for finding in verify(remote_lake, [name])] == ["object-changed"]
@@ -271,6 +273,7 @@ def test_the_cache_gives_up_what_was_used_least_recently(
     remote_lake: Lake, put_text: Put, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     names = [str(put_text(remote_lake, text).object) for text in ("a" * 100, "b" * 100, "c" * 100)]
+    shutil.rmtree(tmp_path / "cache" / "objects")  # of what was put
     monkeypatch.setenv("FLAGDATA_CACHE_LIMIT", "250")
     first, second = (remote_lake.object_path(name) for name in names[:2])
     long_ago = time.time() - 3600
