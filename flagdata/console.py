@@ -55,6 +55,15 @@ def lake_option(command: F) -> F:
     )(command)  # fmt: skip
 
 
+def at_option(command: F) -> F:
+    """Adds `--at REF`."""
+    return click.option(
+        "--at", metavar="REF",
+        help="Tag, branch, version number, commit, or main at a time: 2026-11-26 (its end, UTC), 3.days.ago; the head "
+        "of main by default.",
+    )(command)  # fmt: skip
+
+
 def document(tag: str, content: Mapping[str, Any]) -> None:
     """Print one JSON document, tagged "flagdata.<tag>/1"."""
     tagged = {"schema": f"flagdata.{tag}/1", **content}

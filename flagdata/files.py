@@ -13,6 +13,8 @@ from flagdata.storage import Place, RemotePath
 
 MCAP = b"\x89MCAP0\r\n"
 """First bytes of an MCAP file."""
+LEROBOT_INFO = "meta/info.json"
+"""File that describes a LeRobot data set, within its folder."""
 _SHOWN = 300  # letters of a path in a message
 
 
@@ -31,6 +33,11 @@ def is_mcap(path: Path) -> bool:
             return stream.read(len(MCAP)) == MCAP
     except (OSError, ValueError):
         return False
+
+
+def is_lerobot(path: Path) -> bool:
+    """Whether there is a folder at a path that has LeRobot's description of a data set."""
+    return is_folder(path) and (path / LEROBOT_INFO).is_file()
 
 
 def check_input(path: Path, *, noun: str = "file", limit: int | None = None) -> None:

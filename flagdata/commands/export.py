@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
+from flagdata.console import LocalPath, at_option, document, json_option, lake_option, progress, say
 from flagdata.errors import UsageError
 
 
@@ -14,7 +14,7 @@ from flagdata.errors import UsageError
 @click.argument("format_name", metavar="FORMAT")
 @click.option("--to", "target", required=True, type=LocalPath(), help="New folder to write.")
 @click.option("--where", metavar="EXPR", help="SQL condition as in flagdata query; all rows by default.")
-@click.option("--at", metavar="REF", help="Tag, branch, version number or commit; the head of main by default.")
+@at_option
 @click.option("--split", metavar="SIDE", help="Only this side of the leakage-safe split: train, validation or test.")
 @click.option("--salt", default="", metavar="TEXT", help="Another text gives another split.")
 @click.option(

@@ -36,7 +36,12 @@ from flagdata.errors import UsageError
 )
 @click.option("--session", metavar="NAME", help="One set-up at one place; splits never cut through it.")
 @click.option("--name", help="What people call the artifact; the file's name by default.")
-@click.option("--topic", metavar="NAME", help="MCAP of other programs: the topic of pictures, or of numbers, to read.")
+@click.option(
+    "--topic",
+    metavar="NAME",
+    help="MCAP of other programs: the topic of pictures or numbers to read. LeRobot: the camera.",
+)
+@click.option("--episode", type=click.IntRange(min=0), metavar="N", help="LeRobot: the episode to read.")
 @click.option("--zone", metavar="ZONE", help="Zone of a clock that does not say: Europe/Amsterdam, +02:00, UTC.")
 @click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")
 @click.option(
@@ -124,6 +129,7 @@ def ingest(
     session: str | None,
     name: str | None,
     topic: str | None,
+    episode: int | None,
     zone: str | None,
     branch: str,
     start: str | None,
@@ -166,6 +172,7 @@ def ingest(
       flagdata ingest station.csv --unit km/h --zone Europe/Amsterdam
       flagdata ingest arcsim-output --name reference-4ms
       flagdata ingest drive.mcap --topic /camera/front
+      flagdata ingest pusht --episode 3 --start 2026-05-01T12:00:00Z
       flagdata ingest drive.mcap --topic /mast --columns 'time=time,speed=wind_speed[m/s]'
     """
     from flagdata.outputs import check_file
@@ -183,6 +190,7 @@ def ingest(
         camera=camera_options(
             start=start, zone_name=zone, true_fps=true_fps, sequence_fps=sequence_fps, rate=rate, crop=crop,
             exposure=exposure, archive=archive, topic=topic,
+            episode=episode,
         ),
         wind=wind_options(
             format_name=None if format_name in ("camera", "meshes", "markers") else format_name, sensor=sensor,

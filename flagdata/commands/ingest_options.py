@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from flagdata.ingest.store import CameraIngest, Labels, WindIngest
 
 # Parameters that mean something for one kind of source only, those of --sniff, and those that name or time one source.
-CAMERA_ONLY = ("true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
+CAMERA_ONLY = ("episode", "true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
 WIND_ONLY = (
     "sensor", "date", "date_order", "platform", "talker", "azimuth", "clock", "zero_offset", "encoding", "wind",
     "columns", "missing", "expect", "accept",
@@ -35,7 +35,7 @@ FOREIGN = {
 """What each kind of source is called, and the options that mean nothing for it."""
 SNIFF = (
     "sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture", "unit", "wind",
-    "date_order", "columns", "topic",
+    "date_order", "columns", "topic", "episode",
 )  # fmt: skip
 ONE_SOURCE = ("start", "date", "name", "crop_picture", "accept")
 
@@ -72,6 +72,7 @@ def camera_options(
     exposure: float | None,
     archive: str,
     topic: str | None = None,
+    episode: int | None = None,
 ) -> CameraIngest:
     """Those of a camera.
 
@@ -101,6 +102,7 @@ def camera_options(
         crop=parse_crop(crop),
         exposure=exposure,
         topic=topic,
+        episode=episode,
     )
     return CameraIngest(camera=options, coding=Coding(archive))
 

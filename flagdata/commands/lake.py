@@ -10,19 +10,16 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 from click.core import ParameterSource
 
-from flagdata.console import document, json_option, lake_option, say, table
+from flagdata.console import at_option, document, json_option, lake_option, say, table
 from flagdata.errors import UsageError
 
 if TYPE_CHECKING:
+    from flagdata.lake import Lake
     from flagdata.lake.refs import Ref
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 _SHORT = 12  # characters of an id that are shown; look-ups take any unique beginning
-
-at_option = click.option(
-    "--at", metavar="REF", help="Tag, branch, version number or commit; the head of main by default."
-)
 
 
 @click.command()
@@ -53,21 +50,29 @@ def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
     """List artifacts, clips counted only (--kind clip lists them); filters and SQL are `flagdata query`'s."""
     from flagdata.errors import UnknownNameError
     from flagdata.lake import Lake
+    from flagdata.lake.removals import lost
     from flagdata.schema import Kind
 
     if kind is not None and kind not in list(Kind):
         raise UnknownNameError.of("kind", kind, [k.value for k in Kind])
-    found = Lake.open(lake_path).rows(None if kind is None else {"kind": kind}, at=at).to_pylist()
+    lake = Lake.open(lake_path)
+    selected = lake.rows(None if kind is None else {"kind": kind}, at=at)
+    gone = lost(lake, selected)
+    found = selected.to_pylist()
     rows = [row for row in found if kind is not None or row["kind"] != Kind.CLIP]
     clips = len(found) - len(rows)
     if as_json:
-        document("ls", {"at": at, "artifacts": [_plain(row) for row in rows], "clips_not_listed": clips})
+        listed = [{**_plain(row), "data": "lost" if row["object"] in gone else "there"} for row in rows]
+        document("ls", {"at": at, "artifacts": listed, "clips_not_listed": clips})
         return
     header = ("artifact", "kind", "name", "start", "frames", "wind [m/s]", "size", "quality")
     if rows:
-        table(header, [_line(row) for row in rows])
+        table(header, [_line(row, lost=row["object"] in gone) for row in rows])
     more = f" and {counted(clips, 'clip')} (--kind clip lists them)" if clips else ""
     say(f"{counted(len(rows), 'artifact')}{more}" if found else "no artifacts")
+    for name, why in gone.items():
+        names = sorted({row["name"] for row in found if row["object"] == name})
+        say(f"without data: {', '.join(names)}: {why.what}")
 
 
 @click.command()
@@ -272,23 +277,36 @@ def diff(before: str, after: str | None, as_json: bool, lake_path: str) -> None:
 @click.option("--message", "-m", required=True, help="Why.")
 @click.option("--branch", "branch_name", default="main", show_default=True, help="The branch to take them off.")
 @click.option("--with-descendants", is_flag=True, help="And all that was made from them, directly or not.")
+@click.option(
+    "--everywhere", is_flag=True,
+    help="Off every branch, and delete their data at once, also where tags and older versions show them.",
+)  # fmt: skip
 @json_option
 @lake_option
+@click.pass_context
 def withdraw(
+    context: click.Context,
     artifacts: tuple[str, ...],
     message: str,
     branch_name: str,
     with_descendants: bool,
+    everywhere: bool,
     as_json: bool,
     lake_path: str,
 ) -> None:
     """Hide artifacts from a branch, a recording with its clips.
 
-    Tags, and the branch that this one began from, keep showing them; gc frees what no ref shows any more.
+    Tags, and the branch that this one began from, keep showing them; gc frees what no ref shows any more. With
+    --everywhere the data are erased, and the rows that tags and older versions keep say by which version.
     """
     from flagdata.lake import Lake
 
     lake = Lake.open(lake_path)
+    if everywhere:
+        if context.get_parameter_source("branch_name") is ParameterSource.COMMANDLINE:
+            raise UsageError("--everywhere with --branch", fix="leave out --branch: every branch is meant")
+        _erase(lake, artifacts, message, with_descendants=with_descendants, as_json=as_json)
+        return
     named = {lake.identity(artifact, at=branch_name) for artifact in artifacts}
     made = lake.descendants(named, at=branch_name) if with_descendants else frozenset()
     done = lake.withdraw(sorted(named | made), message, branch=branch_name)
@@ -302,6 +320,39 @@ def withdraw(
     if made:
         parts.append(f"{len(made)} made from them")
     click.echo(f"version {done.version}: {', '.join(parts)}")
+
+
+def _erase(lake: Lake, artifacts: tuple[str, ...], message: str, *, with_descendants: bool, as_json: bool) -> None:
+    from dataclasses import asdict
+
+    from flagdata.lake.erasure import BEYOND
+
+    done = lake.erase([_anywhere(lake, one) for one in artifacts], message, with_descendants=with_descendants)
+    if as_json:
+        document("erasure", {**asdict(done), "not_reached": list(BEYOND)})
+        return
+    for name, why in done.kept.items():
+        say(f"its bytes stay: {name}: {why}")
+    say(f"not reached from here: {'; '.join(BEYOND)}")
+    tags = f"; listed without data by {', '.join(done.tags)}" if done.tags else ""
+    what = f"{counted(len(done.artifacts), 'artifact')} erased, {counted(len(done.objects), 'object')} deleted"
+    click.echo(f"version {done.version}: {what}{tags}")
+
+
+def _anywhere(lake: Lake, artifact: str) -> str:
+    """The full id of an artifact that a branch or tag shows.
+
+    Raises:
+        NotFoundError: no branch or tag does.
+    """
+    from flagdata.errors import NotFoundError
+
+    for ref in (*lake.refs.branches(), *lake.refs.tags()):
+        try:
+            return lake.identity(artifact, at=ref)
+        except NotFoundError:
+            continue
+    return lake.identity(artifact)
 
 
 def _report_deletion(noun: str, name: str, version: int, *, as_json: bool) -> None:
@@ -327,7 +378,7 @@ def size_text(size: float | None) -> str:
     return f"{size:.1f} TB"
 
 
-def _line(row: Mapping[str, Any]) -> list[object]:
+def _line(row: Mapping[str, Any], *, lost: bool) -> list[object]:
     from flagdata.documents import column_json
     from flagdata.schema import Kind
     from flagdata.timebase import iso
@@ -347,7 +398,8 @@ def _line(row: Mapping[str, Any]) -> list[object]:
         "" if row["start"] is None else iso(row["start"] // 10**9 * 10**9),
         row["frame_count"],
         wind,
-        "" if row["kind"] == Kind.CLIP else size_text(row["object_bytes"]),  # a clip's object is its recording's
+        # A clip's object is its recording's.
+        "lost" if lost else "" if row["kind"] == Kind.CLIP else size_text(row["object_bytes"]),
         ",".join(row["quality"]),
     ]
 

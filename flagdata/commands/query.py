@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flagdata.console import LocalPath, document, json_option, lake_option, say, table
+from flagdata.console import LocalPath, at_option, document, json_option, lake_option, say, table
 from flagdata.errors import UsageError
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ VIEWS: dict[str | None, tuple[str, ...]] = {
 @click.command()
 @click.option("--where", metavar="EXPR", help="SQL condition, e.g. \"kind = 'clip' and wind between 3 and 6\".")
 @click.option("--sql", metavar="SELECT", help="One whole SELECT over the table catalog, instead of --where.")
-@click.option("--at", metavar="REF", help="Tag, branch, version number or commit; the head of main by default.")
+@at_option
 @click.option("--columns", metavar="A,B", help="Columns wanted, in order.")
 @click.option("--order", metavar="TERMS", help='SQL order, e.g. "wind desc, start".')
 @click.option(

@@ -309,8 +309,7 @@ class _Films:
         self._folder = folder / "videos" / CAMERA
         self._rate = rate
         self._open = ExitStack()
-        self._stream: Any = None
-        self._container: Any = None
+        self._writing: tuple[Any, Any] | None = None
         self._path: Path | None = None
         self._number = -1
         self._frames = 0
@@ -327,13 +326,12 @@ class _Films:
         """Append the pictures of an episode, and say where they are."""
         begin = None
         for image in images:
-            if self._stream is None:
-                self._next(image)
+            container, stream = self._writing = self._writing or self._next(image)
             begin = self._frames if begin is None else begin
             frame = av.VideoFrame.from_ndarray(np.repeat(image[..., None], 3, axis=2), format="rgb24")
             frame = frame.reformat(format="yuv420p")
             frame.pts, frame.time_base = self._frames, 1 / self._rate
-            self._container.mux(self._stream.encode(frame))
+            container.mux(stream.encode(frame))
             self._frames += 1
         chunk, file = divmod(self._number, _CHUNK)
         place = {
@@ -344,24 +342,27 @@ class _Films:
             self._finish()
         return {f"videos/{CAMERA}/{name}": value for name, value in place.items()}
 
-    def _next(self, image: NDArray[np.uint8]) -> None:
+    def _next(self, image: NDArray[np.uint8]) -> tuple[Any, Any]:
+        """Container and stream of a new file for pictures like this one."""
         height, width = image.shape
         if height % 2 or width % 2:
             raise InputError(f"AV1 of {width} × {height} px", where="--frames", fix="export with --frames png")
         self._number += 1
         self._frames = 0
         self._path = _path(self._folder, self._number, "mp4")
-        self._container = self._open.enter_context(av.open(str(self._path), "w"))
+        container = self._open.enter_context(av.open(str(self._path), "w"))
         options = {"crf": "30", "g": "2", "preset": "8", "svtav1-params": "lp=1"}
-        self._stream = self._container.add_stream("libsvtav1", rate=self._rate, options=options)
-        self._stream.width, self._stream.height, self._stream.pix_fmt = width, height, "yuv420p"
-        self._stream.codec_context.time_base = 1 / self._rate
+        stream: Any = container.add_stream("libsvtav1", rate=self._rate, options=options)
+        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        stream.codec_context.time_base = 1 / self._rate
+        return container, stream
 
     def _finish(self) -> None:
-        if self._stream is not None:
-            self._container.mux(self._stream.encode(None))
+        if self._writing is not None:
+            container, stream = self._writing
+            container.mux(stream.encode(None))
             self._open.close()
-            self._stream = None
+            self._writing = None
 
 
 def _path(folder: Path, number: int, suffix: str) -> Path:

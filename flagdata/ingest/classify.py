@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flagdata.errors import FlagdataError, InputError, UnknownNameError
-from flagdata.files import check_input, is_folder, is_mcap
+from flagdata.files import LEROBOT_INFO, check_input, is_folder, is_lerobot, is_mcap
 from flagdata.ingest.anemometer import Guess, sniff
 from flagdata.ingest.anemometer.formats.registry import FORMATS
 from flagdata.ingest.markers import COLUMNS, is_marker_table
@@ -36,6 +36,9 @@ def guesses(path: Path, *, topic: str | None = None) -> tuple[Guess, ...]:
         return (Guess(format="marker table", score=0.99, reasons=(reason,), kind="markers"),)
     if is_mcap(path):
         return _of_mcap(path, topic)
+    if is_lerobot(path):
+        reason = f"it has LeRobot's {LEROBOT_INFO}"
+        return (Guess(format="LeRobot", score=0.99, reasons=(reason,), kind="camera"),)
     found = sniff(path)
     if found[0].kind != "other":
         return found

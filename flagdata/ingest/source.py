@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.errors import ConflictError, InputError
-from flagdata.files import check_input, is_folder
+from flagdata.files import check_input, is_folder, is_lerobot
 from flagdata.provenance import canonical, code_version, digest, file_hash, recipe_hash
 
 
@@ -76,13 +76,18 @@ class Source:
 
 
 def _state(path: Path) -> tuple[tuple[str, int, int], ...]:
-    """Name, size and time of change of the file, or of each file in the folder that is not hidden."""
+    """Name, size and time of change of the file, or of each file in the folder that is not hidden; of a LeRobot data
+    set, of each below it."""
     try:
         if not is_folder(path):
             status = path.stat()
             return ((path.name, status.st_size, status.st_mtime_ns),)
-        with os.scandir(path) as entries:
-            found = [(e.name, e.stat()) for e in entries if e.is_file() and not e.name.startswith(".")]
+        if is_lerobot(path):
+            files = [one for one in path.rglob("*") if one.is_file() and not one.name.startswith(".")]
+            found = [(str(one.relative_to(path)), one.stat()) for one in files]
+        else:
+            with os.scandir(path) as entries:
+                found = [(e.name, e.stat()) for e in entries if e.is_file() and not e.name.startswith(".")]
         return tuple(sorted((name, status.st_size, status.st_mtime_ns) for name, status in found))
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check the path") from None

@@ -18,7 +18,7 @@ from flagdata.lake.leases import LeaseState, collecting, last_written, leases, u
 from flagdata.lake.log import LogGapError
 from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import StoredObject
-from flagdata.lake.removals import removals
+from flagdata.lake.removals import erased, removals
 from flagdata.schema import FORMAT_VERSION
 from flagdata.storage import Place
 
@@ -50,6 +50,7 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
         return tuple(findings)  # what follows would call the files of the missing entries' commits leftovers
     if not marked.findings:
         held = {name for state in states if state.alive for name in state.objects}
+        findings += _erased(lake, marked)
         findings += _collected(lake, marked, {found.name for found in stored})
         needed = marked.objects | held
         findings += [_orphan(found, grace) for found in stored if found.name not in needed]
@@ -137,6 +138,7 @@ def _linked(path: Path) -> Finding:
 def _rows(lake: Lake, marked: Marked, foreign: Collection[Path]) -> list[Finding]:
     findings: list[Finding] = []
     seen: set[str] = set()
+    gone = set(erased(lake)) - marked.objects if not marked.findings else set()
     for ref, table in marked.refs.items():
         ids = table["artifact"].to_pylist()
         known = set(ids)
@@ -153,7 +155,8 @@ def _rows(lake: Lake, marked: Marked, foreign: Collection[Path]) -> list[Finding
         fresh = table.filter(pa.array([identity not in seen for identity in ids], type=pa.bool_()))
         seen |= known
         for row in fresh.to_pylist():
-            findings += _row(lake, row, known, ref, foreign)
+            if row["object"] not in gone:
+                findings += _row(lake, row, known, ref, foreign)
     return findings
 
 
@@ -189,6 +192,25 @@ def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign:
             findings.append(
                 error("object-size", what, f"{again}; flagdata recover saves what a cut-off record still has")
             )
+    return findings
+
+
+def _erased(lake: Lake, marked: Marked) -> list[Finding]:
+    """A note for each tag or branch that lists rows whose data were erased."""
+    gone = {name: why for name, why in erased(lake).items() if name not in marked.objects}
+    findings = []
+    for ref, table in marked.refs.items():
+        names = [name for name in table["object"].to_pylist() if name in gone]
+        if names:
+            version, message = max(gone[name] for name in names)
+            findings.append(
+                Finding(
+                    kind="erased", severity=Severity.NOTE, count=len(names), where=f"ref {ref}",
+                    what=f"{len(names)} rows have no data any more: they were erased, the last by version {version} "
+                    f"({message})",
+                    fix="none needed; exports of this ref leave them out by --where, or fail",
+                )
+            )  # fmt: skip
     return findings
 
 

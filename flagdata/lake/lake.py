@@ -19,6 +19,7 @@ from flagdata.files import open_regular
 from flagdata.lake.catalog import newer
 from flagdata.lake.deletion import check_reuse, delete
 from flagdata.lake.durable import disk_errors, put_if_absent
+from flagdata.lake.erasure import Erasure, erase
 from flagdata.lake.layout import FOLDERS, STORES, scratch_files
 from flagdata.lake.leases import collecting
 from flagdata.lake.merging import MergeResult, merge
@@ -276,6 +277,22 @@ class Lake(Store):
             ConflictError: a row that stays on the branch was made from one of them; see `descendants`.
         """
         return withdraw(self, artifacts, message, branch=branch)
+
+    def erase(self, artifacts: Sequence[str], message: str, *, with_descendants: bool = False) -> Erasure:
+        """Take rows off every branch and delete their bytes at once, also where tags or older versions show them.
+
+        Their rows stay in tags and in older versions, which say that the data were erased, and by which version.
+
+        Args:
+            artifacts: full ids.
+            with_descendants: and all that was made from them, on any branch or tag.
+
+        Raises:
+            NotFoundError: one that no ref shows.
+            ConflictError: a row that stays was made from one of them.
+            CorruptError: a ref cannot be read, so that what other rows need is unknown; nothing was deleted.
+        """
+        return erase(self, artifacts, message, with_descendants=with_descendants)
 
     def descendants(self, artifacts: Collection[str], *, at: str | None = None) -> frozenset[str]:
         """Ids of all rows at a ref that were made from `artifacts` (full ids), directly or not; without these."""

@@ -31,6 +31,16 @@ def noted_hidden(entry: Entry) -> frozenset[str]:
         return frozenset(str(artifact) for artifact in from_json(entry.get("hidden", "[]")))
 
 
+def noted_erased(entry: Entry) -> Mapping[str, str | None]:
+    """The artifacts that a commit erased from all refs → the object of each.
+
+    Raises:
+        CorruptError: the note cannot be read.
+    """
+    with _reading(entry):
+        return dict(from_json(entry.get("erased", "{}")).items())
+
+
 def noted_view(entry: Entry) -> View:
     """What the tag showed that a commit deleted, or what the branch began from.
 

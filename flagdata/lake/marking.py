@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
-from flagdata.lake.lineage import noted_hidden, noted_view
+from flagdata.lake.lineage import noted_erased, noted_hidden, noted_view
 from flagdata.lake.log import LogGapError
-from flagdata.lake.refs import MAIN, Slice
+from flagdata.lake.refs import MAIN, Slice, View
 from flagdata.lake.store import Store
 from flagdata.provenance import file_hash
 from flagdata.storage import Place
@@ -26,7 +27,7 @@ class Marked:
     Attributes:
         refs: each ref (main, branches, tags) → its rows, in the catalog's schema.
         objects: names of all objects that a row of a ref points to, or one that was withdrawn, or shown by a ref that
-            was deleted, within the grace period.
+            was deleted, within the grace period; not of rows that were erased since.
         findings: refs that cannot be read or are lost; while there are any, nothing may be collected.
     """
 
@@ -50,9 +51,12 @@ def mark(lake: Store, *, grace: timedelta) -> Marked:
         names = [MAIN, *lake.refs.branches(), *lake.refs.tags()]
     except FlagdataError as error:
         return Marked(refs={}, objects=frozenset(), findings=(_unreadable(error, error.where or "refs"),))
+    kept: list[pa.Table] = []
     for name in names:
         try:
-            refs[name] = lake.rows(at=name)
+            view = lake.view(name)
+            refs[name] = lake.table(view)
+            kept.append(_unerased(lake, refs[name], view))
         except FlagdataError as error:
             findings.append(_unreadable(error, f"ref {name}"))
     try:
@@ -60,7 +64,7 @@ def mark(lake: Store, *, grace: timedelta) -> Marked:
         recent = list(_withdrawn(lake, since=datetime.now(UTC) - grace))
     except FlagdataError as error:
         findings.append(_unreadable(error, "recent versions"))
-    objects = {name for table in (*refs.values(), *recent) for name in table["object"].drop_null().to_pylist()}
+    objects = {name for table in (*kept, *recent) for name in table["object"].drop_null().to_pylist()}
     return Marked(refs=refs, objects=frozenset(objects), findings=tuple(findings))
 
 
@@ -127,12 +131,21 @@ def _withdrawn(lake: Store, *, since: datetime) -> Iterator[pa.Table]:
     for entry in lake.catalog.history():
         if entry["timestamp"] < limit:
             continue
+        before = entry["version"] - 1
         if "withdrawn" in entry:
-            yield lake.catalog.rows(entry["version"] - 1)
+            yield _unerased(lake, lake.catalog.rows(before), (Slice(branch=MAIN, version=before),))
         if noted_hidden(entry):  # rows of a base, which may have left the table long ago
-            yield lake.table(lake.lineage().view(Slice(branch=entry["branch"], version=entry["version"] - 1)))
+            view = lake.lineage().view(Slice(branch=entry["branch"], version=before))
+            yield _unerased(lake, lake.table(view), view)
         if "deleted" in entry:
-            yield lake.table(noted_view(entry))
+            yield _unerased(lake, lake.table(noted_view(entry)), noted_view(entry))
+
+
+def _unerased(lake: Store, rows: pa.Table, view: View) -> pa.Table:
+    """The rows that no version after those of a view erased."""
+    newest = max(part.version for part in view)
+    erased = {a for entry in lake.catalog.history() if entry["version"] > newest for a in noted_erased(entry)}
+    return rows.filter(~pc.field("artifact").isin(pa.array(sorted(erased), pa.string()))) if erased else rows
 
 
 def _unreadable(error: FlagdataError, where: str) -> Finding:

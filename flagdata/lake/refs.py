@@ -20,6 +20,7 @@ from flagdata.documents import from_json
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
 from flagdata.files import open_regular
 from flagdata.lake.durable import confirming, disk_errors, flush_folder, put_if_absent
+from flagdata.lake.moments import moment
 from flagdata.storage import Place
 
 MAIN = "main"
@@ -203,14 +204,23 @@ class Refs:
             raise CorruptError("the ref cannot be read", where=str(path), fix="restore it from a copy") from None
 
 
-def resolve(refs: Refs, at: str | None, *, head: int, commits: Callable[[], Mapping[str, View]]) -> View:
-    """The view of a tag, branch, version number, or commit id; `None` is the head of main.
+def resolve(
+    refs: Refs,
+    at: str | None,
+    *,
+    head: int,
+    commits: Callable[[], Mapping[str, View]],
+    history: Callable[[], Iterable[Mapping[str, Any]]],
+) -> View:
+    """The view of a tag, branch, version number, commit id, or of main at an instant; `None` is the head of main.
 
     Args:
         commits: gives commit id → what it shows; called only when `at` has the form of a commit id.
+        history: gives version and timestamp [UTC ms] of each version; called only when `at` names an instant.
 
     Raises:
-        NotFoundError: none of these, with the nearest name; or a version beyond the newest.
+        NotFoundError: none of these, with the nearest name; or a version beyond the newest, or before the first.
+        UsageError: an instant that is none, see `moments.moment`.
     """
     if at is None:
         return refs.view(MAIN, head)
@@ -229,6 +239,12 @@ def resolve(refs: Refs, at: str | None, *, head: int, commits: Callable[[], Mapp
     branches = refs.branches()
     if at == MAIN or at in branches:
         return refs.view(at, head)
+    instant = moment(at)
+    if instant is not None:
+        before = [entry["version"] for entry in history() if entry["timestamp"] * 1_000_000 <= instant]
+        if not before:
+            raise NotFoundError(f"the lake has no version of {at} or before", fix="flagdata log lists its versions")
+        return (Slice(branch=MAIN, version=max(before)),)
     raise _not_there("tag, branch or commit", at, [MAIN, *tags, *branches])
 
 

@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import timedelta
 
+import pyarrow as pa
+
 from flagdata.errors import FlagdataError, NotFoundError
-from flagdata.lake.lineage import noted_hidden
+from flagdata.lake.lineage import noted_erased, noted_hidden
 from flagdata.lake.marking import mark
 from flagdata.lake.refs import MAIN
 from flagdata.lake.store import Store
@@ -47,12 +49,28 @@ def removals(lake: Store, *, since: int = -1, branch: str | None = None) -> Iter
             )
 
 
+def erased(lake: Store) -> dict[str, tuple[int, str]]:
+    """Object → the newest version that erased an artifact of it from all refs, and why."""
+    return {
+        name: (entry["version"], entry.get("message", ""))
+        for entry in reversed(lake.catalog.history())
+        for name in noted_erased(entry).values()
+        if name is not None
+    }
+
+
 def explained(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
-    """Why an object is missing: it was collected after a version withdrew what it held; `missing` where no version did,
-    or where the catalog cannot be asked."""
+    """Why an object is missing: it was erased, or collected after a version withdrew what it held; `missing` where no
+    version did, or where the catalog cannot be asked."""
     try:
         if name in mark(lake, grace=timedelta(0)).objects:
             return missing
+        if name in (known := erased(lake)):
+            version, message = known[name]
+            return NotFoundError(
+                f"{name} was erased from all versions by version {version} ({message})", where=missing.where,
+                fix="leave its artifact out by --where; no version has its data any more",
+            )  # fmt: skip
         for removal in removals(lake):
             if name in removal.objects.values():
                 return NotFoundError(
@@ -63,3 +81,14 @@ def explained(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
     except FlagdataError:
         return missing
     return missing
+
+
+def lost(lake: Store, rows: pa.Table) -> dict[str, NotFoundError]:
+    """Object of some of the rows that is not in the lake → why."""
+    found: dict[str, NotFoundError] = {}
+    for name in sorted(set(rows["object"].drop_null().to_pylist())):
+        try:
+            lake.objects.existing(name)
+        except NotFoundError as error:
+            found[name] = explained(lake, name, error)
+    return found

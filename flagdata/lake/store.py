@@ -108,7 +108,8 @@ class Store:
 
     def view(self, at: str | None) -> View:
         """What a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""
-        return references.resolve(self.refs, at, head=self.catalog.head(), commits=self._commits)
+        history = self.catalog.history
+        return references.resolve(self.refs, at, head=self.catalog.head(), commits=self._commits, history=history)
 
     def table(self, view: View) -> pa.Table:
         """All rows of a view, its base first. An identity is on one branch of a view only."""

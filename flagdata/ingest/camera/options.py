@@ -99,7 +99,8 @@ class CameraOptions:
             grid period or 3/4 of a source period, whichever is more, but no more than 3 grid periods.
         size: side of the square frames that come out [px].
         threads: decoder threads; frames do not depend on it.
-        topic: of pictures in an MCAP file; `None` takes the only one.
+        topic: of pictures in an MCAP file, or camera of a LeRobot data set; `None` takes the only one.
+        episode: of a LeRobot data set; `None` takes the only one.
     """
 
     start: int | None = None
@@ -114,6 +115,7 @@ class CameraOptions:
     threads: int = 1
     limits: Limits = field(default_factory=Limits)
     topic: str | None = None
+    episode: int | None = None
 
     def __post_init__(self) -> None:
         rates = {"true_fps": self.true_fps, "sequence_fps": self.sequence_fps}
@@ -139,9 +141,9 @@ class CameraOptions:
     def recipe(self) -> dict[str, Any]:
         """All options that shape the frames or their times, as JSON values; threads and limits do not.
 
-        A topic is there only where it is given, so that older artifacts keep their hash.
+        A topic and an episode are there only where they are given, so that older artifacts keep their hash.
         """
-        topic = {} if self.topic is None else {"topic": self.topic}
+        chosen = {"topic": self.topic, "episode": self.episode}
         return {
             "start": self.start,
             "zone": self.zone,
@@ -152,7 +154,7 @@ class CameraOptions:
             "exposure": self.exposure,
             "tolerance": self.tolerance,
             "size": self.size,
-            **topic,
+            **{name: value for name, value in chosen.items() if value is not None},
         }
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flagdata.addresses import local_path
 from flagdata.errors import LimitError, RefusedError, UsageError
-from flagdata.files import is_folder, is_mcap
+from flagdata.files import is_folder, is_lerobot, is_mcap
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.chapters import chapter_of
 from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
@@ -327,17 +327,26 @@ def open_camera(path: Path | str, options: CameraOptions | None = None) -> Camer
 
 
 def open_source(path: Path, options: CameraOptions) -> Source:
-    """The reader for `path`: a folder is an image sequence, an MCAP file a topic of it, anything else a video file.
+    """The reader for `path`: a folder is a LeRobot data set or an image sequence, an MCAP file a topic of it, anything
+    else a video file.
 
     Raises:
-        UsageError: a topic of what is no MCAP file.
+        UsageError: a topic or an episode of what has none.
     """
+    if is_lerobot(path):
+        from flagdata.ingest.camera.lerobot import EpisodeSource
+
+        return EpisodeSource(path, options)
+    if options.episode is not None:
+        raise UsageError("an episode of what is no LeRobot data set", where=str(path), fix="leave out --episode")
     if is_mcap(path):
         from flagdata.ingest.mcap.pictures import TopicSource
 
         return TopicSource(path, options)
     if options.topic is not None:
-        raise UsageError("a topic of what is no MCAP file", where=str(path), fix="leave out --topic")
+        raise UsageError(
+            "a topic of what is no MCAP file or LeRobot data set", where=str(path), fix="leave out --topic"
+        )
     return SequenceSource(path, options) if is_folder(path) else VideoSource(path, options)
 
 

@@ -1,0 +1,102 @@
+"""Erasing everywhere: bytes gone at once from all refs, rows that say so, and nothing that others need."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from flagdata.cli import root
+from flagdata.errors import ConflictError, NotFoundError
+from flagdata.findings import Severity
+from flagdata.lake import Artifact, Lake
+from flagdata.lake.collect import collect
+from flagdata.lake.health import doctor, verify, verify_catalog
+from flagdata.lake.removals import lost
+
+Put = Callable[..., Artifact]
+
+
+def test_bytes_go_from_tags_branches_and_old_versions_and_each_says_by_which_version(lake: Lake, put_text: Put) -> None:
+    film, other = put_text(lake, "film"), put_text(lake, "other")
+    lake.tag("v1")
+    lake.branch("b")
+    done = lake.erase([film.id], "asked to be erased")
+    assert not lake.objects.path(str(film.object)).exists()
+    assert (done.branches, done.tags, done.objects) == (("main", "b"), ("v1",), (film.object,))
+    for ref in ("main", "b"):
+        assert lake.rows(at=ref)["artifact"].to_pylist() == [other.id]
+    assert set(lake.rows(at="v1")["artifact"].to_pylist()) == {film.id, other.id}
+    with pytest.raises(NotFoundError, match=r"erased from all versions by version 4 .asked to be erased."):
+        lake.object_path(str(film.object))
+    assert list(lost(lake, lake.rows(at="v1"))) == [film.object]
+    notes = doctor(lake)
+    assert [(note.kind, note.severity, note.where) for note in notes] == [("erased", Severity.NOTE, "ref v1")]
+    assert not verify(lake, [str(other.object)])
+    assert not verify_catalog(lake)
+    assert collect(lake, grace=timedelta(0)).objects == ()
+
+
+def test_what_was_made_of_it_is_named_before_anything_is_deleted(lake: Lake, put_text: Put) -> None:
+    film = put_text(lake, "film")
+    made = put_text(lake, "made", parents=(film.id,))
+    with pytest.raises(ConflictError, match="made"):
+        lake.erase([film.id], "asked")
+    assert lake.objects.path(str(film.object)).exists()
+    done = lake.erase([film.id], "asked", with_descendants=True)
+    assert set(done.artifacts) == {film.id, made.id}
+    assert not any(lake.objects.path(str(one.object)).exists() for one in (film, made))
+    with pytest.raises(NotFoundError, match="no ref shows"):
+        lake.erase(["0" * 32], "asked")
+
+
+def test_a_withdrawn_row_that_a_tag_shows_can_still_be_erased(lake: Lake, put_text: Put) -> None:
+    film = put_text(lake, "film")
+    lake.tag("v1")
+    lake.withdraw([film.id], "first")
+    assert lake.objects.path(str(film.object)).exists()
+    done = lake.erase([film.id], "then")
+    assert (done.branches, done.tags) == ((), ("v1",))
+    assert not lake.objects.path(str(film.object)).exists()
+
+
+def test_content_that_another_artifact_has_stays_and_what_is_ingested_again_is_whole(
+    lake: Lake, put_text: Put, tmp_path: Path
+) -> None:
+    film = put_text(lake, "film")
+    lake.tag("v1")
+    with lake.transaction("the same bytes") as tx:
+        path = tx.staging(".mcap")
+        path.write_text("film")
+        twin = Artifact(kind=film.kind, name="twin", object=tx.put(path), source_hash="b" * 64)
+        tx.add(twin)
+    done = lake.erase([film.id], "asked")
+    assert done.objects == ()
+    assert list(done.kept) == [film.object]
+    lake.erase([twin.id], "asked")
+    again = put_text(lake, "film")
+    assert again.id == film.id
+    assert collect(lake, grace=timedelta(0)).objects == ()
+    assert lake.object_path(str(again.object)).read_text() == "film"
+    assert not doctor(lake)
+
+
+def test_the_command_reports_what_it_erased_and_ls_marks_the_rows(lake: Lake, put_text: Put) -> None:
+    put_text(lake, "film")
+    lake.tag("v1")
+    run = CliRunner()
+    where = ["--lake", str(lake.path)]
+    done = run.invoke(root, ["withdraw", "film", "-m", "asked", "--everywhere", "--json", *where])
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    assert found["schema"] == "flagdata.erasure/1"
+    assert any("clones" in one for one in found["not_reached"])
+    listed = json.loads(run.invoke(root, ["ls", "--at", "v1", "--json", *where]).stdout)
+    assert [row["data"] for row in listed["artifacts"]] == ["lost"]
+    shown = run.invoke(root, ["ls", "--at", "v1", *where])
+    assert "lost" in shown.stdout
+    assert "without data: film" in shown.stderr
