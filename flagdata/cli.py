@@ -47,7 +47,7 @@ VERBS: dict[str, tuple[str, str]] = {
     "pull": ("flagdata.commands.transfer:pull", "Bring versions of another lake in."),
     "clone": ("flagdata.commands.transfer:clone", "Make a lake with all versions of another."),
     "verify": ("flagdata.commands.upkeep:verify", "Re-hash every object."),
-    "doctor": ("flagdata.commands.upkeep:doctor", "Find and explain what is wrong with a lake."),
+    "doctor": ("flagdata.commands.upkeep:doctor", "Find and explain what is wrong with a lake, or a data set."),
     "gc": ("flagdata.commands.upkeep:gc", "Delete unreferenced files."),
     "recover": ("flagdata.commands.upkeep:recover", "Salvage a record that was cut off."),
     "challenge": ("measure.challenge.command:challenge", "Benchmark close-loop on blind data sets."),

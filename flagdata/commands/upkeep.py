@@ -12,9 +12,11 @@ import click
 
 from flagdata.addresses import local_path
 from flagdata.commands.lake import counted, size_text
-from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
+from flagdata.console import LocalPath, document, json_option, lake_option, progress, say, table
+from flagdata.errors import UsageError
 from flagdata.files import check_input
 from flagdata.findings import Finding, Severity
+from flagdata.timebase import iso
 
 _GATE_NOT_MET = 3
 _CENTURY = 36_525 * 86_400  # s
@@ -65,12 +67,22 @@ def verify(sample: int | None, as_json: bool, lake_path: str) -> None:
 
 
 @click.command()
+@click.argument("source", required=False, type=LocalPath())
 @click.option("--deep", is_flag=True, help="Re-hash the catalog's files and every object, too.")
 @grace_option
 @json_option
 @lake_option
-def doctor(deep: bool, grace: timedelta, as_json: bool, lake_path: str) -> None:
-    """Find and explain what is wrong; exits with 3 when there is something to act on."""
+def doctor(source: Path | None, deep: bool, grace: timedelta, as_json: bool, lake_path: str) -> None:
+    """Find and explain what is wrong with a lake; exits with 3 when there is something to act on.
+
+    With SOURCE, an MCAP file or a LeRobot data set of another program, that is examined instead: stamps in order,
+    rates, gaps, and what an ingest would leave out.
+    """
+    if source is not None:
+        if deep:
+            raise UsageError("--deep with a SOURCE", fix="leave it out: stamps are all that is read")
+        _examine(source, as_json=as_json)
+        return
     from flagdata.ingest.before import unconfirmed
     from flagdata.lake import Artifact, Lake
     from flagdata.lake.health import catalog_files
@@ -92,6 +104,28 @@ def doctor(deep: bool, grace: timedelta, as_json: bool, lake_path: str) -> None:
             findings += tuple(f for f in verified(lake, names, advance=advance) if (f.kind, f.where) not in known)
         checked = f"structure checked, {counted(len(names), 'object')} re-hashed"
     _conclude("doctor", findings, checked, as_json=as_json)
+
+
+def _examine(source: Path, *, as_json: bool) -> None:
+    from flagdata.ingest.foreign import as_dict, examine
+    from flagdata.lake.health import is_healthy
+
+    found = examine(source)
+    if as_json:
+        document("foreign", {"source": str(source), **as_dict(found), "healthy": is_healthy(found.findings)})
+        if not is_healthy(found.findings):
+            sys.exit(_GATE_NOT_MET)
+        return
+    header = ("stream", "holds", "messages", "rate [Hz]", "from", "to")
+    rows = [
+        (
+            one.name, one.holds, one.count, "" if one.rate is None else f"{one.rate:.4g}",
+            iso(one.start), iso(one.end),
+        )
+        for one in found.streams
+    ]  # fmt: skip
+    table(header, rows)
+    _conclude("doctor", found.findings, f"{found.format}: {counted(len(rows), 'stream')} examined", as_json=False)
 
 
 @click.command()

@@ -1,0 +1,221 @@
+"""A doctor for other programs' data sets, before they come in: stamps in order, rates, gaps, and what would be lost.
+
+MCAP files are examined topic by topic, LeRobot data sets episode by episode. Nothing is decoded but stamps and the
+first message of a topic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from flagdata.errors import CorruptError, FlagdataError, InputError
+from flagdata.files import is_lerobot, is_mcap
+from flagdata.findings import Finding, Severity
+from flagdata.schema import FRAME_RATE, FRAME_SIZE
+from flagdata.timebase import NANOSECONDS, iso
+
+_GAP = 1.5  # median steps
+_EARLIEST = 315_532_800 * NANOSECONDS  # 1980: before it a stamp is no date
+_STEADY = 1e-3  # s, that LeRobot's stamps may lie from frame / fps
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stream:
+    """A series of stamps in a data set: a topic, or an episode.
+
+    Attributes:
+        holds: what it is: "pictures", "numbers", or the type of its messages.
+        start, end: first and last stamp [UTC ns].
+        rate: one over the median step [Hz]; `None` for fewer than two stamps.
+        gaps: steps of more than 1.5 median ones; longest: the longest of them [s].
+        backward: stamps that are not after the one before.
+    """
+
+    name: str
+    holds: str
+    count: int
+    start: int
+    end: int
+    rate: float | None
+    gaps: int
+    longest: float
+    backward: int
+
+    @classmethod
+    def of(cls, name: str, holds: str, stamps: NDArray[np.int64]) -> Stream:
+        steps = np.diff(stamps)
+        forward = steps[steps > 0]
+        median = float(np.median(forward)) if len(forward) else 0.0
+        gaps = forward[forward > _GAP * median]
+        return cls(
+            name=name, holds=holds, count=len(stamps), start=int(stamps.min()), end=int(stamps.max()),
+            rate=NANOSECONDS / median if median else None, gaps=len(gaps),
+            longest=float(gaps.max()) / NANOSECONDS if len(gaps) else 0.0, backward=int((steps <= 0).sum()),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Examination:
+    """What was found of a data set."""
+
+    format: str
+    streams: tuple[Stream, ...]
+    findings: tuple[Finding, ...]
+
+
+def examine(path: Path) -> Examination:
+    """Examine an MCAP file or a LeRobot data set.
+
+    Raises:
+        InputError: it is neither.
+        CorruptError: it cannot be read, or was cut off.
+    """
+    if is_mcap(path):
+        return _mcap(path)
+    if is_lerobot(path):
+        return _lerobot(path)
+    raise InputError(
+        "neither an MCAP file nor a LeRobot data set", where=str(path), fix="flagdata ingest --sniff looks at others"
+    )
+
+
+def _mcap(path: Path) -> Examination:
+    from flagdata.ingest.anemometer.containers.mcap import of_numbers
+    from flagdata.ingest.mcap.pictures import of_pictures
+    from flagdata.ingest.mcap.topics import messages, topics
+
+    present = topics(path)
+    pictures, numbers = of_pictures(present), of_numbers(path, present)
+    streams: list[Stream] = []
+    findings: list[Finding] = []
+    for topic in present:
+        holds = "pictures" if topic in pictures else "numbers" if topic in numbers else topic.schema or topic.encoding
+        try:
+            pairs = np.array([(one.stamp, one.log_time) for one in messages(path, topic.name)], dtype=np.int64)
+        except FlagdataError as error:
+            findings.append(_unread(topic.name, error))
+            continue
+        stream = Stream.of(topic.name, holds, pairs[:, 0])
+        streams.append(stream)
+        findings += _judged(stream)
+        apart = float(np.abs(pairs[:, 0] - pairs[:, 1]).max()) / NANOSECONDS
+        if apart > 1:
+            findings.append(
+                Finding(
+                    kind="clocks-apart", severity=Severity.WARNING, where=topic.name, value=apart,
+                    what=f"the stamps of its messages lie up to {apart:.3f} s from when they were logged: a delay, or "
+                    "another clock",
+                    fix="compare it with another topic; align it after it is ingested",
+                )
+            )  # fmt: skip
+    findings += _lost_pictures([one for one in streams if one.holds == "pictures"])
+    rest = [topic.name for topic in present if topic not in (*pictures, *numbers)]
+    if rest:
+        findings.append(_lost("topics", f"topics that hold neither pictures nor numbers: {', '.join(rest)}"))
+    return Examination(format="MCAP", streams=tuple(streams), findings=tuple(findings))
+
+
+def _lerobot(folder: Path) -> Examination:
+    from flagdata.ingest.camera.lerobot import TIME, cameras, described
+
+    info = described(folder)
+    fps = float(info.get("fps") or 0)
+    timed = TIME in info["features"]
+    found = cameras(info)
+    streams: list[Stream] = []
+    findings: list[Finding] = []
+    for path in sorted((folder / "data").glob("*/*.parquet")):
+        try:
+            names = ["episode_index", "frame_index", "timestamp", *([TIME] if timed else [])]
+            table = pq.read_table(path, columns=names)
+        except (pa.ArrowException, OSError) as error:
+            raise CorruptError(f"a table cannot be read: {error}", where=str(path), fix="copy it again") from None
+        for episode in pc.unique(table["episode_index"]).to_pylist():  # pyright: ignore[reportAttributeAccessIssue]
+            rows = table.filter(pc.field("episode_index") == episode)
+            seconds = np.asarray(rows["timestamp"].to_numpy(), dtype=np.float64)
+            stamps = rows[TIME].to_numpy() if timed else np.rint(seconds * NANOSECONDS).astype(np.int64)
+            stream = Stream.of(f"episode {episode}", "frames", stamps)
+            streams.append(stream)
+            findings += [one for one in _judged(stream) if timed or one.kind != "not-a-date"]
+            steady = np.abs(seconds - rows["frame_index"].to_numpy() / fps).max() if fps else np.inf
+            if steady > _STEADY:
+                findings.append(
+                    Finding(
+                        kind="timing-uneven", severity=Severity.WARNING, where=stream.name, value=float(steady),
+                        what=f"its stamps lie up to {steady:.3f} s from frame / fps, where LeRobot looks for its films",
+                        fix="check it with LeRobot's own reader",
+                    )
+                )  # fmt: skip
+    findings += _lost_pictures(streams if found else [])
+    if not timed:
+        what = "no instants: LeRobot counts frame / fps, so gaps, jitter and the date of the camera are not in it"
+        findings.append(_lost("instants", what))
+    own = {TIME, "timestamp", "frame_index", "episode_index", "index", "task_index", *found}
+    others = sorted(set(info["features"]) - own)
+    if others:
+        findings.append(_lost("features", f"features that are no pictures: {', '.join(others)}"))
+    missing = [name for name in ("tasks.parquet", "stats.json") if not (folder / "meta" / name).is_file()]
+    if missing:
+        what = f"meta/ lacks {', '.join(missing)}"
+        findings.append(Finding(kind="files-missing", severity=Severity.WARNING, what=what, fix="copy it again"))
+    if len(streams) != info.get("total_episodes", len(streams)):
+        what = f"{len(streams)} episodes are there, its description states {info['total_episodes']}"
+        findings.append(Finding(kind="episodes-missing", severity=Severity.ERROR, what=what, fix="copy it again"))
+    return Examination(format=f"LeRobot {info['codebase_version']}", streams=tuple(streams), findings=tuple(findings))
+
+
+def _judged(stream: Stream) -> Iterator[Finding]:
+    if stream.backward:
+        yield Finding(
+            kind="stamps-disordered", severity=Severity.ERROR, where=stream.name, count=stream.backward,
+            what=f"{stream.backward} of {stream.count} stamps are not after the one before",
+            fix="an ingest leaves such frames out, and sorts or asks about rows; mend the recorder's clock",
+        )  # fmt: skip
+    if stream.gaps:
+        yield Finding(
+            kind="gaps", severity=Severity.WARNING, where=stream.name, count=stream.gaps, value=stream.longest,
+            what=f"{stream.gaps} gaps, the longest of {stream.longest:.3f} s, at a usual {stream.rate or 0:.4g} Hz",
+            fix="none needed: gaps are kept as such, and clips never span one",
+        )  # fmt: skip
+    if stream.start < _EARLIEST:
+        yield Finding(
+            kind="not-a-date", severity=Severity.WARNING, where=stream.name,
+            what=f"its stamps begin at {iso(stream.start)}: they count from a start, or the clock was not set",
+            fix="give --start when you ingest a film",
+        )  # fmt: skip
+
+
+def _lost_pictures(streams: Sequence[Stream]) -> Iterator[Finding]:
+    if streams:
+        yield _lost("colour", f"colour and size: films become gray squares of {FRAME_SIZE} px; --crop chooses the part")
+    fast = [one for one in streams if one.rate is not None and one.rate > FRAME_RATE * 1.01]
+    if fast:
+        names = ", ".join(f"{one.name} ({one.rate:.4g} Hz)" for one in fast[:5])
+        yield _lost("frames", f"frames beyond {FRAME_RATE:g} Hz of {names}; --rate native keeps them")
+
+
+def _lost(what: str, text: str) -> Finding:
+    return Finding(kind=f"lost-{what}", severity=Severity.NOTE, what=f"an ingest leaves out {text}")
+
+
+def _unread(name: str, error: FlagdataError) -> Finding:
+    severity = Severity.ERROR if isinstance(error, CorruptError) else Severity.NOTE
+    return Finding(kind="topic-unread", severity=severity, where=name, what=error.what, fix=error.fix)
+
+
+def as_dict(found: Examination) -> dict[str, Any]:
+    """JSON values; instants as ISO 8601, rates in Hz."""
+    return {
+        "format": found.format,
+        "streams": [{**vars(one), "start": iso(one.start), "end": iso(one.end)} for one in found.streams],
+        "findings": [finding.as_dict() for finding in found.findings],
+    }
