@@ -37,6 +37,7 @@ VERBS: dict[str, tuple[str, str]] = {
     "branch": ("flagdata.commands.lake:branch", "Begin, list or delete branches."),
     "merge": ("flagdata.commands.lake:merge", "Commit on main what a branch changed."),
     "diff": ("flagdata.commands.lake:diff", "Rows and objects added and removed between two versions."),
+    "label": ("flagdata.commands.label:label", "Put columns of your own on artifacts."),
     "withdraw": ("flagdata.commands.lake:withdraw", "Hide artifacts from a branch; tags still show them."),
     "query": ("flagdata.commands.query:query", "Select rows of the catalog by filter or SQL."),
     "export": (

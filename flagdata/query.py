@@ -1,9 +1,9 @@
 """Rows of the catalog by filter or SQL, at any ref. DuckDB over the Arrow catalog, sealed off from everything else.
 
-SQL sees one table, `catalog`: the columns of `schema.CATALOG` and the derived ones of `DERIVED`. It cannot read or
-write files (nor spill to them), load extensions, change settings or run more than one statement. It is stopped after a
-time limit, and where it needs more than 2 GB or gives more rows than can be held; DuckDB looks at both between blocks
-of 2,048 rows.
+SQL sees one table, `catalog`: the columns of `schema.CATALOG`, the derived ones of `DERIVED`, and `label_<name>` for
+each label of the user's. It cannot read or write files (nor spill to them), load extensions, change settings or run
+more than one statement. It is stopped after a time limit, and where it needs more than 2 GB or gives more rows than can
+be held; DuckDB looks at both between blocks of 2,048 rows.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import duckdb
 import pyarrow as pa
 
 from flagdata.errors import LimitError, UnknownNameError, UsageError
+from flagdata.lake.labels import PREFIX, columns
 from flagdata.lake.matching import Where, matching
 from flagdata.lake.refs import View
 from flagdata.schema import CATALOG, Field, Kind, catalog_schema
@@ -105,7 +106,7 @@ class Request:
         if self.columns is not None and not self.columns:
             raise UsageError("no columns", fix=f"name some of: {', '.join(COLUMNS)}")
         for name in self.columns or ():
-            if name not in COLUMNS:
+            if name not in COLUMNS and not name.startswith(PREFIX):
                 raise UnknownNameError.of("column", name, COLUMNS)
 
 
@@ -127,10 +128,17 @@ class Selection:
             catalog = matching(catalog, request.where)
         self._connection = duckdb.connect(":memory:", config=_SEALED)
         self._left = request.time_limit
+        labels = columns(catalog)
+        for name, values in labels.items():
+            catalog = catalog.append_column(name, values)
+        self._labels = {name: Field(type=values.type, about="a label of the user's") for name, values in labels.items()}
+        for name in request.columns or ():
+            if name not in COLUMNS and name not in labels:
+                raise UnknownNameError.of("column", name, [*COLUMNS, *labels])
         self._held = max(CELL_LIMIT, 2 * catalog.num_rows * catalog.num_columns), max(BYTE_LIMIT, 2 * catalog.nbytes)
         with self._running():
             self._connection.register("stored", catalog)
-            self._connection.execute(f"CREATE VIEW catalog AS SELECT {_view_columns()} FROM stored")
+            self._connection.execute(f"CREATE VIEW catalog AS SELECT {_view_columns(tuple(labels))} FROM stored")
             self._connection.execute("SET TimeZone = 'UTC'")
             self._connection.execute("SET lock_configuration = true")
             self._relation = self._sql(request.sql) if request.sql is not None else self._filtered(request)
@@ -204,7 +212,8 @@ class Selection:
             return raw
         if self.request.columns is None:
             return catalog_schema()
-        return pa.schema([_field(name, COLUMNS[name]) for name in self.request.columns])
+        known = COLUMNS | self._labels
+        return pa.schema([_field(name, known[name]) for name in self.request.columns])
 
     @contextmanager
     def _running(self) -> Iterator[None]:
@@ -248,7 +257,7 @@ def _field(name: str, field: Field) -> pa.Field:
     return pa.field(name, field.type, nullable=field.nullable, metadata=about)
 
 
-def _view_columns() -> str:
+def _view_columns(labels: Sequence[str]) -> str:
     """The catalog as SQL sees it. A NaN is an unknown value, but DuckDB sorts NaN above every number, so that
     "wind > 3" would hold for it: it becomes NULL."""
     stored = [
@@ -257,7 +266,8 @@ def _view_columns() -> str:
         else f'"{name}"'
         for name, field in CATALOG.items()
     ]
-    return ", ".join([*stored, *(f'{sql} AS "{name}"' for name, (_, sql) in DERIVED.items())])
+    own = [f'"{name}"' for name in labels]
+    return ", ".join([*stored, *own, *(f'{sql} AS "{name}"' for name, (_, sql) in DERIVED.items())])
 
 
 def select(

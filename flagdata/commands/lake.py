@@ -84,13 +84,17 @@ def show(artifact: str, at: str | None, as_json: bool, lake_path: str) -> None:
     """Show one artifact: all it says, what it was made from and what was made from it."""
     from flagdata.ingest.before import unconfirmed
     from flagdata.lake import Lake
+    from flagdata.lake.labels import PREFIX
+    from flagdata.lake.tabled import labels_of
 
     lake = Lake.open(lake_path)
     found = lake.artifact(artifact, at=at)
     row = _plain(found.row())
     for column in ("recipe", "parameters", "clock_model", "report"):
         row[column] = json.loads(row[column]) if row[column] else None
-    others = lake.rows(at=at, columns=["artifact", "kind", "name", "parents"]).to_pylist()
+    shown = lake.table(lake.view(at))
+    labels = labels_of(shown).get(found.id, {})
+    others = shown.select(["artifact", "kind", "name", "parents"]).to_pylist()
     parents = [_relative(other) for other in others if other["artifact"] in row["parents"]]
     children = [_relative(other) for other in others if row["artifact"] in other["parents"]]
     path = lake.objects.path(row["object"]) if row["object"] else None
@@ -99,7 +103,8 @@ def show(artifact: str, at: str | None, as_json: bool, lake_path: str) -> None:
         document(
             "show",
             {
-                "artifact": row, "path": str(path) if path else None, "parents": parents, "children": children,
+                "artifact": row, "labels": labels, "path": str(path) if path else None, "parents": parents,
+                "children": children,
                 "findings": [finding.as_dict() for finding in doubts],
             },
         )  # fmt: skip
@@ -107,6 +112,8 @@ def show(artifact: str, at: str | None, as_json: bool, lake_path: str) -> None:
     for column, value in row.items():
         if value is not None and value != [] and column not in ("parents", "report"):
             click.echo(f"{column:<15} {_said(column, value)}")
+    for name, value in labels.items():
+        click.echo(f"{PREFIX + name:<15} {value}")
     if path is not None:
         click.echo(f"{'path':<15} {path}")
     for label, relatives in (("made from", parents), ("made into", children)):

@@ -19,6 +19,7 @@ from flagdata.documents import column_json
 from flagdata.errors import NotFoundError, RefusedError, UsageError
 from flagdata.lake import Lake
 from flagdata.lake.matching import Where
+from flagdata.lake.tabled import labels_of
 from flagdata.query import Request, Selection
 from flagdata.record import Record
 from flagdata.schema import TRUTH_WINDOW, Kind
@@ -84,7 +85,7 @@ def resolve(
         raise NotFoundError(
             "no clips match", where=where, fix="align recordings first, or widen the filter; flagdata query shows rows"
         )
-    table = PairTable.of(clips)
+    table = PairTable.of(clips, labels=labels_of(catalog))
     if split is not None:
         wanted = clips_on_side(catalog, split, split_by)
         table = table.take(np.isin(table.artifact, np.array(sorted(wanted), dtype=np.str_)))

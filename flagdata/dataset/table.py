@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Self
@@ -65,8 +66,12 @@ class PairTable:
         return len(self.artifact)
 
     @classmethod
-    def of(cls, rows: pa.Table) -> Self:
+    def of(cls, rows: pa.Table, *, labels: Mapping[str, Mapping[str, Any]] | None = None) -> Self:
         """The table of catalog rows (with at least `COLUMNS`), in the order of recording, frame and identity.
+
+        Args:
+            labels: artifact → the user's own values; those that are numbers or truth values become the parameters
+                "label.<name>".
 
         Raises:
             CorruptError: a clip without its object or frames.
@@ -77,7 +82,11 @@ class PairTable:
                 artifact = rows.filter(rows[column].is_null())["artifact"][0].as_py()
                 raise CorruptError(f"a clip without {column}", where=f"artifact {artifact}", fix="run flagdata doctor")
         objects, index = np.unique(_text(rows, "object"), return_inverse=True)
-        parameters, names = _parameters(rows["parameters"].to_pylist(), rows["artifact"].to_pylist())
+        ids = rows["artifact"].to_pylist()
+        texts = rows["parameters"].to_pylist()
+        if labels:
+            texts = [_labelled(text, labels.get(i), artifact=i) for text, i in zip(texts, ids, strict=True)]
+        parameters, names = _parameters(texts, ids)
         return cls(
             artifact=_text(rows, "artifact"),
             recording=_text(rows, "recording"),
@@ -154,6 +163,14 @@ def _parameters(texts: Sequence[str | None], artifacts: Sequence[str]) -> tuple[
         for name, value in parsed[text].items() if text else ():
             out[row, column[name]] = value
     return out, np.array(names, dtype=np.str_)
+
+
+def _labelled(text: str | None, labels: Mapping[str, Any] | None, *, artifact: str) -> str | None:
+    """The parameters of a clip with its labels among them."""
+    if not labels:
+        return text
+    known = column_json(text, "parameters", artifact=artifact) if text else {}
+    return json.dumps({**known, "label": labels})
 
 
 def _numbers(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, float]]:

@@ -67,7 +67,7 @@ class Parquet:
             for rows, size, frames in self._groups(source):
                 if writer is None or written + size > self.shard_bytes:
                     stack.close()
-                    writer = stack.enter_context(_part(folder / part_name(parts)))
+                    writer = stack.enter_context(_part(folder / part_name(parts), source.rows.schema))
                     parts, written = parts + 1, 0
                 writer.write_table(pa.Table.from_pylist(rows, schema=writer.schema))
                 written, total = written + size, total + frames
@@ -91,11 +91,11 @@ class Parquet:
             yield rows, size, frames
 
 
-def _part(path: Path) -> pq.ParquetWriter:
-    schema = pa.schema([*catalog_schema(), *FRAME_COLUMNS], metadata=catalog_schema().metadata)
-    compression = dict.fromkeys(CATALOG, "zstd") | {"frames.list.element": "none"}
+def _part(path: Path, rows: pa.Schema) -> pq.ParquetWriter:
+    schema = pa.schema([*rows, *FRAME_COLUMNS], metadata=catalog_schema().metadata)
+    compression = dict.fromkeys(rows.names, "zstd") | {"frames.list.element": "none"}
     # Pictures do not compress further, and a dictionary of them would only cost memory.
-    dictionary = [name for name in CATALOG if name not in ("parents", "quality")]
+    dictionary = [name for name in rows.names if name not in ("parents", "quality")]
     return pq.ParquetWriter(path, schema, compression=compression, use_dictionary=dictionary)  # pyright: ignore[reportArgumentType]
 
 

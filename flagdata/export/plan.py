@@ -13,6 +13,8 @@ from flagdata.errors import NotFoundError, UsageError
 from flagdata.export.choice import check_kinds, current, on_side
 from flagdata.export.source import Source
 from flagdata.lake import Lake
+from flagdata.lake.labels import columns
+from flagdata.lake.tabled import labels_of, with_labels
 from flagdata.manifest import write_manifest
 from flagdata.outputs import fresh_folder
 from flagdata.provenance import code_version, digest, recipe_hash
@@ -172,7 +174,10 @@ def prepare(lake: Lake, request: Export) -> Prepared:
         given = {"filter": request.where, "split": request.split, "version": str(version)}
         where = ", ".join(f"{name} {value}" for name, value in given.items() if value is not None)
         raise NotFoundError("no rows match", where=where, fix="try the filter with flagdata query")
-    source = Source(lake=lake, rows=rows)
+    labels = labels_of(catalog)
+    for name, values in columns(with_labels(rows, labels)).items():
+        rows = rows.append_column(name, values)
+    source = Source(lake=lake, rows=rows, labels=labels)
     return Prepared(request=request, exporter=exporter, version=version, source=source, superseded=replaced)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,7 @@ class Entry:
         record: the record.
         first: index of the first frame in the record.
         count: number of frames; 0 for a record without any.
+        labels: of the user's, by name.
     """
 
     row: Mapping[str, Any]
@@ -51,6 +52,7 @@ class Entry:
     record: Record
     first: int
     count: int
+    labels: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def key(self) -> str:
@@ -117,6 +119,7 @@ class Entry:
             "end_time": None if row["end"] is None else iso(row["end"]),
             "frame_times": times.tolist(),
             "parameters": self.parameters,
+            **({"labels": dict(self.labels)} if self.labels else {}),
         }
 
 
@@ -141,10 +144,12 @@ class Source:
     Attributes:
         lake: that they are in.
         rows: with all columns of `schema.CATALOG`.
+        labels: artifact → the user's own values.
     """
 
     lake: Lake
     rows: pa.Table
+    labels: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return self.rows.num_rows
@@ -184,4 +189,5 @@ class Source:
                 fix="run flagdata verify",
             )
         path = self.lake.object_path(row["object"])
-        return Entry(row=row, path=path, record=record, first=first, count=count)
+        labels = self.labels.get(row["artifact"], {})
+        return Entry(row=row, path=path, record=record, first=first, count=count, labels=labels)

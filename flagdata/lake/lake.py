@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import uuid
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,6 +20,7 @@ from flagdata.lake.catalog import newer
 from flagdata.lake.deletion import check_reuse, delete
 from flagdata.lake.durable import disk_errors, put_if_absent
 from flagdata.lake.erasure import Erasure, erase
+from flagdata.lake.labels import Value, put
 from flagdata.lake.layout import FOLDERS, STORES, scratch_files
 from flagdata.lake.leases import collecting
 from flagdata.lake.merging import MergeResult, merge
@@ -293,6 +294,21 @@ class Lake(Store):
             CorruptError: a ref cannot be read, so that what other rows need is unknown; nothing was deleted.
         """
         return erase(self, artifacts, message, with_descendants=with_descendants)
+
+    def label(
+        self, artifacts: Sequence[str], values: Mapping[str, Value | None], message: str, *, branch: str = MAIN
+    ) -> tuple[int, frozenset[str]]:
+        """Put the user's own values on artifacts, a recording's on its clips too: the version, and the ids of all.
+
+        Args:
+            artifacts: full ids.
+            values: name → value; `None` takes one off.
+
+        Raises:
+            NotFoundError: one that the branch does not show.
+            ConflictError: a name whose values on other artifacts are of another type.
+        """
+        return put(self, artifacts, values, message, branch=branch)
 
     def descendants(self, artifacts: Collection[str], *, at: str | None = None) -> frozenset[str]:
         """Ids of all rows at a ref that were made from `artifacts` (full ids), directly or not; without these."""

@@ -119,6 +119,20 @@ class Lineage:
         """Ids of rows of its base that a branch does not show, since they were withdrawn from it."""
         return frozenset(artifact for entry in self.commits(part) for artifact in noted_hidden(entry))
 
+    def labelled(self, part: Slice) -> Sequence[Entry]:
+        """The commits that put labels on artifacts, oldest first, of all branches whose commits went into one."""
+        if not any("labels" in entry for entries in self._entries.values() for entry in entries):
+            return ()
+        known = self._known(part)
+        found = [
+            entry
+            for entries in self._entries.values()
+            for entry in entries
+            if "labels" in entry
+            and entry["version"] <= known.get(self.life(Slice(branch=entry["branch"], version=entry["version"])), -1)
+        ]
+        return sorted(found, key=lambda entry: entry["version"])
+
     def knows(self, part: Slice, other: Slice) -> bool:
         """Whether all commits that went into `other` went into `part` too."""
         known = self._known(part)

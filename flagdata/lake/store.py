@@ -17,6 +17,7 @@ from flagdata.lake.matching import Where, matching
 from flagdata.lake.objects import Objects
 from flagdata.lake.refs import Refs, Slice, View
 from flagdata.lake.remote_objects import RemoteObjects
+from flagdata.lake.tabled import folded, with_labels
 from flagdata.schema import CATALOG
 from flagdata.storage import Place, RemotePath
 
@@ -120,7 +121,7 @@ class Store:
             if hidden:
                 rows = rows.filter(~pc.field("artifact").isin(sorted(hidden)))
             rows = pa.concat_tables([rows, self._own(part)])
-        return rows
+        return with_labels(rows, folded(self.lineage().labelled(view[0])))
 
     def lineage(self) -> Lineage:
         """How branches came to be, as known at the head."""

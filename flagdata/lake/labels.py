@@ -1,0 +1,120 @@
+"""The user's own columns: values by name that are put on artifacts, typed, versioned with the branch they are put on.
+
+They are notes of commits, not columns of the stored catalog, so that programs that know nothing of them read the lake
+as before. `Store.table` hands them on in its schema's metadata; queries see each as a column `label_<name>`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Collection, Mapping
+from typing import TypeAlias
+
+import pyarrow as pa
+
+from flagdata.errors import ConflictError, NotFoundError, UsageError
+from flagdata.lake.catalog import persist
+from flagdata.lake.durable import disk_errors
+from flagdata.lake.leases import keeping_collectors_out
+from flagdata.lake.store import Store
+from flagdata.lake.tabled import LABELS, labels_of
+from flagdata.lake.withdrawal import clips_of
+from flagdata.schema import catalog_schema
+
+Value: TypeAlias = bool | int | float | str
+PREFIX = "label_"
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
+_LONGEST = 1000  # characters of a text
+
+
+def given(text: str) -> tuple[str, Value | None]:
+    """Name and value of "name=value": true and false, a number, else a text; in double quotes always a text. Nothing
+    behind the sign takes the label off.
+
+    Raises:
+        UsageError: no name and value, a name that cannot be a column, a number that is not finite, or a long text.
+    """
+    name, sign, written = text.partition("=")
+    if not sign or not _NAME.fullmatch(name):
+        fix = "write name=value; a name is of letters, digits and underscores, a letter first"
+        raise UsageError(f"{text!r} is no label", fix=fix)
+    if not written:
+        return name, None
+    try:
+        value = json.loads(written) if re.match(r'[\d"tf-]', written) else written
+    except ValueError:
+        value = written
+    value = value if isinstance(value, bool | int | float | str) else written
+    if isinstance(value, int | float) and not math.isfinite(value):
+        raise UsageError(f"{text!r} is not finite", fix="leave the label out where nobody knows")
+    if isinstance(value, str) and (len(value) > _LONGEST or not value.isprintable()):
+        raise UsageError(f"the text of {name} is longer than {_LONGEST}, or not printable", fix="shorten it")
+    return name, value
+
+
+def put(
+    lake: Store, artifacts: Collection[str], values: Mapping[str, Value | None], message: str, *, branch: str
+) -> tuple[int, frozenset[str]]:
+    """See `Lake.label`."""
+
+    def attempt() -> tuple[int, frozenset[str]]:
+        head = lake.catalog.head()
+        shown = lake.table(lake.refs.view(branch, head))
+        known = set(shown["artifact"].to_pylist())
+        if absent := sorted(set(artifacts) - known):
+            raise NotFoundError(
+                f"{', '.join(absent)} is not on branch {branch!r}", where=str(lake.path),
+                fix=f"give ids of rows that flagdata ls --at {branch} shows",
+            )  # fmt: skip
+        labelled = frozenset(artifacts) | clips_of(shown, artifacts)
+        _check_types(labels_of(shown), values, except_of=labelled)
+        noted = {artifact: dict(values) for artifact in sorted(labelled)}
+        info = {"message": message, "branch": branch, LABELS: json.dumps(noted, ensure_ascii=False, allow_nan=False)}
+        return lake.catalog.append(catalog_schema().empty_table(), base=head, info=info), labelled
+
+    lake.check_writable()
+    with disk_errors("labelling", lake.path), keeping_collectors_out(lake.staging):
+        return persist(attempt, where=lake.catalog.path)
+
+
+def _check_types(
+    present: Mapping[str, Mapping[str, Value]], values: Mapping[str, Value | None], *, except_of: Collection[str]
+) -> None:
+    """Whether a name keeps its type; that of artifacts which are labelled anew does not count.
+
+    Raises:
+        ConflictError: it does not.
+    """
+    for artifact, labels in present.items():
+        for name, value in values.items():
+            if value is None or artifact in except_of or name not in labels:
+                continue
+            if kind(labels[name]) != kind(value):
+                raise ConflictError(
+                    f"{name} is a {kind(labels[name])} on other artifacts, as {labels[name]!r}, not a {kind(value)}",
+                    where=artifact, fix="give a value of that type, or take the label off the others: name=",
+                )  # fmt: skip
+
+
+def kind(value: Value) -> str:
+    """The type of a label's value in words."""
+    return "truth value" if isinstance(value, bool) else "text" if isinstance(value, str) else "number"
+
+
+def columns(catalog: pa.Table) -> dict[str, pa.Array]:
+    """Name of a column → the values of the rows of a table, null where a row has no such label."""
+    labels = labels_of(catalog)
+    ids = catalog["artifact"].to_pylist()
+    names = sorted({name for artifact in ids if artifact in labels for name in labels[artifact]})
+    return {PREFIX + name: _column([labels.get(artifact, {}).get(name) for artifact in ids]) for name in names}
+
+
+def _column(values: list[Value | None]) -> pa.Array:
+    kinds = {kind(value) for value in values if value is not None}
+    if kinds == {"truth value"}:
+        return pa.array(values, pa.bool_())
+    if kinds == {"number"}:
+        return pa.array([None if value is None else float(value) for value in values], pa.float64())
+    return pa.array([None if value is None else str(value) for value in values], pa.string())
