@@ -310,7 +310,7 @@ class _Films:
         self._rate = rate
         self._open = ExitStack()
         self._writing: tuple[Any, Any] | None = None
-        self._path: Path | None = None
+        self._size = 0
         self._number = -1
         self._frames = 0
 
@@ -331,14 +331,16 @@ class _Films:
             frame = av.VideoFrame.from_ndarray(np.repeat(image[..., None], 3, axis=2), format="rgb24")
             frame = frame.reformat(format="yuv420p")
             frame.pts, frame.time_base = self._frames, 1 / self._rate
-            container.mux(stream.encode(frame))
+            packets = stream.encode(frame)
+            self._size += sum(packet.size for packet in packets)
+            container.mux(packets)
             self._frames += 1
         chunk, file = divmod(self._number, _CHUNK)
         place = {
             "chunk_index": chunk, "file_index": file, "from_timestamp": float((begin or 0) / self._rate),
             "to_timestamp": float(self._frames / self._rate),
         }  # fmt: skip
-        if self._path is not None and self._path.stat().st_size >= _VIDEO_BYTES:
+        if self._size >= _VIDEO_BYTES:
             self._finish()
         return {f"videos/{CAMERA}/{name}": value for name, value in place.items()}
 
@@ -349,8 +351,8 @@ class _Films:
             raise InputError(f"AV1 of {width} × {height} px", where="--frames", fix="export with --frames png")
         self._number += 1
         self._frames = 0
-        self._path = _path(self._folder, self._number, "mp4")
-        container = self._open.enter_context(av.open(str(self._path), "w"))
+        self._size = 0
+        container = self._open.enter_context(av.open(str(_path(self._folder, self._number, "mp4")), "w"))
         options = {"crf": "30", "g": "2", "preset": "8", "svtav1-params": "lp=1"}
         stream: Any = container.add_stream("libsvtav1", rate=self._rate, options=options)
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
