@@ -86,8 +86,7 @@ def ingest_record(lake: Lake, path: Path, *, labels: Labels | None = None, branc
         source.check_unchanged()
         transaction.add(artifact)
         if artifact.kind is Kind.RECORDING:
-            stored = Record.open(lake.object_path(str(artifact.object)))
-            for clip in clip_rows(stored, artifact, window=truth_window(artifact.recipe)):
+            for clip in clip_rows(record, artifact, window=truth_window(artifact.recipe)):
                 transaction.add(clip)
     return result_of(transaction, artifact, report, labels)
 

@@ -27,7 +27,7 @@ from flagdata.lake.withdrawal import check_leaving, clips_of, descendants, take_
 BEYOND = (
     "exports that were made of them",
     "clones and copies of this lake",
-    "decoded caches outside it, and backups",
+    "caches outside it, and backups",
     "the files that were ingested",
 )
 """What holds the bytes where this lake does not reach."""
@@ -57,7 +57,7 @@ class Erasure:
 def erase(lake: Store, artifacts: Collection[str], message: str, *, with_descendants: bool) -> Erasure:
     """See `Lake.erase`."""
     lake.check_writable()
-    with disk_errors("erasing", lake.path), collecting(lake.staging):
+    with disk_errors("erasing", lake.path), collecting(lake.staging) as check:
         shown = {ref: lake.rows(at=ref) for ref in (MAIN, *lake.refs.branches(), *lake.refs.tags())}
         going = _all(shown, frozenset(artifacts), with_descendants=with_descendants, where=str(lake.path))
         erased = {
@@ -72,6 +72,7 @@ def erase(lake: Store, artifacts: Collection[str], message: str, *, with_descend
         version = 0
         for branch in branches or [MAIN]:
             version = persist(lambda b=branch: _off(lake, erased, message, branch=b), where=lake.catalog.path)
+        check()
         removed, kept = _delete(lake, {name for name in erased.values() if name is not None})
     return Erasure(
         version=version, artifacts=tuple(sorted(erased)), branches=tuple(branches),

@@ -87,8 +87,7 @@ def lost(lake: Store, rows: pa.Table) -> dict[str, NotFoundError]:
     """Object of some of the rows that is not in the lake → why."""
     found: dict[str, NotFoundError] = {}
     for name in sorted(set(rows["object"].drop_null().to_pylist())):
-        try:
-            lake.objects.existing(name)
-        except NotFoundError as error:
-            found[name] = explained(lake, name, error)
+        if not lake.objects.has(name):
+            missing = NotFoundError(f"object {name} is missing", where=str(lake.path), fix="run flagdata doctor")
+            found[name] = explained(lake, name, missing)
     return found
