@@ -37,8 +37,9 @@ def all_bits(outcomes: Sequence[Outcome]) -> list[bytes | None]:
     [
         {}, {"more": '[integrator]\nname = "implicit"'}, {"more": "[contact]\nthickness = 0.02"},
         {"more": "[effects.gusts]\nintensity = 0.2\n[effects.hysteresis]\ncouple = 1e-3"},
+        {"more": '[integrator]\nbackend = "warp"'},
     ],
-    ids=["explicit", "implicit", "contact", "effects"],
+    ids=["explicit", "implicit", "contact", "effects", "warp"],
 )  # fmt: skip
 def test_a_member_is_the_same_to_the_bit_whatever_it_is_simulated_with(make_recipe: Callable, additions: dict) -> None:
     crew = Crew(make_recipe(**additions))
@@ -49,6 +50,12 @@ def test_a_member_is_the_same_to_the_bit_whatever_it_is_simulated_with(make_reci
     assert len(set(together)) == SIZE
     assert all_bits(run(crew, stepper, members[::-1], size=SIZE))[::-1] == together
     assert bits(run(crew, stepper, members[1:2], size=SIZE)[0]) == together[1]
+
+
+def test_a_backend_that_cannot_run_a_recipe_is_refused_before_the_first_step(make_recipe: Callable) -> None:
+    more = '[integrator]\nbackend = "warp"\n[effects.lift]\ncoefficient = 2.0'
+    with pytest.raises(UsageError, match="only the base model, not effects"):
+        Stepper.of(Crew(make_recipe(more=more)))
 
 
 @pytest.mark.parametrize(
