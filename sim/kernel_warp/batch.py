@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import threading
 import weakref
 from dataclasses import dataclass
 from types import ModuleType
@@ -63,9 +64,10 @@ class WarpKernel:
             UsageError: warp-lang is not installed, or has no such device; numbers that are not float32; a mesh that is
                 too large; a system with more than the base model, which is named.
         """
-        if system not in _KERNELS:
-            _KERNELS[system] = cls._build(system)
-        return _KERNELS[system]
+        with _LAUNCHING:
+            if system not in _KERNELS:
+                _KERNELS[system] = cls._build(system)
+            return _KERNELS[system]
 
     @classmethod
     def _build(cls, system: System) -> WarpKernel:
@@ -123,16 +125,18 @@ class WarpKernel:
         after = (x.clone(memory_format=torch.contiguous_format), v.clone(memory_format=torch.contiguous_format))
         motion = self.code.Motion()
         motion.wind, motion.targets, motion.rate = (wp.from_torch(tensor) for tensor in given)
-        kernel = self.code.kernel(mesh.vertex_count, len(mesh.faces), len(mesh.hinges))
         where = wp.device_from_torch(x.device)
-        wp.launch_tiled(
-            kernel, dim=[self.system.cloth.batch], block_dim=self.code.THREADS, device=where,
-            inputs=[self.sheet, self.members, motion, *(wp.from_torch(tensor) for tensor in after), h, steps],
-            stream=wp.stream_from_torch(torch.cuda.current_stream(x.device)) if where.is_cuda else None,
-        )  # fmt: skip
+        with _LAUNCHING:
+            kernel = self.code.kernel(mesh.vertex_count, len(mesh.faces), len(mesh.hinges))
+            wp.launch_tiled(
+                kernel, dim=[self.system.cloth.batch], block_dim=self.code.THREADS, device=where,
+                inputs=[self.sheet, self.members, motion, *(wp.from_torch(tensor) for tensor in after), h, steps],
+                stream=wp.stream_from_torch(torch.cuda.current_stream(x.device)) if where.is_cuda else None,
+            )  # fmt: skip
         return after
 
 
+_LAUNCHING = threading.Lock()  # Warp is started, compiles and launches in one thread at a time
 _KERNELS: weakref.WeakKeyDictionary[System, WarpKernel] = weakref.WeakKeyDictionary()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -164,3 +165,16 @@ def test_a_recipe_names_the_backend_and_its_hash_changes_only_then() -> None:
     assert recipe('backend = "warp"').identity() != recipe("").identity()
     with pytest.raises(UsageError, match="only leapfrog steps"):
         recipe('name = "implicit"\nbackend = "warp"')
+
+
+def test_threads_may_run_batches_at_once(make_system, plain) -> None:
+    # As `flagdata simulate --workers` does; the mesh is one that no other test has had compiled.
+    mesh = grid(width=0.5, height=0.3, columns=5, rows=3)
+
+    def one(_: int) -> torch.Tensor:
+        system, start = make_system(mesh, [plain], wind=(3.0, 0.5, 0.0), dtype=torch.float32)
+        return advance(system, start, 0.002, steps=20, backend=Backend.WARP).position
+
+    with ThreadPoolExecutor(4) as pool:
+        first, *others = pool.map(one, range(8))
+    assert all(torch.equal(other, first) for other in others)
