@@ -12,6 +12,7 @@ from click.testing import CliRunner
 
 from flagdata.cli import root
 from flagdata.errors import ConflictError, NotFoundError
+from flagdata.export import Export, export
 from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.collect import collect
@@ -39,6 +40,23 @@ def test_bytes_go_from_tags_branches_and_old_versions_and_each_says_by_which_ver
     assert not verify(lake, [str(other.object)])
     assert not verify_catalog(lake)
     assert collect(lake, grace=timedelta(0)).objects == ()
+
+
+def test_an_old_version_whose_data_gc_took_says_so_to_ls_export_and_doctor_alike(
+    lake: Lake, put_text: Put, tmp_path: Path
+) -> None:
+    film = put_text(lake, "film")
+    version = str(lake.catalog.head())
+    lake.withdraw([film.id], "blurred")
+    collect(lake, grace=timedelta(0))
+    (why,) = lost(lake, lake.rows(at=version)).values()
+    assert "withdrawn by version 2 (blurred)" in why.what
+    listed = CliRunner().invoke(root, ["ls", "--at", version, "--lake", str(lake.path)])
+    assert "without data: film" in listed.stderr
+    with pytest.raises(NotFoundError) as refused:
+        export(lake, Export(format="csv", at=version), tmp_path / "out")
+    assert refused.value.what == why.what
+    assert [note.kind for note in doctor(lake)] == ["withdrawn-collected"]
 
 
 def test_what_was_made_of_it_is_named_before_anything_is_deleted(lake: Lake, put_text: Put) -> None:
