@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from http.client import HTTPConnection
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
 from typing import ClassVar
@@ -93,6 +94,27 @@ class Denying(Careless):
         )
 
     do_GET = do_HEAD = do_POST = do_PUT  # noqa: N815
+
+
+class ReadOnly(Denying):
+    """Passes reads on to another store, and refuses writes."""
+
+    store: ClassVar[str] = ""
+
+    def do_GET(self) -> None:
+        connection = HTTPConnection(self.store, timeout=30)
+        connection.request(self.command, self.path, headers=dict(self.headers))
+        answer = connection.getresponse()
+        content = answer.read()
+        connection.close()
+        self.send_response_only(answer.status)
+        for name, value in answer.getheaders():
+            if name.lower() not in ("connection", "transfer-encoding"):
+                self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(content)
+
+    do_HEAD = do_GET  # noqa: N815
 
 
 @contextmanager

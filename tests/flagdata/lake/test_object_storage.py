@@ -26,7 +26,7 @@ from flagdata.lake.transaction import Transaction
 from flagdata.schema import Kind
 from flagdata.storage import RemotePath
 from tests.program import invoke
-from tests.s3 import SECRETS, Careless, Denying, serving
+from tests.s3 import SECRETS, Careless, Denying, ReadOnly, serving
 
 NOW = timedelta(0)
 Put = Callable[..., Artifact]
@@ -153,6 +153,20 @@ def test_a_lake_at_another_storage_is_refused_and_makes_no_folder(
     with pytest.raises(UsageError, match="object storage"):
         Lake.create(address)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_with_credentials_that_permit_reading_alone_rows_are_read_and_nothing_is_written(
+    remote_lake: Lake, put_text: Put, use_store: Use, s3_server: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = str(put_text(remote_lake, "gusts").object)
+    monkeypatch.setattr(ReadOnly, "store", s3_server.removeprefix("http://"))
+    with serving(ReadOnly) as address:
+        use_store(address)
+        lake = Lake.open(str(remote_lake.path))
+        assert lake.rows()["name"].to_pylist() == ["gusts"]
+        assert lake.object_path(name).read_text() == "gusts"
+        with pytest.raises(FlagdataError, match="can be read, but not written"):
+            put_text(lake, "more")
 
 
 def test_where_no_lake_is_in_a_bucket_it_says_so(bucket_folder: str) -> None:
