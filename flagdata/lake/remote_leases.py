@@ -19,6 +19,7 @@ A holder that could not write for half of `life` does not publish and deletes no
 from __future__ import annotations
 
 import json
+import logging
 import os
 import socket
 import threading
@@ -39,6 +40,9 @@ LIFE = 240.0
 """How long what is not written anew counts [s]: longer than all retries of one request."""
 _FIRST_WAIT = 0.02  # s
 _LONGEST_WAIT = 1.0  # s
+_SILENT = 10.0
+"""How long is waited without a word [s]."""
+_LOG = logging.getLogger("flagdata")
 LEASE = "lease"
 COLLECT = "collect"
 MADE = "made"
@@ -123,8 +127,7 @@ class Held:
 def sharing(staging: RemotePath) -> Iterator[Held]:
     """Nobody collects during the block."""
     text = _line(owner())
-    wait = _FIRST_WAIT
-    while True:
+    for _ in _pauses(staging):
         held = Held(_put(staging / SHARED / uuid.uuid4().hex, text), text)
         try:
             if _living(staging / COLLECT, staging) is None:
@@ -132,8 +135,6 @@ def sharing(staging: RemotePath) -> Iterator[Held]:
                 return
         finally:
             held.close()
-        time.sleep(wait)
-        wait = min(2 * wait, _LONGEST_WAIT)
 
 
 @contextmanager
@@ -141,16 +142,10 @@ def alone(staging: RemotePath) -> Iterator[Held]:
     """Nobody else has the shared or the exclusive lock during the block."""
     place = staging / COLLECT
     text = _line({**owner(), "id": uuid.uuid4().hex})
-    wait = _FIRST_WAIT
-    while (tag := _taken(place, text, staging)) is None:
-        time.sleep(wait)
-        wait = min(2 * wait, _LONGEST_WAIT)
+    tag = next(tag for _ in _pauses(staging) if (tag := _taken(place, text, staging)) is not None)
     held = Held(place, text, e_tag=tag)
     try:
-        wait = _FIRST_WAIT
-        while _sharers(staging):
-            time.sleep(wait)
-            wait = min(2 * wait, _LONGEST_WAIT)
+        next(None for _ in _pauses(staging) if not _sharers(staging))
         held.check()
         yield held
     finally:
@@ -196,10 +191,23 @@ def _sharers(staging: RemotePath) -> bool:
 
 def await_collectors(staging: RemotePath) -> None:
     """Wait until nobody collects who may have read the leases before."""
-    wait = _FIRST_WAIT
-    while _living(staging / COLLECT, staging) is not None:
+    next(None for _ in _pauses(staging) if _living(staging / COLLECT, staging) is None)
+
+
+def _pauses(staging: RemotePath) -> Iterator[None]:
+    """Endless tries, the first at once, with waits between them that grow; a wait that becomes long is reported."""
+    wait, begun, said = _FIRST_WAIT, _now(), False
+    while True:
+        yield
         time.sleep(wait)
         wait = min(2 * wait, _LONGEST_WAIT)
+        if not said and _now() - begun > _SILENT:
+            said = True
+            _LOG.warning(
+                "flagdata: waiting for another process that uses the lake: it collects, names a version or commits\n"
+                "  where: %s\n  fix:   none needed; if it was killed on another machine, its lock is void after %.0f s",
+                staging, LIFE,
+            )  # fmt: skip
 
 
 def lease_lines(folder: RemotePath) -> tuple[list[str], bool]:

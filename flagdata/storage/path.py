@@ -47,6 +47,12 @@ class DeniedError(StoreError, PermissionError):
     fix = "check the credentials (AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or AWS_PROFILE) and what they permit"
 
 
+class NoBucketError(StoreError):
+    """There is no such bucket at this end point."""
+
+    fix = "make the bucket with the store's own tools, or check its name and the end point (AWS_ENDPOINT_URL)"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Status:
     """Size [B], when it was written [s since 1970, by the store's clock], and the version that conditions name."""
@@ -288,6 +294,11 @@ class RemotePath:
         except FileNotFoundError:
             return False
 
+    def _check_bucket(self, error: Exception) -> None:
+        """Raises NoBucketError where that is what the store says."""
+        if "NoSuchBucket" in str(error):
+            raise NoBucketError(errno.ENOENT, f"there is no bucket {self.bucket!r}", str(self)) from None
+
     def _ask(self, request: Callable[[Any, S3Store], T]) -> T:
         """The answer of the store; what it refuses is an error of the system that shows no credentials."""
         store = connection.client(self.bucket)
@@ -296,7 +307,8 @@ class RemotePath:
 
         try:
             return request(obstore, store)
-        except (FileNotFoundError, exceptions.NotFoundError):
+        except (FileNotFoundError, exceptions.NotFoundError) as error:
+            self._check_bucket(error)
             raise FileNotFoundError(errno.ENOENT, "there is no such object", str(self)) from None
         except (exceptions.AlreadyExistsError, exceptions.PreconditionError):
             raise FileExistsError(
@@ -305,6 +317,7 @@ class RemotePath:
         except (exceptions.PermissionDeniedError, exceptions.UnauthenticatedError) as error:
             raise DeniedError(errno.EACCES, connection.plain(error), str(self)) from None
         except (exceptions.BaseError, OSError) as error:
+            self._check_bucket(error)
             denied = "status code: 403" in str(error) or "status code: 401" in str(error)
             kind = DeniedError if denied else StoreError
             raise kind(errno.EACCES if denied else errno.EREMOTEIO, connection.plain(error), str(self)) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import logging
 import os
@@ -169,6 +170,11 @@ def test_with_credentials_that_permit_reading_alone_rows_are_read_and_nothing_is
             put_text(lake, "more")
 
 
+def test_a_bucket_that_is_not_there_is_named(bucket_folder: str) -> None:
+    with pytest.raises(FlagdataError, match="no bucket 'nowhere'"):
+        Lake.create("s3://nowhere/lake")
+
+
 def test_where_no_lake_is_in_a_bucket_it_says_so(bucket_folder: str) -> None:
     with pytest.raises(NotFoundError, match="no lake"):
         Lake.open(bucket_folder)
@@ -256,6 +262,15 @@ def test_who_was_cut_off_for_long_publishes_nothing(
         put_text(remote_lake, "late")
     monkeypatch.undo()
     assert remote_lake.rows().num_rows == 0
+
+
+def test_a_long_wait_for_a_lock_is_reported_once(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(remote_leases, "_SILENT", 0.0)
+    tries = list(itertools.islice(remote_leases._pauses(RemotePath("bucket", "lake/staging")), 4))
+    assert len(tries) == 4
+    assert caplog.text.count("waiting for another process") == 1
 
 
 def test_the_exclusive_lock_keeps_writers_waiting(remote_lake: Lake, put_text: Put) -> None:
