@@ -27,6 +27,7 @@ VERBS: dict[str, tuple[str, str]] = {
     "train": ("models.training.command:train", "Train a network on the clips of a lake, and commit it."),
     "evaluate": ("models.evaluation.command:evaluate", "Evaluate trained networks on test clips, in one table."),
     "measure": ("measure.estimate.command:measure", "Measure wind and cloth from a film, with intervals, or refuse."),
+    "observe": ("measure.observables.command:observe", "Read droop, extension, speed and frequency off a film."),
     "calibrate": ("measure.calibrate.command:calibrate", "Weigh a filmed flag's cloth with the log of the wind."),
     "close-loop": ("measure.closing.command:close_loop", "Find what the model of a cloth lacks, and add it."),
     "propose": ("measure.propose.command:propose", "Propose an effect that the library lacks, and test it."),

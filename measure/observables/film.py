@@ -14,8 +14,6 @@ from measure.observables.unseen import UnseenError
 
 _SHOWN = 0.8
 """Share of a window's frames whose outline is to be found."""
-_FREE_END = (0.94, 1.0)
-"""Part of the silhouette's area, counted from the hoist, that stands for the free edge."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,7 +73,7 @@ class FilmWindow:
     def free_edge(self) -> NDArray[np.float64]:
         """(n, 2) middle of the free edge, as far as the outline shows it: away from the middle of the hoist, and above
         it [m]."""
-        return self.silhouettes.middle_of(*_FREE_END)
+        return self.silhouettes.free_edge()
 
     @cached_property
     def middle(self) -> NDArray[np.float64]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 
+_TAIL = 0.06
+"""Share of a silhouette's area that stands for its free end."""
 BESIDE = 0.15
 """Share of the chord next to the hoist that counts as held, not as free."""
 
@@ -67,3 +70,35 @@ class Silhouettes:
         inside = np.clip(begins + profile / total, low, high) - np.clip(begins, low, high)
         up = np.einsum("nrc,r->nc", self.masks, self.rows) / held
         return np.stack([(inside * self.columns).sum(axis=1), (inside * up).sum(axis=1)], axis=1) / (high - low)
+
+    def free_edge(self) -> NDArray[np.float64]:
+        """(n, 2) middle of the free edge as far as an outline shows it [m]: midway between the middle quarter of the
+        free outline and the centroid of the `_TAIL` of the area that is farthest along the chord; NaN without cloth.
+
+        Against the mean of the edge's points, the first is too high where the flag droops, the second too low.
+        """
+        found = np.full((len(self.masks), 2), np.nan)
+        for k, mask in enumerate(self.masks):
+            if mask.any():
+                found[k] = (self._along_outline(mask) + self._tail(mask)) / 2
+        return found
+
+    def _tail(self, mask: NDArray[np.bool_]) -> NDArray[np.float64]:
+        rows, columns = np.nonzero(mask)
+        places = np.stack([self.columns[columns], self.rows[rows]], axis=1)
+        along = places @ places.mean(axis=0)
+        return places[along >= np.quantile(along, 1 - _TAIL)].mean(axis=0)
+
+    def _along_outline(self, mask: NDArray[np.bool_]) -> NDArray[np.float64]:
+        contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        border = np.asarray(max(contours, key=len), np.int64)[:, 0]
+        places = np.stack([self.columns[border[:, 0]], self.rows[border[:, 1]]], axis=1)
+        upper, lower = (
+            int(np.hypot(places[:, 0], places[:, 1] - end).argmin()) for end in (self.height / 2, -self.height / 2)
+        )
+        places = np.roll(places, -upper, axis=0)
+        there, back = places[: (lower - upper) % len(places) + 1], places[(lower - upper) % len(places) :]
+        free = there if there[:, 0].mean() >= back[:, 0].mean() else back
+        length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(free, axis=0).T))])
+        middle = np.abs(length - length[-1] / 2) <= length[-1] / 8
+        return free[middle].mean(axis=0)

@@ -31,6 +31,7 @@ ALLOWED = {
     "flagdata/export/csv_text.py": INSIDE, "flagdata/export/mcap.py": INSIDE, "flagdata/export/mp4.py": INSIDE,
     "flagdata/export/parquet.py": INSIDE, "flagdata/export/webdataset.py": INSIDE,
     "flagdata/export/wind_csv.py": INSIDE, "flagdata/ingest/meshes/folder.py": INSIDE,
+    "measure/observables/table.py": INSIDE,
     "flagdata/commands/query.py": INSIDE, "measure/challenge/folder.py": INSIDE, "measure/demo/field.py": INSIDE,
     "measure/demo/page.py": INSIDE, "measure/demo/tracked.py": INSIDE, "sim/blender/worker.py": SCRATCH,
     "sim/datasets/record.py": SCRATCH, "sim/datasets/plan.py": SCRATCH, "measure/nulls/plan.py": SCRATCH,

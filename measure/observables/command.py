@@ -1,0 +1,97 @@
+"""`flagdata observe`: what a film shows in numbers with units, window by window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from flagdata.commands.durations import DURATION
+from flagdata.console import LocalPath, document, json_option, say
+from flagdata.errors import RefusedError, UsageError
+
+
+@click.command()
+@click.argument("source", metavar="SOURCE")
+@click.option("--flag-size", metavar="LxH", required=True, help="Length along the wind and height along the pole [m], "
+              "as in 1.5x1.0; the height gives the scale.")  # fmt: skip
+@click.option("--window", "seconds", type=DURATION, default="2.5s", show_default=True, help="Length of a window.")
+@click.option("--crop", metavar="X,Y,W,H", help="Region in which the flag is [px]; by default the whole picture.")
+@click.option("--flag", type=click.IntRange(min=1), metavar="N",
+              help="Which moving cloth; by default the one that moves most.")  # fmt: skip
+@click.option("--start", "first", type=DURATION, metavar="TIME", help="Where to begin in the film, as in 12s.")
+@click.option("--end", "last", type=DURATION, metavar="TIME", help="Where to end.")
+@click.option("--true-fps", type=float, metavar="HZ", help="Rate at which a high-speed camera really ran.")
+@click.option("--sequence-fps", type=float, metavar="HZ", help="Rate of a folder of images.")
+@click.option("--parquet", "parquet_path", type=LocalPath(), metavar="FILE.parquet", help="Write the table as Parquet.")
+@click.option("--zarr", "zarr_path", type=LocalPath(), metavar="FOLDER", help="Write the table as a Zarr data set.")
+@click.option("--picture", "picture_path", type=LocalPath(), metavar="FILE.png", help="Draw each observable against "
+              "time, and against the log's wind where the recording has one.")  # fmt: skip
+@click.option("--lake", "lake_path", type=LocalPath(), envvar="FLAGDATA_LAKE", help="Where recordings are; also "
+              "FLAGDATA_LAKE.")  # fmt: skip
+@click.option("--at", metavar="REF", default="main", show_default=True, help="Tag, branch or version of the lake.")
+@json_option
+def observe(
+    source: str, flag_size: str, seconds: float, crop: str | None, flag: int | None, first: float | None,
+    last: float | None, true_fps: float | None, sequence_fps: float | None, parquet_path: Path | None,
+    zarr_path: Path | None, picture_path: Path | None, lake_path: Path | None, at: str, as_json: bool,
+) -> None:  # fmt: skip
+    """Read observables off a film: droop, extension, speeds, frequency, amplitudes, wave, area.
+
+    SOURCE is a video file, a folder of images, or a recording, clip or camera of --lake by its name or id. Each window
+    gives a value with its unit, or the reason why it shows none. docs/method/films.md defines each observable and
+    states its error.
+
+    \b
+      flagdata observe clip.mp4 --flag-size 1.5x1.0 --parquet clip.parquet --picture clip.png
+      flagdata observe recording-7 --lake lake --flag-size 1.5x1.0 --json
+    """
+    from flagdata.ingest.camera import CropBox, parse_crop
+    from flagdata.lake import Lake
+    from flagdata.outputs import check_file, check_folder, fresh_folder, write_file
+    from flagdata.pages.pictures import png
+    from measure.estimate.similarity import parse_size
+    from measure.estimate.source import Reading, subjects
+    from measure.observables.picture import picture
+    from measure.observables.table import table_of
+    from measure.observables.watching import watched
+
+    if parquet_path is not None:
+        check_file(parquet_path)
+    if picture_path is not None:
+        check_file(picture_path, command="observe")
+    if zarr_path is not None:
+        check_folder(zarr_path)
+    if seconds < 1.0:
+        raise UsageError(f"windows of {seconds:g} s", where="--window", fix="give 1s or more: a flutter's period")
+    box = None if crop is None else parse_crop(crop)
+    if not (box is None or isinstance(box, CropBox)):
+        raise UsageError(f"the crop {crop!r} is not a box", where="--crop", fix="give x,y,width,height in pixels")
+    size = parse_size(flag_size)
+    lake = None if lake_path is None else Lake.open(lake_path)
+    reading = Reading(crop=box, flag=flag, aspect=size.aspect, true_fps=true_fps, sequence_fps=sequence_fps)
+    (subject,) = subjects(source, query=None, lake=lake, at=at, reading=reading)
+    windows = watched(subject.film, size, first=first, last=last, seconds=seconds)
+    table = table_of(
+        windows, film=subject.film.name, length=size.length, height=size.height, start=subject.film.start,
+        wind=None if subject.record is None else subject.record.wind(),
+    )  # fmt: skip
+    for sentence in subject.film.sentences:
+        say(f"  {sentence}")
+    if table.empty:
+        raise RefusedError(
+            f"none of {len(table.time)} windows shows the cloth: its outline or its hoist was not found",
+            where=subject.film.name, fix="give --crop around one whole flag on its pole, or another film",
+        )  # fmt: skip
+    if parquet_path is not None:
+        write_file(parquet_path, table.parquet())
+    if zarr_path is not None:
+        with fresh_folder(zarr_path) as scratch:
+            table.write_zarr(scratch)
+    if picture_path is not None:
+        write_file(picture_path, png(picture(table)), command="observe")
+    if as_json:
+        document("observe", table.as_dict())
+    else:
+        for line in table.lines():
+            click.echo(line)

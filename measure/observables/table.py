@@ -1,0 +1,166 @@
+"""Observables of a film as a table: a row a window, with the log's wind where there is one."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.dataset.truth import TruthSeries, over_ground
+from flagdata.lake.meshes import write_plain
+from flagdata.signals import WindSeries
+from flagdata.timebase import NANOSECONDS
+from measure.observables import OBSERVABLES
+from measure.observables.observable import Observable, Reading
+from measure.observables.unseen import REASONS
+from measure.observables.watching import Watched
+
+SCHEMA = "flagdata.observables/1"
+UNSEEN = "no-silhouette"
+"""Reason of all observables of a window in which no cloth was found."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Table:
+    """Readings of a film.
+
+    Attributes:
+        film: its name.
+        length, height: of the flag that the scale is from [m].
+        seconds: length of a window.
+        time: (w,) middles of the windows [s from the film's first frame].
+        readings: observable → (w,) readings.
+        wind: (w,) of the log, the mean over the window [m/s]; NaN where it was silent. None without a log.
+    """
+
+    film: str
+    length: float
+    height: float
+    seconds: float
+    time: NDArray[np.float64]
+    readings: Mapping[str, tuple[Reading, ...]]
+    wind: NDArray[np.float64] | None = field(default=None)
+
+    def values(self, name: str) -> NDArray[np.float64]:
+        """(w,) of an observable, NaN where a window does not show it."""
+        return np.array([reading.value for reading in self.readings[name]])
+
+    def unseen(self, name: str) -> Counter[str]:
+        """Reason → windows without a value."""
+        return Counter(reading.reason for reading in self.readings[name] if reading.reason is not None)
+
+    @property
+    def empty(self) -> bool:
+        """Whether no window has a value."""
+        return not any(np.isfinite(self.values(name)).any() for name in self.readings)
+
+    def parquet(self) -> bytes:
+        """A Parquet file: `time`, `wind` and, for each observable, its value and `NAME-reason`; units, meanings and
+        sigmas in the fields' metadata."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        columns: list[pa.Array] = [pa.array(self.time)]
+        fields = [pa.field("time", pa.float64(), metadata={"unit": "s", "meaning": "middle of the window"})]
+        if self.wind is not None:
+            columns.append(pa.array(self.wind, from_pandas=True))
+            fields.append(pa.field("wind", pa.float64(), metadata={"unit": "m/s", "meaning": "the log's mean"}))
+        for name, readings in self.readings.items():
+            found: Observable = OBSERVABLES[name]
+            columns.append(pa.array(self.values(name), from_pandas=True))
+            fields.append(pa.field(name, pa.float64(), metadata={k: str(v) for k, v in _about(found).items()}))
+            columns.append(pa.array([reading.reason for reading in readings], type=pa.string()))
+            fields.append(pa.field(f"{name}-reason", pa.string()))
+        schema = pa.schema(fields, metadata={"flagdata": json.dumps(self.head())})
+        sink = io.BytesIO()
+        pq.write_table(pa.Table.from_arrays(columns, schema=schema), sink, compression="zstd")
+        return sink.getvalue()
+
+    def write_zarr(self, folder: Path) -> None:
+        """A new Zarr group: `time`, `wind` and each observable over `time`, units and sigmas as attributes."""
+        import zarr
+
+        group = zarr.open_group(folder, mode="w-", zarr_format=3)
+        group.update_attributes(
+            {"flagdata_observables": self.head(), "reasons": {name: dict(self.unseen(name)) for name in self.readings}}
+        )
+        write_plain(group, "time", self.time, ("time",))
+        if self.wind is not None:
+            write_plain(group, "wind", self.wind, ("time",))
+        for name in self.readings:
+            write_plain(group, name, self.values(name), ("time",))
+            group[name].attrs.update(_about(OBSERVABLES[name]))
+
+    def head(self) -> dict[str, Any]:
+        """What the table is of: JSON values."""
+        return {
+            "schema": SCHEMA, "film": self.film, "flag": [self.length, self.height], "window": self.seconds,
+        }  # fmt: skip
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values: mean, its standard error and the windows of each observable."""
+        return {
+            **self.head(), "windows": len(self.time),
+            "wind": None if self.wind is None else [None if math.isnan(v) else v for v in self.wind.tolist()],
+            "observables": {name: self._summary(name) for name in self.readings},
+        }  # fmt: skip
+
+    def _summary(self, name: str) -> dict[str, Any]:
+        values = self.values(name)
+        shown = values[np.isfinite(values)]
+        found: Observable = OBSERVABLES[name]
+        return {
+            "unit": found.unit, "windows": len(shown), "mean": float(shown.mean()) if len(shown) else None,
+            "deviation": float(shown.std(ddof=1)) if len(shown) > 1 else None, "sigma": found.sigma,
+            "unseen": dict(self.unseen(name)),
+        }  # fmt: skip
+
+    def lines(self) -> list[str]:
+        """For people: an observable a line."""
+        found = []
+        for name in self.readings:
+            own, about = self._summary(name), OBSERVABLES[name]
+            unit = "" if about.unit == "1" else f" {about.unit}"
+            missing = "".join(f"; {count} × {REASONS[kind]}" for kind, count in own["unseen"].items())
+            if own["mean"] is None:
+                found.append(f"{name:17} not shown{missing}")
+                continue
+            spread = "" if own["deviation"] is None else f", deviation between windows {own['deviation']:.3f}"
+            found.append(f"{name:17} {own['mean']:8.3f}{unit}{spread}, n = {own['windows']} windows{missing}")
+        return found
+
+
+def table_of(watched: Watched, *, film: str, length: float, height: float, start: int | None = None,
+             wind: WindSeries | None = None) -> Table:  # fmt: skip
+    """All observables of all windows.
+
+    Args:
+        start: instant of the film's first frame [UTC ns]; None where nobody said, and no wind stands beside it.
+        wind: of the log.
+    """
+    nothing = Reading(value=math.nan, reason=UNSEEN)
+    readings = {
+        name: tuple(nothing if one is None else OBSERVABLES[name].of_film(one) for one in watched.windows)
+        for name in OBSERVABLES
+    }
+    logged = None
+    if start is not None and wind is not None and over_ground(wind) is not None:
+        truth = TruthSeries.of(wind)
+        ends = [start + round((begin + watched.seconds) * NANOSECONDS) for begin in watched.starts.tolist()]
+        logged = np.array([truth.before(end, window=max(watched.seconds, truth.period)).wind for end in ends])
+    return Table(
+        film=film, length=length, height=height, seconds=watched.seconds, time=watched.starts + watched.seconds / 2,
+        readings=readings, wind=logged,
+    )  # fmt: skip
+
+
+def _about(found: Observable) -> dict[str, Any]:
+    return {"unit": found.unit, "meaning": found.meaning, "sigma": found.sigma, "blind": found.blind}

@@ -1,0 +1,164 @@
+"""The power map: which observable shows which effect, in standard errors that a minute of film gives, at each wind.
+
+Flags of one cloth are simulated without and with each effect of the library, each with a strength in the middle of its
+prior, in a wind that varies as gusts do, and seen from 70° to the wind. The difference of an observable's mean is
+divided by the standard error of the mean of a minute: the deviation between windows, with what pixels add to it.
+FLAGDATA_POWER_ONLY gives patterns of effects. Cases that were simulated are kept in `out`, so that a run that was
+stopped goes on.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from measure.observables import OBSERVABLES, Observable, View, seen_from
+from measure.observables.cloth import edges_of
+from measure.observables.observable import WINDOW
+from sim.effects import EFFECTS
+from sim.effects.parameter import Parameter, Role
+from sim.run.batch import Stepper
+from sim.run.batch import run as simulate
+from sim.run.members import Crew
+from sim.run.reading import parse
+
+WINDS = (3.0, 6.0)
+FLAGS = 4
+SECONDS = 10.0
+SETTLE = 4.0
+RATE = 25.0
+LENGTH, HEIGHT, COLUMNS = 1.5, 1.0, 12
+SEEN = View(azimuth=math.radians(70))
+INTENSITY = 0.1
+"""Of the gusts that all flags fly in, with and without an effect."""
+NO_EFFECT = "none"
+LEFT_OUT = ("gusts", "logged-gusts")
+"""They are what all flags fly in, or need a log."""
+_TOLD = 3.0
+"""Standard errors from which on an observable shows an effect."""
+
+
+def run(*, seed: int, out: Path) -> dict[str, Any]:
+    """Standard errors a minute by effect, observable and wind."""
+    torch.set_num_threads(1)
+    only = os.environ.get("FLAGDATA_POWER_ONLY", "*").split()
+    kept = out / f"power-{seed}"
+    kept.mkdir(exist_ok=True)
+    names = [n for n in EFFECTS if n not in LEFT_OUT and any(fnmatch(n, pattern) for pattern in only)]
+    values = {
+        name: {f"{wind:g}": _once(name, wind, seed, kept / f"{name}-{wind:g}.json") for wind in WINDS}
+        for name in (NO_EFFECT, *names)
+    }
+    sheet = {
+        "strengths": {name: strength(name) for name in names},
+        "map": {name: {wind: _errors(values[name][wind], values[NO_EFFECT][wind]) for wind in values[name]}
+                for name in names},
+    }  # fmt: skip
+    (out / "validate-power.md").write_text(page(sheet), encoding="utf-8")
+    return sheet
+
+
+def strength(name: str) -> dict[str, float]:
+    """Values of an effect's strengths in the middle of their priors; shapes as they usually are."""
+    found: Mapping[str, Parameter] = EFFECTS[name].parameters()
+    return {key: _middle(one) for key, one in found.items() if one.role is Role.STRENGTH}
+
+
+def _middle(one: Parameter) -> float:
+    low, high = one.prior
+    middle = (low + high) / 2
+    return middle if abs(middle - one.null) > 1e-12 else (middle + high) / 2
+
+
+def readings(name: str, wind: float, seed: int) -> dict[str, list[float | None]]:
+    """Observable → a value a window of all flags."""
+    effect = "" if name == NO_EFFECT else "".join(
+        [f"[effects.{name}]\n", *(f"{key.replace('_', '-')} = {value!r}\n" for key, value in strength(name).items())]
+    )  # fmt: skip
+    text = (
+        f"seed = {seed}\ncount = {FLAGS}\nbatch = {FLAGS}\n"
+        f"[scene]\nwidth = {LENGTH}\nheight = {HEIGHT}\ncolumns = {COLUMNS}\nstart-noise = 1e-3\n"
+        f'[material]\nname = "camel-ponte-roma"\n[wind]\nspeed = {wind}\n{effect}'
+        f"[effects.gusts]\nintensity = {INTENSITY}\nlength = 20.0\n"
+        f"[time]\nsettle = {SETTLE}\nframes = {round(SECONDS * RATE)}\nrate = {RATE}\n"
+    )
+    recipe = parse(text, name="power", folder=Path(), where="power")
+    crew = Crew(recipe)
+    outcomes = simulate(crew, Stepper.of(crew), [crew.member(index) for index in range(FLAGS)], size=FLAGS)
+    found: dict[str, list[float | None]] = {observable: [] for observable in OBSERVABLES}
+    for outcome in outcomes:
+        if outcome.sequence is None:
+            continue
+        hoist, free = edges_of(outcome.sequence.rest)
+        frames = round(WINDOW * RATE)
+        for first in range(0, len(outcome.sequence.positions) - frames + 1, frames):
+            cloth = seen_from(
+                SEEN, outcome.sequence.positions[first : first + frames], times=np.arange(frames) / RATE,
+                faces=outcome.sequence.faces, hoist=hoist, free=free, length=LENGTH, height=HEIGHT,
+            )  # fmt: skip
+            for observable in OBSERVABLES:
+                value = OBSERVABLES[observable].of_cloth(cloth).value
+                found[observable].append(None if math.isnan(value) else value)
+    return found
+
+
+def _once(name: str, wind: float, seed: int, path: Path) -> dict[str, list[float | None]]:
+    if not path.exists():
+        path.write_text(json.dumps(readings(name, wind, seed)), encoding="utf-8")
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def _errors(
+    own: Mapping[str, list[float | None]], base: Mapping[str, list[float | None]]
+) -> dict[str, float | None]:  # fmt: skip
+    """Observable → standard errors of a minute; None where fewer than half of the windows show it."""
+    found: dict[str, float | None] = {}
+    for name in OBSERVABLES:
+        observable: Observable = OBSERVABLES[name]
+        with_effect, without = _shown(own[name]), _shown(base[name])
+        if len(with_effect) < 0.5 * len(own[name]) or len(without) < 0.5 * len(base[name]) or len(with_effect) < 3:
+            found[name] = None
+            continue
+        variance = (with_effect.var(ddof=1) + without.var(ddof=1)) / 2 + observable.sigma**2
+        found[name] = float((with_effect.mean() - without.mean()) / math.sqrt(variance * WINDOW / 60.0))
+    return found
+
+
+def _shown(values: list[float | None]) -> NDArray[np.float64]:
+    return np.array([value for value in values if value is not None])
+
+
+def page(sheet: Mapping[str, Any]) -> str:
+    """The sheet in Markdown."""
+    winds = " / ".join(f"{wind:g}" for wind in WINDS)
+    lines = [
+        "# Power map: effect × observable × wind", "",
+        (f"Standard errors that a minute of film gives, at {winds} m/s: the difference that the effect makes to the "
+        f"mean of an observable, over the standard error of the mean of a minute. {FLAGS} flags of {SECONDS:g} s each, "
+        f"1.5 × 1.0 m, Camel Ponte Roma, {COLUMNS} columns, gusts of {INTENSITY:.0%}, seen from 70° to the wind; the "
+        "deviation between windows with the sigma of pixels. The difference itself is known to about "
+        f"{math.sqrt(2 * 60 / (FLAGS * SECONDS)):.1f} of these (`python -m tests.validation power`)."), "",
+        "| effect, strength | " + " | ".join(OBSERVABLES) + " |", "|---" * (1 + len(OBSERVABLES)) + "|",
+    ]  # fmt: skip
+    for name, of in sheet["map"].items():
+        strengths = ", ".join(f"{value:.3g}" for value in sheet["strengths"][name].values())
+        cells = [" / ".join(_cell(of[f"{wind:g}"][observable]) for wind in WINDS) for observable in OBSERVABLES]
+        lines.append(f"| {name}, {strengths} | " + " | ".join(cells) + " |")
+    lines += ["", f"In bold: {_TOLD:g} or more. A dash: fewer than half of the windows show the observable."]
+    return "\n".join(lines) + "\n"
+
+
+def _cell(value: float | None) -> str:
+    if value is None:
+        return "–"
+    text = f"{value:+.0f}".replace("-", "−")
+    return f"**{text}**" if abs(value) >= _TOLD else text
