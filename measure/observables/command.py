@@ -27,19 +27,25 @@ from flagdata.errors import RefusedError, UsageError
 @click.option("--zarr", "zarr_path", type=LocalPath(), metavar="FOLDER", help="Write the table as a Zarr data set.")
 @click.option("--picture", "picture_path", type=LocalPath(), metavar="FILE.png", help="Draw each observable against "
               "time, and against the log's wind where the recording has one.")  # fmt: skip
-@click.option("--lake", "lake_path", type=LocalPath(), envvar="FLAGDATA_LAKE", help="Where recordings are; also "
-              "FLAGDATA_LAKE.")  # fmt: skip
-@click.option("--at", metavar="REF", default="main", show_default=True, help="Tag, branch or version of the lake.")
+@click.option("--lake", "lake_path", type=LocalPath(), envvar="FLAGDATA_LAKE", help="Where recordings are, and where "
+              "tables go; also FLAGDATA_LAKE.")  # fmt: skip
+@click.option(
+    "--at", metavar="REF", help="Tag, branch or version of the lake to look at; by default the branch's head."
+)
+@click.option("--branch", default="main", show_default=True, help="Branch of the lake to commit on.")
+@click.option("--read-only", is_flag=True, help="Read the lake, commit nothing.")
 @json_option
 def observe(
     source: str, flag_size: str, seconds: float, crop: str | None, flag: int | None, first: float | None,
     last: float | None, true_fps: float | None, sequence_fps: float | None, parquet_path: Path | None,
-    zarr_path: Path | None, picture_path: Path | None, lake_path: Path | None, at: str, as_json: bool,
+    zarr_path: Path | None, picture_path: Path | None, lake_path: Path | None, at: str | None, branch: str, read_only: bool,
+    as_json: bool,
 ) -> None:  # fmt: skip
     """Read observables off a film: droop, extension, speeds, frequency, amplitudes, wave, area.
 
     SOURCE is a video file, a folder of images, or a recording, clip or camera of --lake by its name or id. Each window
-    gives a value with its unit, or the reason why it shows none. docs/method/films.md defines each observable and
+    gives a value with its unit, or the reason why it shows none. With --lake the table becomes an artifact.
+    docs/method/films.md defines each observable and
     states its error.
 
     \b
@@ -52,6 +58,7 @@ def observe(
     from flagdata.pages.pictures import png
     from measure.estimate.similarity import parse_size
     from measure.estimate.source import Reading, subjects
+    from measure.observables.artifact import keep
     from measure.observables.picture import picture
     from measure.observables.table import table_of
     from measure.observables.watching import watched
@@ -69,8 +76,10 @@ def observe(
         raise UsageError(f"the crop {crop!r} is not a box", where="--crop", fix="give x,y,width,height in pixels")
     size = parse_size(flag_size)
     lake = None if lake_path is None else Lake.open(lake_path)
+    if lake is not None and not read_only:
+        lake.check_writable()
     reading = Reading(crop=box, flag=flag, aspect=size.aspect, true_fps=true_fps, sequence_fps=sequence_fps)
-    (subject,) = subjects(source, query=None, lake=lake, at=at, reading=reading)
+    (subject,) = subjects(source, query=None, lake=lake, at=at if at is not None else branch, reading=reading)
     windows = watched(subject.film, size, first=first, last=last, seconds=seconds)
     table = table_of(
         windows, film=subject.film.name, length=size.length, height=size.height, start=subject.film.start,
@@ -83,6 +92,10 @@ def observe(
             f"none of {len(table.time)} windows shows the cloth: its outline or its hoist was not found",
             where=subject.film.name, fix="give --crop around one whole flag on its pole, or another film",
         )  # fmt: skip
+    identity = None
+    if lake is not None and not read_only:
+        identity, new = keep(lake, table, subject, {**reading.recipe(), "part": [first, last]}, branch=branch)
+        say(f"{identity[:12]}  measurement, {'committed' if new else 'there already'}")
     if parquet_path is not None:
         write_file(parquet_path, table.parquet())
     if zarr_path is not None:
@@ -91,7 +104,7 @@ def observe(
     if picture_path is not None:
         write_file(picture_path, png(picture(table)), command="observe")
     if as_json:
-        document("observe", table.as_dict())
+        document("observe", {**table.as_dict(), "artifact": identity})
     else:
         for line in table.lines():
             click.echo(line)
