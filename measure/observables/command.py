@@ -38,8 +38,8 @@ from flagdata.errors import RefusedError, UsageError
 def observe(
     source: str, flag_size: str, seconds: float, crop: str | None, flag: int | None, first: float | None,
     last: float | None, true_fps: float | None, sequence_fps: float | None, parquet_path: Path | None,
-    zarr_path: Path | None, picture_path: Path | None, lake_path: Path | None, at: str | None, branch: str, read_only: bool,
-    as_json: bool,
+    zarr_path: Path | None, picture_path: Path | None, lake_path: Path | None, at: str | None, branch: str,
+    read_only: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Read observables off a film: droop, extension, speeds, frequency, amplitudes, wave, area.
 

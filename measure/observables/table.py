@@ -63,8 +63,8 @@ class Table:
         return not any(np.isfinite(self.values(name)).any() for name in self.readings)
 
     def parquet(self) -> bytes:
-        """A Parquet file: `time`, `wind` and, for each observable, its value and `NAME-reason`; units, meanings and
-        sigmas in the fields' metadata."""
+        """A Parquet file: `time`, `wind` and, for each observable, its value, `NAME-sigma` and `NAME-reason`;
+        units and meanings in the fields' metadata. `flagdata calibrate` reads it where there is a wind."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -77,6 +77,8 @@ class Table:
             found: Observable = OBSERVABLES[name]
             columns.append(pa.array(self.values(name), from_pandas=True))
             fields.append(pa.field(name, pa.float64(), metadata={k: str(v) for k, v in _about(found).items()}))
+            columns.append(pa.array(np.full(len(self.time), found.sigma)))
+            fields.append(pa.field(f"{name}-sigma", pa.float64(), metadata={"unit": found.unit}))
             columns.append(pa.array([reading.reason for reading in readings], type=pa.string()))
             fields.append(pa.field(f"{name}-reason", pa.string()))
         schema = pa.schema(fields, metadata={"flagdata": json.dumps(self.head())})

@@ -15,8 +15,8 @@ _SECTIONS = np.linspace(0.35, 0.85, 6)
 """Of the mean chord, where the middle line is followed."""
 _COHERENT = 0.5
 """Share of the power at neighbouring sections whose phases belong together from which on there is a wave."""
-_FASTEST = 0.25
-"""Phase along a length [rad] below which all moves together: no wave."""
+_LONGEST = 3.0
+"""Length [flag lengths] of a wave above which all of the chord moves together, and no wave is seen."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +60,6 @@ def wave(window: Window) -> Wave:
         raise UnseenError("no-wave")
     apart = float(np.diff(_SECTIONS).mean()) * reach / window.length
     number = -math.atan2(total.imag, total.real) / apart
-    if number < _FASTEST:
+    if number * _LONGEST < 2 * math.pi:
         raise UnseenError("no-wave")
     return Wave(frequency=float((power * frequency).sum() / power.sum()), number=number)
