@@ -30,6 +30,7 @@ from sim.run.batch import Stepper
 from sim.run.batch import run as simulate
 from sim.run.members import Crew
 from sim.run.reading import parse
+from tests.evidence import REFERENCE
 
 WINDS = (3.0, 6.0)
 FLAGS = 4
@@ -59,12 +60,26 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         for name in (NO_EFFECT, *names)
     }
     sheet = {
-        "strengths": {name: strength(name) for name in names},
+        "reference": reference(), "strengths": {name: strength(name) for name in names},
         "map": {name: {wind: _errors(values[name][wind], values[NO_EFFECT][wind]) for wind in values[name]}
                 for name in names},
     }  # fmt: skip
     (out / "validate-power.md").write_text(page(sheet), encoding="utf-8")
     return sheet
+
+
+def reference() -> dict[str, dict[str, dict[str, float | None]]]:
+    """The same of the reference simulator's runs: what acted → wind → observable → standard errors of a minute; nothing
+    where the runs are not there."""
+    folder = REFERENCE / "arcsim" / "jittered"
+    found: dict[str, dict[str, dict[str, list[float | None]]]] = {}
+    for path in sorted(folder.glob("*_w*.npz")):
+        name, _, wind = path.stem.rpartition("_w")
+        with np.load(path) as run:
+            values = windows(run["q"] * 1e-4, faces=run["faces"], rest=run["rest"])
+        found.setdefault(name, {})[wind] = values
+    base = found.pop("null", {})
+    return {name: {wind: _errors(of[wind], base[wind]) for wind in of} for name, of in found.items()}
 
 
 def strength(name: str) -> dict[str, float]:
@@ -98,16 +113,27 @@ def readings(name: str, wind: float, seed: int) -> dict[str, list[float | None]]
     for outcome in outcomes:
         if outcome.sequence is None:
             continue
-        hoist, free = edges_of(outcome.sequence.rest)
-        frames = round(WINDOW * RATE)
-        for first in range(0, len(outcome.sequence.positions) - frames + 1, frames):
-            cloth = seen_from(
-                SEEN, outcome.sequence.positions[first : first + frames], times=np.arange(frames) / RATE,
-                faces=outcome.sequence.faces, hoist=hoist, free=free, length=LENGTH, height=HEIGHT,
-            )  # fmt: skip
-            for observable in OBSERVABLES:
-                value = OBSERVABLES[observable].of_cloth(cloth).value
-                found[observable].append(None if math.isnan(value) else value)
+        own = windows(outcome.sequence.positions, faces=outcome.sequence.faces, rest=outcome.sequence.rest)
+        for observable, values in own.items():
+            found[observable] += values
+    return found
+
+
+def windows(
+    positions: NDArray[np.floating], *, faces: NDArray[np.integer], rest: NDArray[np.floating]
+) -> dict[str, list[float | None]]:
+    """Observable → a value a window of a flag (frame, vertex, 3) at `RATE`."""
+    hoist, free = edges_of(rest)
+    found: dict[str, list[float | None]] = {observable: [] for observable in OBSERVABLES}
+    frames = round(WINDOW * RATE)
+    for first in range(0, len(positions) - frames + 1, frames):
+        cloth = seen_from(
+            SEEN, positions[first : first + frames], times=np.arange(frames) / RATE, faces=faces, hoist=hoist,
+            free=free, length=LENGTH, height=HEIGHT,
+        )  # fmt: skip
+        for observable, values in found.items():
+            value = OBSERVABLES[observable].of_cloth(cloth).value
+            values.append(None if math.isnan(value) else value)
     return found
 
 
@@ -153,6 +179,13 @@ def page(sheet: Mapping[str, Any]) -> str:
         strengths = ", ".join(f"{value:.3g}" for value in sheet["strengths"][name].values())
         cells = [" / ".join(_cell(of[f"{wind:g}"][observable]) for wind in WINDS) for observable in OBSERVABLES]
         lines.append(f"| {name}, {strengths} | " + " | ".join(cells) + " |")
+    if sheet["reference"]:
+        lines += ["", "## The reference simulator's runs", "", "ArcSim, 10 s at 3 / 5 / 7 m/s without gusts.", ""]
+        lines += ["| what acted | " + " | ".join(OBSERVABLES) + " |", "|---" * (1 + len(OBSERVABLES)) + "|"]
+        lines += [
+            f"| {name} | " + " | ".join(" / ".join(_cell(of[w][o]) for w in sorted(of)) for o in OBSERVABLES) + " |"
+            for name, of in sheet["reference"].items()
+        ]
     lines += ["", f"In bold: {_TOLD:g} or more. A dash: fewer than half of the windows show the observable."]
     return "\n".join(lines) + "\n"
 

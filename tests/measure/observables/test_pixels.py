@@ -31,7 +31,7 @@ def waving(u: NDArray[np.float64], v: NDArray[np.float64], t: float) -> tuple[ND
     angle = 0.3 + 0.12 * math.sin(2 * math.pi * 1.5 * t) + 0.05 * math.sin(2 * math.pi * 0.7 * t)
     wave = 0.08 * u / LENGTH * np.sin(2 * np.pi * (u / 1.2 - 1.9 * t))
     turned = 0.5 * angle * u / LENGTH
-    return u * math.cos(angle) - v * np.sin(turned), wave, v * np.cos(turned) - u * math.sin(angle) + wave
+    return u * math.cos(angle) + v * np.sin(turned), wave, v * np.cos(turned) - u * math.sin(angle) + wave
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,14 +111,17 @@ def test_the_hoist_is_where_the_pole_ends(seen: Seen) -> None:
 
 @pytest.mark.parametrize("name", list(OBSERVABLES))
 def test_pixels_agree_with_geometry(seen: Seen, name: str) -> None:
-    """Within twice the stated sigma of one window. Pixels may not show a wave that geometry shows, and no other."""
+    """Within twice the stated sigma of one window, before the bias is taken off, which is that of films less clean.
+    Pixels may not show a wave that geometry shows, and no other."""
     pixels, geometry = OBSERVABLES[name].of_film(seen.window), OBSERVABLES[name].of_cloth(seen.painted.cloth)
-    assert geometry.reason is None
+    if geometry.reason is not None:
+        assert pixels.reason == geometry.reason
+        return
     if pixels.reason is not None:
         assert (name.partition("-")[0], pixels.reason) == ("wave", "no-wave")
         assert math.isnan(pixels.value)
         return
-    assert abs(pixels.value - geometry.value) < 2 * OBSERVABLES[name].sigma
+    assert abs(OBSERVABLES[name].pixels(seen.window) - geometry.value) < 2 * OBSERVABLES[name].sigma
 
 
 def test_a_film_without_outlines_gives_reasons_and_no_number(seen: Seen) -> None:
