@@ -131,6 +131,7 @@ class RemoteObjects(Objects):
     def remove(path: Place) -> None:
         if isinstance(path, RemotePath):
             path.remove_tree(first=None if path.suffix == ".mcap" else SUMS)
+            forget(f"{path.parent.name}/{path.stem}", path.suffix)  # what is erased stays nowhere on this machine
         else:
             Objects.remove(path)
 

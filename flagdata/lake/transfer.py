@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from datetime import timedelta
 
 from flagdata.errors import ConflictError, CorruptError
+from flagdata.findings import Severity
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.lake import Lake
 from flagdata.lake.marking import mark
@@ -69,9 +70,8 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
     """
     target.check_writable()
     marked = mark(source, grace=timedelta(0))
-    if marked.findings:
-        first = marked.findings[0]
-        raise CorruptError(first.what, where=first.where, fix=first.fix or "run flagdata doctor")
+    if damage := [finding for finding in marked.findings if finding.severity is Severity.ERROR]:
+        raise CorruptError(damage[0].what, where=damage[0].where, fix=damage[0].fix or "run flagdata doctor")
     head, there = source.catalog.head(), target.catalog.head()
     _check_history(source, target, head=head, there=there)
     refs = _missing_refs(source, target)

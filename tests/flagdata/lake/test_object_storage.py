@@ -58,7 +58,7 @@ def test_rows_and_objects_of_a_bucket_are_found_whole_by_a_fresh_handle(remote_l
     assert verify(again, object_names(again)) == verify_catalog(again) == doctor(again, grace=NOW) == ()
 
 
-def test_what_is_withdrawn_is_collected_and_tags_keep_theirs(remote_lake: Lake, put_text: Put) -> None:
+def test_what_is_withdrawn_is_collected_and_tags_keep_theirs(remote_lake: Lake, put_text: Put, tmp_path: Path) -> None:
     kept, gone = put_text(remote_lake, "kept"), put_folder(remote_lake, "gone")
     remote_lake.tag("v1")
     put_text(remote_lake, "later")
@@ -67,6 +67,9 @@ def test_what_is_withdrawn_is_collected_and_tags_keep_theirs(remote_lake: Lake, 
     remote_lake.delete_tag("v1", discard=True)
     assert set(collect(remote_lake, grace=NOW).objects) == {kept.object, gone.object}
     assert not any(str(gone.object)[5:] in str(path) for path in remote_lake.path.rglob("*"))
+    copies = [path.name for path in (tmp_path / "cache" / "objects").iterdir()]
+    assert len(copies) > 1
+    assert not any(name.endswith((f"{str(kept.object)[5:]}.mcap", f"{str(gone.object)[5:]}.zarr")) for name in copies)
     assert [finding.kind for finding in doctor(remote_lake, grace=NOW)] == ["withdrawn-collected"]
 
 

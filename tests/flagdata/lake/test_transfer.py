@@ -102,7 +102,7 @@ def test_lakes_that_went_apart_are_refused_and_stay_as_they_are(lake: Lake, put_
             transfer(one, other, bars=no_bar)
     assert copy.rows()["name"].to_pylist() == ["first", "there"]
     with pytest.raises(ConflictError, match="no history"):
-        transfer(lake, Lake.create(tmp_path / "stranger"), bars=no_bar)
+        transfer(lake, Lake.create(tmp_path / "another"), bars=no_bar)
 
 
 def test_a_tag_of_the_same_name_that_is_another_is_refused(lake: Lake, put_text: Put, tmp_path: Path) -> None:
@@ -151,3 +151,12 @@ def test_a_lake_is_cloned_to_a_bucket_and_back(
     put_text(Lake.open(bucket_folder), "third")
     assert invoke(capsys, "pull", bucket_folder, "--lake", back.path, "--json").document["versions"] == 1
     assert collect(Lake.open(bucket_folder), grace=NOW).objects == ()
+
+
+def test_a_lake_of_which_something_was_erased_is_cloned_without_it(lake: Lake, put_text: Put, tmp_path: Path) -> None:
+    gone, kept = put_text(lake, "gone"), put_text(lake, "kept")
+    lake.tag("v1")
+    lake.erase([gone.id], "consent withdrawn")
+    copy, done = clone(lake, tmp_path / "copy", bars=no_bar)
+    assert done.objects == (kept.object,)
+    assert copy.rows(at="v1").equals(lake.rows(at="v1"))
