@@ -6,10 +6,13 @@ import functools
 import hashlib
 import json
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from flagdata.files import open_regular
 from flagdata.storage import Place
@@ -29,6 +32,17 @@ def digest(text: str) -> str:
 def recipe_hash(recipe: Mapping[str, Any]) -> str:
     """SHA-256 of the canonical JSON of all options that shape a result."""
     return digest(canonical(recipe))
+
+
+def array_hash(content: Mapping[str, Any], arrays: Iterable[NDArray[Any]]) -> str:
+    """SHA-256 of plain values and of arrays with their types and shapes, hex."""
+    total = hashlib.sha256()
+    total.update(canonical(content).encode())
+    for values in arrays:
+        array = np.ascontiguousarray(values)
+        total.update(f"{array.dtype.str}{array.shape}".encode())
+        total.update(array.tobytes())
+    return total.hexdigest()
 
 
 def file_hash(path: Place) -> str:

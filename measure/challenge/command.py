@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.console import LocalPath, document, json_option, progress, say
+from flagdata.console import LakePlace, LocalPath, document, json_option, progress, say
 
 if TYPE_CHECKING:
     from measure.challenge.filing import Filing
@@ -58,13 +58,19 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
 
 @challenge.command()
 @_FOLDER
-@click.option("--recipe", default="standard", show_default=True, help="Recipe: a name of the catalog, or a .toml file.")
+@click.option(
+    "--recipe", default="standard", show_default=True,
+    help="Recipe of a challenge: a name of the catalog, or a .toml file; or a recipe of close-loop, for nulls of its "
+    "cloth, markers and winds.",
+)  # fmt: skip
 @click.option(
     "--seed",
     type=click.IntRange(min=0),
     required=True,
     help="Seed of everything that is drawn; it must differ from that of the challenge.",
 )
+@click.option("--lake", "lake_path", type=LakePlace(), envvar="FLAGDATA_LAKE",
+              help="Lake that a recipe of close-loop reads artifacts from; also FLAGDATA_LAKE.")  # fmt: skip
 @click.option(
     "--kinds",
     type=click.IntRange(min=4),
@@ -76,15 +82,15 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
     "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Number of processes that simulate."
 )
 @json_option
-def bank(folder: Path, recipe: str, seed: int, kinds: int, workers: int, as_json: bool) -> None:
+def bank(folder: Path, recipe: str, seed: int, lake_path: Path | None, kinds: int, workers: int, as_json: bool) -> None:
     """Simulate nulls that all sets of a recipe share, by what participants know; a build that was stopped goes on."""
-    from measure.challenge.nulls import claim, null_batches
-    from measure.challenge.recipe import load
+    from flagdata.lake import Lake
+    from measure.challenge.nulls import claim, nulls_of
     from measure.nulls import bank as banks
 
-    loaded = load(recipe)
-    batches = null_batches(loaded, seed=seed, kinds=kinds)
-    claim(folder, loaded, seed=seed)
+    lake = None if lake_path is None else Lake.open(lake_path)
+    origin, batches = nulls_of(recipe, seed=seed, kinds=kinds, lake=lake)
+    claim(folder, origin, seed=seed)
     with progress(kinds, label="null recordings", unit="kind") as advance:
         banks.build(folder, batches, workers=workers, progress=advance)
     if as_json:

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+import tomllib
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 
 from flagdata.documents import read_json
 from flagdata.errors import ConflictError, InputError
+from flagdata.lake import Lake
 from flagdata.outputs import check_folder
 from flagdata.provenance import code_version, recipe_hash
 from flagdata.rng import child_seed, stream
 from measure.challenge.folder import HEIGHT, MODEL_COLUMNS, MODEL_ROWS, write_json
 from measure.challenge.meshes import layout
-from measure.challenge.recipe import ChallengeRecipe
+from measure.challenge.recipe import ChallengeRecipe, load
 from measure.forecasting.segments import Cut
+from measure.forecasting.setting import Setting
 from measure.nulls import bank as banks
+from measure.nulls import plan
 from measure.nulls.simulation import NullBatch
+from measure.observe import recipe as recipes
 from measure.observe.trajectory import Specimen
 from sim import handles
 from sim.material import named
@@ -64,13 +69,49 @@ def null_batches(recipe: ChallengeRecipe, *, seed: int, kinds: int) -> list[Null
     return made
 
 
-def claim(folder: Path, recipe: ChallengeRecipe, *, seed: int) -> None:
+@dataclass(frozen=True, kw_only=True)
+class Origin:
+    """What nulls are made from: a recipe's title, and the hash of all that shapes them."""
+
+    title: str
+    recipe: str
+
+
+def nulls_of(recipe: str, *, seed: int, kinds: int, lake: Lake | None) -> tuple[Origin, list[NullBatch]]:
+    """The nulls of a challenge's recipe, or of the recordings that a recipe of close-loop names.
+
+    Args:
+        lake: that artifacts are read from; None where there is none.
+
+    Raises:
+        FlagdataError: as the readers of either.
+    """
+    path = Path(recipe)
+    if not (path.suffix == ".toml" and path.is_file() and _of_recordings(path)):
+        loaded = load(recipe)
+        made = null_batches(loaded, seed=seed, kinds=kinds)
+        return Origin(title=loaded.title, recipe=recipe_hash(asdict(loaded))), made
+    experiment = recipes.load(path)
+    setting = Setting.of(recipes.read(experiment, lake).experiment)
+    origin = Origin(title=experiment.title, recipe=plan.design_hash(setting))
+    return origin, plan.batches(setting, kinds=kinds, seed=seed)
+
+
+def _of_recordings(path: Path) -> bool:
+    """Whether a recipe names recordings, as those of close-loop do and those of challenges do not."""
+    try:
+        return isinstance(tomllib.loads(path.read_text(encoding="utf-8")).get("recording"), list)
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError):
+        return False  # the challenge's reader says what is wrong with it
+
+
+def claim(folder: Path, origin: Origin, *, seed: int) -> None:
     """Note what the nulls of a folder are made from, so that a build that was stopped goes on with the same.
 
     Raises:
         ConflictError: the folder's are of another recipe or seed, or the folder holds something else.
     """
-    made = {"recipe": recipe_hash(asdict(recipe)), "title": recipe.title, "seed": seed}
+    made = {"recipe": origin.recipe, "title": origin.title, "seed": seed}
     path = folder / "bank.json"
     if not path.exists():
         check_folder(folder)

@@ -6,7 +6,6 @@ A measurement's object is a Zarr folder with the verdict's JSON, its report and 
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,12 +17,13 @@ import numpy as np
 from flagdata.findings import Finding, quality_flags
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.meshes import check_format, read_part, store_errors, write_plain
-from flagdata.provenance import canonical, digest, file_hash
+from flagdata.provenance import array_hash, canonical, digest, file_hash
 from flagdata.schema import Kind
 from measure.closing.models import NamedModel, acting
 from measure.loop.run import Options
 from measure.nulls.bank import files
 from measure.observe import Experiment
+from measure.observe.trajectory import described
 from measure.report.document import as_document, from_document
 from measure.report.page import page
 from measure.verdict.record import Verdict
@@ -122,28 +122,12 @@ def read(path: Path) -> tuple[Verdict, str]:
 def fingerprint(experiment: Experiment) -> str:
     """SHA-256 of an experiment with its uncertainties: cloth, pins, recordings and wind; not of names and
     files."""
-    specimen = experiment.specimen
-    material = specimen.material
-    total = hashlib.sha256()
-    total.update(canonical({
-        "held": list(specimen.held), "stiffness": repr(specimen.stiffness),
-        "anchors-told": specimen.anchors_given, "gravity": list(specimen.gravity),
-        "air": [type(specimen.air).__name__, *vars(specimen.air).items()],
-        "material": [material.density, material.damping],
-        "density-uncertainty": specimen.density_uncertainty if specimen.mass_known else None,
-        "recordings": [[r.rate, r.noise, *r.wind.uncertainty] for r in experiment.recordings],
-    }).encode())  # fmt: skip
-    arrays: list[Any] = [
-        specimen.mesh.rest, specimen.mesh.faces, specimen.anchors, material.stretching, material.bending,
-    ]  # fmt: skip
+    content, arrays = described(experiment.specimen)
+    content["recordings"] = [[r.rate, r.noise, *r.wind.uncertainty] for r in experiment.recordings]
     for recording in experiment.recordings:
         arrays += [recording.markers, recording.positions, recording.wind.times, recording.wind.velocity]
         arrays += [] if recording.seen is None else [recording.seen]
-    for values in arrays:
-        array = np.ascontiguousarray(values)
-        total.update(f"{array.dtype.str}{array.shape}".encode())
-        total.update(array.tobytes())
-    return total.hexdigest()
+    return array_hash(content, arrays)
 
 
 def _recipe(closed: Closed) -> dict[str, Any]:
@@ -153,7 +137,7 @@ def _recipe(closed: Closed) -> dict[str, Any]:
         bank = digest(" ".join(file_hash(path) for path in files(options.bank)))
     return {
         "close-loop": 1, "experiment": fingerprint(closed.experiment), "level": options.level,
-        "nulls": None if options.bank is not None else options.nulls, "bank": bank,
+        "nulls": None if options.bank is not None else [options.nulls, options.most_nulls], "bank": bank,
     }  # fmt: skip
 
 

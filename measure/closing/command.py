@@ -34,7 +34,7 @@ _OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "accept", "
 _FILES = ("report.html", "verdict.json", "base.toml", "model.toml")
 """What is written; the last one only where an effect was found."""
 
-_DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
+_DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside", "still-away-from-pins")
 """Kinds of findings that look like an effect."""
 
 
@@ -95,6 +95,8 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside")
     help="Standard deviation of a marker's coordinate [m]; by default it is estimated.",
 )
 @null_options(level="Significance level of the global test; 0.05 by default.")
+@click.option("--most-nulls", type=click.IntRange(min=1), default=320, show_default=True,
+              help="Number up to which more are simulated where p is within a factor of two of the level.")  # fmt: skip
 @click.option("--lake", "lake_path", type=LakePlace(), envvar="FLAGDATA_LAKE",
               help="Lake that artifacts are read from and results are written to; also FLAGDATA_LAKE.")  # fmt: skip
 @click.option("--branch", default="main", show_default=True, help="Branch of the lake to commit on.")
@@ -123,6 +125,7 @@ def close_loop(
     up: str,
     noise: float | None,
     nulls: int | None,
+    most_nulls: int,
     bank: Path | None,
     level: float | None,
     seed: int,
@@ -165,7 +168,9 @@ def close_loop(
     if lake is not None:
         lake.check_writable()
     said = nulls_given(recipe, level=level, nulls=nulls, bank=bank)
-    options = Options(seed=seed, bank=bank, workers=workers or len(os.sched_getaffinity(0)), **said)
+    options = Options(
+        seed=seed, bank=bank, most_nulls=most_nulls, workers=workers or len(os.sched_getaffinity(0)), **said,
+    )  # fmt: skip
     setup = _setup(Setup() if recipe is None else recipe.setup, material, density_uncertainty, size, pins)
     if recipe is not None and recipe.recordings:
         observed = recipes.read(replace(recipe, setup=setup), lake)

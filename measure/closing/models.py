@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from measure.forecasting.alignment import aligned
+from measure.forecasting.regressors import SHAPES
 from measure.observe.trajectory import Experiment, Specimen
 from measure.verdict.record import Candidate, Conclusion, Verdict
 from sim import handles
@@ -88,6 +89,7 @@ def _model(
             described = EFFECTS[candidate.effect].parameters()[candidate.parameter]
             own = strengths.setdefault(candidate.effect, {})
             own[candidate.parameter.replace("_", "-")] = described.nearest(candidate.strength.value)
+            own.update(SHAPES.get(candidate.effect, ()))
         content["effects"] = strengths
     return NamedModel(name=name, content=content)
 

@@ -72,6 +72,10 @@ class Model:
         )
 
 
+_SHARE = 0.1
+"""Of a strength, by which it is stepped at least: a hoist of 10⁴ N/m² does not feel 20 more."""
+
+
 def errors_of(models: Sequence[Model], forecaster: Forecaster, segments: Segments) -> list[Tensor]:
     """What each model of the same effects leaves of segments: (frame, marker, 3, segment) errors [m].
 
@@ -92,7 +96,8 @@ def errors_of(models: Sequence[Model], forecaster: Forecaster, segments: Segment
 
 def linearised(model: Model, forecaster: Forecaster, segments: Segments) -> tuple[Tensor, list[Tensor]]:
     """The errors of a model (frame, marker, 3, segment) [m] and, per unit, what each of its parameters takes away."""
-    sizes = [*(step for _, _, step in THETA), *(column.step for column, _ in model.effects)]
+    strengths = (max(column.step, _SHARE * abs(value)) for column, value in model.effects)
+    sizes = [*(step for _, _, step in THETA), *strengths]
     steps = [model.stepped(place, size) for place, size in enumerate(sizes)]
     base, *errors = errors_of([model, *(moved for moved, _ in steps)], forecaster, segments)
     return base, [(base - own) / taken for own, (_, taken) in zip(errors, steps, strict=True)]

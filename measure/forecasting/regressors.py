@@ -63,11 +63,13 @@ class EffectColumn(StepColumn):
     Attributes:
         effect: its name.
         parameter: the strength.
+        shapes: (name, value) of its other parameters, where they are not the usual ones.
     """
 
     effect: str
     parameter: str
     step: float
+    shapes: tuple[tuple[str, float], ...] = ()
 
     @property
     def name(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -90,7 +92,7 @@ class EffectColumn(StepColumn):
 
     def at(self, coefficient: float | Tensor) -> Effect:
         """The effect at a strength `coefficient` beyond its null value, or one for each member (batch,)."""
-        return EFFECTS[self.effect](**{self.parameter: self.described.null + coefficient})
+        return EFFECTS[self.effect](**dict(self.shapes), **{self.parameter: self.described.null + coefficient})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -278,7 +280,13 @@ _STEPS: tuple[tuple[str, str, float], ...] = (
     ("full-hoist", "stiffness", 20.0),
     ("tilted-pole", "lean", 0.02),
     ("tilted-pole", "sway", 0.02),
+    ("direction-change", "angle", 0.05),
+    ("wet-mass", "uptake", 0.1),
 )
+SHAPES: dict[str, tuple[tuple[str, float], ...]] = {"direction-change": (("start", -1.0), ("duration", 1e-3))}
+"""Of effects whose usual shape is another than what is weighed: a wind that has turned before the recording begins."""
+TURNED = "direction-change.angle"
+"""The column of what the log's direction is off by, which is fitted within its tolerance in every comparison."""
 DOUBLE = frozenset({"bending", "hem-stiffness.ratio", "hysteresis.couple", "rest-curvature.curvature"})
 """Directions whose steps are simulated in double precision: those of how cloth bends. In single precision a prediction
 of 40 ms rounds to 0.2 to 1.6 µm, and these move predictions by 3 to 80 µm a step, less where cloth is soft, heavy or
@@ -295,7 +303,10 @@ def library() -> tuple[EffectColumn, ...]:
     Raises:
         UsageError: an entry that the registry of effects does not have.
     """
-    columns = tuple(EffectColumn(effect=effect, parameter=name, step=step) for effect, name, step in _STEPS)
+    columns = tuple(
+        EffectColumn(effect=effect, parameter=name, step=step, shapes=SHAPES.get(effect, ()))
+        for effect, name, step in _STEPS
+    )
     for column in columns:
         if column.parameter not in EFFECTS[column.effect].strengths():
             raise UsageError(

@@ -70,6 +70,11 @@ class Setting:
         return np.array([r.wind.speed for r in self.experiment.recordings])
 
     @property
+    def tolerance(self) -> float:
+        """Standard deviation that the direction of the wind's logs is declared with, the largest of them [rad]."""
+        return max(r.wind.direction for r in self.experiment.recordings)
+
+    @property
     def design(self) -> Design:
         """Its markers are as noisy as in the noisiest recording."""
         return Design(

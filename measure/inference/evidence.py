@@ -15,7 +15,7 @@ from measure.inference.random_effect import NullModel
 from measure.probes.course import Course
 from measure.probes.rows import Rows
 from measure.probes.statistics import Statistics
-from measure.probes.wind_log import by_recording
+from measure.probes.wind_log import DIRECTION, NUISANCES, by_recording
 
 Floats = NDArray[np.float64]
 Chosen = Sequence[int]
@@ -37,22 +37,26 @@ class Evidence(Rows):
         score: (segment, column) g = Rᵀ Σ⁻¹ (r − μ).
         energy: (segment,) c = (r − μ)ᵀ Σ⁻¹ (r − μ).
         columns: how many are the statistics' and those given beside; the nuisances follow.
+        logged: how many of these, the last, are what logs may be off by.
         lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
         turning: the same of moments about the pole; None where they are not looked at.
         course: of the wind, estimated from the errors; None where not asked for.
+        settled: (segment, quantity) what its recording settles at less what the model does; None where not looked at.
         prior: of the calibrated parameters, see `NullModel`.
     """
 
-    _WHOLE: ClassVar = frozenset({"columns", "prior"})
+    _WHOLE: ClassVar = frozenset({"columns", "logged", "prior"})
 
     recording: NDArray[np.int64]
     curvature: Floats
     score: Floats
     energy: Floats
     columns: int
+    logged: int = 0
     lines: Floats | None = None
     turning: Evidence | None = None
     course: Course | None = None
+    settled: Floats | None = None
     prior: Floats = field(default_factory=PRIOR.copy)
 
     @classmethod
@@ -81,6 +85,7 @@ class Evidence(Rows):
         left = r - null.mean(speeds)
         shifts = np.broadcast_to(null.shifts.T, (len(left), *null.shifts.T.shape))
         response = np.concatenate([statistics.response, shifts], axis=2)
+        plain = response.shape[2]
         if statistics.log is not None:
             response = np.concatenate([response, by_recording(statistics.log, statistics.recording)], axis=2)
         precision = np.linalg.inv(null.covariance)
@@ -89,7 +94,8 @@ class Evidence(Rows):
             recording=statistics.recording, curvature=weighted @ response,
             score=np.einsum("saj,sj->sa", weighted, left),
             energy=np.einsum("si,ij,sj->s", left, precision, left), columns=statistics.response.shape[2],
-            lines=statistics.lines, course=statistics.course, prior=null.prior,
+            logged=response.shape[2] - plain, lines=statistics.lines, course=statistics.course,
+            settled=statistics.settled, prior=null.prior,
         )  # fmt: skip
 
     @property
@@ -102,6 +108,14 @@ class Evidence(Rows):
     def swing(self) -> Floats | None:
         """(part,) of the wind's course; None where it is not looked at."""
         return None if self.course is None else self.course.swing(self.recording)
+
+    @property
+    def settles(self) -> Floats | None:
+        """(quantity,) what recordings settle at less what the model does, the mean over recordings; None where it is
+        not looked at."""
+        if self.settled is None:
+            return None
+        return self.settled[np.unique(self.recording, return_index=True)[1]].mean(axis=0)
 
     def _total(self) -> tuple[Floats, Floats, float]:
         """Sums over the segments, with the priors of the nuisance columns."""
@@ -128,8 +142,8 @@ class Evidence(Rows):
     def freed(self, column: int) -> Evidence:
         """With a coefficient of a column that is free in every segment: what is left across it.
 
-        Moments about the pole and the wind's course are not looked at: what fluctuates within a segment moves them all
-        the same.
+        Moments about the pole, the wind's course and what recordings settle at are not looked at: what fluctuates
+        within a segment moves them all the same.
         """
         own = np.maximum(self.curvature[:, column, column], np.finfo(np.float64).tiny)
         along, slope = self.curvature[:, column], self.score[:, column]
@@ -140,8 +154,17 @@ class Evidence(Rows):
         curvature[:, column, column] = 1.0
         return Evidence(
             recording=self.recording, curvature=curvature, score=score, energy=self.energy - slope**2 / own,
-            columns=self.columns, lines=self.lines, prior=self.prior,
+            columns=self.columns, logged=self.logged, lines=self.lines, prior=self.prior,
         )  # fmt: skip
+
+    def with_directions(self) -> Evidence:
+        """With the directions of the logs taken as they are logged: nothing is fitted to them."""
+        curvature, score = self.curvature.copy(), self.score.copy()
+        places = np.arange(score.shape[1])[score.shape[1] - self.logged :][DIRECTION::NUISANCES]
+        curvature[:, places, :] = 0.0
+        curvature[:, :, places] = 0.0
+        score[:, places] = 0.0
+        return replace(self, curvature=curvature, score=score)
 
     def drops(self, beside: Chosen = ()) -> Floats:
         """(column,) how much each column, added to the nuisances and to some more, lowers the squared distance."""
@@ -224,10 +247,14 @@ def gains(evidence: Evidence, choices: Sequence[Chosen]) -> Floats:
     return result
 
 
-def best_gain(evidence: Evidence, beside: Chosen = ()) -> float:
-    """The largest held-out gain that one more column brings, over that of some columns alone: see `gains`."""
+def best_gain(evidence: Evidence, beside: Chosen = (), *, without: Chosen = ()) -> float:
+    """The largest held-out gain that one more column brings, over that of some columns alone: see `gains`.
+
+    Args:
+        without: columns whose gains do not count.
+    """
     folds, active = left_together(evidence.recording), [*evidence.nuisance, *beside]
-    columns = [column for column in range(evidence.columns) if column not in active]
+    columns = [column for column in range(evidence.columns) if column not in (*active, *without)]
     total = np.zeros(len(columns))
     for index in np.unique(folds):
         inside, outside = evidence.select(folds != index), evidence.select(folds == index)

@@ -25,6 +25,8 @@ ROUNDS = 3
 _FEW = 8
 """Shifts of the numerics that are fitted beside the few columns of a model: with 16, they take the columns' place."""
 _HALVINGS = 4
+_TRIED = 4
+"""Strengths across a prior of one sign from which a fit may begin."""
 STAYS = 0.3
 """Standard errors below which a step is not worth another round."""
 _LONGEST = 1.5
@@ -77,7 +79,8 @@ def refine(
     *,
     weighed: Sequence[Column],
 ) -> Refined:
-    """Fit the calibrated parameters and chosen columns to segments, from the linear fit of the statistics on.
+    """Fit the calibrated parameters and chosen columns to segments, from the linear fit of the statistics on; one
+    effect alone from where across its prior least is left, if that is less.
 
     Every round uses the errors along the fitted columns alone, with their part of the null model. These alone would
     lead the calibrated parameters astray by what numerics leave, so that their prior is there the estimate by all
@@ -94,6 +97,7 @@ def refine(
     effects = tuple((column, 0.0) for column in own if isinstance(column, EffectColumn))
     values = [*fit.value[: len(THETA)], *(fit.of(c)[0] for c in chosen)]
     model = Model(calibration=whitened.origin, effects=effects).moved(cut(np.array(values, dtype=np.float64)))
+    model = _where_least_is_left(forecaster, segments, whitened, model)
     prior = np.array([fit.of(place)[1] for place in range(len(THETA))])
     part = replace(_part(whitened.null, [*range(len(THETA)), *chosen]), prior=prior)
     anchor = model.calibration
@@ -105,6 +109,28 @@ def refine(
     every = np.ones(len(segments), dtype=bool)
     ((model, errors),) = finished(forecaster, segments, whitened, [reached.model], chosen, [every])
     return replace(reached, model=model, errors=errors)
+
+
+def _where_least_is_left(forecaster: Forecaster, segments: Segments, whitened: WhitenedMisfit, model: Model) -> Model:
+    """A model of one effect at the strength that leaves least, of the linear fit's and of some across what is expected:
+    an effect that soon saturates, as springs along the hoist do, is far from what its first small step promises."""
+    if len(model.effects) != 1:
+        return model
+    ((column, linear),) = model.effects
+    tried = [replace(model, effects=((column, value),)) for value in (linear, *_expected(column))]
+    left: list[float] = []
+    for errors in errors_of(tried, forecaster, segments):
+        finite = bool(errors.isfinite().all())
+        left.append(whitened.of(errors).fit(()).left if finite else np.inf)
+    return tried[int(np.argmin(left))] if np.isfinite(left).any() else model
+
+
+def _expected(column: EffectColumn) -> list[float]:
+    """Strengths beyond null across the prior: spaced by factors where all have one sign."""
+    low, high = (end - column.described.null for end in column.described.prior)
+    if low * high > 0:
+        return [float(value) for value in np.geomspace(low, high, _TRIED)]
+    return [share * end for end in (low, high) if end for share in (0.5, 1.0)]
 
 
 def finished(

@@ -6,14 +6,15 @@ unseen recordings worse than nothing.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from measure.forecasting.model import Model
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import columns, names
 from measure.forecasting.segments import Segments
@@ -32,11 +33,13 @@ class Fits:
 
     Attributes:
         whitened: the measure; the model of its statistics is where the fits begin.
+        settling: (segment, quantity) what recordings settle at less what a model does; None where it is not looked at.
     """
 
     forecaster: Forecaster
     segments: Segments
     whitened: WhitenedMisfit
+    settling: Callable[[Model], Floats] | None = None
     _made: dict[tuple[int, ...], Refined | None] = field(default_factory=dict)
     _left: dict[tuple[tuple[int, ...], bytes], LeftOut] = field(default_factory=dict)
     _errors: dict[tuple[int, ...], Tensor] = field(default_factory=dict)
@@ -68,6 +71,11 @@ class Fits:
                 *fitted.model.system(self.forecaster, self.segments), self.segments
             )
         return self._errors[fitted.chosen]
+
+    def evidence(self, fitted: Refined) -> Evidence:
+        """Of what one of these models leaves."""
+        found = self.whitened.of(self.errors(fitted))
+        return found if self.settling is None else replace(found, settled=self.settling(fitted.model))
 
     @property
     def base(self) -> Refined:
@@ -115,7 +123,7 @@ def refit(fits: Fits, reference: Reference, candidates: Sequence[int], *, worker
         fitted = fits.of((column,))
         if fitted is None:
             return None
-        evidence = fits.whitened.of(fits.errors(fitted))
+        evidence = fits.evidence(fitted)
         gains = np.zeros(len(together))
         for outside, old, new in zip(parts, before, left(fitted), strict=True):
             gains[outside] = old - new

@@ -6,6 +6,7 @@ numerics, weigh the library's effects, judge, and run the refitted model on what
 
 from __future__ import annotations
 
+import math
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -17,8 +18,10 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.provenance import code_version
+from flagdata.rng import child_seed
 from measure.forecasting.calibration import THETA, Calibration
-from measure.forecasting.regressors import columns
+from measure.forecasting.model import Model
+from measure.forecasting.regressors import columns, names
 from measure.forecasting.setting import Setting, Stage
 from measure.inference.evidence import Evidence, Fit
 from measure.inference.whitened_misfit import WhitenedMisfit
@@ -27,19 +30,32 @@ from measure.loop.gauss_newton import Refined, cut
 from measure.loop.parameters import parameters
 from measure.loop.refit import Fits, Refit, refit
 from measure.loop.residuals import residuals
-from measure.loop.selection import EQUIVALENT, GUST_COLUMN, Judgement, Weighed, finalists, judge, strength
+from measure.loop.selection import (
+    GUST_COLUMN,
+    Judgement,
+    Weighed,
+    equivalent,
+    finalists,
+    judge,
+    strength,
+    withdrawn,
+)
+from measure.loop.set_up import SetUp
 from measure.loop.validation import LeftOut, Predictions, Trial, compare, folds, numerical_floor, predict
 from measure.nulls import bank as banks
 from measure.nulls import plan
 from measure.nulls.conformal import kinds_needed
+from measure.nulls.free_run import settled_off
 from measure.nulls.reference import NullBank, Reference
+from measure.nulls.simulation import NullBatch
+from measure.observe.checks.attachment import hoist_stands_still
 from measure.observe.trajectory import Experiment
 from measure.probes.course import Variation
 from measure.probes.lines import Line
 from measure.probes.statistics import Projection, Statistics, projected
 from measure.probes.wind_log import lags
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Verdict
+from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
 
 Floats = NDArray[np.float64]
 _FLOOR_COPIES = 4
@@ -51,9 +67,14 @@ _LOOKS = 4
 class Options(plan.NullOptions):
     """How to close the loop: by which nulls, at which level of the global test.
 
+    Attributes:
+        most_nulls: up to so many are simulated where p is near the level; without effect where a bank is given.
+
     Raises:
         UsageError: values that make no sense, or a level that so many nulls cannot test.
     """
+
+    most_nulls: int = 2 * plan.FEWEST_NULLS
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -116,25 +137,46 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
         setting = setting.moved(late)
         found, projection = _looked_at(setting)
     report("sensitivities", 1, 1)
-    bank = plan.bank_for(setting, options, stage=report)
-    reference = bank.reference(
-        len(setting.segments), noise=setting.design.noise, seed=options.seed, prior=setting.prior
-    )
-    report("base model", 0, 1)
-    setting, fits = _calibrated(setting, _fits(setting, found, projection, bank), bank)
-    report("base model", 1, 1)
-    reference = reference.at(setting.calibration)
+    nominal = setting
+
+    def tested() -> tuple[Setting, Fits, NullBank, Reference]:
+        bank = plan.bank_for(nominal, options, stage=report)
+        reference = bank.reference(
+            len(nominal.segments), noise=nominal.design.noise, seed=options.seed, prior=nominal.prior
+        )
+        report("base model", 0, 1)
+        fitted, fits = _calibrated(nominal, _fits(nominal, found, projection, bank), bank)
+        fits = _settling(fitted, fits, options.seed)
+        report("base model", 1, 1)
+        return fitted, fits, bank, reference.at(fitted.calibration)
+
+    setting, fits, bank, reference = tested()
     evidence = fits.whitened.evidence(fits.whitened.found)
-    judgement, refits = judge(evidence, reference, level=options.level), dict[int, Refit | None]()
+    while (more := _more(options, reference, evidence)) is not None:
+        options = replace(options, nulls=more)
+        setting, fits, bank, reference = tested()
+        evidence = fits.whitened.evidence(fits.whitened.found)
+    set_up = SetUp(tolerance=setting.tolerance, attached=hoist_stands_still(setting.experiment))
+    judgement, refits = judge(evidence, reference, level=options.level, set_up=set_up), dict[int, Refit | None]()
     if judgement.conclusion not in (Conclusion.SUFFICIENT, Conclusion.UNTESTED):
         report("before and after", 0, 1)
         while new := [column for column in finalists(judgement) if column not in refits]:
             refits |= refit(fits, reference, new, workers=options.workers)
-            judgement = judge(evidence, reference, level=options.level, refits=refits)
+            judgement = judge(evidence, reference, level=options.level, refits=refits, set_up=set_up)
     solved = Solved(setting=setting, fits=fits, reference=reference, judgement=judgement)
     trial = _trial(solved, options)
+    if trial.rises:
+        solved, trial = replace(solved, judgement=withdrawn(judgement)), Trial()
     report("before and after", 1, 1)
     return _outcome(solved, bank, trial, options, began, late)
+
+
+def _more(options: Options, reference: Reference, evidence: Evidence) -> int | None:
+    """How many nulls to go on with; None where those that there are decide, or are given as a bank."""
+    if options.bank is not None:
+        return None
+    statistic = reference.farthest(evidence, names())
+    return plan.more_nulls(options.nulls, options.most_nulls, reference.conformal, statistic, level=options.level)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -225,6 +267,24 @@ def _calibrated(setting: Setting, fits: Fits, bank: NullBank) -> tuple[Setting, 
     return setting, fits
 
 
+def _settling(setting: Setting, fits: Fits, seed: int) -> Fits:
+    """With what the recordings settle at beside the models, run freely in the same winds."""
+    recordings = setting.experiment.recordings
+    plain = NullBatch(
+        specimen=setting.experiment.specimen, markers=setting.segments.markers, rate=1 / setting.segments.period,
+        duration=max(float(r.times[-1]) for r in recordings), noise=0.0,
+        calibrations=(setting.calibration,) * len(recordings), speeds=tuple(float(u) for u in setting.speeds),
+        winds=tuple(r.wind for r in recordings), seed=child_seed(seed, "settled"),
+    )  # fmt: skip
+
+    def settling(model: Model) -> Floats:
+        batch = replace(plain, calibrations=(model.calibration,) * len(recordings), effects=model.acting)
+        return settled_off(recordings, batch)[setting.recording]
+
+    found = replace(fits.whitened.found, settled=settling(Model(calibration=setting.calibration)))
+    return replace(fits, whitened=replace(fits.whitened, found=found), settling=settling)
+
+
 def _base_fit(setting: Setting, fits: Fits) -> Fit:
     """The base model, linear where statistics were taken."""
     evidence = fits.whitened.evidence(fits.whitened.found)
@@ -253,6 +313,7 @@ def _trial(solved: Solved, options: Options) -> Trial:
     made: list[Comparison] = []
     apart: list[Floats] = []
     places: list[NDArray[np.int64]] = []
+    squared = 0.0
     frames = len(setting.segments.items[0].positions) - setting.segments.first
     for place, (fold, (before, after, *wrong)) in enumerate(zip(every, zip(*tried, strict=True), strict=True)):
         near = np.isin(of_recording, np.unique(setting.recording[fold.outside]))
@@ -265,10 +326,12 @@ def _trial(solved: Solved, options: Options) -> Trial:
             )
         )  # fmt: skip
         if len(every) == 1 or place < len(setting.speeds):  # the late parts are in the recordings as well
+            squared += after.squared.sum() - before.squared.sum()
             places.append(np.full(len(after.misfit), place))
             apart += [own.misfit - after.misfit for own in wrong]
     return Trial(
         comparisons=tuple(made), apart=np.concatenate(apart) if apart else None, recording=np.concatenate(places),
+        rises=bool(squared > 0),
     )  # fmt: skip
 
 
@@ -280,7 +343,10 @@ def _outcome(
     after = None if larger is None else _unseen(setting, larger)
     verdict = Verdict(
         conclusion=judgement.conclusion, named=_named(judgement), words="", test=_test(solved, bank, options),
-        parameters=parameters(solved.base, larger, solved.reference.reach, weighed=float(setting.prior[0])),
+        parameters=(
+            *parameters(solved.base, larger, solved.reference.reach, weighed=float(setting.prior[0])),
+            *_direction(judgement),
+        ),
         ranking=_ranking(solved, larger),
         comparisons=trial.comparisons, apart=trial.control,
         residuals=residuals(setting.experiment, setting.segments, before, after, held_out=len(setting.speeds) > 1),
@@ -299,6 +365,18 @@ def _outcome(
         line=judgement.line if beyond else None,
         course=judgement.course if beyond else None,
     )  # fmt: skip
+
+
+def _direction(judgement: Judgement) -> tuple[Parameter, ...]:
+    """By how much the wind is turned from its logs, in degrees."""
+    found = judgement.direction
+    if found is None:
+        return ()
+    value, low, high = (math.degrees(v) for v in (found.value, found.low, found.high))
+    shown = Estimate(value=value, low=low, high=high, unit="°", level=found.level)
+    return (
+        Parameter(name="direction of the wind from its log, counter-clockwise", before=shown, after=None, shift=None),
+    )
 
 
 def _test(solved: Solved, bank: NullBank, options: Options) -> NullTest:
@@ -344,7 +422,7 @@ def _ranking(solved: Solved, larger: Refined | None) -> tuple[Candidate, ...]:
     made: list[Candidate] = []
     for weighed in solved.judgement.ranking:
         candidate = weighed.candidate
-        if larger is not None and weighed.column in solved.acting:
+        if larger is not None and weighed.column in solved.acting and weighed.measured is None:
             candidate = replace(candidate, strength=solved.strength(weighed, larger))
         made.append(candidate)
     return tuple(made)
@@ -354,5 +432,6 @@ def _named(judgement: Judgement) -> tuple[str, ...]:
     names: list[str] = []
     for weighed in judgement.ranking:
         if weighed.column in judgement.named:
-            names += [weighed.candidate.effect, *EQUIVALENT.get(weighed.candidate.effect, ())]
+            candidate = weighed.candidate
+            names += [candidate.effect, *equivalent(candidate.effect, candidate.strength)]
     return tuple(dict.fromkeys(names))

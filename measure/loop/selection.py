@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from measure.forecasting.calibration import THETA
-from measure.forecasting.regressors import EffectColumn, columns, names
+from measure.forecasting.regressors import TURNED, EffectColumn, columns, names
 from measure.inference.evidence import Evidence, gains
 from measure.inference.fluctuation import fluctuation, fluctuation_gains
 from measure.loop.refit import Refit
+from measure.loop.set_up import HOIST, SetUp, beyond_tolerance, turned
 from measure.loop.validation import total_error
 from measure.nulls.reference import GUSTS, Reference
-from measure.probes.course import Variation
+from measure.probes.course import ALONG, Variation
 from measure.probes.lines import Line
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.quantity import number
@@ -36,8 +37,11 @@ GUST_COLUMN = -1
 """Stands for gusts, which are no column: only their size can be found, not their course."""
 _FIRST = len(THETA)
 
-EQUIVALENT: dict[str, tuple[str, ...]] = {"air-density": ("porosity",)}
-"""Effects that no recording of this kind can distinguish from a weighed one: both scale the dynamic pressure alone."""
+
+def equivalent(effect: str, strength: Estimate) -> tuple[str, ...]:
+    """Effects that no recording of this kind can distinguish from a weighed one: holes in the cloth scale the dynamic
+    pressure as the air's density does, but only lower it."""
+    return ("porosity",) if effect == "air-density" and strength.value < 0 else ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,7 +56,9 @@ class Weighed:
         recording: (segment,) of each.
         admissible: whether the model exists: its strength is one that the effect may have, its cloth stays one, and a
             wind that fluctuates does it as turbulence does.
-        unlike: how the wind's course differs from that of turbulence, for gusts; empty where it does not.
+        unlike: why such a model does not exist, beside its strength: how the wind's course differs from that of
+            turbulence, or that a log's direction is within its tolerance; empty where it does.
+        measured: the strength where it is found apart from the other columns; None where it is fitted beside them.
     """
 
     column: int
@@ -62,6 +68,7 @@ class Weighed:
     recording: NDArray[np.int64]
     admissible: bool
     unlike: str = ""
+    measured: Estimate | None = None
 
     def passes(self, level: float) -> bool:
         """Whether the model passes its predictive test: what it leaves is what nulls leave, and its strength is the
@@ -83,6 +90,8 @@ class Judgement:
         line: of the errors' spectra that the first of the ranking leaves, where it alone would reject the model.
         course: how the wind varies, by the errors that the first leaves, where that alone would and it is not
             turbulence.
+        direction: by how much the wind is turned from where its logs have it, counter-clockwise [rad].
+        departed: columns of what the recordings show of the set-up against what was declared.
     """
 
     conclusion: Conclusion
@@ -93,10 +102,17 @@ class Judgement:
     p_value: float
     line: Line | None = None
     course: Variation | None = None
+    direction: Estimate | None = None
+    departed: tuple[int, ...] = ()
 
 
 def judge(
-    evidence: Evidence, reference: Reference, *, level: float, refits: Mapping[int, Refit | None] | None = None
+    evidence: Evidence,
+    reference: Reference,
+    *,
+    level: float,
+    refits: Mapping[int, Refit | None] | None = None,
+    set_up: SetUp | None = None,
 ) -> Judgement:
     """Weigh the library against the evidence of all recordings.
 
@@ -104,6 +120,7 @@ def judge(
         level: of the global test.
         refits: of columns whose models were refitted, which count in place of the linear evidence; None for a cloth
             that diverged.
+        set_up: what recordings may show of it; what they show leads the verdict, whatever the test says.
     """
     known = refits or {}
     statistics = reference.statistics(evidence, names())
@@ -117,9 +134,14 @@ def judge(
         )
         for (column, effect), own in zip(effects, held_out, strict=True)
     ]
+    direction, declared = turned(evidence, reference), set_up or SetUp()
+    beyond = beyond_tolerance(direction, declared.tolerance)
+    weighed = [_within(w, direction, declared.tolerance) if w.column == names().index(TURNED) else w for w in weighed]
     ranking = _ranked([*weighed, _gusts(evidence, reference, float(statistics[len(names())]))])
+    departing = {names().index(name) for name, shown in ((TURNED, beyond), (HOIST, declared.attached)) if shown}
+    departed = [w for w in ranking if w.column in departing]
     confident = _confidence_set(ranking, evidence)
-    first = known.get(ranking[0].column)
+    first = known.get((departed or ranking)[0].column)
     left = evidence if first is None else first.evidence
 
     def judgement(conclusion: Conclusion, named: Sequence[Weighed], why: str = "") -> Judgement:
@@ -131,15 +153,34 @@ def judge(
         return Judgement(
             conclusion=conclusion, named=tuple(w.column for w in named), ranking=tuple(reasoned),
             confident=tuple(w.column for w in confident), statistic=statistic, p_value=p_value,
-            line=_swinging(left, reference, level), course=_blown(left, reference, level),
+            line=_swinging(left, reference, level), course=_blown(left, reference, level), direction=direction,
+            departed=tuple(w.column for w in departed),
         )  # fmt: skip
 
     if not reference.conformal.tests(level):
         return judgement(Conclusion.UNTESTED, (), "there are too few kinds of numerics to test the base model")
+    if departed:
+        rest = "the recordings show that the set-up is another than the declared one, and nothing else is needed"
+        columns_shown = [w.column for w in departed]
+        if len(departed) == 1 and first is not None:
+            explained = first.leftover > level
+        else:
+            explained = reference.p_left_by(left, names(), columns_shown) > level
+        if explained:
+            return judgement(Conclusion.EFFECT, departed, rest)
+        second = _second(left, reference, departed[0], ranking, level) if len(departed) == 1 else None
+        if second is not None:
+            return judgement(Conclusion.EFFECT, (*departed, second))
+        return judgement(Conclusion.PARTLY, departed)
     if p_value > level:
         return judgement(Conclusion.SUFFICIENT, (), "the base model is not rejected")
     if not confident:
-        return judgement(Conclusion.OUTSIDE, ())
+        pulsating = _pulsating(left, reference, ranking, level)
+        if pulsating is None:
+            return judgement(Conclusion.OUTSIDE, ())
+        ranking = [pulsating if w.column == GUST_COLUMN else w for w in ranking]
+        passes = pulsating.candidate.leftover > level
+        return judgement(Conclusion.EFFECT if passes else Conclusion.PARTLY, [pulsating])
     passing = [w for w in confident if w.passes(level)]
     if passing:
         return judgement(Conclusion.EFFECT if len(passing) == 1 else Conclusion.ONE_OF, passing)
@@ -147,6 +188,27 @@ def judge(
     if second is not None:
         return judgement(Conclusion.EFFECT, (confident[0], second))
     return judgement(Conclusion.PARTLY, confident[:1])
+
+
+def _within(weighed: Weighed, direction: Estimate, tolerance: float) -> Weighed:
+    """The turned wind as it was measured; no effect where the log's tolerance allows for it."""
+    inside = tolerance > 0 and not beyond_tolerance(direction, tolerance)
+    low, high, allowed = (number(math.degrees(v), digits=2) for v in (direction.low, direction.high, tolerance))
+    unlike = f"the wind is turned by {low}° to {high}° from its log, which {allowed}° of tolerance allow for"
+    return replace(
+        weighed, measured=direction, admissible=weighed.admissible and not inside, unlike=unlike if inside else "",
+        candidate=replace(weighed.candidate, strength=direction),
+    )  # fmt: skip
+
+
+def withdrawn(judgement: Judgement) -> Judgement:
+    """Without an effect named: with those that were, errors on unseen recordings are larger than without."""
+    why = "with it, errors on unseen recordings are larger than without"
+    ranking = tuple(
+        replace(w, candidate=replace(w.candidate, why_not=why)) if w.column in judgement.named else w
+        for w in judgement.ranking
+    )
+    return replace(judgement, conclusion=Conclusion.OUTSIDE, named=(), ranking=ranking)
 
 
 def _confidence_set(ranking: Sequence[Weighed], evidence: Evidence) -> list[Weighed]:
@@ -185,6 +247,27 @@ def _blown(left: Evidence, reference: Reference, level: float) -> Variation | No
     return variation if reference.conformal.p(swing) <= level else None
 
 
+def _pulsating(left: Evidence, reference: Reference, ranking: Sequence[Weighed], level: float) -> Weighed | None:
+    """Gusts by the course of a wind that varies along itself alone, where that alone would reject a model: what varies
+    within segments is not found by how the pressure differs between them. None where the wind does not vary so."""
+    variation = _blown(left, reference, level)
+    if variation is None or not variation.alone:
+        return None
+    (gusts,) = (w for w in ranking if w.column == GUST_COLUMN)
+    each = [_intensity(left.select(left.recording == index)) for index in np.unique(left.recording)]
+    error = float(np.std(each, ddof=1) / math.sqrt(len(each))) if len(each) > 1 else 0.0
+    found = estimate(_intensity(left), error, gusts.candidate.strength.unit)
+    return replace(
+        gusts, admissible=True, unlike="", measured=found, candidate=replace(gusts.candidate, strength=found)
+    )
+
+
+def _intensity(evidence: Evidence) -> float:
+    """Standard deviation of the wind along itself, as a share of its mean, by its course."""
+    variation = _varying(evidence)
+    return 0.0 if variation is None else math.sqrt(max(float(variation.whole[ALONG]), 0.0))
+
+
 def heterogeneity(strengths: Sequence[Estimate]) -> float | None:
     """p-value of one strength in all recordings, by Cochran's Q (Biometrics 10:101, 1954); None of fewer than two.
 
@@ -213,7 +296,7 @@ def finalists(judgement: Judgement) -> tuple[int, ...]:
     able = [w for w in judgement.ranking if w.admissible and w.column != GUST_COLUMN]
     strongest = sorted(able, key=lambda w: -abs(w.candidate.z))
     first = (*able[: CRITERIA.refitted], *strongest[: CRITERIA.refitted])
-    chosen = dict.fromkeys([*(w.column for w in first), *judgement.confident])
+    chosen = dict.fromkeys([*judgement.departed, *(w.column for w in first), *judgement.confident])
     return tuple(column for column in chosen if column != GUST_COLUMN)
 
 
@@ -321,7 +404,7 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
     found, gained = fluctuation(evidence, place), fluctuation_gains(evidence, place)
     described = EFFECTS["gusts"].parameters()["intensity"]
     variation = _varying(evidence)
-    unlike = "" if variation is None or variation.turbulent else variation.words
+    unlike = "" if variation is None or variation.turbulent or variation.alone else variation.words
     by_recording = []
     for index in np.unique(evidence.recording):
         own = fluctuation(evidence.select(evidence.recording == index), place)

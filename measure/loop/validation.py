@@ -50,11 +50,13 @@ class Trial:
         apart: (segment,) half misfit (see `whitened_misfit`) of the control less that of the effect, each segment of
             the recordings left out in turn (of a single recording: of its last part); None without a control.
         recording: (segment,) what was left out together with each.
+        rises: whether squared errors on all that was left out in turn are larger with the effect than without.
     """
 
     comparisons: tuple[Comparison, ...] = ()
     apart: Floats | None = None
     recording: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    rises: bool = False
 
     @property
     def control(self) -> Estimate | None:

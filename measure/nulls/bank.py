@@ -10,15 +10,18 @@ import math
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from io import BytesIO
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
 
 from flagdata.errors import CorruptError, LimitError, NotFoundError, UsageError
 from flagdata.lake.durable import put_if_absent
+from flagdata.provenance import code_version
 from flagdata.rng import child_seed, stream
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
@@ -26,6 +29,7 @@ from measure.forecasting.regressors import Column, columns, names
 from measure.forecasting.segments import Segments
 from measure.inference.random_effect import Nulls
 from measure.nulls import stiffness
+from measure.nulls.free_run import mistaken, settled_off
 from measure.nulls.reference import NullBank
 from measure.nulls.simulation import NullBatch
 from measure.observe.anchors import as_seen
@@ -37,12 +41,12 @@ from sim.integrate.split import SplitEuler
 WINDS = 4
 """Recordings of a batch: one cloth in so many winds, one experiment of one kind of numerics. What experiments leave
 differs by their numerics more than by the cloth, and only kinds count in the test, so that each has one cloth."""
-_VERSION = 3
+_VERSION = 4
 """Raised whenever the arrays of a batch mean something else; 2: one cloth a batch, the damping by its logarithm;
-3: sensitivities of how cloth bends in double precision."""
+3: sensitivities of how cloth bends in double precision; 4: what recordings settle at."""
 _SEGMENTS = (
     "recording", "r", "response", "error", "marker_error", "lines", "speeds", "calibration", "noise", "period", "cloth",
-    "turned", "turning", "moment", "course", "course_curvature",
+    "turned", "turning", "moment", "course", "course_curvature", "settled",
 )  # fmt: skip
 """Arrays with a row for each segment."""
 FILE_LIMIT = 4 << 30
@@ -99,6 +103,7 @@ def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tupl
     forecaster = Forecaster(specimen=batch.specimen, markers=batch.markers, integrator=SplitEuler())
     own = [batch.calibrations[recording] for recording in segments.recording]
     found = statistics(forecaster, segments, own, weighed)
+    found = replace(found, settled=settled_off(recordings, mistaken(batch))[found.recording])
     cloths = np.array([c.steps_from(Calibration()) for c in batch.calibrations])
     nulls = Nulls(
         statistics=found, speeds=np.array(batch.speeds)[found.recording], calibration=cloths[found.recording],
@@ -144,8 +149,10 @@ def build(folder: Path, batches: Sequence[NullBatch], *, workers: int = 1, progr
 def _cache(folder: Path, batch: NullBatch, index: int) -> None:
     nulls, duration = evaluate(batch, index, columns())
     own = nulls.statistics
-    if own.lines is None or own.turning is None or own.course is None:
-        raise UsageError("no spectra, moments or courses", where="null bank", fix="take statistics by `statistics`")
+    if own.lines is None or own.turning is None or own.course is None or own.settled is None:
+        raise UsageError(
+            "no spectra, moments, courses or settled quantities", where="null bank", fix="take statistics by `evaluate`"
+        )
     buffer = BytesIO()
     np.savez(
         buffer, version=np.array(_VERSION), columns=np.array(names()), recording=own.recording, r=own.r,
@@ -153,7 +160,7 @@ def _cache(folder: Path, batch: NullBatch, index: int) -> None:
         calibration=nulls.calibration, noise=nulls.noise, period=nulls.period, cloth=nulls.cloth,
         duration=np.array(duration), anchors_told=np.array(batch.specimen.anchors_given), turned=own.turning.r,
         turning=own.turning.response, moment=own.turning.error, course=own.course.score,
-        course_curvature=own.course.curvature,
+        course_curvature=own.course.curvature, settled=own.settled,
     )  # fmt: skip
     put_if_absent(_file(folder, index), buffer.getvalue())
 
@@ -211,15 +218,23 @@ def files(folder: Path) -> list[Path]:
     return sorted(folder.glob("nulls-*.npz"))
 
 
-def load(folder: Path, *, words: str) -> NullBank:
+def version_of_content() -> dict[str, Any]:
+    """What the arrays of a batch are, beside its design: nulls of another version are none of these."""
+    return {"version": _VERSION, "columns": list(names()), "code": code_version()}
+
+
+def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
     """The bank of a folder.
+
+    Args:
+        kinds: how many of its kinds, the first; None for all.
 
     Raises:
         NotFoundError: no batches there.
         CorruptError: a file that cannot be read, or of other columns.
         InputError: too few batches.
     """
-    paths = files(folder)
+    paths = files(folder)[:kinds]
     if not paths:
         raise NotFoundError("no null recordings", where=str(folder), fix="build the bank first")
     parts: list[Nulls] = []
@@ -235,7 +250,7 @@ def load(folder: Path, *, words: str) -> NullBank:
                 recording=content["recording"] + count, r=content["turned"], response=content["turning"],
                 error=content["moment"], marker_error=content["moment"][:, None],
             ),
-            course=Course(score=content["course"], curvature=content["course_curvature"]),
+            course=Course(score=content["course"], curvature=content["course_curvature"]), settled=content["settled"],
         )  # fmt: skip
         numerics = np.full(len(own.r), _number(path))
         parts.append(

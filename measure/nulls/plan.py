@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from flagdata.errors import InputError, UsageError
+from flagdata.provenance import array_hash, recipe_hash
 from flagdata.rng import child_seed
 from measure.forecasting.setting import Setting, Stage
 from measure.nulls import bank as banks
 from measure.nulls import winds
+from measure.nulls.conformal import GroupedConformal
 from measure.nulls.reference import NullBank
 from measure.nulls.simulation import NullBatch
+from measure.observe.trajectory import described
 from measure.verdict.criteria import CRITERIA
+from sim.kernel.build import cache_folder
 
 FEWEST_NULLS = CRITERIA.simulated_kinds * banks.WINDS
 """So many at least are simulated: each kind of numerics is a batch, and p-values count the kinds."""
@@ -61,6 +64,14 @@ def bank_for(setting: Setting, options: NullOptions, *, stage: Stage) -> NullBan
     if options.bank is not None:
         return load_bank(options.bank, setting)
     return simulated(setting, nulls=options.nulls, seed=options.seed, workers=options.workers, stage=stage)
+
+
+def more_nulls(nulls: int, most: int, conformal: GroupedConformal, statistic: float, *, level: float) -> int | None:
+    """Twice as many nulls, up to `most`, where so many leave open what the test decides: p within `Criteria.near` of
+    the level, and a level that its interval includes. None where they decide it, or no more may be simulated."""
+    p, (low, high) = conformal.p(statistic), conformal.interval(statistic, level=CRITERIA.interval)
+    near = level / CRITERIA.near <= p <= CRITERIA.near * level and low <= level <= high
+    return min(2 * nulls, most) if near and nulls < most else None
 
 
 def load_bank(folder: Path, setting: Setting) -> NullBank:
@@ -114,17 +125,38 @@ def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
 
 
 def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: Stage) -> NullBank:
-    """A bank for one verdict, of `batches`."""
+    """A bank of `batches`, kept in the user's cache folder by the hash of its design: what is there already is not
+    simulated anew, and a build that was stopped goes on."""
     wanted = batches(setting, kinds=math.ceil(nulls / banks.WINDS), seed=seed)
     done = 0
 
     def count(more: int) -> None:
         nonlocal done
         done += more
-        stage("nulls", done, len(wanted))
+        stage(f"nulls of {len(wanted)} kinds", done, len(wanted))
 
-    with TemporaryDirectory(prefix="flagdata-nulls-") as folder:
-        banks.build(Path(folder), wanted, workers=workers, progress=count)
-        total = banks.WINDS * len(wanted)
-        words = f"{total} recordings of {len(wanted)} meshes and methods, over the priors of the cloth"
-        return banks.load(Path(folder), words=words)
+    folder = kept_in(setting, seed=seed)
+    banks.build(folder, wanted, workers=workers, progress=count)
+    total = banks.WINDS * len(wanted)
+    words = f"{total} recordings of {len(wanted)} meshes and methods, over the priors of the cloth"
+    return banks.load(folder, words=words, kinds=len(wanted))
+
+
+def kept_in(setting: Setting, *, seed: int) -> Path:
+    """The folder of the nulls of an experiment's design, by a seed and by this version of the code."""
+    made = {"design": design_hash(setting), "seed": seed, **banks.version_of_content()}
+    return cache_folder() / "nulls" / recipe_hash(made)[:32]
+
+
+def design_hash(setting: Setting) -> str:
+    """SHA-256 of all of an experiment that shapes its nulls: cloth, markers, rate, noise, lengths and winds."""
+    segments, recordings = setting.segments, setting.experiment.recordings
+    content, arrays = described(setting.experiment.specimen)
+    del content["density-uncertainty"]  # nulls are judged under it, not made by it
+    content |= {
+        "period": segments.period, "noise": setting.design.noise, "segments": len(segments),
+        "lengths": [float(r.times[-1]) for r in recordings],
+    }  # fmt: skip
+    return array_hash(
+        content, [*arrays, segments.markers, *(w for r in recordings for w in (r.wind.times, r.wind.velocity))]
+    )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError, UsageError
 from flagdata.rng import stream
 from measure.forecasting.calibration import DAMPING, PRIOR, THETA, Calibration
+from measure.forecasting.regressors import TURNED
 from measure.forecasting.setting import Design
 from measure.inference.evidence import Evidence, best_gain
 from measure.inference.fluctuation import fluctuation
@@ -108,8 +109,9 @@ class NullBank:
         return NullModel.fit(self.nulls, design)
 
     def plain(self) -> NullBank:
-        """For those who look at the errors alone: without moments about the pole and the wind's course."""
-        own = replace(self.nulls.statistics, turning=None, course=None)
+        """For those who look at the errors alone: without moments about the pole, the wind's course and settled
+        quantities."""
+        own = replace(self.nulls.statistics, turning=None, course=None, settled=None)
         return replace(self, nulls=replace(self.nulls, statistics=own))
 
     def reference(self, segments: int, *, noise: float, seed: int, prior: Floats = PRIOR) -> Reference:
@@ -145,6 +147,7 @@ class _Found(Rows):
         left: (group,) what the base model leaves.
         gained: (group,) best held-out gains.
         swings: (group, part) of the wind's course, of no part where it is not looked at.
+        settled: (group, quantity) what recordings settle at, of none where it is not looked at.
         lines: (group, shape · axis) `strongest`; None where spectra are not looked at.
         deviations: (group, theta) of the calibrated parameters from the true ones, in standard errors.
         noise: (group,) of the markers [m].
@@ -156,6 +159,7 @@ class _Found(Rows):
     left: Floats
     gained: Floats
     swings: Floats
+    settled: Floats
     lines: Floats | None
     deviations: Floats
     noise: Floats
@@ -173,10 +177,11 @@ class _Found(Rows):
             own: one segment of it.
         """
         nominal = -own.calibration[0] * np.minimum(evidence.prior / PRIOR, 1.0)
-        swing = np.zeros(0) if evidence.swing is None else evidence.swing
+        swing, settles = (np.zeros(0) if own is None else own for own in (evidence.swing, evidence.settles))
         return cls(
             shares=unscaled(evidence, columns)[None], left=np.array([evidence.fit(()).left]),
-            gained=np.array([best_gain(evidence)]), swings=swing[None],
+            gained=np.array([best_gain(evidence, without=_uncounted(columns))]), swings=swing[None],
+            settled=settles[None],
             lines=None if evidence.lines is None else strongest(evidence.lines)[None],
             deviations=evidence.fit((), centre=nominal).in_errors(range(len(THETA)))[None],
             noise=own.noise, kinds=own.numerics, damping=own.calibration[:, DAMPING],
@@ -204,16 +209,17 @@ class _Usual:
         )  # fmt: skip
 
     def far(self, found: _Found) -> Floats:
-        """(group, column + 2 to 6) how far groups are from their mean, in their standard deviations."""
+        """(group, column + 2 to 11) how far groups are from their mean, in their standard deviations."""
         far = (_roots(found, self.lines, self.powers) - self.centre) / self.width
-        swings = slice(found.shares.shape[1] + 2, found.shares.shape[1] + 2 + found.swings.shape[1])
-        far[:, swings] = np.abs(far[:, swings])
+        begin = found.shares.shape[1] + 2
+        either = slice(begin, begin + found.swings.shape[1] + found.settled.shape[1])
+        far[:, either] = np.abs(far[:, either])
         return far
 
 
 def _roots(found: _Found, lines: Lines | None, powers: Floats) -> Floats:
     swings = found.swings * np.exp(-np.outer(found.damping, powers))
-    roots = np.c_[np.cbrt(np.c_[found.shares, found.left, found.gained]), swings]
+    roots = np.c_[np.cbrt(np.c_[found.shares, found.left, found.gained]), swings, found.settled]
     return roots if lines is None or found.lines is None else np.c_[roots, lines.standing_out(found.lines)]
 
 
@@ -234,8 +240,8 @@ class Reference:
     not fitted to: so they weigh the best held-out gain as well.
     So they do how the wind's course swings: a covariance, of which nulls have what chance and their numerics leave, on
     either side of nothing, and both sides are far; it grows by a power of the damping, which is taken out (see
-    `growth`). Evidence whose moments or course are not to count goes
-    without them.
+    `growth`). What recordings settle at is far on either side as well. Evidence whose moments, course or settled
+    quantities are not to count goes without them.
 
     What is usual of a null group is that of other kinds of numerics, as it is for data: by means and deviations that it
     had a part in, 3 % of true nulls were rejected at 2 %, and 7 % at 5 % (20 kinds; by other kinds 2 and 4 %).
@@ -243,13 +249,13 @@ class Reference:
     Attributes:
         scaled: (group, column) of `unscaled`: columns, gusts, then moments.
         spread: (column,) mean share of nulls as noisy as the data.
-        far: (group, column + 2 to 6) how far the cube root of each is from its mean in other kinds' nulls as noisy, in
+        far: (group, column + 2 to 11) how far the cube root of each is from its mean in other kinds' nulls as noisy, in
             standard deviations; after the columns that of what the base model leaves, then the best held-out gain,
-            swings and the line as they are.
+            swings, settled quantities and the line as they are.
         kinds: (group,) of numerics.
         deviations: (group, theta) of the calibrated parameters from those that the nulls were simulated with, in
             standard errors as Σ has them.
-        centre, width: (column + 2 to 6,) mean and standard deviation of the same, of nulls as noisy as the data.
+        centre, width: (column + 2 to 11,) mean and standard deviation of the same, of nulls as noisy as the data.
         lines: of the nulls; None where spectra are not looked at.
         powers: (part,) of the damping by which swings grow.
         damping: of the data, the logarithm of its ratio to the nominal one.
@@ -342,6 +348,11 @@ class Reference:
         """The same for the column alone."""
         return GroupedConformal(null=self.scaled[:, column], kinds=self.kinds).p(statistic)
 
+    def reach_of(self, column: int) -> float:
+        """How many standard errors, those that make nulls' mean squared z 1, reach to either side of an interval."""
+        null = GroupedConformal(null=self.scaled[:, column], kinds=self.kinds)
+        return math.sqrt(null.quantile(CRITERIA.interval))
+
     def p_left_by(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int]) -> float:
         """p of the global test on what some columns leave, fitted to the data."""
         return self.conformal.p(self.farthest(evidence, columns, chosen))
@@ -350,9 +361,11 @@ class Reference:
         """How far the farthest of data is, where some columns are fitted already: the statistic of the global test."""
         shares, left = unscaled(evidence, columns, chosen), evidence.fit(chosen).left
         far = max(float(self._far(shares, slice(len(shares))).max()), float(self._far(left, len(self.spread))))
-        gained = float(self._far(best_gain(evidence, chosen), len(self.spread) + 1))
-        swing, line = self.swing(evidence), self.line(evidence)
-        return max([far, gained, *([] if swing is None else [swing]), *([] if line is None else [line.far])])
+        best = best_gain(evidence, chosen, without=_uncounted(columns))
+        gained = float(self._far(best, len(self.spread) + 1))
+        swing, line, settles = self.swing(evidence), self.line(evidence), self.settles(evidence)
+        beside = [swing, None if line is None else line.far, None if settles is None else float(settles.max())]
+        return max(far, gained, *(own for own in beside if own is not None))
 
     def swing(self, evidence: Evidence) -> float | None:
         """How far the wind's course of data swings, by the part that does most; None where it is not looked at.
@@ -363,11 +376,28 @@ class Reference:
         found = evidence.swing
         if found is None:
             return None
-        own = slice(len(self.spread) + 2, len(self.centre) - (self.lines is not None))
+        own = slice(len(self.spread) + 2, len(self.spread) + 2 + len(self.powers))
         if len(self.centre[own]) != len(found):
             raise UsageError("courses of the data alone", where="reference", fix="look at them in the nulls as well")
         damped = found * np.exp(-self.damping * self.powers)
         return float(np.abs((damped - self.centre[own]) / self.width[own]).max())
+
+    def settles(self, evidence: Evidence) -> Floats | None:
+        """(quantity,) how far each of data lies that recordings settle at; None where they are not looked at.
+
+        Raises:
+            UsageError: they are of the data, and were not of the nulls.
+        """
+        found = evidence.settles
+        if found is None:
+            return None
+        begin = len(self.spread) + 2 + len(self.powers)
+        own = slice(begin, len(self.centre) - (self.lines is not None))
+        if len(self.centre[own]) != len(found):
+            raise UsageError(
+                "settled quantities of the data alone", where="reference", fix="look at them in the nulls as well"
+            )
+        return np.abs((found - self.centre[own]) / self.width[own])
 
     def line(self, evidence: Evidence) -> Line | None:
         """The most prominent one of data; None where spectra are not looked at.
@@ -390,6 +420,12 @@ class Reference:
 
 _NOTHING = 1e-6
 """Mean share below which a column is unobservable: that of the columns that are always fitted."""
+
+
+def _uncounted(columns: tuple[str, ...]) -> list[int]:
+    """Columns whose held-out gains do not count in the test: what a log may be off by within its tolerance gains on
+    recordings whose own log was not fitted."""
+    return [columns.index(TURNED)] if TURNED in columns else []
 
 
 def unscaled(evidence: Evidence, columns: tuple[str, ...], beside: Sequence[int] = ()) -> Floats:

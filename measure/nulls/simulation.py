@@ -116,7 +116,7 @@ class NullBatch:
             FlagdataError: it diverges in the smallest steps as well.
         """
         for halvings in range(1 + _HALVINGS):
-            found = self._run(flat, held, halvings)
+            found = self._run(flat, held, *self._method(halvings))
             if np.isfinite(found).all():
                 return found
         raise FlagdataError(
@@ -126,10 +126,24 @@ class NullBatch:
             fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",
         )  # fmt: skip
 
-    def _run(self, flat: Mesh, held: tuple[int, ...], halvings: int) -> Floats:
-        """The same in steps that were halved so often; not finite where it diverges."""
+    def as_fitted(self) -> Floats:
+        """(frame, marker, 3, recording) of the same by the mesh and the steps of the fit, without noise [m].
+
+        Raises:
+            FlagdataError: it diverges.
+        """
         specimen = self.specimen
-        integrator, damped = self._method(halvings)
+        found = self._run(specimen.mesh, specimen.held, SplitEuler(), 0.0)
+        if not np.isfinite(found).all():
+            raise FlagdataError(
+                "a free run of the model diverges", where=f"{self.calibrations[0]}",
+                fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",
+            )  # fmt: skip
+        return np.einsum("mv,fvcb->fmcb", onto(specimen.mesh.rest, self.markers), found)
+
+    def _run(self, flat: Mesh, held: tuple[int, ...], integrator: Integrator, damped: float) -> Floats:
+        """The same by a method that damps by itself so much [s]; not finite where it diverges."""
+        specimen = self.specimen
         lowest = specimen.held[int(np.argmin(specimen.anchors[:, 2]))]
         offset = flat.rest - specimen.mesh.rest[lowest]
         start = specimen.anchors[np.argmin(specimen.anchors[:, 2])] + np.stack(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -246,3 +247,18 @@ def _frozen(values: Floats) -> Floats:
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array
+
+
+def described(specimen: Specimen) -> tuple[dict[str, Any], list[NDArray[Any]]]:
+    """Plain values and arrays that say all of a cloth and its uncertainties, to be hashed; no names and files."""
+    material = specimen.material
+    content: dict[str, Any] = {
+        "held": list(specimen.held), "stiffness": repr(specimen.stiffness),
+        "anchors-told": specimen.anchors_given, "gravity": list(specimen.gravity),
+        "air": [type(specimen.air).__name__, *vars(specimen.air).items()],
+        "material": [material.density, material.damping],
+        "density-uncertainty": specimen.density_uncertainty if specimen.mass_known else None,
+    }  # fmt: skip
+    return content, [
+        specimen.mesh.rest, specimen.mesh.faces, specimen.anchors, material.stretching, material.bending,
+    ]  # fmt: skip

@@ -128,6 +128,12 @@ class Variation:
         )
 
     @property
+    def alone(self) -> bool:
+        """Whether the wind varies along itself alone, however fast: neither turbulence nor an obstacle does so."""
+        across = max(float(self.whole[LEFT]), 0.0)
+        return bool(self.whole[ALONG] > 0 and across < CRITERIA.least_obstructed**2 * self.whole[ALONG])
+
+    @property
     def words(self) -> str:
         """How it differs from turbulence's."""
         if self.whole[ALONG] <= 0:

@@ -62,6 +62,8 @@ class Statistics(Rows):
         course: of the wind, estimated from the errors; None where not asked for.
         log: (segment, column, nuisance) how r moves with a prior standard deviation of what the wind's log may be off
             by, see `wind_log`; None where the wind is known, as in nulls.
+        settled: (segment, quantity) what its recording settles at less what the model does, see `settled`; None where
+            not looked at.
     """
 
     recording: NDArray[np.int64]
@@ -73,6 +75,7 @@ class Statistics(Rows):
     turning: Statistics | None = None
     course: Course | None = None
     log: Floats | None = None
+    settled: Floats | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -27,6 +27,9 @@ from measure.probes.course import ALONG, Course
 
 Floats = NDArray[np.float64]
 
+NUISANCES, DIRECTION = 3, 1
+"""How many there are for each recording, and the place of the direction among them."""
+
 _STEPS = (0.03, 0.05, 0.1)
 """Steps of the gain, the direction [rad] and the clock [s]: about as large as what is expected of them."""
 
@@ -60,7 +63,7 @@ def sensitivities(
     """
     batches = []
     for place, step in enumerate(_STEPS):
-        off = [step if k == place else 0.0 for k in range(3)]
+        off = [step if k == place else 0.0 for k in range(NUISANCES)]
         items = tuple(
             replace(item, wind=misread(item.wind, gain=off[0], direction=off[1], clock=off[2]))
             for item in segments.items

@@ -146,6 +146,12 @@ def _full(estimate: Estimate) -> Markup:
     return _data(estimate.value, value) + Markup('<span class="ends">{}</span>').format(ends_text)
 
 
+def _parameter(estimate: Estimate) -> Markup:
+    """The same, unless the data leave it open."""
+    text = sentences.parameter_text(estimate)
+    return _full(estimate) if text == quantity.with_level(estimate) else _data(estimate.value, text)
+
+
 def _number(value: float | None) -> Markup:
     return _data(value, quantity.number(value))
 
@@ -173,6 +179,7 @@ def _with_error(value: float, error: float) -> Markup:
 _FILTERS = {
     "estimate": _estimate,
     "full": _full,
+    "parameter": _parameter,
     "number": _number,
     "count": _count,
     "probability": _probability,

@@ -5,12 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from measure.verdict.quantity import estimate_text, known, level_text, number, probability
-from measure.verdict.record import Candidate, Conclusion, Estimate, NullTest, Verdict
+from measure.verdict.quantity import display, estimate_text, known, level_text, number, probability, with_level
+from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Verdict
+
+CONTRADICTING = ("still-away-from-pins",)
+"""Kinds of findings by which the recordings contradict what was declared: they lead a verdict that names nothing."""
+
+_DETERMINED = 5.0
+"""A factor to either side beyond which a quantity counts as not determined: cloths of all kinds lie within some ten."""
+_FACTORS = ("of nominal", "s")
+"""Units of what is estimated by its logarithm."""
 
 
 def heading(verdict: Verdict) -> str:
-    """The conclusion in one line."""
+    """The conclusion in one line; what contradicts it in the set-up, if anything does, before it."""
+    contradicting = [text for kind, text in verdict.findings if kind in CONTRADICTING]
+    if verdict.conclusion is Conclusion.SUFFICIENT and contradicting:
+        return f"The set-up is not as declared, so that this verdict does not count: {contradicting[0]}"
     named = listed(titles(verdict))
     partly = f"the base model lacked {named}, and something more" if verdict.named else "something is still missing"
     return {
@@ -73,17 +84,24 @@ def as_large(test: NullTest) -> int:
 
 
 def control_warnings(verdict: Verdict) -> list[str]:
-    """Where the wrong effect helps as much as the named one, or hardly less: one sentence each."""
+    """Where the wrong effect helps as much as the named one, or hardly less: a sentence for all parts of each kind."""
+    compared = [c for c in verdict.comparisons if c.apart is not None and known(c.apart)]
+    failing = [c for c in compared if c.apart is not None and c.apart.value <= 0]
+    alike = [c for c in compared if c.apart is not None and c.apart.low <= 0 < c.apart.value]
     found = []
-    for c in verdict.comparisons:
-        if c.apart is None or not known(c.apart):
-            continue
-        if c.apart.value <= 0:
-            what = f"the control {c.control_name} does as well as the named effect, so that the attribution fails there"
-            found.append(f"{_begun(c.what)}: {what}.")
-        elif c.apart.low <= 0:
-            found.append(f"{_begun(c.what)}: the control {c.control_name} and the named effect fit equally well there.")
+    if failing:
+        what = f"the control {failing[0].control_name} does as well as the named effect, so that the attribution fails"
+        found.append(f"{_parts(failing, verdict)}: {what} there.")
+    if alike:
+        what = f"the control {alike[0].control_name} and the named effect fit equally well there"
+        found.append(f"{_parts(alike, verdict)}: {what}.")
     return found
+
+
+def _parts(some: Sequence[Comparison], verdict: Verdict) -> str:
+    """Which parts of the data, and of how many."""
+    which = _begun(listed([c.what for c in some]))
+    return which if len(verdict.comparisons) == 1 else f"{which}, {len(some)} of {len(verdict.comparisons)} parts"
 
 
 def control_summary(verdict: Verdict) -> str:
@@ -100,17 +118,32 @@ def control_summary(verdict: Verdict) -> str:
 
 
 def reduction_warnings(verdict: Verdict) -> list[str]:
-    """Where the effect's reduction of the error is not significant, or nothing was to be gained: one sentence each."""
-    found = []
-    for c in verdict.comparisons:
-        if not known(c.after):
-            continue
-        if c.share is None and known(c.floor):
-            what = "the base model's error is no larger than the numerical floor, so that nothing could be gained"
-            found.append(f"{_begun(c.what)}: {what}.")
-        elif known(c.reduction) and c.reduction.low <= 0:
-            found.append(f"{_begun(c.what)}: the reduction is not significant.")
-    return found
+    """Where the effect's reduction of the error is not significant: one sentence for all parts."""
+    weak = [c for c in verdict.comparisons if known(c.after) and known(c.reduction) and c.reduction.low <= 0]
+    return [f"{_parts(weak, verdict)}: the reduction is not significant there."] if weak else []
+
+
+def floor_text(comparison: Comparison) -> str:
+    """The floor of a comparison; that it limits nothing, where the errors are below it."""
+    shown = display([e.value for e in (comparison.before, comparison.floor) if known(e)], "m")
+    text = f"floor {estimate_text(comparison.floor, shown=shown)}"
+    if known(comparison.floor) and comparison.floor.value > comparison.before.value:
+        return f"{text}, above the errors, so that it limits nothing"
+    return text
+
+
+def parameter_text(estimate: Estimate) -> str:
+    """A calibrated parameter; that these recordings do not determine it, where its interval is wider than a factor of
+    five to either side."""
+    if not known(estimate) or estimate.unit not in _FACTORS:
+        return with_level(estimate)
+    shown = display((estimate.value, estimate.low, estimate.high), estimate.unit)
+    if estimate.low > 0 and estimate.high > _DETERMINED**2 * estimate.low:
+        return f"not determined by these recordings: {with_level(estimate)}"
+    if estimate.low == 0 and estimate.high > _DETERMINED * estimate.value:
+        most = f"{number(shown.factor * estimate.high, digits=2)}{shown.suffix}"
+        return f"at most {most} {level_text(estimate.level)}, best {number(shown.factor * estimate.value, digits=2)}"
+    return with_level(estimate)
 
 
 def named_candidates(verdict: Verdict) -> list[Candidate]:
@@ -140,9 +173,15 @@ def common_level(estimates: Iterable[Estimate]) -> str:
 
 
 def titles(verdict: Verdict) -> tuple[str, ...]:
-    """What the verdict names, in its order; an effect of which several parameters were weighed with its parameter."""
+    """What the verdict names, in its order; an effect of which several parameters were weighed with its parameter, and
+    the air's density and holes in the cloth by what they have in common."""
     found: list[str] = []
+    pressure = [name for name in verdict.named if name in ("air-density", "porosity")]
     for name in verdict.named:
+        if name == "air-density":
+            found.append(f"another dynamic pressure ({' or '.join(pressure)})")
+        if name in pressure:
+            continue
         own = [c for c in verdict.ranking if c.effect == name]
         acting = [c for c in own if not c.why_not]
         found += [title(c.effect, c.parameter) for c in acting] if acting and len(own) > 1 else [name]

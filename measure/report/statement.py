@@ -73,6 +73,10 @@ def sentence(verdict: Verdict) -> str:
     if verdict.conclusion is Conclusion.SUFFICIENT:
         return f"The base model is not rejected ({test}): no effect is needed to explain these recordings."
     rejected = f"The base model is rejected ({test})."
+    if verdict.test.p_value.value > verdict.test.level:
+        rejected = (
+            f"The recordings show another set-up than the declared one; what is left of it is not rejected ({test})."
+        )
     if verdict.conclusion is Conclusion.OUTSIDE:
         return f"{rejected} No effect of the library explains what it lacks."
     found = " and ".join(

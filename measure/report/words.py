@@ -50,7 +50,7 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
         moved = ""
         if known(parameter.after):
             moved = f" → {estimate_text(parameter.after)}, a shift of {in_errors(parameter.shift)} standard errors"
-        yield _item(parameter.name, f"{with_level(parameter.before)}{moved}")
+        yield _item(parameter.name, f"{sentences.parameter_text(parameter.before)}{moved}")
     others = sentences.rejected(verdict)
     for candidate in others[:_RUNNERS_UP]:
         yield _item(
@@ -87,7 +87,7 @@ def _compared(comparison: Comparison, after_label: str) -> str:
         parts[0] += f" → {estimate_text(comparison.after, shown=shown)} {after_label}"
         parts.append(f"reduction {estimate_text(comparison.reduction, shown=shown)}")
         parts.append(f"E_red {share(comparison.share)}")
-    parts.append(f"floor {estimate_text(comparison.floor, shown=shown)}")
+    parts.append(sentences.floor_text(comparison))
     if known(comparison.control):
         parts.append(f"control {comparison.control_name} {estimate_text(comparison.control, shown=shown)}")
         if known(comparison.apart):

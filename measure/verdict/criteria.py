@@ -36,6 +36,8 @@ class Criteria:
             were named rightly (decision 030).
         least_turned: a wind that varies across its mean by less than this share of what it does along it is not
             turbulence (see `course`).
+        least_obstructed: one that varies across its mean by less than this share varies along itself alone, as a fan
+            makes it: passing obstacles turn it by 0.15 to 0.23 (decision 012).
         most_within: nor is one whose variance within two seconds is more than so many times that between stretches.
         density_between: standard deviation of the logarithm of the density by which simulators of other authors differ;
             this and the next two are of twenty nulls of MuJoCo (decision 023).
@@ -43,6 +45,7 @@ class Criteria:
         damping_between: standard deviation of the internal damping by which they differ [s].
         damping_factor: standard deviation of the logarithm of the internal damping by which a fit that begins at
             2.5 ms ends elsewhere than at that of a cloth that is damped more (decision 029).
+        near: factor of the level within which p lets more nulls be simulated: of 40 kinds, p is decided by one at 2/41.
         room: share of the squared error before that must lie above the floor, for a reduction to be a share of it.
 
     Raises:
@@ -58,11 +61,13 @@ class Criteria:
     lead: float = 2.0
     strength_factor: float = 0.5
     least_turned: float = 0.3
+    least_obstructed: float = 0.1
     most_within: float = 2.0
     density_between: float = 0.07
     bending_between: float = 0.6
     damping_between: float = 2.4e-3
     damping_factor: float = 1.1
+    near: float = 2.0
     room: float = 0.02
 
     def __post_init__(self) -> None:

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from measure.observe import cloth
 from measure.observe.interpolation import onto
-from measure.observe.trajectory import Floats, Specimen, Trajectory
+from measure.observe.trajectory import Experiment, Floats, Specimen, Trajectory
 
 # A pin's root-mean-square motion over that of the median marker. Held by springs of 1 kN/m in 8 m/s: below 0.01.
 _LOOSE, _FREE = 0.05, 0.3
 _STILL = 1e-3  # of the cloth's size: what moves less is still, whatever the rest does
 _SEEN = 0.02  # of the cloth's size: a pin that far beyond the outermost markers is not observed
+_ALONG = 3  # markers of a hoist between its pins, below which nothing is concluded from their standing still
 _ELSEWHERE = 0.02  # of the cloth's size: pins of two recordings further apart are not in one place
 
 
@@ -66,12 +68,8 @@ def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]
 
 def beside_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
     """Report markers away from the pins that stand as still as these: the cloth may be held there too."""
-    moved = _motion(recording.positions, recording.noise)
-    size = float(np.ptp(specimen.mesh.rest, axis=0).max())
-    still = moved <= max(_STILL * size, recording.noise)
-    seats = specimen.mesh.rest[list(specimen.held)]
-    away = np.linalg.norm(recording.markers[:, None] - seats, axis=2).min(axis=1)
-    others = np.flatnonzero(still & (away > 0.1 * size))
+    still, away = _still(recording, specimen)
+    others = np.flatnonzero(still & (away > 0))
     if not len(others) or still.mean() > 0.5:
         return ()
     u, v = recording.markers[others[int(away[others].argmax())]]
@@ -84,6 +82,29 @@ def beside_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...
             fix="if the cloth is held there, name it with the pins",
         ),
     )  # fmt: skip
+
+
+def hoist_stands_still(experiment: Experiment) -> bool:
+    """Whether in every recording the markers of the hoist away from the pins stand as still as these, three of them or
+    more, and no others do: the cloth is attached along its hoist."""
+    specimen = experiment.specimen
+    size = float(np.ptp(specimen.mesh.rest, axis=0).max())
+    hoist = float(specimen.mesh.rest[:, 0].min()) + _SEEN * size
+    for recording in experiment.recordings:
+        still, away = _still(recording, specimen)
+        along = (recording.markers[:, 0] <= hoist) & (away > 0)
+        if along.sum() < _ALONG or not still[along].all() or (still & ~along & (away > 0)).any():
+            return False
+    return True
+
+
+def _still(recording: Trajectory, specimen: Specimen) -> tuple[NDArray[np.bool_], Floats]:
+    """(marker,) which stand still, and how far each is from the nearest pin [m], 0 of one that is beside it."""
+    size = float(np.ptp(specimen.mesh.rest, axis=0).max())
+    still = _motion(recording.positions, recording.noise) <= max(_STILL * size, recording.noise)
+    seats = specimen.mesh.rest[list(specimen.held)]
+    away = np.linalg.norm(recording.markers[:, None] - seats, axis=2).min(axis=1)
+    return still, np.where(away > 0.1 * size, away, 0.0)
 
 
 def check_places(recordings: Sequence[Trajectory], specimen: Specimen) -> None:

@@ -4,23 +4,30 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from flagdata.errors import ConflictError, InputError
+from flagdata.provenance import recipe_hash
 from measure.challenge import nulls
 from measure.challenge.command import challenge
 from measure.challenge.recipe import ChallengeRecipe, parse
 from measure.forecasting.segments import Cut
 from measure.nulls import bank as banks
 from measure.nulls.simulation import NullBatch
+from measure.observe.trajectory import Experiment, Specimen, Trajectory
 from tests.measure.challenge.cases import TINY
 
 TEN_SECONDS = TINY.replace("duration = 0.2", "duration = 10.0")
+
+
+def origin(recipe: ChallengeRecipe) -> nulls.Origin:
+    return nulls.Origin(title=recipe.title, recipe=recipe_hash(asdict(recipe)))
 
 
 @pytest.fixture
@@ -61,12 +68,12 @@ def test_recordings_too_short_for_a_segment_are_refused(recipe: ChallengeRecipe)
 
 
 def test_a_folder_goes_on_with_its_own_nulls_alone(recipe: ChallengeRecipe, tmp_path: Path) -> None:
-    nulls.claim(tmp_path / "bank", recipe, seed=5)
-    nulls.claim(tmp_path / "bank", recipe, seed=5)
+    nulls.claim(tmp_path / "bank", origin(recipe), seed=5)
+    nulls.claim(tmp_path / "bank", origin(recipe), seed=5)
     with pytest.raises(ConflictError, match="seed 5, not 6"):
-        nulls.claim(tmp_path / "bank", recipe, seed=6)
+        nulls.claim(tmp_path / "bank", origin(recipe), seed=6)
     with pytest.raises(ConflictError, match="recipe"):
-        nulls.claim(tmp_path / "bank", replace(recipe, duration=12.0), seed=5)
+        nulls.claim(tmp_path / "bank", origin(replace(recipe, duration=12.0)), seed=5)
 
 
 def test_the_verb_builds_them(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -81,3 +88,23 @@ def test_the_verb_builds_them(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
     result = CliRunner().invoke(challenge, [*arguments, "--workers", "2", "--json"], catch_exceptions=False)
     assert json.loads(result.stdout)["recordings"] == 6 * banks.WINDS
     assert asked == [(tmp_path / "made", 6, 2)]
+
+
+def test_the_verb_takes_a_recipe_of_close_loop(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, specimen: Specimen, own_recording: Trajectory
+) -> None:
+    """Nulls of its cloth, markers and winds; a folder goes on with those of the same recordings alone."""
+    experiment = Experiment(specimen=specimen, recordings=(own_recording,))
+    asked: list[NullBatch] = []
+    monkeypatch.setattr(banks, "build", lambda folder, batches, **_: asked.extend(batches))
+    monkeypatch.setattr(nulls.recipes, "load", lambda path: SimpleNamespace(title=path.stem))
+    monkeypatch.setattr(nulls.recipes, "read", lambda recipe, lake: SimpleNamespace(experiment=experiment))
+    (tmp_path / "tracked.toml").write_text('[[recording]]\nsource = "tracks.csv"\n')
+    arguments = ["bank", str(tmp_path / "made"), "--recipe", str(tmp_path / "tracked.toml"), "--kinds", "6"]
+    CliRunner().invoke(challenge, [*arguments, "--seed", "5"], catch_exceptions=False)
+    assert len(asked) == 6
+    assert all(np.array_equal(batch.markers, own_recording.markers) for batch in asked)
+    assert all(0.9 * 4.0 <= speed <= 1.1 * 4.0 for batch in asked for speed in batch.speeds)
+    experiment = replace(experiment, recordings=(replace(own_recording, noise=1e-3),))
+    with pytest.raises(ConflictError, match="recipe"):
+        CliRunner().invoke(challenge, [*arguments, "--seed", "5"], catch_exceptions=False)

@@ -180,6 +180,16 @@ def test_a_model_has_the_parameters_of_the_verdict(specimen: Specimen, place: in
     assert crew.handles.vertices == specimen.held
 
 
+def test_a_turned_wind_turns_before_a_run_begins(specimen: Specimen) -> None:
+    found = concluded(Conclusion.EFFECT)
+    turned = replace(found.ranking[0], effect="direction-change", parameter="angle")
+    whole = replace(found, named=("direction-change",), ranking=(turned, *found.ranking[1:]))
+    larger = models(whole, experiment(specimen), name="x", seed=0)[1]
+    assert larger.content["effects"]["direction-change"] == {
+        "angle": pytest.approx(found.ranking[0].strength.value), "start": -1.0, "duration": 1e-3
+    }  # fmt: skip
+
+
 def test_a_cloth_of_any_outline_held_anywhere_keeps_its_mesh_and_pins(specimen: Specimen) -> None:
     rest = specimen.mesh.rest.copy()
     rest[:, 1] *= 1 + 0.3 * rest[:, 0]  # a trapezium

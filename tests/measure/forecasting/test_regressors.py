@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from measure.forecasting.calibration import THETA, Calibration
 from measure.forecasting.model import Model
-from measure.forecasting.regressors import FieldColumn, fields, library, motions
+from measure.forecasting.regressors import TURNED, FieldColumn, fields, library, motions
 from sim.effects import EFFECTS
+from sim.effects.effect import WindEffect
 from sim.material import named
 from sim.scene import assemble, flag
 
@@ -30,6 +31,16 @@ def test_a_step_is_within_what_is_expected_of_the_strength() -> None:
         assert abs(column.step) <= max(abs(low), abs(high)) * 4, column.name
         least, most = column.described.admissible
         assert least <= column.described.null + column.step <= most, column.name
+
+
+def test_a_turned_wind_has_turned_before_a_segment_begins() -> None:
+    (turned,) = (column for column in library() if column.name == TURNED)
+    effect = turned.at(math.radians(10))
+    assert isinstance(effect, WindEffect)
+    wind = torch.tensor([5.0, 0.0, 0.0], dtype=torch.float64)[:, None]
+    for time in (0.0, 0.04, 2.0):
+        blown = effect.velocity(time, wind)[:, 0].tolist()
+        assert blown == pytest.approx([5 * math.cos(math.radians(10)), 5 * math.sin(math.radians(10)), 0.0])
 
 
 @given(density=st.floats(-0.5, 0.5), bending=st.floats(-1.5, 1.5), damping=st.floats(-2.0, 4.0))

@@ -6,6 +6,7 @@ from typing import cast
 
 import numpy as np
 import pytest
+import torch
 
 from measure.forecasting.calibration import THETA, Calibration
 from measure.forecasting.model import Model
@@ -13,6 +14,7 @@ from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import EffectColumn
 from measure.forecasting.segments import Segments
 from measure.inference.random_effect import NullModel
+from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop import gauss_newton
 from measure.probes.statistics import Statistics
 
@@ -74,3 +76,38 @@ def test_sensitivities_at_a_bound_are_taken_from_within(bending: float, steps: t
         moved, taken = model.stepped(place, size)
         assert taken == pytest.approx(step)
         np.testing.assert_allclose(moved.steps_from(model), np.where(np.arange(4) == place, step, 0.0), atol=1e-12)
+
+
+def test_a_fit_begins_where_across_the_prior_least_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Springs along the hoist soon saturate: the linear fit promises 23 N/m² where 17,000 act."""
+    hoist = EffectColumn(effect="full-hoist", parameter="stiffness", step=20.0)
+
+    class Whitened:
+        def of(self, errors: torch.Tensor) -> Whitened:
+            self.left = abs(np.log(float(errors) / 17_000))
+            return self
+
+        def fit(self, chosen: tuple[int, ...]) -> Whitened:
+            return self
+
+    def errors_of(models: list[Model], *_: object) -> list[torch.Tensor]:
+        strengths = [model.effects[0][1] for model in models]
+        return [torch.tensor(value if value < 15_000 else float("inf")) for value in strengths]
+
+    monkeypatch.setattr(gauss_newton, "errors_of", errors_of)
+
+    def begun(linear: float) -> float:
+        model = Model(calibration=Calibration(), effects=((hoist, linear),))
+        found = gauss_newton._where_least_is_left(  # pyright: ignore[reportPrivateUsage]
+            *NOTHING, cast(WhitenedMisfit, Whitened()), model
+        )
+        return found.effects[0][1]
+
+    # 100 to 20,000 N/m² in equal factors of 5.85, the last of which diverges here.
+    assert begun(23.0) == pytest.approx(20_000 / 200 ** (1 / 3))
+    assert begun(9_000.0) == 9_000.0
+
+
+def test_strengths_of_a_prior_of_both_signs_are_tried_on_either_side() -> None:
+    turned = EffectColumn(effect="direction-change", parameter="angle", step=0.05)
+    assert gauss_newton._expected(turned) == [-0.4, -0.8, 0.4, 0.8]  # pyright: ignore[reportPrivateUsage]

@@ -205,7 +205,7 @@ def test_a_level_that_the_bank_cannot_test_is_reported(pulled: Experiment, bank:
     assert "At least 19 kinds" in verdict.words  # K + 1 ≥ 1/0.05
     assert not verdict.test.open
     assert "Another draw" not in verdict.words
-    assert len(verdict.parameters) == 3
+    assert [p.name.split()[0] for p in verdict.parameters] == ["density", "bending", "damping", "direction"]
 
 
 def test_a_bank_of_other_segments_is_refused(specimen: Specimen, plain: Experiment, bank: Path) -> None:

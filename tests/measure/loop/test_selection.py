@@ -12,11 +12,21 @@ from numpy.typing import NDArray
 from flagdata.errors import UsageError
 from flagdata.rng import stream
 from measure.forecasting.calibration import PRIOR, THETA
-from measure.forecasting.regressors import EffectColumn, columns, names
+from measure.forecasting.regressors import TURNED, EffectColumn, columns, names
 from measure.inference.evidence import Evidence
 from measure.inference.random_effect import NullModel, Nulls
 from measure.loop.refit import Refit
-from measure.loop.selection import GUST_COLUMN, Judgement, finalists, judge, strength
+from measure.loop.selection import (
+    GUST_COLUMN,
+    Judgement,
+    equivalent,
+    estimate,
+    finalists,
+    judge,
+    strength,
+    withdrawn,
+)
+from measure.loop.set_up import HOIST, SetUp
 from measure.nulls.reference import GUSTS, NullBank, Reference
 from measure.probes.course import Course
 from measure.probes.lines import REDUCED
@@ -80,8 +90,8 @@ def slow(strength: float) -> Floats:
     return strength * stream(5, "slow").normal(size=(3 * SEGMENTS, 1, 3)) * np.ones((1, 10, 1))
 
 
-def made(seed: int, *, moments: bool = False, courses: bool = False) -> NullBank:
-    """A bank of nulls, with moments about the pole or without, with courses of the wind or without."""
+def made(seed: int, *, moments: bool = False, courses: bool = False, settled: bool = False) -> NullBank:
+    """A bank of nulls, with moments about the pole or without, with courses of the wind, with settled quantities."""
     rng = np.random.default_rng(seed)
     recordings = KINDS * CLOTHS * WINDS
     cloths = np.repeat(rng.normal(size=(KINDS * CLOTHS, len(THETA))) * PRIOR, WINDS * SEGMENTS, axis=0)
@@ -93,6 +103,8 @@ def made(seed: int, *, moments: bool = False, courses: bool = False) -> NullBank
         own = replace(own, turning=replace(drawn(rng, delta, shifts[::-1], speeds), lines=None))
     if courses:
         own = replace(own, course=blown(rng, len(own.r)))
+    if settled:
+        own = replace(own, settled=0.1 * rng.normal(size=(recordings, 2))[own.recording])
     nulls = Nulls(
         statistics=own, speeds=speeds[own.recording], calibration=cloths, noise=np.zeros(len(cloths)),
         period=np.full(len(cloths), 0.04), cloth=np.full(len(cloths), "made"),
@@ -266,7 +278,7 @@ def test_beside_gusts_moments_are_not_looked_at() -> None:
 
 
 def test_errors_that_swing_with_the_wind_are_none_of_the_library(null: NullModel, reference: Reference) -> None:
-    found = judged(null, reference, {}, line=10.0)
+    found = judged(null, reference, {}, line=10.0, seed=3)
     assert (found.conclusion, named(found)) == (Conclusion.OUTSIDE, [])
     assert found.line is not None
     assert (found.line.reduced, found.line.axis) == (SHED, 1)
@@ -307,10 +319,23 @@ def test_gusts_are_named_where_the_course_is_turbulences(blowing: tuple[NullMode
     null, reference = blowing
     gusty = judge(seen(null, {}, gusts=1.0, course=slow(0.2)), reference, level=0.02)
     assert named(gusty) == ["gusts"]
-    # The same pressure, in a wind that comes in pulses from one direction.
-    passing = judge(seen(null, {}, gusts=1.0, course=pulses(0.3)), reference, level=0.02)
+    # The same pressure, in a wind that comes in pulses and turns a little, as behind obstacles that pass.
+    passing = judge(seen(null, {}, gusts=1.0, course=pulses(0.3, turned=0.2)), reference, level=0.02)
     assert "gusts" not in named(passing)
     assert "varies across its mean by" in next(w for w in passing.ranking if w.column == GUST_COLUMN).candidate.why_not
+
+
+def test_a_wind_that_varies_along_itself_alone_is_not_barred_from_gusts(blowing: tuple[NullModel, Reference]) -> None:
+    null, reference = blowing
+    slowly = judge(seen(null, {}, gusts=1.0, course=pulses(0.3)), reference, level=0.02)
+    assert named(slowly) == ["gusts"]
+    # Within segments alone: their mean pressure does not differ, and the course says how much it varies.
+    within = judge(seen(null, {}, course=pulses(0.3)), reference, level=0.02)
+    assert (within.conclusion, named(within)) == (Conclusion.EFFECT, ["gusts"])
+    found = next(w for w in within.ranking if w.column == GUST_COLUMN).candidate
+    # Weaker by 0.3 in three windows of nine, and in both of two neighbours in two of nine: whence 0.1².
+    assert found.strength.value == pytest.approx(0.1, rel=0.35)
+    assert not found.why_not
 
 
 def test_courses_of_the_data_alone_are_refused(null: NullModel, reference: Reference) -> None:
@@ -426,3 +451,72 @@ def test_a_rerun_counts_in_place_of_the_linear(null: NullModel, reference: Refer
     assert linear.named == (place,)
     useless = Refit(coefficient=0.1, gains=np.full(12, -1.0), leftover=0.5, evidence=evidence)
     assert place not in judge(evidence, reference, level=0.02, refits={place: useless}).named
+
+
+def test_what_recordings_settle_at_rejects_alone_and_counts_in_what_is_left() -> None:
+    bank = made(seed=9, settled=True)
+    null, reference = bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
+
+    def found(off: float) -> Judgement:
+        evidence = seen(null, {})
+        return judge(replace(evidence, settled=np.full((12, 2), [0.0, off])), reference, level=0.02)
+
+    assert found(0.05).conclusion is Conclusion.SUFFICIENT
+    # The mean of three recordings is 0.06 in nulls.
+    assert found(-1.0).conclusion is Conclusion.OUTSIDE
+    plain = judge(seen(null, {}), reference, level=0.02)
+    assert found(-1.0).ranking[0].candidate.leftover < 0.05 < plain.ranking[0].candidate.leftover
+
+
+def test_settled_quantities_of_the_data_alone_are_refused(null: NullModel, reference: Reference) -> None:
+    with pytest.raises(UsageError, match="settled"):
+        judge(replace(seen(null, {}), settled=np.zeros((12, 2))), reference, level=0.02)
+
+
+def logged(null: NullModel, angle: float, tolerance: float) -> Evidence:
+    """Of a wind that is turned by an angle from its log, whose direction has a tolerance [rad]."""
+    rng = np.random.default_rng(2)
+    delta = np.zeros((3 * SEGMENTS, COUNT))
+    delta[:, names().index(TURNED)] = angle
+    speeds = np.array([3.5, 5.0, 7.0])
+    own = drawn(rng, delta, np.tile(rng.normal(size=COUNT), (3, 1)), speeds)
+    off = np.zeros((len(own.r), COUNT, 3))
+    off[..., 1] = tolerance * own.response[..., names().index(TURNED)]
+    return Evidence.of(replace(own, log=off), speeds[own.recording], null)
+
+
+def test_a_wind_turned_beyond_its_tolerance_is_the_verdict(null: NullModel, reference: Reference) -> None:
+    found = judge(logged(null, 0.8, 0.2), reference, level=0.02, set_up=SetUp(tolerance=0.2))
+    assert (found.conclusion, named(found)) == (Conclusion.EFFECT, [TURNED])
+    assert found.direction is not None
+    assert 0.2 < found.direction.low < 0.8 < found.direction.high
+    shown = next(w for w in found.ranking if w.column == names().index(TURNED))
+    assert shown.candidate.strength == found.direction
+    assert names().index(TURNED) in finalists(found)
+
+
+def test_a_wind_turned_within_its_tolerance_is_no_effect(null: NullModel, reference: Reference) -> None:
+    found = judge(logged(null, 0.8, 0.8), reference, level=0.02, set_up=SetUp(tolerance=0.8))
+    assert TURNED not in named(found)
+    shown = next(w for w in found.ranking if w.column == names().index(TURNED))
+    assert not shown.admissible
+    assert "46° of tolerance" in shown.unlike
+
+
+def test_a_hoist_that_stands_still_leads_whatever_the_test_says(null: NullModel, reference: Reference) -> None:
+    found = judge(seen(null, {}), reference, level=0.02, set_up=SetUp(attached=True))
+    assert found.p_value > 0.02
+    assert (found.conclusion, named(found)) == (Conclusion.EFFECT, [HOIST])
+    assert names().index(HOIST) in finalists(found)
+
+
+def test_an_effect_with_which_unseen_errors_rise_is_not_named(null: NullModel, reference: Reference) -> None:
+    found = withdrawn(judged(null, reference, {"lift.coefficient": 1.0}))
+    assert (found.conclusion, named(found)) == (Conclusion.OUTSIDE, [])
+    assert "unseen recordings are larger" in found.ranking[0].candidate.why_not
+
+
+def test_holes_stand_for_less_pressure_and_never_for_more() -> None:
+    assert equivalent("air-density", estimate(-0.2, 0.1, "1")) == ("porosity",)
+    assert equivalent("air-density", estimate(0.6, 0.1, "1")) == ()
+    assert equivalent("lift", estimate(-0.2, 0.1, "1")) == ()

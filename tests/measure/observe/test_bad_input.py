@@ -10,6 +10,7 @@ import pytest
 
 from flagdata.errors import InputError
 from measure.observe import Hold, Observation, Setup, Up, WindTrack, observe, sheet
+from measure.observe.checks.attachment import hoist_stands_still
 from tests.measure.observe.flags import HEIGHT, RATE, SETUP, WIDTH, flag
 
 NOISE = 1e-3
@@ -64,6 +65,16 @@ def test_pins_where_the_cloth_moves_are_refused_and_the_still_points_named(seen:
 
 def test_a_cloth_that_is_still_elsewhere_too_is_reported(seen: Observation):
     assert kinds(seen, replace(SETUP, pins=Hold.HOIST_CORNERS)) == {"still-away-from-pins"}
+
+
+def test_a_hoist_that_stands_still_between_its_declared_pins_is_attached(seen: Observation):
+    attached = replace(SETUP, pins=Hold.HOIST_CORNERS)
+    assert hoist_stands_still(observe([seen], attached).experiment)
+    assert not hoist_stands_still(observe([seen], replace(SETUP, pins=Hold.HOIST)).experiment)
+    moved = seen.positions.copy()
+    middle = np.flatnonzero((seen.markers[:, 0] == 0) & (np.abs(seen.markers[:, 1] - HEIGHT / 2) < 0.3 * HEIGHT))[0]
+    moved[:, middle, 1] += 0.05 * np.sin(7 * seen.times)
+    assert not hoist_stands_still(observe([replace(seen, positions=moved)], attached).experiment)
 
 
 def test_pins_that_are_not_on_the_cloth_are_refused(seen: Observation):

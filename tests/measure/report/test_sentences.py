@@ -11,7 +11,7 @@ from measure.report import sentences
 from measure.report.page import page
 from measure.report.sentences import titles
 from measure.report.words import words
-from measure.verdict.record import Conclusion, NullTest
+from measure.verdict.record import Conclusion, Estimate, NullTest
 from tests.measure.report.verdicts import about, verdict
 
 
@@ -103,3 +103,53 @@ def test_missing_numbers_raise_no_warning() -> None:
 @pytest.mark.parametrize(("names", "text"), [(["a"], "a"), (["a", "b"], "a and b"), (["a", "b", "c"], "a, b and c")])
 def test_names_are_listed_as_people_do(names: list[str], text: str) -> None:
     assert sentences.listed(names) == text
+
+
+@pytest.mark.parametrize(
+    ("low", "value", "high", "unit", "said"),
+    [
+        (0.04, 1.0, 22.7, "of nominal", "not determined by these recordings: 1"),
+        (0.4, 1.0, 2.5, "of nominal", "1.0"),
+        (0.0, 1.32e-3, 10.8e-3, "s", "at most 11 ms 90 %, best 1.3"),
+        (4.0e-3, 26e-3, 60e-3, "s", "26"),
+        (0.1, 1.0, 9.0, "°", "1"),
+    ],
+)
+def test_what_recordings_do_not_determine_is_not_shown_like_what_they_do(
+    low: float, value: float, high: float, unit: str, said: str
+) -> None:
+    shown = Estimate(value=value, low=low, high=high, unit=unit)
+    assert sentences.parameter_text(shown).startswith(said)
+
+
+def test_a_floor_above_the_errors_limits_nothing_and_takes_no_significant_reduction_back() -> None:
+    first = verdict(Conclusion.EFFECT).comparisons[0]
+    high = replace(first, floor=about(2 * first.before.value, 1e-5), share=None)
+    whole = replace(verdict(Conclusion.EFFECT), comparisons=(high,))
+    assert "above the errors, so that it limits nothing" in sentences.floor_text(high)
+    assert "limits nothing" not in sentences.floor_text(first)
+    assert sentences.reduction_warnings(whole) == []
+    assert "limits nothing" in " ".join(words(whole).split())
+
+
+def test_several_weak_parts_are_one_warning() -> None:
+    whole = verdict(Conclusion.EFFECT)
+    weak = tuple(replace(c, reduction=about(0.0001, 0.0002)) for c in whole.comparisons)
+    (warning,) = sentences.reduction_warnings(replace(whole, comparisons=weak))
+    assert f"{len(weak)} of {len(weak)} parts" in warning
+
+
+def test_a_set_up_that_recordings_contradict_leads_a_verdict_that_names_nothing() -> None:
+    found = (("still-away-from-pins", "5 markers away from the pins stand as still as these"),)
+    calm, named = (replace(verdict(c), findings=found) for c in (Conclusion.SUFFICIENT, Conclusion.EFFECT))
+    assert sentences.heading(calm).startswith("The set-up is not as declared")
+    assert "5 markers" in sentences.heading(calm)
+    assert sentences.heading(named) == "The base model lacked lift"
+
+
+def test_a_pressure_is_named_by_what_its_causes_have_in_common() -> None:
+    whole = verdict(Conclusion.EFFECT)
+    for effects, said in ((("air-density",), "air-density"), (("air-density", "porosity"), "air-density or porosity")):
+        ranking = (replace(whole.ranking[0], effect="air-density"), *whole.ranking[1:])
+        heading = sentences.heading(replace(whole, named=effects, ranking=ranking))
+        assert heading == f"The base model lacked another dynamic pressure ({said})"

@@ -1,0 +1,42 @@
+"""What recordings show of the set-up against what was declared: it leads a verdict, whatever the test says."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from measure.forecasting.regressors import TURNED, names
+from measure.inference.evidence import Evidence
+from measure.nulls.reference import Reference
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.record import Estimate
+
+HOIST = "full-hoist.stiffness"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SetUp:
+    """What recordings may show of the set-up against what was declared.
+
+    Attributes:
+        tolerance: standard deviation that the direction of the logs is declared with [rad].
+        attached: whether the hoist stands still along its length, between the declared pins.
+    """
+
+    tolerance: float = 0.0
+    attached: bool = False
+
+
+def turned(evidence: Evidence, reference: Reference) -> Estimate:
+    """By how much the wind is turned from where its logs have it, counter-clockwise [rad], whatever their tolerance."""
+    place, held = names().index(TURNED), evidence.with_directions()
+    value, _ = held.fit([place]).of(place)
+    error = abs(value) / math.sqrt(max(float(reference.statistics(held, names())[place]), 1e-12))
+    half = reference.reach_of(place) * error
+    return Estimate(value=value, low=value - half, high=value + half, unit="rad", level=CRITERIA.interval)
+
+
+def beyond_tolerance(direction: Estimate, tolerance: float) -> bool:
+    """Whether all of the interval lies beyond a tolerance; never of a log whose direction is declared exactly, which is
+    tested as every other effect is."""
+    return tolerance > 0 and max(direction.low, -direction.high) > tolerance

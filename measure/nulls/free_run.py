@@ -1,0 +1,44 @@
+"""The model run freely in the winds of recordings, and by how much these settle elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from flagdata.rng import child_seed, stream
+from measure.forecasting.calibration import Calibration
+from measure.nulls.simulation import NullBatch
+from measure.observe.trajectory import Floats, Trajectory
+from measure.probes.settled import settled
+from measure.verdict.criteria import CRITERIA
+
+_COPIES = 2
+"""Runs of the model for each recording, from other starts: the mean of two differs by chance less than one does."""
+
+
+def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> Floats:
+    """(recording, quantity) what recordings settle at less what a model does in the same winds.
+
+    Args:
+        batch: the model's cloth, calibrations, winds and effects, one a recording.
+    """
+    count = len(recordings)
+    copies = replace(
+        batch, calibrations=batch.calibrations * _COPIES, speeds=batch.speeds * _COPIES, winds=batch.winds * _COPIES,
+        seed=child_seed(batch.seed, "free"),
+    )  # fmt: skip
+    runs, period = copies.as_fitted(), 1 / batch.rate
+    modelled = np.stack([settled(batch.markers, runs[..., place], period=period) for place in range(runs.shape[-1])])
+    observed = [settled(r.markers, r.positions, period=1 / r.rate, noise=r.noise) for r in recordings]
+    return np.stack(observed) - modelled.reshape(_COPIES, count, -1).mean(axis=0)
+
+
+def mistaken(batch: NullBatch) -> NullBatch:
+    """The batch with calibrations that are off by as much as those of data are: one draw for its cloth."""
+    rng = stream(batch.seed, "null", "mistaken")
+    spread = (CRITERIA.density_between, CRITERIA.bending_between, CRITERIA.damping_factor)
+    steps = tuple(float(step) for step in spread * rng.standard_normal(3))
+    moved: dict[Calibration, Calibration] = {own: own.moved(steps) for own in batch.calibrations}
+    return replace(batch, calibrations=tuple(moved[own] for own in batch.calibrations))
