@@ -31,6 +31,7 @@ from measure.forecasting.segments import Segments
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen
 from sim.anchors import AnchorTracks
+from sim.effects.effect import InapplicableError
 from sim.handles import Handles
 from sim.integrate.joint_batch import JointBatch
 from sim.integrate.split import SplitEuler
@@ -229,22 +230,31 @@ class Forecaster:
         calibrations: Sequence[Calibration],
         base: Tensor | None,
     ) -> list[Tensor]:
-        """The same of steps; the base's errors are found beside theirs where they are not given."""
+        """The same of steps; the base's errors are found beside theirs where they are not given. Nothing changes with
+        an effect that the cloth cannot have as it is held."""
         nominal = self.system(segments, calibrations)
         sizes: list[float] = []
+        inapplicable: list[int] = []
         batches: list[tuple[System, State]] = [] if base is not None else [nominal]
         for one in wanted:
             if isinstance(one, int):
                 sizes.append(THETA[one][2])
                 batches.append(self.system(segments, _moved(calibrations, one, sizes[-1])))
             elif isinstance(one, StepColumn):
+                try:
+                    batches.append(one.system(*nominal))
+                except InapplicableError:
+                    inapplicable.append(len(sizes) + len(inapplicable))
+                    continue
                 sizes.append(one.step)
-                batches.append(one.system(*nominal))
             else:
                 raise UsageError(f"{one.name} has no sensitivity", where="columns", fix="give a StepColumn")
         errors = self.errors_jointly(batches, segments)
         start = errors.pop(0) if base is None else base
-        return [(start - own) / size for own, size in zip(errors, sizes, strict=True)]
+        found = [(start - own) / size for own, size in zip(errors, sizes, strict=True)]
+        for place in inapplicable:
+            found.insert(place, torch.zeros_like(start))
+        return found
 
     def _written(self, column: WrittenColumn, segments: Segments) -> Tensor:
         seen, rest = self._real(segments.positions), self.specimen.mesh.rest

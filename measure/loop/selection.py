@@ -127,6 +127,8 @@ def judge(
     statistic = reference.farthest(evidence, names())
     p_value = reference.conformal.p(statistic)
     effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
+    # Nothing is known along an effect that the cloth cannot have as it is held.
+    effects = [(i, c) for i, c in effects if evidence.curvature[:, i, i].sum() > 0]
     held_out = gains(evidence, [[i] for i, _ in effects])
     weighed = [
         _weigh(
@@ -174,20 +176,17 @@ def judge(
         return judgement(Conclusion.PARTLY, departed)
     if p_value > level:
         return judgement(Conclusion.SUFFICIENT, (), "the base model is not rejected")
-    if not confident:
-        pulsating = _pulsating(left, reference, ranking, level)
-        if pulsating is None:
-            return judgement(Conclusion.OUTSIDE, ())
-        ranking = [pulsating if w.column == GUST_COLUMN else w for w in ranking]
-        passes = pulsating.candidate.leftover > level
-        return judgement(Conclusion.EFFECT if passes else Conclusion.PARTLY, [pulsating])
     passing = [w for w in confident if w.passes(level)]
     if passing:
         return judgement(Conclusion.EFFECT if len(passing) == 1 else Conclusion.ONE_OF, passing)
-    second = _second(left, reference, confident[0], ranking, level)
+    second = _second(left, reference, confident[0], ranking, level) if confident else None
     if second is not None:
         return judgement(Conclusion.EFFECT, (confident[0], second))
-    return judgement(Conclusion.PARTLY, confident[:1])
+    pulsating = _pulsating(left, reference, ranking, level)
+    if pulsating is not None and (pulsating.candidate.leftover > level or not confident):
+        ranking = [pulsating if w.column == GUST_COLUMN else w for w in ranking]
+        return judgement(Conclusion.EFFECT if pulsating.candidate.leftover > level else Conclusion.PARTLY, [pulsating])
+    return judgement(Conclusion.PARTLY, confident[:1]) if confident else judgement(Conclusion.OUTSIDE, ())
 
 
 def _within(weighed: Weighed, direction: Estimate, tolerance: float) -> Weighed:

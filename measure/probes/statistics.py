@@ -102,7 +102,7 @@ class Projection:
     def along(cls, changes: Sequence[Tensor], scale: Tensor) -> Projection:
         """Along sensitivities (frame, marker, 3, segment) [m per unit], of errors of some scale (marker, segment)."""
         moved = torch.stack([_plain(change, scale).flatten(1) for change in changes], dim=1)
-        moved /= moved.norm(dim=2, keepdim=True)
+        moved /= moved.norm(dim=2, keepdim=True).clamp(min=torch.finfo(moved.dtype).tiny)
         return cls(directions=moved, scale=scale)
 
     def of(self, errors: Tensor) -> Floats:
@@ -307,7 +307,7 @@ def reduced(
         error = errors[place].flatten().double()
         moved = (stacked[..., place] / scale[None, None, :, place, None]).reshape(len(changes), -1).double()
         inner = (moved @ moved.T).cpu().numpy()
-        length = np.sqrt(np.diag(inner))
+        length = np.sqrt(np.maximum(np.diag(inner), np.finfo(np.float64).tiny))
         r[place] = (moved @ error).cpu().numpy() / length
         response[place] = inner / length[:, None]
     return Statistics(

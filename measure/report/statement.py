@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from measure.forecasting.regressors import FieldColumn
+from measure.forecasting.regressors import FieldColumn, library
 from measure.forecasting.segments import Cut
 from measure.loop.corrective_field import Mode
 from measure.loop.run import Outcome
@@ -17,7 +17,7 @@ from measure.nulls.conformal import MOST_KINDS, kinds_needed
 from measure.observe.trajectory import Experiment, Specimen
 from measure.probes.course import ALONG, LEFT, Variation
 from measure.probes.lines import STROUHAL, Line
-from measure.report.sentences import readable, titles
+from measure.report.sentences import listed, readable, titles
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.quantity import level_text, number, probability, with_error, with_level
 from measure.verdict.record import Conclusion, NullTest, Verdict
@@ -47,7 +47,7 @@ def stated(outcome: Outcome) -> Verdict:
     said = [sentence(verdict), *by_draw(verdict.test), *bounds(outcome.at_bounds), *ratios(experiment)]
     return replace(
         verdict, words=" ".join(said), separating=separating(verdict), proposal=_lacking(outcome),
-        assumptions=(*assumptions(experiment), *clocks(experiment, outcome.lags)),
+        assumptions=(*assumptions(experiment), *unweighed(verdict), *clocks(experiment, outcome.lags)),
     )  # fmt: skip
 
 
@@ -151,6 +151,13 @@ def clocks(experiment: Experiment, late: Sequence[float]) -> tuple[str, ...]:
         if lag
     ]
     return (f"by the motion of the cloth the log of the wind lags; it was moved: {', '.join(moved)}",) if moved else ()
+
+
+def unweighed(verdict: Verdict) -> tuple[str, ...]:
+    """Which effects of the library a cloth cannot have as it is held; nothing where it can have all."""
+    weighed = {(candidate.effect, candidate.parameter) for candidate in verdict.ranking}
+    missing = [column.effect for column in library() if (column.effect, column.parameter) not in weighed]
+    return (f"not weighed, since the cloth cannot have it as it is held: {listed(missing)}",) if missing else ()
 
 
 def separating(verdict: Verdict) -> str:

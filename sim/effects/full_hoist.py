@@ -9,9 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.errors import UsageError
 from sim.cloth import Cloth
-from sim.effects.effect import Effect
+from sim.effects.effect import Effect, InapplicableError
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 from sim.handles import Handles, full_hoist
 from sim.state import State
@@ -41,7 +40,7 @@ class FullHoist(Effect):
         hoist = full_hoist(mesh.rest)
         added = [i for i, vertex in enumerate(hoist) if vertex not in system.handles.vertices]
         if not added:
-            raise UsageError(
+            raise InapplicableError(
                 "every vertex of the hoist is held already", where="full hoist",
                 fix="leave the effect out, or start from two corners on a mesh with rows between them",
             )  # fmt: skip

@@ -17,7 +17,9 @@ from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import AcrossColumn, EffectColumn, FieldColumn, MotionColumn, library, winds
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
+from measure.probes.statistics import Projection, reduced
 from measure.propose.terms import Term, columns_of
+from sim import handles
 from sim.integrate.joint_batch import JointBatch
 
 NOMINAL = Calibration()
@@ -277,3 +279,23 @@ def test_sensitivities_in_single_precision_are_within_half_a_percent_of_those_in
     names = [name for name, *_ in THETA] + [column.name for column in columns]
     off = {name: float((one - two).norm() / two.norm()) for name, one, two in zip(names, *found, strict=True)}
     assert {name: share for name, share in off.items() if share >= 0.005} == {}
+
+
+def test_nothing_changes_with_an_effect_that_the_cloth_cannot_have(specimen: Specimen, forecaster: Forecaster) -> None:
+    """A hoist that is held along its length cannot be laced to the pole as well."""
+    rest = specimen.mesh.rest
+    held = handles.full_hoist(rest)
+    anchors = np.stack([0 * rest[list(held), 1], 0 * rest[list(held), 1], rest[list(held), 1]], axis=1)
+    still = np.stack([rest[:, 0], 0.05 * np.sin(8 * rest[:, 0]), rest[:, 1]], axis=1)
+    wind = WindTrack.constant((4.0, 0.0, 0.0))
+    recording = Trajectory(name="bulging", markers=rest, positions=np.tile(still, (60, 1, 1)), rate=25.0, wind=wind)
+    hoist = replace(forecaster, specimen=replace(specimen, held=held, anchors=anchors))
+    segments = Segments.of([recording]).select([0])
+    columns = [one for one in library() if one.effect in ("lift", "full-hoist", "air-density")]
+    base = hoist.errors(*hoist.system(segments, [NOMINAL]), segments)
+    found = hoist.sensitivities(columns, segments, [NOMINAL], base)[len(THETA) :]
+    assert [one.effect for one, own in zip(columns, found, strict=True) if not own.any()] == ["full-hoist"]
+    statistics = reduced(base, found, segments.recording, segments.noise)
+    assert np.isfinite(statistics.r).all()
+    assert np.isfinite(statistics.response).all()
+    assert Projection.along(found, torch.ones(base.shape[1], 1)).directions.isfinite().all()

@@ -320,21 +320,21 @@ def test_gusts_are_named_where_the_course_is_turbulences(blowing: tuple[NullMode
     gusty = judge(seen(null, {}, gusts=1.0, course=slow(0.2)), reference, level=0.02)
     assert named(gusty) == ["gusts"]
     # The same pressure, in a wind that comes in pulses and turns a little, as behind obstacles that pass.
-    passing = judge(seen(null, {}, gusts=1.0, course=pulses(0.3, turned=0.2)), reference, level=0.02)
+    passing = judge(seen(null, {}, gusts=1.0, course=pulses(2.0, turned=0.2)), reference, level=0.02)
     assert "gusts" not in named(passing)
     assert "varies across its mean by" in next(w for w in passing.ranking if w.column == GUST_COLUMN).candidate.why_not
 
 
 def test_a_wind_that_varies_along_itself_alone_is_not_barred_from_gusts(blowing: tuple[NullModel, Reference]) -> None:
     null, reference = blowing
-    slowly = judge(seen(null, {}, gusts=1.0, course=pulses(0.3)), reference, level=0.02)
+    slowly = judge(seen(null, {}, gusts=1.0, course=pulses(2.0)), reference, level=0.02)
     assert named(slowly) == ["gusts"]
     # Within segments alone: their mean pressure does not differ, and the course says how much it varies.
-    within = judge(seen(null, {}, course=pulses(0.3)), reference, level=0.02)
+    within = judge(seen(null, {}, course=pulses(2.0)), reference, level=0.02)
     assert (within.conclusion, named(within)) == (Conclusion.EFFECT, ["gusts"])
     found = next(w for w in within.ranking if w.column == GUST_COLUMN).candidate
-    # Weaker by 0.3 in three windows of nine, and in both of two neighbours in two of nine: whence 0.1².
-    assert found.strength.value == pytest.approx(0.1, rel=0.35)
+    # Weaker by 2 in three windows of nine, and in both of two neighbours in two of nine: a covariance of 4 (2/9 − 1/9).
+    assert found.strength.value == pytest.approx(2 / 3, rel=0.1)
     assert not found.why_not
 
 
@@ -520,3 +520,12 @@ def test_holes_stand_for_less_pressure_and_never_for_more() -> None:
     assert equivalent("air-density", estimate(-0.2, 0.1, "1")) == ("porosity",)
     assert equivalent("air-density", estimate(0.6, 0.1, "1")) == ()
     assert equivalent("lift", estimate(-0.2, 0.1, "1")) == ()
+
+
+def test_an_effect_that_the_cloth_cannot_have_is_not_weighed(null: NullModel, reference: Reference) -> None:
+    evidence, place = seen(null, {}), names().index(HOIST)
+    curvature, score = evidence.curvature.copy(), evidence.score.copy()
+    curvature[:, place] = curvature[:, :, place] = score[:, place] = 0.0
+    found = judge(replace(evidence, curvature=curvature, score=score), reference, level=0.02)
+    assert "full-hoist" not in {w.candidate.effect for w in found.ranking}
+    assert "lift" in {w.candidate.effect for w in found.ranking}
