@@ -10,6 +10,7 @@ import click
 from flagdata.console import LakePlace, LocalPath, document, json_option, progress, say
 
 if TYPE_CHECKING:
+    from flagdata.storage import Place
     from measure.challenge.filing import Filing
 
 _FOLDER = click.argument("folder", metavar="DIR", type=LocalPath())
@@ -82,7 +83,9 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
     "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Number of processes that simulate."
 )
 @json_option
-def bank(folder: Path, recipe: str, seed: int, lake_path: Path | None, kinds: int, workers: int, as_json: bool) -> None:
+def bank(
+    folder: Path, recipe: str, seed: int, lake_path: Place | None, kinds: int, workers: int, as_json: bool
+) -> None:
     """Simulate nulls that all sets of a recipe share, by what participants know; a build that was stopped goes on."""
     from flagdata.lake import Lake
     from measure.challenge.nulls import claim, nulls_of

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from flagdata.caches import user_cache
 from flagdata.errors import InputError, UsageError
 from flagdata.provenance import array_hash, recipe_hash
 from flagdata.rng import child_seed
@@ -17,7 +18,6 @@ from measure.nulls.reference import NullBank
 from measure.nulls.simulation import NullBatch
 from measure.observe.trajectory import described
 from measure.verdict.criteria import CRITERIA
-from sim.kernel.build import cache_folder
 
 FEWEST_NULLS = CRITERIA.simulated_kinds * banks.WINDS
 """So many at least are simulated: each kind of numerics is a batch, and p-values count the kinds."""
@@ -145,7 +145,7 @@ def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: S
 def kept_in(setting: Setting, *, seed: int) -> Path:
     """The folder of the nulls of an experiment's design, by a seed and by this version of the code."""
     made = {"design": design_hash(setting), "seed": seed, **banks.version_of_content()}
-    return cache_folder() / "nulls" / recipe_hash(made)[:32]
+    return user_cache() / "nulls" / recipe_hash(made)[:32]
 
 
 def design_hash(setting: Setting) -> str:
