@@ -57,7 +57,6 @@ class Block {
   }
 
   void stiffness(V g00, V g11, V g01, V k[4]) const {
-    typedef T V4 __attribute__((vector_size(sizeof(T) * 4)));
     I c0, c1, c2;
     V w0, w1, w2;
     const T inverse = T(1 / p.spacing), origin = T(p.origin);
@@ -66,24 +65,91 @@ class Block {
     locate(absolute(g01) * inverse, p.counts[2], c2, w2);
     const int64_t n2 = p.counts[2], n12 = p.counts[1] * n2;
     const I cell = base + (c0 * int32_t(p.counts[1]) + c1) * int32_t(n2) + c2;
-    for (int l = 0; l < L; ++l) {
-      const T* s = p.samples + 4 * int64_t(cell[l]);
-      auto at = [s](int64_t offset) {
-        V4 v;
-        std::memcpy(&v, s + 4 * offset, sizeof v);
-        return v;
-      };
-      auto line = [&](int64_t offset) { return at(offset) + w2[l] * (at(offset + 1) - at(offset)); };
-      auto plane = [&](int64_t offset) {
-        V4 low = line(offset);
-        return low + w1[l] * (line(offset + n2) - low);
-      };
-      V4 low = plane(0);
-      V4 value = low + w0[l] * (plane(n12) - low);
-      for (int i = 0; i < 4; ++i) k[i][l] = value[i];
-    }
+    const std::make_integer_sequence<int, L> all;
+    const V part[4] = {quarter<0>(cell, n2, n12, w0, w1, w2, all), quarter<1>(cell, n2, n12, w0, w1, w2, all),
+                       quarter<2>(cell, n2, n12, w0, w1, w2, all), quarter<3>(cell, n2, n12, w0, w1, w2, all)};
+    const V p01 = pairs<0>(part[0], part[1], all), q01 = pairs<2>(part[0], part[1], all);
+    const V p23 = pairs<0>(part[2], part[3], all), q23 = pairs<2>(part[2], part[3], all);
+    k[0] = halves<0>(p01, p23, all), k[1] = halves<1>(p01, p23, all);
+    k[2] = halves<0>(q01, q23, all), k[3] = halves<1>(q01, q23, all);
   }
 
+ private:
+  // Of a quarter of the lanes, the four numbers of each side by side in one register.
+  template <int which, int... n>
+  V quarter(const I& cell, int64_t n2, int64_t n12, V w0, V w1, V w2, std::integer_sequence<int, n...> all) const {
+    const V share = shuffled<(which * (L / 4) + n / 4)...>(w2, w2);
+    if constexpr (L < 8) {
+      const V low = between<which>(cell, 0, n2, n12, w0, w1, all);
+      const V high = between<which>(cell, 1, n2, n12, w0, w1, all);
+      return low + share * (high - low);
+    } else {
+      const V a = between<2 * which>(cell, 0, n2, n12, w0, w1, all);
+      const V b = between<2 * which + 1>(cell, 0, n2, n12, w0, w1, all);
+      const V low = shuffled<((n / 4) * 8 + n % 4)...>(a, b);
+      const V high = shuffled<((n / 4) * 8 + 4 + n % 4)...>(a, b);
+      return low + share * (high - low);
+    }
+  }
+  // Between the lines of the table along the shear: as many of its numbers of each lane as fit, eight or four, from
+  // `offset` nodes along the line on. Eight are those at both nodes about the shear.
+  template <int which, int... n>
+  V between(const I& cell, int64_t offset, int64_t n2, int64_t n12, V w0, V w1, std::integer_sequence<int, n...>) const {
+    constexpr int width = L < 8 ? 4 : 8, count = L / width, first = which * count;
+    const T* s[count];
+    for (int j = 0; j < count; ++j) s[j] = p.samples + 4 * (cell[first + j] + offset);
+    const auto at = [&](int64_t node) { return side_by_side<width, count>(s, 4 * node); };
+    w0 = shuffled<(first + n / width)...>(w0, w0);
+    w1 = shuffled<(first + n / width)...>(w1, w1);
+    const auto line = [&](int64_t node) {
+      const V low = at(node);
+      return low + w1 * (at(node + n2) - low);
+    };
+    const V low = line(0);
+    return low + w0 * (line(n12) - low);
+  }
+  template <int width, int count>
+  static auto side_by_side(const T* const* s, int64_t offset) {
+    if constexpr (count == 1) {
+      typedef T Part __attribute__((vector_size(sizeof(T) * width)));
+      Part v;
+      std::memcpy(&v, *s + offset, sizeof v);
+      return v;
+    } else {
+      const auto first = side_by_side<width, count / 2>(s, offset);
+      const auto second = side_by_side<width, count / 2>(s + count / 2, offset);
+      return joined(first, second, std::make_integer_sequence<int, width * count>());
+    }
+  }
+  template <typename Half, int... n>
+  static auto joined(Half a, Half b, std::integer_sequence<int, n...>) {
+    return shuffled<n...>(a, b);
+  }
+  // The numbers at places of a and, counted on, of b. Compilers before GCC 12 have no word for it.
+  template <int... n, typename Given>
+  static auto shuffled(Given a, Given b) {
+#if defined(__clang__) || __GNUC__ >= 12
+    return __builtin_shufflevector(a, b, n...);
+#else
+    typedef T Result __attribute__((vector_size(sizeof(T) * sizeof...(n))));
+    constexpr int place[] = {n...}, size = sizeof(Given) / sizeof(T);
+    Result result;
+    for (size_t i = 0; i < sizeof...(n); ++i) result[i] = place[i] < size ? a[place[i]] : b[place[i] - size];
+    return result;
+#endif
+  }
+  // Of four numbers of each lane, the two from `of` on: those of all lanes of a and b, then the next ones.
+  template <int of, int... n>
+  static V pairs(V a, V b, std::integer_sequence<int, n...>) {
+    return shuffled<(4 * (n % (L / 2)) + of + n / (L / 2))...>(a, b);
+  }
+  // The first or second half of a, then that of b.
+  template <int half, int... n>
+  static V halves(V a, V b, std::integer_sequence<int, n...>) {
+    return shuffled<(n % (L / 2) + half * (L / 2) + (n / (L / 2)) * L)...>(a, b);
+  }
+
+ public:
   // The air's force on each corner of a face.
   V3 pushed(V3 x0, V3 x1, V3 x2, V3 v0, V3 v1, V3 v2, V3 wind, T area) const {
     V3 normal = cross(sub(x1, x0), sub(x2, x0));
@@ -167,15 +233,15 @@ class Block {
   // The same by the vectors from i to j, k and l.
   static void fold(V3 edge, V3 left, V3 right, V3 g[4], V& angle) {
     const V3 normal0 = cross(edge, left), normal1 = cross(right, edge);
-    const V square = dot(edge, edge), length = root(square);
-    const V doubled0 = root(dot(normal0, normal0)), doubled1 = root(dot(normal1, normal1));
-    const V floor = T(1e-3) * square, tiny = splat(T(1e-30));
-    const V3 n0 = scale(normal0, 1 / maximum(doubled0, tiny)), n1 = scale(normal1, 1 / maximum(doubled1, tiny));
-    g[2] = scale(n0, length / maximum(doubled0, floor));
-    g[3] = scale(n1, length / maximum(doubled1, floor));
-    const V inverse = 1 / square;
-    const V w0 = dot(edge, left) * inverse, w1 = dot(edge, right) * inverse;
-    const V sine = -dot(edge, cross(n0, n1)) / length, cosine = dot(n0, n1);
+    const V square = dot(edge, edge), length = root(square), inverse = 1 / length, tiny = splat(T(1e-30));
+    const V inverse0 = 1 / maximum(norm(normal0), tiny), inverse1 = 1 / maximum(norm(normal1), tiny);
+    const V3 n0 = scale(normal0, inverse0), n1 = scale(normal1, inverse1);
+    // Divided by the altitudes, which are held at a thousandth of the edge.
+    const V steepest = 1000 * inverse;
+    g[2] = scale(n0, minimum(length * inverse0, steepest));
+    g[3] = scale(n1, minimum(length * inverse1, steepest));
+    const V w0 = dot(edge, left) * (inverse * inverse), w1 = dot(edge, right) * (inverse * inverse);
+    const V sine = -dot(edge, cross(n0, n1)) * inverse, cosine = dot(n0, n1);
     angle = arctangent2(sine, cosine);
     g[0] = combine(g[2], w0 - 1, g[3], w1 - 1);
     g[1] = combine(g[2], -w0, g[3], -w1);

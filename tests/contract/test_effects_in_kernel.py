@@ -7,21 +7,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 import torch
 
+from flagdata.errors import UsageError
+from flagdata.rng import stream
+from sim import scene
 from sim.air import AIR_FORCES, Stokes
 from sim.effects import EFFECTS
 from sim.effects.field import FieldEffect, Seen
+from sim.effects.files import load
 from sim.integrate.backend import Backend
 from sim.integrate.implicit import BackwardEuler
 from sim.integrate.symplectic import advance
 from sim.kernel.fused import Kernel
+from sim.material import named
+from sim.scene import assemble
 from sim.state import State
 from sim.system import System
-from tests.contract.test_effects import drawn, flag, with_effect
+from tests.contract.test_effects import START, drawn, flag, with_effect
 
 EFFECTS_BY_TORCH: dict[str, str] = {}
 """Registered effects that have no C++, with the reason."""
@@ -88,6 +95,26 @@ def test_forces_are_those_of_torch(name: str, dtype: torch.dtype, tolerance: flo
     assert float((computed - expected).abs().max()) < tolerance * max(float(f.abs().max()) for f in (expected, air))
 
 
+@pytest.mark.parametrize("name", BESIDE)
+def test_members_of_every_block_have_their_own_numbers(name: str) -> None:
+    """Twenty members in single precision: a full block, and one with spare lanes."""
+    scenes = [scene.flag(material=named("camel-ponte-roma"), wind_speed=3 + 0.2 * b, columns=4) for b in range(20)]
+    system, state = assemble(scenes)
+    system, state = EFFECTS[name].drawn(stream(5, name), batch=20).for_batch(
+        20, dtype=torch.float32, device=torch.device("cpu")
+    ).apply(system, state)  # fmt: skip
+    moved = state.position + 0.02 * torch.sin(30 * state.position.roll(1, 1))
+    velocity = torch.cos(11 * moved.roll(1, 0))
+    drive = system.drive(START, START + 0.01)
+    memory = system.remembered(state.memory, moved)
+    expected = system.extra_force(drive, 0.3, START, moved, velocity, memory=memory)
+    computed = kernel_of(system).extra(drive, 0.3, moved, velocity, velocity, memory=memory)
+    air = system.air.plain.force(system.cloth, moved, velocity, drive.wind[0])
+    scale = torch.maximum(expected.abs().amax((0, 1)), air.abs().amax((0, 1)))
+    assert (expected.abs().amax((0, 1)) > 0).all()
+    assert ((computed - expected).abs().amax((0, 1)) < 2e-5 * scale).all()
+
+
 def leapfrog(system: System, state: State) -> State:
     return advance(system, state, 0.0012, steps=6, backend=Backend.KERNEL)
 
@@ -138,3 +165,64 @@ def test_both_integrators_with_an_effect_agree_with_torch(name: str, run: Callab
     else:
         expected = BackwardEuler(step=5e-3, tolerance=1e-10, backend=Backend.TORCH).advance(system, state, 0.01)
     torch.testing.assert_close(final.velocity, expected.velocity, rtol=0, atol=1e-9)
+
+
+OWN = '''
+from dataclasses import dataclass
+from typing import Annotated
+from sim.air import face_wind
+from sim.effects.effect import ForceEffect
+from sim.effects.parameter import Value, strength
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sideways(ForceEffect):
+    """A face is pushed along its normal in proportion to the wind across it."""
+
+    size: Annotated[Value, strength(unit="kg/(m² s)", prior=(0.0, 1.0), source="none")] = 0.0
+
+    def force(self, cloth, time, position, velocity, wind):
+        seen = face_wind(cloth, position, velocity, wind)
+        return cloth.shared_out((cloth.areas / 3)[:, None, None] * self.size * seen.across * seen.normal)
+'''
+OWN_CODE = """
+#include "effect.hpp"
+struct Sideways {
+  template <typename V>
+  static void act(const V* number, const Face<V>& seen, Vector3<V>& push) {
+    push = add(push, scale(seen.normal, number[0] * seen.across));
+  }
+};
+EFFECT(FaceForce, Sideways)
+"""
+
+
+def of_file(folder: Path, code: str) -> tuple[System, State]:
+    """A flag with an effect of a file, and that C++ beside it."""
+    # A file is loaded once for its content, wherever it lies.
+    (folder / "own.py").write_text(f"{OWN}\n# {folder.name}\n")
+    (folder / "own.hpp").write_text(code)
+    return with_effect(load(f"{folder / 'own.py'}:Sideways")(size=0.4), *flag())  # pyright: ignore[reportCallIssue]
+
+
+def test_an_effect_of_a_file_runs_in_the_kernel_by_the_code_beside_it(tmp_path: Path) -> None:
+    system, state = of_file(tmp_path, OWN_CODE)
+    assert kernel_of(system).beside is not None
+    final, expected = leapfrog(system, state), advance(system, state, 0.0012, steps=6, backend=Backend.TORCH)
+    torch.testing.assert_close(final.velocity, expected.velocity, rtol=0, atol=1e-10)
+
+
+def test_code_that_does_not_compile_is_reported_and_torch_runs(tmp_path: Path) -> None:
+    system, state = of_file(tmp_path, OWN_CODE.replace("number[0]", "nonsense"))
+    with pytest.warns(RuntimeWarning, match=r"(?s)own.hpp is left aside .*nonsense"):
+        final = leapfrog(system, state)
+    expected = advance(system, state, 0.0012, steps=6, backend=Backend.TORCH)
+    torch.testing.assert_close(final.velocity, expected.velocity, rtol=0, atol=1e-10)
+
+
+def test_code_of_another_kind_is_refused(tmp_path: Path) -> None:
+    other = OWN_CODE.replace("const Face<V>& seen, Vector3<V>& push", "const Vector3<V>&, Vector3<V>&")
+    other = other.replace("push = add(push, scale(seen.normal, number[0] * seen.across));", "")
+    system, _ = of_file(tmp_path, other.replace("FaceForce", "Flow"))
+    with pytest.raises(UsageError, match="FLOW for Sideways"):
+        Kernel.of(system)
