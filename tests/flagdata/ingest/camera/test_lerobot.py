@@ -48,7 +48,7 @@ def test_an_episode_becomes_a_camera_of_the_lake_once(data_set: Path, lake: Lake
     assert ingest_camera(lake, data_set, CameraIngest(camera=options(0))).created
 
 
-def test_what_is_not_named_or_not_there_is_said(data_set: Path) -> None:
+def test_a_choice_that_is_missing_or_wrong_is_refused_with_what_there_is(data_set: Path) -> None:
     with pytest.raises(InputError, match="3 episodes") as raised:
         open_camera(data_set, options(None))
     assert "--episode 0 to 2" in raised.value.fix
