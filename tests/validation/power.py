@@ -44,8 +44,9 @@ INTENSITY = 0.1
 NO_EFFECT = "none"
 LEFT_OUT = ("gusts", "logged-gusts")
 """They are what all flags fly in, or need a log."""
-_TOLD = 3.0
-"""Standard errors from which on an observable shows an effect."""
+_TOLD, _SHORT = 3.0, 7.0
+"""Standard errors from which on an observable shows an effect, of the library and of the reference runs: twice what the
+differences are known to, of 16 windows and of four."""
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
@@ -177,21 +178,26 @@ def page(sheet: Mapping[str, Any]) -> str:
     ]  # fmt: skip
     for name, of in sheet["map"].items():
         strengths = ", ".join(f"{value:.3g}" for value in sheet["strengths"][name].values())
-        cells = [" / ".join(_cell(of[f"{wind:g}"][observable]) for wind in WINDS) for observable in OBSERVABLES]
+        cells = [" / ".join(_cell(of[f"{wind:g}"][observable], _TOLD) for wind in WINDS) for observable in OBSERVABLES]
         lines.append(f"| {name}, {strengths} | " + " | ".join(cells) + " |")
     if sheet["reference"]:
         lines += ["", "## The reference simulator's runs", "", "ArcSim, 10 s at 3 / 5 / 7 m/s without gusts.", ""]
         lines += ["| what acted | " + " | ".join(OBSERVABLES) + " |", "|---" * (1 + len(OBSERVABLES)) + "|"]
         lines += [
-            f"| {name} | " + " | ".join(" / ".join(_cell(of[w][o]) for w in sorted(of)) for o in OBSERVABLES) + " |"
+            f"| {name} | "
+            + " | ".join(" / ".join(_cell(of[w][o], _SHORT) for w in sorted(of)) for o in OBSERVABLES)
+            + " |"
             for name, of in sheet["reference"].items()
         ]
-    lines += ["", f"In bold: {_TOLD:g} or more. A dash: fewer than half of the windows show the observable."]
+    lines += [
+        "",
+        f"In bold: {_TOLD:g} or more, of ArcSim's {_SHORT:g}. A dash: fewer than half of the windows show it.",
+    ]
     return "\n".join(lines) + "\n"
 
 
-def _cell(value: float | None) -> str:
+def _cell(value: float | None, clear: float) -> str:
     if value is None:
         return "–"
     text = f"{value:+.0f}".replace("-", "−")
-    return f"**{text}**" if abs(value) >= _TOLD else text
+    return f"**{text}**" if abs(value) >= clear else text
