@@ -31,22 +31,24 @@ BESIDE = ("gain", "scale")
 """Nuisances that are fitted beside the place."""
 WALKERS, STEPS = 256, 600
 """Of the ensemble that draws from the posterior."""
+_THERE = 0.8
+"""Share of the simulations that are to show a summary."""
+_INFORMATIVE = 0.8
+"""Error of a summary's emulator, as a share of the summary's spread, from which on it is left out: what depends on
+nothing that is regressed on adds noise to the scatter's estimate, and nothing else."""
 _CHECK = (64, 600)
 """The same of each simulation that is weighed to check the intervals, which need not be smooth."""
 
 
 def regressors(values: Mapping[str, Floats]) -> Floats:
-    """(n, p) what summaries are linear in: a cubic in the logarithm of the weight, quadratics in those of bending and
-    damping with their products, and the place through the cosine of its azimuth, the chord's shortening."""
+    """(n, p) what summaries are linear in: quadratics in the logarithms of weight and damping with their product, the
+    logarithm of bending, and the place through the cosine of its azimuth, the chord's shortening."""
     weight, bending, damping = (
         np.log(values[quantity.name] / _middle(quantity)) / _half(quantity) for quantity in CLOTH
     )
     gain, scale = np.log(values["gain"]) / 0.03, np.log(values["scale"]) / 0.01
     along, up = np.cos(values["azimuth"]), np.sin(values["elevation"]) / 0.09
-    return np.stack([
-        weight, weight**2, weight**3, bending, bending**2, damping, damping**2, weight * bending, weight * damping,
-        bending * damping, gain, gain * weight, scale, along, along**2, along * weight, up,
-    ], axis=1)  # fmt: skip
+    return np.stack([weight, weight**2, bending, damping, damping**2, weight * damping, gain, scale, along, up], axis=1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,7 +81,7 @@ class Emulator:
             InputError: too few simulations show what the recording shows.
         """
         there = np.isfinite(summaries)
-        used = used & (there.mean(axis=0) > 0.8)
+        used = used & (there.mean(axis=0) > _THERE)
         complete = np.asarray(there[:, used].all(axis=1) & used.any(), dtype=np.bool_)
         x, y = regressors(values)[complete], summaries[complete][:, used]
         needed = least(x.shape[1] + 1, y.shape[1]) + 8
@@ -88,9 +90,16 @@ class Emulator:
                 f"{len(x)} of {len(complete)} simulations show what the film shows, and {needed} are needed",
                 where="emulator", fix="give more simulations with --simulations",
             )  # fmt: skip
-        group = np.arange(len(x))
-        model = Metamodel.fit(x, y, group)
-        return cls(model=model, used=used, rows=len(x), error=_left_out(x, y) / y.std(axis=0))
+        error = _left_out(x, y) / y.std(axis=0)
+        informative = error < _INFORMATIVE
+        if not informative.any():
+            raise InputError(
+                "what the film shows does not depend on the cloth in these simulations", where="emulator",
+                fix="give more simulations with --simulations, or windows with more wind",
+            )  # fmt: skip
+        used[np.flatnonzero(used)[~informative]] = False
+        model = Metamodel.fit(x, y[:, informative], np.arange(len(x)))
+        return cls(model=model, used=used, rows=len(x), error=error[informative])
 
     def log_density(self, values: Mapping[str, Floats], observed: Floats) -> Floats:
         """(n,) of a recording's summaries (k,), or of one's each (n, k), at values."""

@@ -96,7 +96,7 @@ CLOTH = (
 NUISANCES = (
     Uncertain(
         name="stretching", unit="1", prior=_log(0.5, 2.0),
-        source="factor on the table of one fabric, as nulls of verdicts vary it",
+        source="factor on the table of the fabric that a simulation draws, as nulls of verdicts vary it",
     ),
     Uncertain(name="gain", unit="1", prior=Normal(mean=1.0, sigma=0.03), source="classes of cups, IEC 61400-12-1"),
     Uncertain(

@@ -97,8 +97,11 @@ def test_parquet_with_reasons_is_read_as_the_text(tmp_path: Path) -> None:
     text = of_table(_table(tmp_path / "t.csv"))
     table = csv.read_csv(tmp_path / "t.csv")
     table = table.append_column("droop-reason", pa.array([None] * len(table), pa.string()))
+    field = table.schema.field("droop").with_metadata({"sigma": "0.03"})
+    table = table.cast(table.schema.set(table.schema.get_field_index("droop"), field))
     pq.write_table(table, tmp_path / "t.parquet")
     found = of_table(tmp_path / "t.parquet")
+    assert found.sigma.tolist() == [0.03] + [0.0] * 7
     assert np.array_equal(found.readings, text.readings, equal_nan=True)
     assert np.array_equal(found.log.speed, text.log.speed)
 

@@ -15,6 +15,7 @@ from measure.calibrate.design import Design, simulated
 from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED, Batch, Flag, cloth, mean_bending
 from measure.calibrate.wind import Log
+from sim.material import named
 
 _LOG = Log(times=np.arange(-10.0, 20.0), speed=np.full(30, 5.0), distance=0.0)
 
@@ -41,7 +42,15 @@ def test_a_heavier_flag_droops_more_and_repeats() -> None:
 
 
 def test_a_cloth_has_the_bending_it_is_given() -> None:
-    assert mean_bending(cloth(0.2, 7e-5, 0.01)) == pytest.approx(7e-5)
+    made = cloth(0.2, 7e-5, 0.01, stretching=2.0, fabric="gray-interlock")
+    assert mean_bending(made) == pytest.approx(7e-5)
+    assert made.density == 0.2
+    assert np.allclose(made.stretching, 2 * named("gray-interlock").stretching)
+
+
+def test_simulations_draw_their_fabrics() -> None:
+    drawn = {scene.material.name for scene in _batch([0.2] * 12)._scenes(Flag(length=1.5, height=1.0).mesh(4))}
+    assert len(drawn) > 3
 
 
 def test_kept_simulations_are_not_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
