@@ -315,7 +315,8 @@ def _fitted(
     predicted = sight.emulator.predict(values, seed=options.seed)
     used = sight.emulator.used
     count = len(OBSERVED)
-    whole = np.full((len(predicted), used.size), np.nan)
+    # Slopes that depend on nothing that is regressed on are those of all simulations.
+    whole = np.tile(np.nanmean(summaries, axis=0), (len(predicted), 1))
     whole[:, used] = predicted
     windows = one.projection.at(whole.reshape(len(predicted), -1, count))
     low, middle, high = np.quantile(windows, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=0)

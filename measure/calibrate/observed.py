@@ -131,9 +131,8 @@ def of_table(path: Path) -> Observed:
     """A table of observables, Parquet or comma-separated: one row a window of `WINDOW` seconds, in the order of time.
 
     Its columns: `time`, the middle of a window [s]; `wind`, the logged mean over it [m/s]; and observables by their
-    names, in their units, each perhaps with another column NAME-sigma, what it is off by; else that of a Parquet
-    field's metadata, as `flagdata observe` writes it. Blank cells are windows that do not show one. Columns
-    NAME-reason, why not, are passed over.
+    names, in their units, each perhaps with another column NAME-sigma, what it is off by. Blank cells are windows that
+    do not show one. Columns NAME-reason, why not, are passed over.
 
     Raises:
         InputError: no such table.
@@ -141,7 +140,7 @@ def of_table(path: Path) -> Observed:
     """
     check_input(path, limit=_TABLE_LIMIT)
     where = str(path)
-    heading, rows, stated = _cells(path)
+    heading, rows = _cells(path)
     known = {_TIME, _SPEED, *OBSERVABLES, *(f"{name}-sigma" for name in OBSERVABLES)}
     if unknown := [name for name in heading if name not in known and not name.endswith("-reason")]:
         raise InputError(f"columns {', '.join(unknown)} are not known", where=where, fix=f"keep {', '.join(known)}")
@@ -159,7 +158,7 @@ def of_table(path: Path) -> Observed:
     if not np.isfinite(speed).all():
         raise InputError("a window without a wind speed", where=where, fix="leave out what lies before the gap")
     blank = np.full(len(times), np.nan)
-    sigma = [columns.get(f"{name}-sigma", np.array([stated.get(name, 0.0)])) for name in OBSERVED]
+    sigma = [columns.get(f"{name}-sigma", np.zeros(1)) for name in OBSERVED]
     return Observed(
         name=path.stem, source=file_hash(path),
         readings=np.stack([columns.get(name, blank) for name in OBSERVED], axis=1),
@@ -168,8 +167,8 @@ def of_table(path: Path) -> Observed:
     )  # fmt: skip
 
 
-def _cells(path: Path) -> tuple[list[str], list[list[str]], dict[str, float]]:
-    """Heading and rows of a table as text, and sigmas that its fields state.
+def _cells(path: Path) -> tuple[list[str], list[list[str]]]:
+    """Heading and rows of a table as text.
 
     Raises:
         InputError: no table of that format.
@@ -183,12 +182,10 @@ def _cells(path: Path) -> tuple[list[str], list[list[str]], dict[str, float]]:
         except pa.ArrowException as error:
             raise InputError(f"no Parquet table: {error}", where=str(path), fix="name a table") from None
         columns = [["" if cell is None else str(cell) for cell in column.to_pylist()] for column in table.columns]
-        about = {field.name: (field.metadata or {}).get(b"sigma") for field in table.schema}
-        sigma = {name: float(own) for name, own in about.items() if own is not None}
-        return table.column_names, [list(row) for row in zip(*columns, strict=True)], sigma
+        return table.column_names, [list(row) for row in zip(*columns, strict=True)]
     with path.open(encoding="utf-8-sig", newline="") as file:
         rows = list(csv.reader(file))
-    return ([cell.strip() for cell in rows[0]] if rows else []), rows[1:], {}
+    return ([cell.strip() for cell in rows[0]] if rows else []), rows[1:]
 
 
 def _numbers(rows: Sequence[Sequence[str]], place: int, name: str, where: str) -> Floats:

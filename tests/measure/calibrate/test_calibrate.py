@@ -102,6 +102,14 @@ def test_an_error_of_pixels_widens_the_interval() -> None:
     assert _found(other).weight.sigma / 0.17 == pytest.approx(math.hypot(0.06, 0.2), rel=0.35)
 
 
+def test_windows_lie_about_what_simulations_of_the_answer_show(plain: Calibration) -> None:
+    (one,) = plain.recordings
+    assert np.isfinite(one.middle[:, one.used]).all()
+    assert (one.low[:, one.used] <= one.high[:, one.used]).all()
+    error = one.observed.readings[:, 0] - one.middle[:, 0]
+    assert float(np.abs(error).mean()) < 0.04  # the scatter of a window is 0.02
+
+
 def test_the_answer_is_stated_as_measure_takes_it(plain: Calibration) -> None:
     assert plain.stated is not None
     stated = parse(plain.stated)
