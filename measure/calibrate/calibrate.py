@@ -315,15 +315,17 @@ def _fitted(
     predicted = sight.emulator.predict(values, seed=options.seed)
     used = sight.emulator.used
     count = len(OBSERVED)
-    # Slopes that depend on nothing that is regressed on are those of all simulations.
-    whole = np.tile(np.nanmean(summaries, axis=0), (len(predicted), 1))
+    # What depends on nothing that is regressed on is that of simulations at random.
+    rows = stream(options.seed, "calibrate", "rows").integers(len(summaries), size=len(predicted))
+    whole = np.where(np.isfinite(summaries), summaries, np.nanmean(summaries, axis=0))[rows]
     whole[:, used] = predicted
     windows = one.projection.at(whole.reshape(len(predicted), -1, count))
     low, middle, high = np.quantile(windows, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=0)
-    centre, covariance = predicted.mean(axis=0), np.cov(predicted.T)
-    distance = np.einsum("ni,ij,nj->n", predicted - centre, np.linalg.pinv(covariance), predicted - centre)
-    offset = one.summary[used] - centre
-    own = float(offset @ np.linalg.pinv(covariance) @ offset)
+    looked = np.isfinite(one.summary) & np.isfinite(whole).all(axis=0)
+    centre, inverse = whole[:, looked].mean(axis=0), np.linalg.pinv(np.cov(whole[:, looked].T))
+    offsets = np.concatenate([whole[:, looked], one.summary[None, looked]]) - centre
+    *distances, own = ((offsets @ inverse) * offsets).sum(axis=1).tolist()
+    distance = np.array(distances)
     return Fitted(
         observed=one, low=low, middle=middle, high=high, used=used[:count],
         misfit=float((1 + (distance >= own).sum()) / (1 + len(distance))),

@@ -17,6 +17,10 @@ CASES: dict[str, tuple[tuple[str, ...], str]] = {
     "realign --plot": (("realign", "a", "--lake", "nowhere", "--plot", "{out}/a.png"), "a.png"),
     "ingest --crop-picture": (("ingest", "nowhere.mp4", "--crop", "auto", "--crop-picture", "{out}/a.png"), "a.png"),
     "measure --report": (("measure", "nowhere.mp4", "--report", "{out}/a.html"), "a.html"),
+    "calibrate --report": (
+        ("calibrate", "nowhere.csv", "--flag-size", "1.5x1.0", "--report", "{out}/a.html"),
+        "a.html",
+    ),
     "measure --zarr": (("measure", "nowhere.mp4", "--zarr", "{out}"), "mine"),
     "evaluate --out": (("evaluate", "flow", "--lake", "nowhere", "--out", "{out}"), "evaluation.md"),
     "close-loop --out": (("close-loop", "nowhere.csv", "--lake", "nowhere", "--out", "{out}"), "model.toml"),
