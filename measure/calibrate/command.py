@@ -73,13 +73,14 @@ def calibrate(
     """Weigh the cloth of a flag from its motion and the log of the wind beside it: area weight, bending and damping,
     with intervals.
 
-    RECORDING is a table of observables, Parquet or comma-separated, one row a window of 2.5 s: its columns are `time`
-    [s], `wind`, the logged mean over the window [m/s], and observables by their names (droop, extension, middle-speed,
+    RECORDING is a film with its log, a recording of --lake by its name or id. Or it is a table of observables, Parquet
+    or comma-separated, one row a window of 2.5 s, as flagdata observe --parquet writes: its columns are `time` [s],
+    `wind`, the logged mean over the window [m/s], and observables by their names (droop, extension, middle-speed,
     frequency, bandwidth, amplitude-up, amplitude-across, area), each perhaps with NAME-sigma, what it is off by.
     Several recordings are of one flag.
 
     \b
-      flagdata calibrate monday.csv --flag-size 1.5x1.0 --azimuth 70±7 --report monday.html
+      flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --azimuth 70±7 --report page.html
       flagdata calibrate monday.csv tuesday.csv --flag-size 1.5x1.0 --lake lake --json
     """
     if flag_size is None:
@@ -93,7 +94,7 @@ def calibrate(
     from measure.calibrate.artifact import artifact, keep
     from measure.calibrate.calibrate import Options
     from measure.calibrate.calibrate import calibrate as calibrated
-    from measure.calibrate.observed import cut, of_table
+    from measure.calibrate.filmed import of_source
     from measure.calibrate.page import page
     from measure.calibrate.prior import AZIMUTH, ELEVATION
     from measure.calibrate.simulation import Flag
@@ -111,12 +112,13 @@ def calibrate(
         elevation=ELEVATION if elevation is None else known(ELEVATION, elevation, where="--elevation"),
         distance=distance, simulations=simulations, level=level, seed=seed,
     )  # fmt: skip
-    observed = [cut(of_table(Path(source)), first, last) for source in sources]
+    read = [of_source(source, size, lake=lake, at=branch, first=first, last=last) for source in sources]
+    observed = [one for one, _ in read]
     with progress(simulations * len(observed), label="calibrate", unit="flag") as advance:
         found = calibrated(
             observed, options, folder=(cache or user_cache() / "calibrate"), workers=workers, advance=advance
         )
-    parents: tuple[str, ...] = ()
+    parents = tuple(recording for _, recording in read if recording is not None)
     wanted = None if lake is None or read_only else artifact(found, parents).id
     text = None if report is None else page(found, _provenance(found, wanted))
     new = lake is not None and wanted is not None and keep(lake, found, parents, branch=branch)

@@ -1,0 +1,79 @@
+"""A film and its log become what is calibrated."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flagdata.errors import InputError, RefusedError
+from flagdata.findings import Finding, Severity
+from flagdata.signals import Sensor, WindSeries
+from measure.calibrate import filmed
+from measure.calibrate.simulation import OBSERVED
+from measure.estimate.similarity import FlagSize
+from measure.observables import Reading
+
+_SIZE = FlagSize(length=1.5, height=1.0)
+_START = 1_700_000_000_000_000_000
+
+
+def _subject(*, logged: float = 200.0, findings: tuple[Finding, ...] = ()) -> Any:
+    time = _START + np.round((np.arange(0.0, logged) - 60.0) * 1e9).astype(np.int64)
+    wind = WindSeries(
+        time=time, channels={"wind_speed": np.linspace(4.0, 6.0, len(time))}, flags=np.zeros(len(time), np.uint16),
+        sensor=Sensor(name="cup", distance_constant=2.5),
+    )  # fmt: skip
+    film = SimpleNamespace(name="film", start=_START, duration=300.0, findings=lambda: findings)
+    artifact = SimpleNamespace(id="0123abcd")
+    return SimpleNamespace(
+        film=film, artifact=artifact, record=SimpleNamespace(wind=lambda: wind), recording="0123abcd",
+        content_hash=lambda: None,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Windows that show their number of everything; the third shows nothing."""
+
+    def watched(film: object, size: FlagSize, *, first: float, last: float) -> Any:
+        count = int((last - first) / 2.5)
+        return SimpleNamespace(windows=tuple(None if k == 2 else k for k in range(count)), seconds=2.5)
+
+    monkeypatch.setattr(filmed, "watched", watched)
+    fake = SimpleNamespace(of_film=lambda window: Reading(value=float(window)), sigma=0.01)
+    monkeypatch.setattr(filmed, "OBSERVABLES", dict.fromkeys(OBSERVED, fake))
+
+
+@pytest.mark.usefixtures("shown")
+def test_two_minutes_are_read_with_the_log_on_the_films_clock() -> None:
+    found = filmed.of_film(_subject(), _SIZE, first=10.0, last=None)
+    assert found.readings.shape == (48, len(OBSERVED))
+    assert np.isnan(found.readings[2]).all()
+    assert found.readings[5, 0] == 5.0
+    assert found.log.distance == 2.5
+    # The log rises by 2/199 m/s a second, and is at its 70th second where the part begins.
+    assert found.speed[0] == pytest.approx(4.0 + 2 / 199 * 71.25, abs=0.01)
+    assert found.sigma.tolist() == [0.01] * len(OBSERVED)
+
+
+@pytest.mark.usefixtures("shown")
+def test_a_log_that_ends_before_the_film_is_refused() -> None:
+    with pytest.raises(InputError, match="does not cover"):
+        filmed.of_film(_subject(logged=100.0), _SIZE, first=0.0, last=None)
+
+
+@pytest.mark.usefixtures("shown")
+def test_a_camera_that_cannot_be_steadied_is_refused() -> None:
+    lost = Finding(kind="camera-lost", severity=Severity.WARNING, what="40 % of the frames", value=0.4)
+    with pytest.raises(RefusedError, match="the camera moves"):
+        filmed.of_film(_subject(findings=(lost,)), _SIZE, first=0.0, last=None)
+
+
+def test_a_film_without_a_log_is_refused() -> None:
+    subject = _subject()
+    subject.record = None
+    with pytest.raises(InputError, match="no log of the wind"):
+        filmed.of_film(subject, _SIZE, first=0.0, last=None)
