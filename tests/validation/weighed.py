@@ -202,7 +202,10 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     low, middle, high = np.quantile(draws, [0.05, 0.5, 0.95], axis=1)
     options = Options(flag=FLAG, azimuth=own.azimuth, simulations=own.count, seed=SEED)
     check = left_out([(blank, own.values(), summaries, used)], options)
+    fine, places = finer(own)
+    change = blank.projection.of(fine) - blank.projection.of(readings_of[places])
     return {
+        "mesh": {"bias": change.mean(axis=0).tolist(), "sigma": change.std(axis=0, ddof=1).tolist()},
         "truths": len(truth), "median_error": float(np.median(np.abs(middle / truth - 1))),
         "held": int(((low <= truth) & (truth <= high)).sum()), "left_out": check.as_dict(),
         "emulator_error": emulator.error.tolist(), "observables": list(OBSERVED), "seconds_of_film": DURATION,
