@@ -2,7 +2,7 @@
 
 A place that the cloth leaves bare shows the same value again and again, so the narrowest fifth of a pixel's values is
 taken for what is behind, the *still picture*. Where cloth always covers a place, the still picture shows cloth. The two
-are told apart by what surrounds them: background that is bare is joined to the outside of the cloth's region through
+differ in what surrounds them: background that is bare is joined to the outside of the cloth's region through
 places that are bare at the same instant and that no edge of the still picture separates; cloth is not, since its
 outline, which differs from the still picture, lies between.
 """
