@@ -30,7 +30,7 @@ from models.targets import Cloth, Target
 
 SHIPPED = Path(__file__).parent / "shipped"
 """Models that come with the package, a folder each."""
-DEFAULT = "flow"
+DEFAULT = "flow-outdoor"
 DRAWS = 400
 CLOUD = "cloud.safetensors"
 

@@ -25,7 +25,7 @@ from flagdata.timebase import NANOSECONDS
 from measure.gate.distortions import DISTORTIONS, Film
 from measure.gate.features import Features, features_of
 from measure.gate.gate import Gate
-from models.estimator import SHIPPED, Estimator, load
+from models.estimator import DEFAULT, SHIPPED, Estimator, load
 from models.training.conditioned import FitFilm
 from models.training.recipe import DataSpec
 
@@ -144,7 +144,7 @@ def rate_of(model: Estimator) -> float | None:
 
 
 @click.command()
-@click.argument("model", type=LocalPath(), default=SHIPPED / "flow")
+@click.argument("model", type=LocalPath(), default=SHIPPED / DEFAULT)
 @click.option("--lake", "lake_path", type=LocalPath(exists=True), required=True,
               help="Where the films are that the network was trained on and validated by.")  # fmt: skip
 @click.option("--dataset", "datasets", multiple=True,

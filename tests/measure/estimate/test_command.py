@@ -31,7 +31,7 @@ from measure.estimate.artifact import read
 from measure.estimate.material import weight_of
 from measure.estimate.nearest import nearest
 from models.conditioning import conditioned
-from models.estimator import Estimator
+from models.estimator import DEFAULT, Estimator
 from tests.measure.estimate.conftest import FRAMES, RATE, pictures, write_video
 
 START = 1_700_000_000 * NANOSECONDS
@@ -150,7 +150,7 @@ def test_python_returns_a_refused_film_with_its_reasons_and_hides_its_values(str
 def test_the_shipped_model_measures_a_file_without_any_option_but_the_films(tmp_path: Path) -> None:
     path = write_video(tmp_path / "flag.mkv", pictures(40, height=240, width=320))
     found = answer(path, "--anyway")
-    assert found["model"] == "flow"
+    assert found["model"] == DEFAULT
     assert "size-assumed" in [finding["kind"] for finding in found["findings"]]  # type: ignore[index, union-attr]
 
 

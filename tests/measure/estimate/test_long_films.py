@@ -18,7 +18,7 @@ from sim.datasets.reading import load
 
 @pytest.fixture(scope="module")
 def shipped() -> Estimator:
-    return estimator.shipped()
+    return estimator.shipped("flow")
 
 
 @pytest.fixture(scope="module")
