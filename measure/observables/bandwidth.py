@@ -20,5 +20,5 @@ BANDWIDTH = Observable(
     name="bandwidth", unit="Hz",
     meaning="standard deviation of the frequencies in the same spectrum",
     blind="whether a broad spectrum is of many waves or of one whose frequency follows the wind",
-    pixels=bandwidth, geometry=bandwidth, bias=0.649, sigma=0.355,
+    pixels=bandwidth, geometry=bandwidth, bias=0.395, sigma=0.237,
 )  # fmt: skip

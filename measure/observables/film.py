@@ -12,6 +12,8 @@ from flagdata.errors import InputError
 from measure.observables.silhouettes import Silhouettes
 from measure.observables.unseen import UnseenError
 
+_LARGEST = 1.15
+"""Mean area over that of the flat flag above which the hoist's height, and with it the scale, is wrong."""
 _SHOWN = 0.8
 """Share of a window's frames whose outline is to be found."""
 
@@ -64,6 +66,8 @@ class FilmWindow:
         masks, middle = self.masks[self.shown], self.hoist.mean(axis=0)
         if self.side < 0:
             masks, middle = masks[:, :, ::-1], np.array([masks.shape[2] - middle[0], middle[1]])
+        if masks.sum(axis=(1, 2)).mean() > _LARGEST * self.length * self.height * self.scale**2:
+            raise UnseenError("no-silhouette")
         return Silhouettes(
             times=self.times[self.shown], masks=masks, scale=self.scale, hoist=middle, length=self.length,
             height=self.height,

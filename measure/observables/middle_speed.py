@@ -16,5 +16,5 @@ MIDDLE_SPEED = Observable(
     name="middle-speed", unit="1/s",
     meaning="root mean square speed, in flag lengths, of the centroid of the middle third of the silhouette",
     blind="motion along the line of sight",
-    pixels=middle_speed, geometry=middle_speed, bias=-0.022, sigma=0.024,
+    pixels=middle_speed, geometry=middle_speed, bias=-0.026, sigma=0.020,
 )  # fmt: skip

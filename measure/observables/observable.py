@@ -41,8 +41,8 @@ class Observable:
         meaning: what it is, one sentence.
         blind: what it does not show.
         pixels, geometry: its two definitions; each raises `UnseenError` where its window does not show it.
-        bias: mean of pixels less geometry in filmed simulations, in the unit.
-        sigma: standard deviation of the same for one window: what segmentation, blur and folds leave. Both are measured
+        bias: median of pixels less geometry in filmed simulations, in the unit.
+        sigma: robust deviation (1.48 times the median one) of the same for one window: what segmentation, blur and folds leave. Both are measured
             by `python -m tests.validation observables` (docs/results/validate-observables.md).
     """
 

@@ -19,5 +19,5 @@ WAVE_LENGTH = Observable(
     name="wave-length", unit="1",
     meaning="length, in flag lengths along the picture, of the wave that travels along the silhouette's middle line",
     blind="waves whose crests are along the line of sight's direction of motion, and standing waves",
-    pixels=wave_length, geometry=wave_length, bias=0.139, sigma=0.219,
+    pixels=wave_length, geometry=wave_length, bias=-0.026, sigma=0.213,
 )  # fmt: skip
