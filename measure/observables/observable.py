@@ -42,7 +42,8 @@ class Observable:
         blind: what it does not show.
         pixels, geometry: its two definitions; each raises `UnseenError` where its window does not show it.
         bias: median of pixels less geometry in filmed simulations, in the unit.
-        sigma: robust deviation (1.48 times the median one) of the same for one window: what segmentation, blur and folds leave. Both are measured
+        sigma: robust deviation (1.48 times the median one) of the same for one window: what segmentation, blur and
+            folds leave. Both are measured
             by `python -m tests.validation observables` (docs/results/validate-observables.md).
     """
 
