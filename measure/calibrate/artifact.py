@@ -16,44 +16,49 @@ from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from measure.calibrate.calibrate import ANSWER, Calibration
 from measure.calibrate.simulation import OBSERVED, VERSION
+from measure.estimate.source import Reading
+from measure.observables.artifact import VERSION as READINGS
+from models.conditioning.conditioning import VERSION as CONDITIONED
 
 _FORMAT = 1
 _HEAD = "flagdata_calibration"
 
 
-def artifact(found: Calibration, parents: tuple[str, ...], *, stored: str | None = None) -> Artifact:
+def artifact(found: Calibration, reading: Reading, parents: tuple[str, ...], *, stored: str | None = None) -> Artifact:
     """The row of a calibration.
 
     Args:
+        reading: how films were read.
         parents: artifacts that the recordings were read from; none for tables.
     """
     values = {q.name: q.value for q in found.cloth if q.value is not None}
     sources = [one.observed.source for one in found.recordings]
-    spans = [[one.observed.log.times[0].item(), one.observed.duration] for one in found.recordings]
+    spans = [[one.observed.first, one.observed.duration] for one in found.recordings]
     return Artifact(
         kind=Kind.MEASUREMENT, name=", ".join(one.observed.name for one in found.recordings), object=stored,
         parents=parents, seed=found.options.seed, parameters=canonical(values),
         recipe={
-            "calibrate": ANSWER, "simulations": VERSION, "sources": sources, "spans": spans, **found.options.recipe()
+            "calibrate": ANSWER, "simulations": VERSION, "observe": READINGS, "conditioned": CONDITIONED,
+            "sources": sources, "spans": spans, **reading.recipe(), **found.options.recipe(),
         },
         quality=quality_flags(found.findings),
         report=canonical({"schema": "flagdata.calibrate-report/1", **found.as_dict()}),
     )  # fmt: skip
 
 
-def keep(lake: Lake, found: Calibration, parents: tuple[str, ...], *, branch: str) -> bool:
+def keep(lake: Lake, found: Calibration, reading: Reading, parents: tuple[str, ...], *, branch: str) -> bool:
     """Commit a calibration and return whether it is new; the same one again adds nothing.
 
     Raises:
         FlagdataError: as `Lake.transaction`.
     """
-    wanted = artifact(found, parents)
+    wanted = artifact(found, reading, parents)
     with lake.transaction(f"calibrate {wanted.name}", branch=branch) as transaction:
         if transaction.find(wanted.id) is not None:
             return False
         staged = transaction.staging(".zarr")
         write(staged, found)
-        transaction.add(artifact(found, parents, stored=transaction.put(staged)))
+        transaction.add(artifact(found, reading, parents, stored=transaction.put(staged)))
     return wanted.id in transaction.result.added
 
 

@@ -115,7 +115,7 @@ class Fitted:
     Attributes:
         observed: the recording.
         low, middle, high: (window, observable) of simulated flags of the posterior at the level, by the emulator.
-        used: (observable,) those that the answer rests on.
+        used: (observable,) those whose mean or slope the answer rests on.
         misfit: tail probability of its summary among those that the answer predicts.
         failed: simulations that diverged or hardly show the flag.
     """
@@ -327,7 +327,7 @@ def _fitted(
     *distances, own = ((offsets @ inverse) * offsets).sum(axis=1).tolist()
     distance = np.array(distances)
     return Fitted(
-        observed=one, low=low, middle=middle, high=high, used=used[:count],
+        observed=one, low=low, middle=middle, high=high, used=used.reshape(-1, count).any(axis=0),
         misfit=float((1 + (distance >= own).sum()) / (1 + len(distance))),
         failed=int((~np.isfinite(summaries[:, used]).all(axis=1)).sum()),
     )  # fmt: skip
@@ -350,7 +350,7 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
     check, level = calibration.check, calibration.options.level
     if check.held < check.count * level - 2.6 * math.sqrt(check.count * level * (1 - level)):
         what = (
-            f"of {check.count} simulations left out, the intervals of {check.held} hold the area weight, where "
+            f"of {check.count} simulations left out, the intervals of {check.held} contain the area weight, where "
             f"{check.count * level:.0f} are expected: they are too narrow"
         )
         fix = "give more simulations with --simulations"

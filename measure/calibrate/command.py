@@ -32,6 +32,11 @@ if TYPE_CHECKING:
 @click.option("--elevation", type=STATED, metavar="DEGREES", help="Of the camera's axis, upwards; by default 0±5.")
 @click.option("--distance", type=click.FloatRange(min=1.0), default=15.0, show_default=True, metavar="M",
               help="From the camera to the flag [m].")  # fmt: skip
+@click.option(
+    "--crop", metavar="X,Y,W,H", help="Region of films in which the flag is [px]; by default the whole picture."
+)
+@click.option("--flag", type=click.IntRange(min=1), metavar="N",
+              help="Which moving cloth; by default the one that moves most.")  # fmt: skip
 @click.option("--start", "first", type=DURATION, default="0s", metavar="TIME", help="Where to begin, as in 12s.")
 @click.option("--end", "last", type=DURATION, metavar="TIME", help="Where to end; two minutes are used at most.")
 @click.option("--simulations", type=click.IntRange(min=64), default=128, show_default=True,
@@ -57,6 +62,8 @@ def calibrate(
     azimuth: Stated | None,
     elevation: Stated | None,
     distance: float,
+    crop: str | None,
+    flag: int | None,
     first: float,
     last: float | None,
     simulations: int,
@@ -99,6 +106,7 @@ def calibrate(
     from measure.calibrate.prior import AZIMUTH, ELEVATION
     from measure.calibrate.simulation import Flag
     from measure.estimate.similarity import parse_size
+    from measure.estimate.source import Reading, box_of
 
     if report is not None:
         check_file(report, command="calibrate")
@@ -112,16 +120,21 @@ def calibrate(
         elevation=ELEVATION if elevation is None else known(ELEVATION, elevation, where="--elevation"),
         distance=distance, simulations=simulations, level=level, seed=seed,
     )  # fmt: skip
-    read = [of_source(source, size, lake=lake, at=branch, first=first, last=last) for source in sources]
+    reading = Reading(crop=box_of(crop), flag=flag, aspect=size.aspect)
+    with progress(None, label="observe", unit="window") as advance:
+        read = [
+            of_source(source, size, reading, lake=lake, at=branch, first=first, last=last, advance=advance)
+            for source in sources
+        ]
     observed = [one for one, _ in read]
     with progress(simulations * len(observed), label="calibrate", unit="flag") as advance:
         found = calibrated(
             observed, options, folder=(cache or user_cache() / "calibrate"), workers=workers, advance=advance
         )
     parents = tuple(recording for _, recording in read if recording is not None)
-    wanted = None if lake is None or read_only else artifact(found, parents).id
+    wanted = None if lake is None or read_only else artifact(found, reading, parents).id
     text = None if report is None else page(found, _provenance(found, wanted))
-    new = lake is not None and wanted is not None and keep(lake, found, parents, branch=branch)
+    new = lake is not None and wanted is not None and keep(lake, found, reading, parents, branch=branch)
     if wanted is not None:
         say(f"{wanted[:12]}  measurement, {'committed' if new else 'there already'}")
     if report is not None and text is not None:
@@ -158,7 +171,10 @@ def known(about: Uncertain, stated: Stated, *, where: str) -> Uncertain:
 
 
 def _provenance(found: Calibration, artifact: str | None) -> dict[str, str]:
-    rows = {one.observed.name: f"SHA-256 {one.observed.source}" for one in found.recordings}
+    rows = {
+        f"recording {number}": f"{one.observed.name}, from {one.observed.first:g} s on, SHA-256 {one.observed.source}"
+        for number, one in enumerate(found.recordings, start=1)
+    }
     rows |= {name: str(value) for name, value in found.options.recipe().items()}
     return rows if artifact is None else {**rows, "artifact": artifact}
 
@@ -175,7 +191,7 @@ def _print(found: Calibration) -> None:
         fitted = ", ".join(f"{row['name']} {row['interval']} {row['unit']}".strip() for row in map(shown, place))
         say(f"  {recording.observed.name}: {fitted}")
     check = found.check
-    say(f"  intervals of {check.held} of {check.count} simulations left out hold their weight, median error "
+    say(f"  intervals of {check.held} of {check.count} simulations left out contain their weight, median error "
         f"{check.error:.1%}")  # fmt: skip
     for finding in found.findings:
         say(f"{finding.severity.value}: {finding.what}" + (f"; {finding.fix}" if finding.fix else ""))

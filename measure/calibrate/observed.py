@@ -38,6 +38,7 @@ class Observed:
             `simulation.OBSERVED`; NaN where a window does not show one.
         sigma: (observable,) what readings of a film are off by, the same in all its windows; 0 for geometry.
         log: of the wind, its times since the first window begins.
+        first: where the first window begins in the film or table [s].
         findings: what was noticed.
 
     Raises:
@@ -48,6 +49,7 @@ class Observed:
     source: str
     readings: Floats
     log: Log
+    first: float = 0.0
     sigma: Floats = field(default_factory=lambda: np.zeros(len(OBSERVED)))
     findings: tuple[Finding, ...] = ()
 
@@ -65,7 +67,7 @@ class Observed:
         if not shown(self.readings).any():
             raise InputError(
                 f"no flag is found: no observable is shown by {SHOWN:.0%} of the windows", where=self.name,
-                fix="look at the film with flagdata measure --report, and choose the flag with --crop or --flag",
+                fix="look at the film with flagdata observe --picture, and choose the flag with --crop or --flag",
             )  # fmt: skip
 
     @property
@@ -119,12 +121,16 @@ def cut(found: Observed, first: float, last: float | None) -> Observed:
     most = begin + round(LONGEST / WINDOW)
     findings = found.findings
     if min(end, len(found.readings)) > most:
-        what = f"of {(min(end, len(found.readings)) - begin) * WINDOW:g} s the first {LONGEST:g} are used"
-        fix = "choose others with --start and --end"
-        findings = (*findings, Finding(kind="first-part", severity=Severity.NOTE, what=what, fix=fix))
+        findings = (*findings, first_part((min(end, len(found.readings)) - begin) * WINDOW))
     readings = found.readings[begin : min(end, most)]
     log = found.log.cut(begin * WINDOW, (begin + len(readings)) * WINDOW)
-    return replace(found, readings=readings, log=log, findings=findings)
+    return replace(found, readings=readings, log=log, first=found.first + begin * WINDOW, findings=findings)
+
+
+def first_part(duration: float) -> Finding:
+    """What a recording of that duration [s] above `LONGEST` is reported with."""
+    what = f"of {duration:.1f} s the first {LONGEST:g} are used"
+    return Finding(kind="first-part", severity=Severity.NOTE, what=what, fix="choose others with --start and --end")
 
 
 def of_table(path: Path) -> Observed:

@@ -50,9 +50,10 @@ def shown(one: Quantity) -> dict[str, str]:
     """A quantity as text: angles in degrees."""
     turn = 180 / math.pi if one.name in _DEGREES else 1.0
     (low, high), (least, most) = one.interval, one.assumed
+    unit = "" if one.unit == "1" else one.unit
     return {
-        "name": one.name.replace("_", " "), "unit": "°" if one.name in _DEGREES else one.unit.replace("1", "", 1)
-        if one.unit == "1" else one.unit, "value": "" if one.value is None else f"{one.value * turn:.3g}",
+        "name": one.name.replace("_", " "), "unit": "°" if one.name in _DEGREES else unit,
+        "value": "" if one.value is None else f"{one.value * turn:.3g}",
         "interval": f"[{low * turn:.3g}, {high * turn:.3g}]", "assumed": f"{least * turn:.3g} to {most * turn:.3g}",
     }  # fmt: skip
 
@@ -65,7 +66,7 @@ def _posterior(found: Calibration) -> str:
         low, high = about.at(np.array([0.0, 1.0])).tolist()
         logarithmic = isinstance(about.prior, Range) and about.prior.scale is Scale.LOG
         edges = np.geomspace(low, high, 41) if logarithmic else np.linspace(low, high, 41)
-        axes.hist(found.draws.cloth[about.name], bins=edges, weights=None, color=_BLUE)
+        axes.hist(found.draws.cloth[about.name], bins=edges, color=_BLUE)
         axes.axhline(len(found.draws.cloth[about.name]) / 40, color=_RUST)
         axes.set_xscale("log" if logarithmic else "linear")
         axes.set_xlabel(f"{about.name.replace('_', ' ')} [{about.unit}]")

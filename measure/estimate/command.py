@@ -114,21 +114,18 @@ def measure(
         raise UsageError("more than one form of output", fix="choose one of --json and --csv")
     if cache is not None and refine is None:
         raise UsageError("--cache without --refine", fix="give --refine N, or leave --cache out")
-    from flagdata.ingest.camera import CropBox, parse_crop
     from flagdata.lake import Lake
     from flagdata.outputs import check_file, check_folder
     from measure.estimate.measuring import Options
     from measure.estimate.run import weight
     from measure.estimate.similarity import parse_size
-    from measure.estimate.source import Reading, network, subjects
+    from measure.estimate.source import Reading, box_of, network, subjects
 
     if report is not None:
         check_file(report, command="measure")
     if zarr_path is not None:
         check_folder(zarr_path)
-    box = None if crop is None else parse_crop(crop)
-    if not (box is None or isinstance(box, CropBox)):
-        raise UsageError(f"the crop {crop!r} is not a box", where="--crop", fix="give x,y,width,height in pixels")
+    box = box_of(crop)
     lake = None if lake_path is None else Lake.open(lake_path)
     if lake is not None and not read_only:
         lake.check_writable()

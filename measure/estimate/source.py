@@ -10,7 +10,7 @@ from typing import Any
 
 from flagdata.addresses import local_path
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
-from flagdata.ingest.camera import CropBox
+from flagdata.ingest.camera import CropBox, parse_crop
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.matching import matching
 from flagdata.provenance import digest, file_hash
@@ -84,6 +84,11 @@ class Subject:
         """What a simulated record states of itself."""
         return None if self.record is None else self.record.truth
 
+    @property
+    def identity(self) -> str:
+        """Id of the artifact, or the content hash of a plain file."""
+        return str(self.content_hash()) if self.artifact is None else self.artifact.id
+
     def content_hash(self) -> str | None:
         """SHA-256 of a plain file, or of the names and hashes of a folder's files; None of an artifact."""
         if self.path is None:
@@ -94,6 +99,18 @@ class Subject:
         for entry in sorted(entry for entry in self.path.iterdir() if entry.is_file()):
             total.update(f"{entry.name} {file_hash(entry)}\n".encode(errors="surrogateescape"))
         return total.hexdigest()
+
+
+def box_of(crop: str | None) -> CropBox | None:
+    """The region of an option --crop.
+
+    Raises:
+        UsageError: it is not x,y,width,height.
+    """
+    box = None if crop is None else parse_crop(crop)
+    if not (box is None or isinstance(box, CropBox)):
+        raise UsageError(f"the crop {crop!r} is not a box", where="--crop", fix="give x,y,width,height in pixels")
+    return box
 
 
 def subjects(
@@ -135,8 +152,11 @@ def subjects(
 
 
 def _named(lake: Lake, source: str, at: str | None) -> Artifact:
-    rows = lake.rows({"kind": FILMED}, at=at, columns=["artifact", "kind", "name"]).to_pylist()
+    """The film of a name; a recording rather than the film that it was aligned from and whose name it has."""
+    rows = lake.rows({"kind": FILMED}, at=at, columns=["artifact", "kind", "name", "parents"]).to_pylist()
     meant = [row for row in rows if row["name"] == source and row["kind"] != Kind.CLIP]
+    aligned = {parent for row in meant for parent in row["parents"] or ()}
+    meant = [row for row in meant if row["artifact"] not in aligned]
     if not meant and len(source) >= _LEAST_PREFIX:
         meant = [row for row in rows if row["artifact"].startswith(source)]
     if not meant:

@@ -23,12 +23,15 @@ def artifact(table: Table, subject: Subject, options: Mapping[str, Any], *, stor
     Args:
         options: all that shapes the readings beside the film: JSON values.
     """
-    start = subject.film.start
+    origin, half = subject.film.start, table.seconds / 2
+    start, end = (
+        None if origin is None else origin + round(at * NANOSECONDS)
+        for at in (float(table.time[0]) - half, float(table.time[-1]) + half)
+    )
     return Artifact(
         kind=Kind.MEASUREMENT, name=f"{table.film} observables", object=stored,
         parents=[] if subject.artifact is None else [subject.artifact.id], source_hash=subject.content_hash(),
-        source_name=None if subject.path is None else subject.path.name, start=start,
-        end=None if start is None else start + round(float(table.time[-1] + table.seconds / 2) * NANOSECONDS),
+        source_name=None if subject.path is None else subject.path.name, start=start, end=end,
         recipe={"observe": VERSION, "conditioned": CONDITIONED, **table.head(), **options},
         report=canonical(table.as_dict()),
     )  # fmt: skip

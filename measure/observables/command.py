@@ -7,8 +7,9 @@ from pathlib import Path
 import click
 
 from flagdata.commands.durations import DURATION
-from flagdata.console import LocalPath, document, json_option, say
+from flagdata.console import LakePlace, LocalPath, document, json_option, progress, say
 from flagdata.errors import RefusedError, UsageError
+from flagdata.storage import Place
 
 
 @click.command()
@@ -27,7 +28,7 @@ from flagdata.errors import RefusedError, UsageError
 @click.option("--zarr", "zarr_path", type=LocalPath(), metavar="FOLDER", help="Write the table as a Zarr data set.")
 @click.option("--picture", "picture_path", type=LocalPath(), metavar="FILE.png", help="Draw each observable against "
               "time, and against the log's wind where the recording has one.")  # fmt: skip
-@click.option("--lake", "lake_path", type=LocalPath(), envvar="FLAGDATA_LAKE", help="Where recordings are, and where "
+@click.option("--lake", "lake_path", type=LakePlace(), envvar="FLAGDATA_LAKE", help="Where recordings are, and where "
               "tables go; also FLAGDATA_LAKE.")  # fmt: skip
 @click.option(
     "--at", metavar="REF", help="Tag, branch or version of the lake to look at; by default the branch's head."
@@ -38,26 +39,24 @@ from flagdata.errors import RefusedError, UsageError
 def observe(
     source: str, flag_size: str, seconds: float, crop: str | None, flag: int | None, first: float | None,
     last: float | None, true_fps: float | None, sequence_fps: float | None, parquet_path: Path | None,
-    zarr_path: Path | None, picture_path: Path | None, lake_path: Path | None, at: str | None, branch: str,
+    zarr_path: Path | None, picture_path: Path | None, lake_path: Place | None, at: str | None, branch: str,
     read_only: bool, as_json: bool,
 ) -> None:  # fmt: skip
     """Read observables off a film: droop, extension, speeds, frequency, amplitudes, wave, area.
 
     SOURCE is a video file, a folder of images, or a recording, clip or camera of --lake by its name or id. Each window
     gives a value with its unit, or the reason why it shows none. With --lake the table becomes an artifact.
-    docs/method/films.md defines each observable and
-    states its error.
+    docs/method/films.md defines each observable and states its error.
 
     \b
       flagdata observe clip.mp4 --flag-size 1.5x1.0 --parquet clip.parquet --picture clip.png
       flagdata observe recording-7 --lake lake --flag-size 1.5x1.0 --json
     """
-    from flagdata.ingest.camera import CropBox, parse_crop
     from flagdata.lake import Lake
     from flagdata.outputs import check_file, check_folder, fresh_folder, write_file
     from flagdata.pages.pictures import png
     from measure.estimate.similarity import parse_size
-    from measure.estimate.source import Reading, subjects
+    from measure.estimate.source import Reading, box_of, subjects
     from measure.observables.artifact import keep
     from measure.observables.picture import picture
     from measure.observables.table import table_of
@@ -71,16 +70,15 @@ def observe(
         check_folder(zarr_path)
     if seconds < 1.0:
         raise UsageError(f"windows of {seconds:g} s", where="--window", fix="give 1s or more: a flutter's period")
-    box = None if crop is None else parse_crop(crop)
-    if not (box is None or isinstance(box, CropBox)):
-        raise UsageError(f"the crop {crop!r} is not a box", where="--crop", fix="give x,y,width,height in pixels")
+    box = box_of(crop)
     size = parse_size(flag_size)
     lake = None if lake_path is None else Lake.open(lake_path)
     if lake is not None and not read_only:
         lake.check_writable()
     reading = Reading(crop=box, flag=flag, aspect=size.aspect, true_fps=true_fps, sequence_fps=sequence_fps)
     (subject,) = subjects(source, query=None, lake=lake, at=at if at is not None else branch, reading=reading)
-    windows = watched(subject.film, size, first=first, last=last, seconds=seconds)
+    with progress(None, label="observe", unit="window") as advance:
+        windows = watched(subject.film, size, first=first, last=last, seconds=seconds, advance=advance)
     table = table_of(
         windows, film=subject.film.name, length=size.length, height=size.height, start=subject.film.start,
         wind=None if subject.record is None else subject.record.wind(),

@@ -7,7 +7,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +47,7 @@ class Table:
     seconds: float
     time: NDArray[np.float64]
     readings: Mapping[str, tuple[Reading, ...]]
-    wind: NDArray[np.float64] | None = field(default=None)
+    wind: NDArray[np.float64] | None = None
 
     def values(self, name: str) -> NDArray[np.float64]:
         """(w,) of an observable, NaN where a window does not show it."""

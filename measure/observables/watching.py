@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,19 +43,20 @@ class Watched:
 
 def watched(
     film: ConditionedFilm, size: FlagSize, *, first: float | None = None, last: float | None = None,
-    seconds: float = WINDOW,
+    seconds: float = WINDOW, advance: Callable[[int], object] | None = None,
 ) -> Watched:  # fmt: skip
     """The windows of a film, one after another.
 
     Args:
         size: of the flag, whose height gives the scale.
         first, last: part of the film [s].
+        advance: called with the number of windows that were read.
 
     Raises:
         RefusedError: the film has no whole window, or no moving cloth.
     """
     begin, end = first or 0.0, min(film.duration, math.inf if last is None else last)
-    count = int((end - begin + 1 / film.rate) / seconds)
+    count = int((end - begin + 1 / film.rate) / seconds + 1e-6)
     if count < 1:
         raise RefusedError(
             f"{end - begin:.1f} s of film have no window of {seconds:g} s", where=film.name,
@@ -63,15 +64,20 @@ def watched(
         )  # fmt: skip
     a_chunk = max(1, round(CHUNK / seconds))
     windows: list[FilmWindow | None] = []
+
+    def read(own: Sequence[tuple[float, NDArray[np.uint8]]], some: int) -> None:
+        windows.extend(_chunk(film, own, begin + len(windows) * seconds, some, seconds, size))
+        if advance is not None:
+            advance(some)
+
     held: list[tuple[float, NDArray[np.uint8]]] = []
     for time, frame in film.frames(begin, begin + count * seconds):
         held.append((time, frame))
         if time >= begin + (len(windows) + a_chunk) * seconds:
-            windows += _chunk(film, held[:-1], begin + len(windows) * seconds, a_chunk, seconds, size)
+            read(held[:-1], a_chunk)
             held = held[-1:]
     if len(windows) < count:
-        rest = count - len(windows)
-        windows += _chunk(film, held, begin + len(windows) * seconds, rest, seconds, size)
+        read(held, count - len(windows))
     if film.found is None or film.found.region is None:
         raise RefusedError(
             "nothing moves like cloth in the film", where=film.name, fix="give another film, or --crop around the flag"

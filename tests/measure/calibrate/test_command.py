@@ -67,6 +67,7 @@ def test_a_table_is_weighed_kept_and_shown(tmp_path: Path) -> None:
     [
         ((), "the flag's size is missing"),
         (("--flag-size", "1.5x1.0", "--azimuth", "190"), "give degrees from 1 to 179"),
+        (("--flag-size", "1.5x1.0", "--crop", "0,0,9,9"), "a table of observables has no pictures"),
         (("--flag-size", "1.5x1.0", "--start", "110s"), "10 s of film with a log beside them"),
     ],
 )

@@ -29,8 +29,7 @@ def _subject(*, logged: float = 200.0, findings: tuple[Finding, ...] = ()) -> An
     film = SimpleNamespace(name="film", start=_START, duration=300.0, findings=lambda: findings)
     artifact = SimpleNamespace(id="0123abcd")
     return SimpleNamespace(
-        film=film, artifact=artifact, record=SimpleNamespace(wind=lambda: wind), recording="0123abcd",
-        content_hash=lambda: None,
+        film=film, artifact=artifact, record=SimpleNamespace(wind=lambda: wind), identity="0123abcd",
     )  # fmt: skip
 
 
@@ -38,7 +37,7 @@ def _subject(*, logged: float = 200.0, findings: tuple[Finding, ...] = ()) -> An
 def shown(monkeypatch: pytest.MonkeyPatch) -> None:
     """Windows that show their number of everything; the third shows nothing."""
 
-    def watched(film: object, size: FlagSize, *, first: float, last: float) -> Any:
+    def watched(film: object, size: FlagSize, *, first: float, last: float, advance: object) -> Any:
         count = int((last - first) / 2.5)
         return SimpleNamespace(windows=tuple(None if k == 2 else k for k in range(count)), seconds=2.5)
 
@@ -56,6 +55,8 @@ def test_two_minutes_are_read_with_the_log_on_the_films_clock() -> None:
     assert found.log.distance == 2.5
     # The log rises by 2/199 m/s a second, and is at its 70th second where the part begins.
     assert found.speed[0] == pytest.approx(4.0 + 2 / 199 * 71.25, abs=0.01)
+    assert found.first == 10.0
+    assert [(one.kind, one.what) for one in found.findings] == [("first-part", "of 290.0 s the first 120 are used")]
     assert found.sigma.tolist() == [0.01] * len(OBSERVED)
 
 
