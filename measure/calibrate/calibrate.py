@@ -327,7 +327,7 @@ def _fitted(
     *distances, own = ((offsets @ inverse) * offsets).sum(axis=1).tolist()
     distance = np.array(distances)
     return Fitted(
-        observed=one, low=low, middle=middle, high=high, used=used.reshape(-1, count).any(axis=0),
+        observed=one, low=low, middle=middle, high=high, used=np.asarray(used.reshape(-1, count).any(axis=0)),
         misfit=float((1 + (distance >= own).sum()) / (1 + len(distance))),
         failed=int((~np.isfinite(summaries[:, used]).all(axis=1)).sum()),
     )  # fmt: skip

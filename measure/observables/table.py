@@ -145,7 +145,7 @@ def table_of(watched: Watched, *, film: str, length: float, height: float, start
     """All observables of all windows.
 
     Args:
-        start: instant of the film's first frame [UTC ns]; None where nobody said, and no wind stands beside it.
+        start: instant of the film's first frame [UTC ns]; None where it is unknown: then the table has no wind.
         wind: of the log.
     """
     nothing = Reading(value=math.nan, reason=UNSEEN)

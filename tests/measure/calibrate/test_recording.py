@@ -31,7 +31,8 @@ def lake(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pictures = painted(contrast=90.0, seconds=2.5).frames[:-1]
     times = _START + np.round(np.arange(round(_SECONDS * RATE)) / RATE * NANOSECONDS).astype(np.int64)
     seconds = np.arange(-70, 30, dtype=np.int64)
-    made = Lake.create(tmp_path_factory.mktemp("lakes") / "lake")
+    folder = tmp_path_factory.mktemp("lakes") / "lake"
+    made = Lake.create(folder)
     with made.transaction("a film with its log") as transaction:
         staged = transaction.staging(".mcap")
         with RecordWriter(staged, metadata={"camera": {"name": "monday"}}) as writer:
@@ -51,7 +52,7 @@ def lake(tmp_path_factory: pytest.TempPathFactory) -> Path:
         camera = Artifact(kind=Kind.CAMERA, recipe={"of": "camera"}, **shared)
         transaction.add(camera)
         transaction.add(Artifact(kind=Kind.RECORDING, recipe={"of": "recording"}, parents=[camera.id], **shared))
-    return made.path
+    return folder
 
 
 def _said(command: Command, lake: Path, *arguments: str) -> dict[str, Any]:
