@@ -172,10 +172,11 @@ def known(about: Uncertain, stated: Stated, *, where: str) -> Uncertain:
 
 def _provenance(found: Calibration, artifact: str | None) -> dict[str, str]:
     rows = {
-        f"recording {number}": f"{one.observed.name}, from {one.observed.first:g} s on, SHA-256 {one.observed.source}"
+        f"recording {number}": f"{one.observed.name}, from {one.observed.first:g} s on, {one.observed.source}"
         for number, one in enumerate(found.recordings, start=1)
     }
-    rows |= {name: str(value) for name, value in found.options.recipe().items()}
+    rows |= {name.replace("_", " "): str(value) for name, value in found.options.recipe().items()}
+    rows |= {about.name: about.degrees for about in (found.options.azimuth, found.options.elevation)}
     return rows if artifact is None else {**rows, "artifact": artifact}
 
 

@@ -33,7 +33,7 @@ from measure.calibrate.wind import Log
 from measure.challenge.workers import single_threaded
 
 FAR = 15.0
-"""m from which a flag is filmed where the user gives no distance: beyond some flag lengths the distance hardly matters."""
+"""m from which a flag is filmed where the user gives no distance: beyond some flag lengths it hardly matters."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -35,8 +35,8 @@ def page(found: Calibration, provenance: Mapping[str, str]) -> str:
         "recordings": [
             {
                 "name": one.observed.name, "windows": len(one.observed.readings),
-                "wind": f"{one.observed.speed.mean():.1f}", "place": [shown(q) for q in place],
-                "picture": _windows(one),
+                "wind": f"{one.observed.speed.mean():.1f}", "misfit": f"{one.misfit:.2g}",
+                "place": [shown(q) for q in place], "picture": _windows(one),
             }
             for one, place in zip(found.recordings, found.places, strict=True)
         ],
@@ -60,6 +60,7 @@ def shown(one: Quantity) -> dict[str, str]:
 
 def _posterior(found: Calibration) -> str:
     from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
     figure = Figure(figsize=(9.0, 2.6), layout="constrained")
     for axes, about in zip(figure.subplots(1, len(CLOTH)), CLOTH, strict=True):
@@ -68,7 +69,11 @@ def _posterior(found: Calibration) -> str:
         edges = np.geomspace(low, high, 41) if logarithmic else np.linspace(low, high, 41)
         axes.hist(found.draws.cloth[about.name], bins=edges, color=_BLUE)
         axes.axhline(len(found.draws.cloth[about.name]) / 40, color=_RUST)
-        axes.set_xscale("log" if logarithmic else "linear")
+        if logarithmic:
+            axes.set_xscale("log")
+            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 30 * low else (1.0,)))
+            axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_xlabel(f"{about.name.replace('_', ' ')} [{about.unit}]")
         axes.set_yticks([])
     return figure_url(figure)
@@ -78,9 +83,10 @@ def _windows(one: Fitted) -> str:
     from matplotlib.figure import Figure
 
     names = [name for name, used in zip(OBSERVED, one.used, strict=True) if used]
-    rows = math.ceil(len(names) / 4)
-    figure = Figure(figsize=(11.0, 2.5 * rows), layout="constrained")
-    cells = np.atleast_1d(figure.subplots(rows, 4, squeeze=False)).ravel()
+    columns = min(4, len(names))
+    rows = math.ceil(len(names) / columns)
+    figure = Figure(figsize=(2.75 * columns, 2.5 * rows), layout="constrained")
+    cells = figure.subplots(rows, columns, squeeze=False).ravel()
     speed = one.observed.speed
     order = np.argsort(speed)
     for axes, name in zip(cells, names, strict=False):

@@ -64,6 +64,13 @@ class Uncertain:
     prior: Range | Normal
     source: str
 
+    @property
+    def degrees(self) -> str:
+        """The prior of an angle in words."""
+        if isinstance(self.prior, Normal):
+            return f"{math.degrees(self.prior.mean):.3g} ± {math.degrees(self.prior.sigma):.2g}°"
+        return f"{math.degrees(self.prior.low):.3g} to {math.degrees(self.prior.high):.3g}°"
+
     def at(self, share: Floats) -> Floats:
         """Values of shares in [0, 1)."""
         if isinstance(self.prior, Normal):

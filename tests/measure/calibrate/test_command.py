@@ -57,6 +57,8 @@ def test_a_table_is_weighed_kept_and_shown(tmp_path: Path) -> None:
     text = page.read_text()
     assert "area weight" in text
     assert found["area_weight_stated"] in text
+    assert "70 ± 8.6°" in text  # with the 5° to which a logged direction is lined up
+    assert "monday, from 0 s on" in text
     again = _run(*given[:-2], tmp_path / "other.html", "--json")
     assert json.loads(again.stdout)["artifact"] == found["artifact"]
     assert len(Lake.open(lake).rows({"kind": "measurement"})) == 1
