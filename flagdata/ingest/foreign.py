@@ -12,9 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from flagdata.errors import CorruptError, FlagdataError, InputError
@@ -91,7 +89,7 @@ def examine(path: Path) -> Examination:
 def _mcap(path: Path) -> Examination:
     from flagdata.ingest.anemometer.containers.mcap import of_numbers
     from flagdata.ingest.mcap.pictures import of_pictures
-    from flagdata.ingest.mcap.topics import messages, topics
+    from flagdata.ingest.mcap.topics import instants, topics
 
     present = topics(path)
     pictures, numbers = of_pictures(present), of_numbers(path, present)
@@ -100,14 +98,16 @@ def _mcap(path: Path) -> Examination:
     for topic in present:
         holds = "pictures" if topic in pictures else "numbers" if topic in numbers else topic.schema or topic.encoding
         try:
-            pairs = np.array([(one.stamp, one.log_time) for one in messages(path, topic.name)], dtype=np.int64)
+            pairs = instants(path, topic.name)
+            if not len(pairs):
+                raise CorruptError(f"{topic.count} messages are stated and none is there", fix="copy the file again")
         except FlagdataError as error:
             findings.append(_unread(topic.name, error))
             continue
         stream = Stream.of(topic.name, holds, pairs[:, 0])
         streams.append(stream)
         findings += _judged(stream)
-        apart = float(np.abs(pairs[:, 0] - pairs[:, 1]).max()) / NANOSECONDS
+        apart = float(np.abs(pairs[:, 0].astype(float) - pairs[:, 1]).max()) / NANOSECONDS
         if apart > 1:
             findings.append(
                 Finding(
@@ -125,28 +125,24 @@ def _mcap(path: Path) -> Examination:
 
 
 def _lerobot(folder: Path) -> Examination:
-    from flagdata.ingest.camera.lerobot import TIME, cameras, described
+    from flagdata.ingest.camera.lerobot import TIME, cameras, described, read, stamps_of
 
     info = described(folder)
-    fps = float(info.get("fps") or 0)
+    fps = float(info["fps"])
     timed = TIME in info["features"]
     found = cameras(info)
     streams: list[Stream] = []
     findings: list[Finding] = []
     for path in sorted((folder / "data").glob("*/*.parquet")):
-        try:
-            names = ["episode_index", "frame_index", "timestamp", *([TIME] if timed else [])]
-            table = pq.read_table(path, columns=names)
-        except (pa.ArrowException, OSError) as error:
-            raise CorruptError(f"a table cannot be read: {error}", where=str(path), fix="copy it again") from None
+        table = read(path, ["episode_index", "frame_index", "timestamp", *([TIME] if timed else [])])
         for episode in pc.unique(table["episode_index"]).to_pylist():  # pyright: ignore[reportAttributeAccessIssue]
             rows = table.filter(pc.field("episode_index") == episode)
-            seconds = np.asarray(rows["timestamp"].to_numpy(), dtype=np.float64)
-            stamps = rows[TIME].to_numpy() if timed else np.rint(seconds * NANOSECONDS).astype(np.int64)
+            stamps = stamps_of(rows, str(path))
+            seconds = stamps_of(rows.select(["timestamp"]), str(path)) / NANOSECONDS
             stream = Stream.of(f"episode {episode}", "frames", stamps)
             streams.append(stream)
             findings += [one for one in _judged(stream) if timed or one.kind != "not-a-date"]
-            steady = np.abs(seconds - rows["frame_index"].to_numpy() / fps).max() if fps else np.inf
+            steady = np.abs(seconds - rows["frame_index"].to_numpy() / fps).max()
             if steady > _STEADY:
                 findings.append(
                     Finding(

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from flagdata.errors import FlagdataError
 from flagdata.storage import Place, RemotePath, StoreError
+from flagdata.storage.connection import COLOUR
 
 SCRATCH = re.compile(r"\.[0-9a-f]{32}")
 """Names of files that are written before they are linked under their own."""
@@ -103,7 +104,7 @@ def disk_errors(doing: str, where: Place) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        text = " ".join(_COLOUR.sub("", error.strerror or str(error)).split())
+        text = " ".join(COLOUR.sub("", error.strerror or str(error)).split())
         number = error.errno or (int(found[1] or found[2]) if (found := _NUMBER.search(text)) else 0)
         fix = error.fix if isinstance(error, StoreError) else _FIXES.get(number, "check the disk")
         raise FlagdataError(
@@ -111,7 +112,6 @@ def disk_errors(doing: str, where: Place) -> Iterator[None]:
         ) from error
 
 
-_COLOUR = re.compile(r"\x1b\[\d+m")
 _NUMBER = re.compile(r"\(os error (\d+)\)|\bOs \{ code: (\d+)")  # as the Delta library writes it
 _FIXES = {
     errno.ENOSPC: "free some space, or move the lake to a larger disk",

@@ -18,7 +18,7 @@ from flagdata.errors import CorruptError, NotFoundError
 from flagdata.findings import Severity
 from flagdata.lake.catalog import persist
 from flagdata.lake.durable import disk_errors
-from flagdata.lake.leases import collecting, leases
+from flagdata.lake.leases import Check, collecting, leases
 from flagdata.lake.marking import mark
 from flagdata.lake.refs import MAIN
 from flagdata.lake.store import Store
@@ -72,8 +72,7 @@ def erase(lake: Store, artifacts: Collection[str], message: str, *, with_descend
         version = 0
         for branch in branches or [MAIN]:
             version = persist(lambda b=branch: _off(lake, erased, message, branch=b), where=lake.catalog.path)
-        check()
-        removed, kept = _delete(lake, {name for name in erased.values() if name is not None})
+        removed, kept = _delete(lake, {name for name in erased.values() if name is not None}, check)
     return Erasure(
         version=version, artifacts=tuple(sorted(erased)), branches=tuple(branches),
         tags=tuple(ref for ref in concerned if ref in tags), objects=removed, kept=kept,
@@ -109,10 +108,11 @@ def _off(lake: Store, erased: Mapping[str, str | None], message: str, *, branch:
     return take_off(lake, leaving, branch=branch, base=head, info=info)
 
 
-def _delete(lake: Store, names: Collection[str]) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Delete the objects that nothing else needs; the lock that keeps transactions out is held.
+def _delete(lake: Store, names: Collection[str], check: Check) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Delete the objects that nothing else needs; the lock that keeps transactions out is held, and checked.
 
     Raises:
+        ConflictError: the lock may have been lost.
         CorruptError: a ref cannot be read, so what is needed is unknown; the rows are withdrawn.
     """
     marked = mark(lake, grace=timedelta(0))
@@ -127,5 +127,6 @@ def _delete(lake: Store, names: Collection[str]) -> tuple[tuple[str, ...], dict[
     kept |= dict.fromkeys(sorted(set(names) & held - marked.objects), "a running transaction holds it")
     gone = sorted(set(names) - kept.keys())
     for name in gone:
+        check()
         lake.objects.remove(lake.objects.path(name))
     return tuple(gone), kept

@@ -7,8 +7,8 @@ as before. `Store.table` hands them on in its schema's metadata; queries see eac
 from __future__ import annotations
 
 import json
-import math
 import re
+import sys
 from collections.abc import Collection, Mapping
 from typing import TypeAlias
 
@@ -37,21 +37,33 @@ def given(text: str) -> tuple[str, Value | None]:
         UsageError: no name and value, a name that cannot be a column, a number that is not finite, or a long text.
     """
     name, sign, written = text.partition("=")
-    if not sign or not _NAME.fullmatch(name):
-        fix = "write name=value; a name is of letters, digits and underscores, a letter first"
-        raise UsageError(f"{text!r} is no label", fix=fix)
+    if not sign:
+        raise UsageError(f"{text!r} is no label", fix="write name=value")
     if not written:
+        _check(name, None)
         return name, None
     try:
         value = json.loads(written) if re.match(r'[\d"tf-]', written) else written
     except ValueError:
         value = written
     value = value if isinstance(value, bool | int | float | str) else written
-    if isinstance(value, int | float) and not math.isfinite(value):
-        raise UsageError(f"{text!r} is not finite", fix="leave the label out where nobody knows")
+    _check(name, value)
+    return name, value
+
+
+def _check(name: str, value: Value | None) -> None:
+    """Whether a name and value make a label.
+
+    Raises:
+        UsageError: a name that cannot be a column, a number that is not finite or too large, or a long text.
+    """
+    if not _NAME.fullmatch(name):
+        fix = "a name is of letters, digits and underscores, a letter first"
+        raise UsageError(f"{name!r} is no name of a label", fix=fix)
+    if isinstance(value, int | float) and not abs(value) <= sys.float_info.max:  # a NaN neither
+        raise UsageError(f"{name} is no finite number", fix="leave the label out where nobody knows")
     if isinstance(value, str) and (len(value) > _LONGEST or not value.isprintable()):
         raise UsageError(f"the text of {name} is longer than {_LONGEST}, or not printable", fix="shorten it")
-    return name, value
 
 
 def put(
@@ -69,11 +81,17 @@ def put(
                 fix=f"give ids of rows that flagdata ls --at {branch} shows",
             )  # fmt: skip
         labelled = frozenset(artifacts) | clips_of(shown, artifacts)
-        _check_types(labels_of(shown), values, except_of=labelled)
+        present = labels_of(shown)
+        others = {artifact: present[artifact] for artifact in sorted(present.keys() & known)}
+        _check_types(others, values, except_of=labelled)
+        if fresh := {name for name, value in values.items() if value is not None}:
+            _check_case(fresh.union(*others.values()))
         noted = {artifact: dict(values) for artifact in sorted(labelled)}
         info = {"message": message, "branch": branch, LABELS: json.dumps(noted, ensure_ascii=False, allow_nan=False)}
         return lake.catalog.append(catalog_schema().empty_table(), base=head, info=info), labelled
 
+    for name, value in values.items():
+        _check(name, value)
     lake.check_writable()
     with disk_errors("labelling", lake.path), keeping_collectors_out(lake.staging):
         return persist(attempt, where=lake.catalog.path)
@@ -98,6 +116,22 @@ def _check_types(
                 )  # fmt: skip
 
 
+def _check_case(names: Collection[str]) -> None:
+    """Whether all names are different columns in SQL, which takes capitals for small letters.
+
+    Raises:
+        ConflictError: they are not.
+    """
+    known: dict[str, str] = {}
+    for name in sorted(names):
+        other = known.setdefault(name.lower(), name)
+        if other != name:
+            raise ConflictError(
+                f"the labels {other} and {name} are one column in SQL, which takes capitals for small letters",
+                where=name, fix=f"keep one of the two names; flagdata label ID {name}= takes the other off",
+            )  # fmt: skip
+
+
 def kind(value: Value) -> str:
     """The type of a label's value in words."""
     return "truth value" if isinstance(value, bool) else "text" if isinstance(value, str) else "number"
@@ -108,6 +142,7 @@ def columns(catalog: pa.Table) -> dict[str, pa.Array]:
     labels = labels_of(catalog)
     ids = catalog["artifact"].to_pylist()
     names = sorted({name for artifact in ids if artifact in labels for name in labels[artifact]})
+    _check_case(names)
     return {PREFIX + name: _column([labels.get(artifact, {}).get(name) for artifact in ids]) for name in names}
 
 

@@ -105,7 +105,11 @@ class RemoteLease:
         self._staging = staging
         self._local = Lease(_scratch())
         self.folder = self._local.folder
-        self._held = remote_leases.new_lease(staging)
+        try:
+            self._held = remote_leases.new_lease(staging)
+        except BaseException:
+            self._local.close()
+            raise
 
     def hold(self, object_name: str) -> None:
         """Note that the transaction relies on the object; no collection that has not seen it runs afterwards."""
@@ -210,7 +214,7 @@ def last_written(path: Place) -> float:
     """When a file, or anything in a folder, was written last [s since 1970]."""
     inside = path.rglob("*") if _is_folder(path) else ()
     own = () if isinstance(path, RemotePath) and inside else (path,)
-    return max(entry.lstat().st_mtime for entry in (*own, *inside))
+    return max((entry.lstat().st_mtime for entry in (*own, *inside)), default=0.0)  # its owner has just removed it
 
 
 def _is_folder(path: Place) -> bool:

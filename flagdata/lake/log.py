@@ -31,6 +31,8 @@ PREVIOUS_HASH = "flagdata.previous_sha256"
 """Key of a commit's info: SHA-256 of the log entry before it."""
 
 _ACTIONS = {"add", "remove", "metaData", "protocol", "commitInfo", "txn", "cdc", "domainMetadata"}
+_FILE = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
+"""Names of files of rows: none leads out of the catalog's folder, also where a lake of somebody else is copied."""
 _NAME = "{:020d}.json"
 _ENTRY = re.compile(r"(\d{20})\.json")
 _MARK = re.compile(r"\d{1,20}")
@@ -148,7 +150,10 @@ class Log:
             if not actions or not all(_ACTIONS.issuperset(action.keys()) for action in actions):
                 raise self.damaged(version)
             info = next((action["commitInfo"] for action in actions if "commitInfo" in action), {})
-            return [action["add"]["path"] for action in actions if "add" in action], dict(info)
+            names = [action["add"]["path"] for action in actions if "add" in action]
+            if any(not _FILE.fullmatch(name) for name in names):
+                raise self.damaged(version)
+            return names, dict(info)
         except (ValueError, KeyError, TypeError, AttributeError):
             raise self.damaged(version) from None
 

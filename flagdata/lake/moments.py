@@ -25,7 +25,10 @@ def moment(text: str, *, now: datetime | None = None) -> int | None:
     ago = _AGO.fullmatch(text)
     if ago is not None:
         passed = timedelta(seconds=int(ago[1]) * _SECONDS[ago[2]])
-        return from_datetime((now or datetime.now(UTC)) - passed)
+        try:
+            return from_datetime((now or datetime.now(UTC)) - passed)
+        except OverflowError:
+            raise UsageError(f"{text!r} is before the year 1", where="--at", fix="name a later instant") from None
     if not re.match(_DAY, text):
         return None
     try:

@@ -156,13 +156,18 @@ class RemoteObjects(Objects):
         """Relative path → SHA-256 of a folder's files.
 
         Raises:
-            CorruptError: they cannot be read, or name files outside the folder.
+            CorruptError: they cannot be read, are not those of its name, or name files outside the folder.
         """
+        stated = (place / SUMS).read_bytes()
         try:
-            sums = read_sums((place / SUMS).read_bytes().decode())
-        except (ValueError, UnicodeDecodeError):
-            sums = {"/": ""}
-        if any(file.startswith("/") or ".." in Path(file).parts for file in sums):
+            sums = read_sums(stated.decode())
+        except ValueError:
+            sums = None
+        if (
+            sums is None
+            or hashlib.sha256(stated).hexdigest() != place.stem
+            or any("\0" in file or file.startswith("/") or ".." in Path(file).parts for file in sums)
+        ):
             raise CorruptError(
                 "the sums of its files are damaged", where=str(place / SUMS), fix="ingest the source again"
             )

@@ -88,6 +88,5 @@ def lost(lake: Store, rows: pa.Table) -> dict[str, NotFoundError]:
     found: dict[str, NotFoundError] = {}
     for name in sorted(set(rows["object"].drop_null().to_pylist())):
         if not lake.objects.has(name):
-            missing = NotFoundError(f"object {name} is missing", where=str(lake.path), fix="run flagdata doctor")
-            found[name] = explained(lake, name, missing)
+            found[name] = explained(lake, name, lake.objects.missing(name))
     return found

@@ -13,11 +13,12 @@ import shutil
 import time
 import uuid
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from flagdata.caches import user_cache
 from flagdata.checksums import content_hash, size_of
-from flagdata.errors import CorruptError, UsageError
+from flagdata.errors import CorruptError, InputError, UsageError
 from flagdata.locks import LOCK, alone_in
 
 LIMIT = 20 * 10**9
@@ -115,18 +116,25 @@ def _take_room(folder: Path, size: int) -> None:
 def _swept(folder: Path, size: int, limit: int) -> int:
     """Delete what was used least recently until there is room for `size` more; bytes that are there then, with it."""
     old = time.time() - _IN_USE
-    entries = sorted((path.lstat().st_mtime, path) for path in folder.iterdir() if path.name not in (LOCK, _TALLY))
-    sizes = {path: size_of(path) for _, path in entries}
-    total = sum(sizes.values()) + size
-    for used, path in entries:
+    entries: list[tuple[float, Path, int]] = []
+    for path in folder.iterdir():
+        if path.name not in (LOCK, _TALLY):
+            with suppress(FileNotFoundError, InputError):  # another process has just renamed its part
+                entries.append((path.lstat().st_mtime, path, size_of(path)))
+    total = sum(held for _, _, held in entries) + size
+    for used, path, held in sorted(entries):
         if used < old and (total > limit or path.name.startswith(_PART)):
             _remove(path)
-            total -= sizes[path]
+            total -= held
     return total
 
 
 def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
+    """Delete a file or folder; a process that dies meanwhile leaves a part, never a copy that lacks files."""
+    if not path.is_dir():
         path.unlink(missing_ok=True)
+        return
+    part = path.with_name(f"{_PART}{uuid.uuid4().hex}{path.suffix}")
+    with suppress(FileNotFoundError):  # another process was faster
+        path.rename(part)
+    shutil.rmtree(part, ignore_errors=True)

@@ -36,6 +36,9 @@ _ENVIRONMENT = {
 _SHOWN = 300  # letters of what a server said
 _MESSAGE = re.compile(r"<Message>([^<]*)</Message>")
 _STATUS = re.compile(r"status code: (\d{3} [A-Za-z ]+)")
+COLOUR = re.compile(r"\x1b\[\d+m")
+"""What the Delta library writes for terminals."""
+_USER = re.compile(r"//[^/@\s]+@")
 _ACCESS_KEY = re.compile(r"\b(?:AKIA|ASIA)[A-Z0-9]{12,}\b")
 
 
@@ -130,8 +133,8 @@ def _client(bucket: str) -> S3Store:
 
 
 def plain(error: BaseException | str) -> str:
-    """What a client or server said, in one line, without credentials."""
-    text = str(error)
+    """What a client or server said, in one line, without credentials and colours."""
+    text = COLOUR.sub("", str(error))
     said = " ".join((text.split("Debug source:")[0].split("<?xml")[0]).split()).rstrip(": ")
     if message := _MESSAGE.search(text):
         status = _STATUS.search(text)
@@ -140,11 +143,11 @@ def plain(error: BaseException | str) -> str:
 
 
 def redacted(text: str) -> str:
-    """`text` without the credentials in use, or anything of the form of an access key."""
+    """`text` without the credentials in use, the user of an address, or anything of the form of an access key."""
     for variable in _ENVIRONMENT:
         if (value := settings().get(variable)) and len(value) > 3:
             text = text.replace(value, "…")
-    return _ACCESS_KEY.sub("…", text)
+    return _ACCESS_KEY.sub("…", _USER.sub("//…@", text))
 
 
 def _profile(name: str, *, required: bool) -> dict[str, str]:

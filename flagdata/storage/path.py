@@ -26,6 +26,8 @@ SCHEME = "s3://"
 BLOCK = 8 << 20
 """Bytes that one request reads or writes of a larger object."""
 _ADDRESS = re.compile(r"s3://([a-z0-9][a-z0-9.-]{1,61}[a-z0-9])(?:/(.*))?", re.DOTALL)
+_SECRET = re.compile(r"(?<!^[sS]3):|[@?]")
+"""What stands beside credentials in an address: a user's name and password, or the query of a signed one."""
 _KEY = re.compile(r"[A-Za-z0-9._=+-]+(?:/[A-Za-z0-9._=+-]+)*")
 
 T = TypeVar("T")
@@ -87,15 +89,16 @@ class RemotePath:
         """
         found = _ADDRESS.fullmatch(address)
         if found is None:
-            shown = address if "@" not in address else "s3://…"  # it may hold what it must not
+            shown = "s3://…" if _SECRET.search(address) else address
             raise UsageError(
                 "not the address of a bucket", where=shown, fix="write s3://bucket/prefix; credentials are read from"
                 " the environment or a profile"
             )  # fmt: skip
         key = (found[2] or "").rstrip("/")
         if key and (not _KEY.fullmatch(key) or {".", ".."} & set(key.split("/"))):
+            shown = f"{SCHEME}{found[1]}/…" if _SECRET.search(address) else address
             raise UsageError(
-                "the prefix of a lake has letters, digits and . _ = + - only, between single slashes", where=address,
+                "the prefix of a lake has letters, digits and . _ = + - only, between single slashes", where=shown,
                 fix="choose another prefix",
             )  # fmt: skip
         return cls(found[1], key)

@@ -9,12 +9,14 @@ Source: lerobot 0.6, `lerobot.datasets`.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import av
 import av.error
@@ -22,14 +24,16 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 from PIL import Image
 
 from flagdata.documents import read_json
 from flagdata.errors import CorruptError, InputError, LimitError, NotFoundError, TimeError, UnknownNameError
 from flagdata.files import LEROBOT_INFO
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.container import open_container
 from flagdata.ingest.camera.geometry import Orientation
-from flagdata.ingest.camera.luma import luma_of_frame, luma_of_image
+from flagdata.ingest.camera.luma import BROKEN, STILLS, luma_of_frame, luma_of_image
 from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import survey
@@ -37,8 +41,11 @@ from flagdata.ingest.camera.stamps import survey
 VERSION = "v3.0"
 TIME = "flagdata.time"
 _NANOSECOND = Fraction(1, 1_000_000_000)
-_BROKEN = (OSError, ValueError, SyntaxError, EOFError, Image.DecompressionBombError)
+_FIELD = re.compile(r"\{(\w+)(?::0?(\d?)d)?\}")
+_FARTHEST = 9.2e18  # ns; 64 bits hold a little more
 _PAST_END = 0.25  # frame periods before the episode's end up to which a frame of its film counts
+
+T = TypeVar("T")
 
 
 def described(folder: Path) -> Mapping[str, Any]:
@@ -57,8 +64,11 @@ def described(folder: Path) -> Mapping[str, Any]:
     if stored != "parquet":
         fix = "write it as Parquet and MP4 by LeRobot's own tools"
         raise InputError(f"a LeRobot data set stored as {stored}", where=str(where), fix=fix)
-    if not isinstance(info.get("features"), dict) or not isinstance(info.get("data_path"), str):
-        raise CorruptError("LeRobot's description lacks its features or paths", where=str(where), fix="copy it again")
+    fps = info.get("fps")
+    known = isinstance(info.get("features"), dict) and isinstance(info.get("data_path"), str)
+    if not known or not isinstance(fps, int | float) or fps <= 0:
+        what = "LeRobot's description lacks its features, paths or frame rate"
+        raise CorruptError(what, where=str(where), fix="copy it again")
     return info
 
 
@@ -86,30 +96,35 @@ class EpisodeSource:
         if options.sequence_fps is not None:
             raise TimeError("its frames have stamps", where=self._where, fix="leave out --sequence-fps")
         row = _episode(folder, options.episode)
-        data = folder / info["data_path"].format(chunk_index=row["data/chunk_index"], file_index=row["data/file_index"])
+        data = folder / _path(info["data_path"], row, "data", self._where)
         columns = ["timestamp", *([TIME] if TIME in info["features"] else [])]
         columns += [self._camera] if self._kind == "image" else []
-        table = _table(data, columns, int(row["episode_index"]))
+        table = _table(data, columns, round(_stated(row, "episode_index", self._where)))
         if table.num_rows > options.limits.frames:
             raise LimitError(
                 f"{table.num_rows} frames are beyond the limit of {options.limits.frames}", where=self._where,
                 fix="raise the limit",
             )  # fmt: skip
-        seconds = np.asarray(table["timestamp"].to_numpy(), dtype=np.float64)
         self._stamped = TIME in columns
-        self._stamps = table[TIME].to_numpy() if self._stamped else np.rint(seconds * 1e9).astype(np.int64)
+        self._stamps = stamps_of(table, str(data))
         self._limits = options.limits
         self._folder = folder
         self._pictures = table[self._camera] if self._kind == "image" else None
         self._film: tuple[Path, float, float] | None = None
         if self._kind == "video":
-            place = {part: row[f"videos/{self._camera}/{part}"] for part in ("chunk_index", "file_index")}
-            path = folder / str(info["video_path"]).format(video_key=self._camera, **place)
-            begin, end = (float(row[f"videos/{self._camera}/{part}_timestamp"]) for part in ("from", "to"))
+            of_film = f"videos/{self._camera}"
+            path = folder / _path(str(info.get("video_path")), row, of_film, self._where, video_key=self._camera)
+            begin, end = (_stated(row, f"{of_film}/{part}_timestamp", self._where) for part in ("from", "to"))
+            if not 0 <= begin < end:
+                raise CorruptError(f"its film lasts from {begin} s to {end} s", where=self._where, fix="copy it again")
             self._film = (path, begin, end)
         self._broken = 0
         timing = survey(
-            np.sort(self._stamps), tick=_NANOSECOND, missing=0, fallback_rate=_rate(info), where=self._where
+            np.sort(self._stamps),
+            tick=_NANOSECOND,
+            missing=0,
+            fallback_rate=Fraction(str(info["fps"])),
+            where=self._where,
         )
         first = next(self.samples(1, 1, 1), None)
         if first is None:
@@ -154,13 +169,16 @@ class EpisodeSource:
             return
         pictures = self._pictures if self._pictures is not None else pa.chunked_array([], pa.binary())
         for stamp, cell in zip(self._stamps[start:].tolist(), pictures.slice(start), strict=True):
-            held = cell.as_py() or {}
+            held = cell.as_py()
+            stored = held.get("bytes") if isinstance(held, Mapping) else held
             try:
-                image = Image.open(io.BytesIO(held["bytes"]) if held.get("bytes") else self._folder / held["path"])
+                if not stored:
+                    stored = (self._folder / _inside(str(held["path"]), self._where)).read_bytes()
+                image = Image.open(io.BytesIO(stored), formats=STILLS)
                 if image.width * image.height > self._limits.frame_pixels:
                     raise LimitError("a picture beyond the limit of pixels", where=self._where, fix="raise the limit")
                 image.load()
-            except (*_BROKEN, KeyError, TypeError):
+            except (*BROKEN, TypeError):
                 continue
             yield Picture(stamp=stamp, luma=partial(luma_of_image, image))
 
@@ -172,9 +190,8 @@ class EpisodeSource:
         period = (end - begin) / max(len(self._stamps), 1)
         wanted = begin + start * period
         try:
-            with av.open(f"file:{path.resolve()}") as container:
-                stream = container.streams.video[0]
-                stream.codec_context.thread_count = 1
+            container, stream = open_container(path, self._limits, threads=1)
+            with container:
                 container.seek(int((wanted - period) * av.time_base) if wanted > period else 0)
                 for frame in container.decode(stream):
                     at = frame.time
@@ -185,8 +202,63 @@ class EpisodeSource:
                         return
                     luma = partial(luma_of_frame, frame, codec=stream.codec_context.name)
                     yield Picture(stamp=int(self._stamps[number]), luma=luma)
-        except (av.error.FFmpegError, IndexError):
+        except av.error.FFmpegError:
             return
+
+
+def _path(template: str, row: Mapping[str, Any], prefix: str, where: str, **names: str) -> str:
+    """Where the description has a file of an episode, from the data set's folder on.
+
+    Raises:
+        CorruptError: outside that folder, or not by the fields that LeRobot has.
+    """
+    numbers = {part: round(_stated(row, f"{prefix}/{part}", where)) for part in ("chunk_index", "file_index")}
+
+    def filled(match: re.Match[str]) -> str:
+        known = {**numbers, **names}
+        return str(known[match[1]]).zfill(int(match[2] or 0)) if match[1] in known else match[0]
+
+    text = _FIELD.sub(filled, template)
+    if "{" in text:
+        raise CorruptError(f"{template!r} names no file", where=f"{where}/{LEROBOT_INFO}", fix="copy it again")
+    return _inside(text, where)
+
+
+def _inside(text: str, where: str) -> str:
+    """A path within a data set.
+
+    Raises:
+        CorruptError: it leads out of it.
+    """
+    if text.startswith("/") or "\0" in text or ".." in Path(text).parts:
+        raise CorruptError(f"{text!r} leads out of the data set", where=where, fix="do not trust this data set")
+    return text
+
+
+def _stated(row: Mapping[str, Any], name: str, where: str) -> float:
+    """A number of a row of the table of episodes.
+
+    Raises:
+        CorruptError: it is not there, or no finite number.
+    """
+    value = row.get(name)
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        raise CorruptError(f"the table of episodes does not state {name}", where=where, fix="copy it again")
+    return value
+
+
+def stamps_of(table: pa.Table, where: str) -> NDArray[np.int64]:
+    """(n,) instants of frames [UTC ns], or nanoseconds from the episode's start where the table has no `TIME`.
+
+    Raises:
+        CorruptError: a column of another type, or with values that are no instants.
+    """
+    name, kind = (TIME, pa.types.is_int64) if TIME in table.column_names else ("timestamp", pa.types.is_floating)
+    column = table[name]
+    values = column.to_numpy() if kind(column.type) and not column.null_count else np.array([np.nan])
+    if not np.all(np.abs(values.astype(np.float64)) < _FARTHEST * (1 if name == TIME else 1e-9)):
+        raise CorruptError(f"the column {name} has values that are no instants", where=where, fix="copy it again")
+    return values if name == TIME else np.rint(values.astype(np.float64) * 1e9).astype(np.int64)
 
 
 def _chosen(found: Mapping[str, str], wanted: str | None, where: str) -> tuple[str, str]:
@@ -206,38 +278,44 @@ def _episode(folder: Path, wanted: int | None) -> dict[str, Any]:
         raise CorruptError("no table of episodes", where=str(folder / "meta" / "episodes"), fix="copy it again")
     rows: list[dict[str, Any]] = []
     for path in files:
-        try:
-            names = [name for name in pq.read_schema(path).names if not name.startswith("stats/")]
-            rows += pq.read_table(path, columns=names).to_pylist()
-        except (pa.ArrowException, OSError) as error:
-            raise CorruptError(f"a table cannot be read: {error}", where=str(path), fix="copy it again") from None
+        names = [name for name in _reading(path, pq.read_schema).names if not name.startswith("stats/")]
+        rows += read(path, names).to_pylist()
     if wanted is None and len(rows) != 1:
         raise InputError(
             f"{len(rows)} episodes, each a recording of its own", where=str(folder),
             fix=f"choose one: --episode 0 to {len(rows) - 1}",
         )  # fmt: skip
     for row in rows:
-        if wanted in (None, row["episode_index"]):
+        if wanted in (None, row.get("episode_index")):
             return row
     raise NotFoundError(f"there is no episode {wanted}", where=str(folder), fix=f"there are {len(rows)}, from 0 on")
 
 
-def _table(path: Path, columns: list[str], episode: int) -> pa.Table:
+def read(path: Path, columns: list[str]) -> pa.Table:
+    """Columns of a table of a data set.
+
+    Raises:
+        NotFoundError: it is missing.
+        CorruptError: it cannot be read, or lacks one of them.
+    """
+    return _reading(path, partial(pq.read_table, columns=columns))
+
+
+def _reading(path: Path, how: Callable[[Path], T]) -> T:
     try:
-        table = pq.read_table(path, columns=[*columns, "episode_index", "frame_index"])
+        return how(path)
     except FileNotFoundError:
-        raise NotFoundError("the table of the episode is missing", where=str(path), fix="copy it again") from None
+        raise NotFoundError("a table of the data set is missing", where=str(path), fix="copy it again") from None
     except (pa.ArrowException, OSError) as error:
         raise CorruptError(f"a table cannot be read: {error}", where=str(path), fix="copy it again") from None
+
+
+def _table(path: Path, columns: list[str], episode: int) -> pa.Table:
+    table = read(path, [*columns, "episode_index", "frame_index"])
     table = table.filter(pc.field("episode_index") == episode).sort_by("frame_index")
     if not table.num_rows:
         raise CorruptError(f"the table has no frame of episode {episode}", where=str(path), fix="copy it again")
     return table
-
-
-def _rate(info: Mapping[str, Any]) -> Fraction:
-    fps = info.get("fps")
-    return Fraction(str(fps)) if isinstance(fps, int | float) and fps > 0 else Fraction(1)
 
 
 def _counted() -> Finding:

@@ -14,6 +14,10 @@ from flagdata.errors import InputError
 _FULL = 2  # AVCOL_RANGE_JPEG
 _LIMITED = 1  # AVCOL_RANGE_MPEG
 _STILL_CODECS = frozenset({"mjpeg", "png", "apng", "gif", "bmp", "tiff", "webp", "jpeg2000", "ljpeg", "jpegls", "ffv1"})
+BROKEN = (OSError, ValueError, SyntaxError, EOFError, Image.DecompressionBombError)
+"""What Pillow raises on a picture that is damaged."""
+STILLS = ("JPEG", "PNG", "WEBP")
+"""Formats in which other programs' data sets hold single pictures."""
 
 
 @dataclass(frozen=True, kw_only=True)

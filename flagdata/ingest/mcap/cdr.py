@@ -23,6 +23,7 @@ _NUMBERS = {
 }  # fmt: skip
 _BYTES = frozenset({"byte", "char", "octet", "uint8"})
 _FIELD = re.compile(r"^([\w/]+)(?:<=\d+)?(\[(?:<=)?\d*\])?\s+(\w+)(?!\s*=)(?:\s+\S.*)?$")
+_NOTHING = re.compile(r"\[0+\]")  # ROS 2 knows no such list; messages of no bytes could be without end
 _CONSTANT = re.compile(r"^[\w/]+(?:<=\d+)?\s+\w+\s*=")
 _BUILT_IN = {
     "builtin_interfaces/Time": "int32 sec\nuint32 nanosec",
@@ -80,7 +81,7 @@ def _fields(text: str, *, package: str) -> list[_Field]:
         if not line or _CONSTANT.match(line):
             continue
         match = _FIELD.match(line)
-        if match is None or match[1] == "wstring":
+        if match is None or match[1] == "wstring" or _NOTHING.fullmatch(match[2] or ""):
             raise InputError(f"a line of a ROS 2 definition cannot be read: {line!r}", fix="convert the topic to JSON")
         kind, brackets = match[1], match[2]
         if kind not in _NUMBERS and kind != "string":

@@ -23,11 +23,11 @@ from PIL import Image
 from flagdata.errors import InputError, LimitError, TimeError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.geometry import Orientation
-from flagdata.ingest.camera.luma import Luma, luma_of_frame, luma_of_image
+from flagdata.ingest.camera.luma import BROKEN, STILLS, Luma, luma_of_frame, luma_of_image
 from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import survey
-from flagdata.ingest.mcap.topics import MOVING, PICTURES, RAW, STILL, Decoded, Topic, choose, messages, topics
+from flagdata.ingest.mcap.topics import MOVING, PICTURES, RAW, STILL, Decoded, Topic, choose, instants, messages, topics
 
 _NANOSECOND = Fraction(1, 1_000_000_000)
 _VIDEO = {"h264": "h264", "h265": "hevc", "hevc": "hevc", "av1": "av1", "vp9": "vp9"}
@@ -36,7 +36,6 @@ _PLAIN = {  # encoding → (mode for Pillow, how the bytes of a pixel lie)
     "rgba8": ("RGB", "RGBX"), "bgra8": ("RGB", "BGRX"),
 }  # fmt: skip
 _BYTES_OF = {"L": 1, "RGB": 3, "BGR": 3, "RGBX": 4, "BGRX": 4}
-_BROKEN = (OSError, ValueError, SyntaxError, EOFError, Image.DecompressionBombError)
 
 
 def of_pictures(found: Sequence[Topic]) -> tuple[Topic, ...]:
@@ -64,11 +63,6 @@ class TopicSource:
         self._topic = choose(of_pictures(present), options.topic, where=where, noun="pictures")
         if options.sequence_fps is not None:
             raise TimeError("pictures of a topic have stamps of their own", where=where, fix="leave out --sequence-fps")
-        if self._topic.count > options.limits.frames:
-            raise LimitError(
-                f"{self._topic.count} pictures are beyond the limit of {options.limits.frames}", where=where,
-                fix="cut the file, or raise the limit",
-            )  # fmt: skip
         self._kind = PICTURES[self._topic.schema]
         self._broken = self._resized = 0
         stamps, logged = self._instants()
@@ -93,10 +87,9 @@ class TopicSource:
 
     def _instants(self) -> tuple[np.ndarray, np.ndarray]:
         """(n,) instants of the pictures and of their logging [UTC ns], in order of logging."""
-        pairs = [(one.stamp, one.log_time) for one in messages(self._path, self._topic.name)]
-        if not pairs:
+        both = instants(self._path, self._topic.name, limit=self._limits.frames)
+        if not len(both):
             raise InputError(f"{self._topic.name} has no messages", where=str(self._path), fix="choose another topic")
-        both = np.array(pairs, dtype=np.int64)
         return both[:, 0], both[:, 1]
 
     def pictures(self) -> Iterator[Picture]:
@@ -160,10 +153,10 @@ class TopicSource:
     def _stills(self, found: Iterator[Decoded]) -> Iterator[_Shown | None]:
         for one in found:
             try:
-                image = Image.open(io.BytesIO(_data(one.values)), formats=("JPEG", "PNG", "WEBP"))
+                image = Image.open(io.BytesIO(_data(one.values) or b""), formats=STILLS)
                 if image.width * image.height <= self._limits.frame_pixels:
                     image.load()
-            except _BROKEN:
+            except BROKEN:
                 yield None
                 continue
             yield (
@@ -181,10 +174,13 @@ class TopicSource:
                     fix=f"record one of {', '.join(_PLAIN)}, or compressed images",
                 )  # fmt: skip
             mode, layout = _PLAIN[encoding]
-            width, height, step = (int(values.get(name, 0)) for name in ("width", "height", "step"))
-            step = step or width * _BYTES_OF[layout]
             data = _data(values)
-            if width < 1 or height < 1 or len(data) < step * height or step < width * _BYTES_OF[layout]:
+            width, height, step = (values.get(name) or 0 for name in ("width", "height", "step"))
+            if not all(isinstance(size, int) for size in (width, height, step)):  # of JSON
+                yield None
+                continue
+            step = step or width * _BYTES_OF[layout]
+            if data is None or width < 1 or height < 1 or len(data) < step * height or step < width * _BYTES_OF[layout]:
                 yield None
                 continue
             image = Image.frombytes(mode, (width, height), data[: step * height], "raw", layout, step, 1)
@@ -205,8 +201,13 @@ class TopicSource:
                     )  # fmt: skip
                 context = av.CodecContext.create(name, "r")
                 context.thread_count, context.flags = 1, context.flags | 0x00080000  # low delay
+                context.options = {"max_pixels": str(2 * self._limits.frame_pixels)}
+            data = _data(one.values)
+            if data is None:
+                yield None
+                continue
             stamps[number] = one.stamp
-            packet = av.Packet(_data(one.values))
+            packet = av.Packet(data)
             packet.pts = packet.dts = number
             yield from self._frames(context, packet, stamps, name)
         if context is not None:
@@ -238,10 +239,15 @@ def _picture(one: _Shown) -> Picture:
     return Picture(stamp=one[0], luma=one[5])
 
 
-def _data(values: Mapping[str, Any]) -> bytes:
-    """The bytes of a picture's message; in JSON they are base64."""
-    data = values.get("data", b"")
-    return base64.b64decode(data) if isinstance(data, str) else bytes(data)
+def _data(values: Mapping[str, Any]) -> bytes | None:
+    """The bytes of a picture's message; in JSON they are base64. None where there are none."""
+    data = values.get("data")
+    try:
+        if isinstance(data, str):
+            data = base64.b64decode(data)
+        return bytes(data) if data and isinstance(data, bytes | list) else None
+    except (ValueError, TypeError):
+        return None
 
 
 def _others(present: tuple[Topic, ...], chosen: Topic) -> Iterator[Finding]:

@@ -5,23 +5,29 @@ Source: the MCAP specification and its registry of encodings, https://mcap.dev/s
 
 from __future__ import annotations
 
-import json
+import os
+import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
+import numpy as np
+import zstandard
 from google.protobuf.message import DecodeError, Message
 from mcap.exceptions import McapError
 from mcap.reader import McapReader, make_reader
 from mcap.records import Channel, Schema
 from mcap.summary import Summary
 from mcap_protobuf.decoder import DecoderFactory
+from numpy.typing import NDArray
 
-from flagdata.errors import CorruptError, FlagdataError, InputError, UnknownNameError
+from flagdata.documents import from_stored_json
+from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError, UnknownNameError
 from flagdata.files import check_input
 from flagdata.ingest.mcap import cdr
+from flagdata.record.salvage import CHUNK_LIMIT
 
 STILL, MOVING, RAW = "compressed images", "compressed video", "plain pixels"
 PICTURES = {
@@ -31,8 +37,14 @@ PICTURES = {
     "foxglove.RawImage": RAW, "foxglove_msgs/msg/RawImage": RAW, "sensor_msgs/msg/Image": RAW,
 }  # fmt: skip
 """Types of messages that are pictures → what kind."""
-_UNREADABLE = (McapError, EOFError, ValueError, RuntimeError, DecodeError)
+_UNREADABLE = (
+    McapError, EOFError, ValueError, RuntimeError, DecodeError, zstandard.ZstdError, struct.error, KeyError, TypeError
+)  # fmt: skip
 """What libraries raise on damaged chunks and messages; also those that decompress."""
+
+_CHUNK_HEAD = struct.Struct("<BQQQQII")
+"""Opcode and length of a chunk's record; first and last time, unpacked size, checksum, length of the compression's
+name. The name, the length of the records (8 bytes) and the records follow."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,14 +80,18 @@ class Decoded:
 
     @property
     def stamp(self) -> int:
-        """Its instant [UTC ns]: that of the measurement where it states one that is not zero, else the log's."""
+        """Its instant [UTC ns]: that of the measurement where it states one that is not zero, else the log's.
+
+        Raises:
+            CorruptError: an instant beyond those that 64 bits hold.
+        """
         header = self.values.get("header")
         for holder in (self.values, header if isinstance(header, Mapping) else {}):
             for name in ("timestamp", "stamp"):
                 instant = _instant(holder.get(name))
                 if instant:
-                    return instant
-        return self.log_time
+                    return _checked(instant)
+        return _checked(self.log_time)
 
 
 def profile(path: Path) -> str:
@@ -93,6 +109,7 @@ def topics(path: Path) -> tuple[Topic, ...]:
 
     Raises:
         CorruptError: a file that was cut off, or whose summary is damaged.
+        LimitError: a chunk that would unpack to more than `CHUNK_LIMIT`.
     """
     with _opened(path) as (_, summary):
         return _topics(summary)
@@ -134,6 +151,23 @@ def messages(path: Path, topic: str, *, since: int = 0) -> Iterator[Decoded]:
             yield Decoded(log_time=message.log_time, values=decode(message.data))
 
 
+def instants(path: Path, topic: str, *, limit: int | None = None) -> NDArray[np.int64]:
+    """(n, 2) when each message of a topic was measured and when it was logged [UTC ns], in order of logging.
+
+    Raises:
+        LimitError: more messages than `limit`, whatever the file's summary states.
+        InputError, CorruptError: as `messages`; or an instant beyond those that 64 bits hold.
+    """
+    pairs: list[tuple[int, int]] = []
+    for one in messages(path, topic):
+        if len(pairs) == limit:
+            raise LimitError(
+                f"more than {limit} messages in {topic}", where=str(path), fix="cut the file, or raise the limit"
+            )
+        pairs.append((one.stamp, _checked(one.log_time)))
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
 @contextmanager
 def _opened(path: Path) -> Iterator[tuple[McapReader, Summary]]:
     check_input(path)
@@ -147,12 +181,33 @@ def _opened(path: Path) -> Iterator[tuple[McapReader, Summary]]:
                     "an MCAP file without a summary: it was cut off, or written by a program that adds none",
                     where=where, fix="write one: flagdata recover FILE NEW.mcap, or mcap recover",
                 )  # fmt: skip
+            _check_chunks(stream, summary, where=where)
             yield reader, summary
     except FlagdataError:
         raise
     except _UNREADABLE as error:
         what = f"the MCAP file is damaged or cut off: {type(error).__name__} {error}".strip()
         raise CorruptError(what, where=where, fix="salvage what is whole: flagdata recover FILE NEW.mcap") from None
+
+
+def _check_chunks(stream: IO[bytes], summary: Summary, *, where: str) -> None:
+    """Whether all chunks are small enough to be unpacked, by what they state and by what their zstd frames state.
+
+    Raises:
+        LimitError: one is not.
+    """
+    for index in summary.chunk_indexes:
+        stream.seek(index.chunk_start_offset)
+        head = stream.read(_CHUNK_HEAD.size)
+        *_, size, _, named = _CHUNK_HEAD.unpack(head)
+        if named == len("zstd") and stream.read(named) == b"zstd":
+            stream.seek(8, os.SEEK_CUR)
+            size = max(size, zstandard.frame_content_size(stream.read(18)))
+        if size > CHUNK_LIMIT:
+            raise LimitError(
+                f"a chunk claims to unpack to {size} bytes", where=where,
+                fix=f"at most {CHUNK_LIMIT} are unpacked at once: write smaller chunks",
+            )  # fmt: skip
 
 
 def _topics(summary: Summary) -> tuple[Topic, ...]:
@@ -186,7 +241,7 @@ def _decoder(schema: Schema | None, channel: Channel) -> Callable[[bytes], Mappi
 
 
 def _from_json(data: bytes) -> Mapping[str, Any]:
-    value = json.loads(data)
+    value = from_stored_json(data.decode())
     return value if isinstance(value, dict) else {"value": value}
 
 
@@ -205,6 +260,17 @@ def _values(message: Message) -> dict[str, Any]:
         elif not one.has_presence or message.HasField(one.name):
             found[one.name] = value
     return found
+
+
+def _checked(instant: int) -> int:
+    """An instant, unless 64 bits do not hold it.
+
+    Raises:
+        CorruptError: they do not.
+    """
+    if not -(1 << 63) <= instant < 1 << 63:
+        raise CorruptError(f"a message states an instant of {instant} ns", fix="mend the recorder's clock")
+    return instant
 
 
 def _instant(stamp: object) -> int | None:

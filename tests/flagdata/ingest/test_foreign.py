@@ -11,10 +11,11 @@ import pytest
 from click.testing import CliRunner
 
 from flagdata.cli import root
-from flagdata.errors import InputError
+from flagdata.errors import CorruptError, InputError
 from flagdata.export import Export, export
 from flagdata.findings import Severity
 from flagdata.ingest.foreign import examine
+from flagdata.ingest.mcap import topics
 from tests.flagdata.export.conftest import known as known
 from tests.flagdata.ingest.mcap.conftest import NOON
 from tests.flagdata.ingest.mcap.conftest import write_json as write_json
@@ -48,6 +49,37 @@ def test_order_rate_gaps_and_losses_of_topics_are_reported(write_json: Callable[
     assert not [where for _, where, _ in reported if where in ("/even", "/text")]
     lost = [finding.what for finding in found.findings if finding.kind == "lost-topics"]
     assert lost == ["an ingest leaves out topics that hold neither pictures nor numbers: /text"]
+
+
+@pytest.mark.parametrize("instant", [{"sec": 10**30, "nsec": 0}, {"sec": -(10**12), "nsec": 0}])
+def test_an_instant_that_64_bits_do_not_hold_is_damage_of_its_topic(
+    write_json: Callable[..., Path], instant: dict[str, int]
+) -> None:
+    path = write_json({"/far": [{"timestamp": instant, "x": 1.0}], "/even": [{"timestamp": at(0), "x": 1.0}]})
+    found = examine(path)
+    assert [one.name for one in found.streams] == ["/even"]
+    assert [(one.kind, one.where) for one in found.findings if one.severity is Severity.ERROR] == [
+        ("topic-unread", "/far")
+    ]
+
+
+def test_messages_that_are_stated_and_not_there_are_damage_of_their_topic(
+    write_json: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_json({"/empty": [{"timestamp": at(0), "x": 1.0}]})
+    monkeypatch.setattr(topics, "messages", lambda *_, **__: iter(()))
+    found = examine(path)
+    assert found.streams == ()
+    assert [one.kind for one in found.findings if one.severity is Severity.ERROR] == ["topic-unread"]
+
+
+def test_a_message_whose_channel_is_not_in_the_summary_is_damage(
+    write_json: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_json({"/odd": [{"x": 1.0}]})
+    monkeypatch.setattr(topics, "_from_json", lambda data: {}[data])  # KeyError, as the mcap library raises it
+    with pytest.raises(CorruptError, match="damaged or cut off"):
+        list(topics.messages(path, "/odd"))
 
 
 def test_a_lerobot_data_set_is_examined_by_its_episodes(known: Any, tmp_path: Path) -> None:

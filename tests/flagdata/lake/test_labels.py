@@ -29,7 +29,7 @@ def test_a_value_is_a_number_a_truth_value_or_a_text() -> None:
     assert [given(text)[1] for text in ("a=4", "a=-0.5", "a=true", "a=red", 'a="5"', "a=", "a=2026-05-01")] == [
         4, -0.5, True, "red", "5", None, "2026-05-01",
     ]  # fmt: skip
-    for wrong in ("a", "=1", "1a=1", "a-b=1", "a=1e999"):
+    for wrong in ("a", "=1", "1a=1", "a-b=1", "a=1e999", f"a={'9' * 400}"):
         with pytest.raises(UsageError):
             given(wrong)
 
@@ -59,6 +59,22 @@ def test_a_name_keeps_its_type_and_an_artifact_has_to_be_there(lake: Lake, put_t
     lake.label([one.id], {"rating": "good"}, "the only one may change")
     with pytest.raises(NotFoundError):
         lake.label(["0" * 32], {"rating": "good"}, "absent")
+    lake.withdraw([one.id], "wrong")
+    lake.label([two.id], {"rating": 4}, "no artifact that is shown has a text any more")
+
+
+def test_no_name_hides_another_or_leaves_its_column(lake: Lake, put_text: Put) -> None:
+    one, two = put_text(lake, "one"), put_text(lake, "two")
+    lake.label([one.id], {"Cloth": 1}, "a capital")
+    with pytest.raises(ConflictError, match="one column in SQL"):
+        lake.label([two.id], {"cloth": 2}, "a small letter")
+    lake.label([two.id], {"cloth": None}, "nothing to take off")
+    for wrong in ({'a" FROM stored --': 1}, {"a": float("nan")}, {"a": "x" * 1001}):
+        with pytest.raises(UsageError):
+            lake.label([one.id], wrong, "of a program")
+    assert select(lake, columns=["label_Cloth"], order="name").to_pylist() == [
+        {"label_Cloth": 1.0}, {"label_Cloth": None}
+    ]  # fmt: skip
 
 
 def test_labels_of_a_branch_stay_there_until_it_is_merged(lake: Lake, put_text: Put) -> None:

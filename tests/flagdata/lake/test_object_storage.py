@@ -18,14 +18,16 @@ from pathlib import Path
 import pytest
 
 import flagdata
-from flagdata.errors import FlagdataError, NotFoundError, RefusedError, UsageError
+from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError, RefusedError, UsageError
 from flagdata.lake import Artifact, Lake, remote_leases
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, object_names, verify, verify_catalog
-from flagdata.lake.leases import collecting, leases
+from flagdata.lake.leases import collecting, last_written, leases, open_lease
 from flagdata.lake.transaction import Transaction
 from flagdata.schema import Kind
 from flagdata.storage import RemotePath
+from flagdata.storage import cache as object_cache
+from flagdata.storage.connection import plain
 from tests.program import invoke
 from tests.s3 import SECRETS, Careless, Denying, ReadOnly, serving
 
@@ -138,9 +140,12 @@ def test_credentials_show_nowhere(
 
 
 def test_an_address_with_credentials_is_refused_without_repeating_them() -> None:
-    with pytest.raises(UsageError) as caught:
-        Lake.open("s3://key:secret@bucket/lake")
-    assert "secret" not in str(caught.value)
+    for address in ("key:secret@bucket/lake", "key:secret/lake", "bucket/lake?X-Amz-Signature=secret"):
+        with pytest.raises(UsageError) as caught:
+            Lake.open(f"s3://{address}")
+        assert "secret" not in f"{caught.value} {caught.value.where}"
+    assert plain("Generic S3 error \x1b[31m↳\x1b[0m no route") == "Generic S3 error ↳ no route"
+    assert plain("no answer of (http://key:secret@store:9000/bucket)") == "no answer of (http://…@store:9000/bucket)"
 
 
 @pytest.mark.parametrize("address", ["s3://", "s3://b", "s3://bucket//x", "s3://bucket/../x", "s3://bucket/a%41"])
@@ -313,6 +318,81 @@ def test_the_cache_gives_up_what_was_used_least_recently(
     third = remote_lake.object_path(names[2])
     assert [path.exists() for path in (first, second, third)] == [False, True, True]
     assert remote_lake.object_path(names[0]).read_text() == "a" * 100  # fetched again
+
+
+def test_a_copy_whose_deletion_was_cut_short_is_no_copy_any_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FLAGDATA_CACHE", str(tmp_path))
+    folder = tmp_path / "staged.zarr"
+    folder.mkdir()
+    (folder / "zarr.json").write_text("{}")
+    (tmp_path / "objects").mkdir()
+    object_cache.kept("zarr/0", ".zarr", folder)
+    with monkeypatch.context() as killed:
+        killed.setattr(shutil, "rmtree", lambda *_, **__: None)  # the process ends here
+        object_cache.forget("zarr/0", ".zarr")
+    assert object_cache.copy_of("zarr/0", ".zarr") is None
+
+
+def test_a_sweep_passes_over_what_another_process_renames_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FLAGDATA_CACHE", str(tmp_path))
+    objects = tmp_path / "objects"
+    objects.mkdir()
+    staged = tmp_path / "staged.mcap"
+    staged.write_text("gusts")
+    gone = objects / "part-0.mcap"
+    listed = Path.iterdir
+    monkeypatch.setattr(Path, "iterdir", lambda path: [*listed(path), gone] if path == objects else listed(path))
+    object_cache.kept("mcap/0", ".mcap", staged)
+    assert (objects / "mcap-0.mcap").read_text() == "gusts"
+
+
+def test_files_of_a_folder_that_its_name_does_not_vouch_for_are_not_fetched(remote_lake: Lake, tmp_path: Path) -> None:
+    name = str(put_folder(remote_lake, "sheet").object)
+    shutil.rmtree(tmp_path / "cache" / "objects")
+    (remote_lake.objects.path(name) / ".sums").write_bytes(f"{'0' * 64}  zarr.json\n".encode())
+    with pytest.raises(CorruptError, match="sums of its files are damaged"):
+        remote_lake.object_path(name)
+
+
+def test_a_lease_that_the_store_refuses_leaves_nothing_on_this_machine(
+    remote_lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object) -> None:
+        raise OSError("no answer")
+
+    monkeypatch.setattr(remote_leases, "new_lease", refused)
+    with pytest.raises(OSError, match="no answer"):
+        open_lease(remote_lake.staging)
+    assert leases(tmp_path / "cache" / "staging") == []
+
+
+def test_a_staging_folder_that_its_owner_removes_meanwhile_is_old(
+    bucket_folder: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = RemotePath.parse(bucket_folder) / "staging" / "0"
+    monkeypatch.setattr(RemotePath, "is_dir", lambda _: True)
+    assert last_written(place) == 0.0
+
+
+def test_erasing_stops_where_its_lock_was_lost_on_the_way(
+    remote_lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, two = put_text(remote_lake, "one"), put_text(remote_lake, "two")
+    remove = remote_lake.objects.remove
+
+    def slow(path: RemotePath) -> None:
+        remove(path)
+        monkeypatch.setattr(remote_leases, "LIFE", 0.0)  # has passed since the lock was renewed
+
+    monkeypatch.setattr(remote_lake.objects, "remove", slow)
+    with pytest.raises(ConflictError, match="take this process for dead"):
+        remote_lake.erase([one.id, two.id], "asked to")
+    monkeypatch.undo()
+    assert sorted(remote_lake.objects.has(str(artifact.object)) for artifact in (one, two)) == [False, True]
 
 
 def test_an_exclusive_lock_whose_renewal_was_answered_to_nobody_is_still_its_holders(

@@ -92,6 +92,18 @@ def test_a_transfer_that_was_stopped_goes_on(
     assert is_whole(copy)
 
 
+def test_a_log_that_names_a_file_outside_its_folder_is_damaged(lake: Lake, put_text: Put) -> None:
+    put_text(lake, "first")
+    head = lake.catalog.head()
+    stored, files = lake.catalog.entry(head)
+    (name,) = files
+    entry = lake.path / "catalog" / "_delta_log" / f"{head:020d}.json"
+    for wrong in (f"../{name}", f"/tmp/{name}", ".."):
+        entry.write_bytes(stored.replace(name.encode(), wrong.encode()))
+        with pytest.raises(CorruptError, match="is damaged"):
+            lake.catalog.entry(head)
+
+
 def test_lakes_that_went_apart_are_refused_and_stay_as_they_are(lake: Lake, put_text: Put, tmp_path: Path) -> None:
     put_text(lake, "first")
     copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)

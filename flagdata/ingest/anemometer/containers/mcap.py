@@ -64,12 +64,12 @@ def open_topic(path: Path, name: str | None, *, limits: Limits) -> TableText:
     """
     where = str(path)
     topic = choose(of_numbers(path, topics(path)), name, where=where, noun="numbers")
-    if topic.count > limits.rows:
-        raise LimitError(f"more than {limits.rows} messages", where=where, fix="cut the file")
     headings = _HEADINGS.get(topic.schema, {})
     names: dict[str, int] = {}
     rows: list[tuple[int, dict[str, str]]] = []
     for message in messages(path, topic.name):
+        if len(rows) == limits.rows:
+            raise LimitError(f"more than {limits.rows} messages", where=where, fix="cut the file")
         row = dict(_numbers(message.values))
         for one in row:
             if one not in names and len(names) < _WIDEST:
@@ -77,8 +77,8 @@ def open_topic(path: Path, name: str | None, *, limits: Limits) -> TableText:
         rows.append((message.stamp, row))
     lines = [",".join(["time", *(headings.get(one, one) for one in names)])]
     lines += [",".join([iso(stamp), *(row.get(one, "") for one in names)]) for stamp, row in rows]
-    what = f"the topic {topic.name}: {topic.count} messages of {topic.schema or topic.encoding}, a row each"
-    found = (Finding(kind="topic-read", severity=Severity.NOTE, what=what, count=topic.count),)
+    what = f"the topic {topic.name}: {len(rows)} messages of {topic.schema or topic.encoding}, a row each"
+    found = (Finding(kind="topic-read", severity=Severity.NOTE, what=what, count=len(rows)),)
     return TableText(path=path, encoding="utf-8", lines=len(lines), findings=found, text=tuple(lines))
 
 

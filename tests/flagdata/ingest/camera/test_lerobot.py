@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
-from flagdata.errors import InputError, NotFoundError, TimeError, UnknownNameError
+from flagdata.errors import CorruptError, InputError, NotFoundError, TimeError, UnknownNameError
 from flagdata.export import Export, export
 from flagdata.ingest.camera import CameraOptions, open_camera
+from flagdata.ingest.camera.lerobot import stamps_of
 from flagdata.ingest.classify import classify
 from flagdata.ingest.store import CameraIngest, ingest_camera
 from flagdata.lake import Lake
@@ -77,3 +81,66 @@ def test_without_instants_of_their_own_frames_count_from_the_start_that_is_given
                 open_camera(data_set, options())
     finally:
         where.write_text(whole)
+
+
+@pytest.mark.parametrize(
+    "path", ["../{chunk_index}.parquet", "/etc/{file_index}", "data/{episode}.parquet", "{chunk_index:>999999999}"]
+)
+def test_a_path_of_the_description_that_leaves_the_data_set_or_names_no_file_is_refused(
+    data_set: Path, tmp_path: Path, path: str
+) -> None:
+    folder = changed(data_set, tmp_path, data_path=path)
+    with pytest.raises(CorruptError, match=r"leads out of|names no file"):
+        open_camera(folder, options())
+
+
+def test_a_description_without_a_frame_rate_is_refused(data_set: Path, tmp_path: Path) -> None:
+    with pytest.raises(CorruptError, match="frame rate"):
+        open_camera(changed(data_set, tmp_path, fps=0), options())
+
+
+@pytest.mark.parametrize("missing", ["data/file_index", "episode_index"])
+def test_a_table_of_episodes_that_lacks_a_number_is_damaged(data_set: Path, tmp_path: Path, missing: str) -> None:
+    folder = changed(data_set, tmp_path)
+    path = folder / "meta" / "episodes" / "chunk-000" / "file-000.parquet"
+    pq.write_table(pq.read_table(path).slice(1, 1).drop_columns([missing]), path)
+    with pytest.raises(CorruptError, match=f"does not state {missing}"):
+        open_camera(folder, options(None))
+
+
+def test_a_film_that_ends_before_it_begins_and_one_that_is_a_list_of_other_files_are_refused(
+    known: Any, data_set: Path, tmp_path: Path
+) -> None:
+    if data_set.name != "av1":
+        return
+    folder = changed(data_set, tmp_path)
+    table = folder / "meta" / "episodes" / "chunk-000" / "file-000.parquet"
+    rows = pq.read_table(table)
+    column = "videos/observation.images.camera/to_timestamp"
+    wrong = rows.set_column(rows.column_names.index(column), column, pa.array([0.0] * rows.num_rows))
+    pq.write_table(wrong, table)
+    with pytest.raises(CorruptError, match="its film lasts from"):
+        open_camera(folder, options())
+    pq.write_table(rows, table)
+    (film,) = folder.rglob("*.mp4")
+    film.write_text("#EXTM3U\n#EXT-X-TARGETDURATION:9\n#EXTINF:9,\n/etc/passwd\n#EXT-X-ENDLIST\n")
+    with pytest.raises(InputError, match="cannot be opened as a video"):
+        open_camera(folder, options())
+
+
+@pytest.mark.parametrize(
+    "values", [pa.array([0.0, float("nan")]), pa.array([0.0, None]), pa.array(["0", "1"]), pa.array([0.0, 1e300])]
+)
+def test_stamps_that_are_no_instants_are_damage(values: pa.Array) -> None:
+    with pytest.raises(CorruptError, match="no instants"):
+        stamps_of(pa.table({"timestamp": values}), "here")
+    np.testing.assert_array_equal(stamps_of(pa.table({"timestamp": [0.0, 0.25]}), "here"), [0, 250_000_000])
+
+
+def changed(data_set: Path, tmp_path: Path, **description: Any) -> Path:
+    """A copy of a data set with another description."""
+    folder = tmp_path / "copy"
+    shutil.copytree(data_set, folder)
+    where = folder / "meta" / "info.json"
+    where.write_text(json.dumps(json.loads(where.read_text()) | description))
+    return folder

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import zstandard
+from mcap.writer import CompressionType, Writer
 
-from flagdata.errors import CorruptError, InputError, UnknownNameError, UsageError
+from flagdata.errors import CorruptError, InputError, LimitError, UnknownNameError, UsageError
 from flagdata.ingest.camera import CameraOptions, open_camera
 from flagdata.ingest.classify import classify, guesses
+from flagdata.ingest.mcap import topics as mcap_topics
 from flagdata.ingest.mcap.pictures import TopicSource
+from flagdata.ingest.mcap.topics import instants
 from flagdata.ingest.store import CameraIngest, ingest_camera
 from flagdata.lake import Lake
 from flagdata.record import salvage
 from tests.flagdata.ingest.mcap.conftest import FRAMES, NOON, STEP
+
+zstd_compress = zstandard.compress
 
 
 def options(topic: str | None = None) -> CameraOptions:
@@ -100,3 +107,49 @@ def test_pictures_that_cannot_be_decoded_are_counted_and_left_out(write_json: Ca
         times = [frame.time for frame in stream]
     assert times == [NOON, NOON + 200_000_000, NOON + 300_000_000]
     assert [finding.count for finding in stream.findings if finding.kind == "corrupt-frames"] == [1]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"data": 10**12}, {"data": "A"}, {"data": None}, {"step": -4}, {"step": "4"}, {"width": 1e300},
+        {"height": None}, {"data": ["a"]},
+    ],
+)  # fmt: skip
+def test_plain_pixels_whose_numbers_or_bytes_make_no_sense_are_left_out(
+    write_json: Callable[..., Path], wrong: dict[str, Any]
+) -> None:
+    sound = {"encoding": "mono8", "width": 2, "height": 2, "step": 2, "data": [9, 9, 9, 9]}
+    with open_camera(write_json({"/foxglove.RawImage": [sound, sound | wrong, sound]}), options()) as stream:
+        assert len(list(stream)) == 2
+    assert [finding.count for finding in stream.findings if finding.kind == "corrupt-frames"] == [1]
+
+
+def test_more_pictures_than_the_summary_states_are_counted_as_they_are_read(drive: Path) -> None:
+    with pytest.raises(LimitError, match="more than 3 messages"):
+        instants(drive, "/png", limit=3)
+    assert instants(drive, "/png", limit=FRAMES).shape == (FRAMES, 2)
+
+
+def test_a_chunk_that_would_unpack_to_more_than_the_limit_is_refused_before_it_is_read(
+    drive: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mcap_topics, "CHUNK_LIMIT", 1000)
+    with pytest.raises(LimitError, match="claims to unpack"):
+        mcap_topics.topics(drive)
+
+
+def test_the_size_that_a_zstd_frame_states_counts_whatever_its_chunk_states(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "bomb.mcap"
+    monkeypatch.setattr(zstandard, "compress", lambda data: zstd_compress(bytes(5000) + data))
+    with path.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.ZSTD)
+        writer.start()
+        channel = writer.register_channel(topic="/a", message_encoding="json", schema_id=0)
+        writer.add_message(channel, log_time=NOON, publish_time=NOON, data=b"{}")
+        writer.finish()
+    monkeypatch.setattr(mcap_topics, "CHUNK_LIMIT", 4000)
+    with pytest.raises(LimitError, match="claims to unpack"):
+        mcap_topics.topics(path)

@@ -68,3 +68,9 @@ def test_messages_that_end_too_soon_and_types_that_are_not_defined_are_refused()
         cdr.decoder("a/msg/B", "C c")
     with pytest.raises(InputError, match="deeper"):
         cdr.decoder("a/msg/B", "B b")(bytes.fromhex("00010000"))
+
+
+def test_lists_of_no_length_are_refused_since_messages_of_no_bytes_would_be_without_end() -> None:
+    levels = [f"p/A{k}[99] a\n====\nMSG: p/A{k}" for k in range(9)]
+    with pytest.raises(InputError, match="cannot be read"):
+        cdr.decoder("p/msg/B", "\n".join([*levels, "uint8[00] nothing"]))
