@@ -24,6 +24,7 @@ from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, object_names, verify, verify_catalog
 from flagdata.lake.leases import collecting, last_written, leases, open_lease
 from flagdata.lake.transaction import Transaction
+from flagdata.query import select
 from flagdata.schema import Kind
 from flagdata.storage import RemotePath
 from flagdata.storage import cache as object_cache
@@ -376,6 +377,19 @@ def test_a_staging_folder_that_its_owner_removes_meanwhile_is_old(
     place = RemotePath.parse(bucket_folder) / "staging" / "0"
     monkeypatch.setattr(RemotePath, "is_dir", lambda _: True)
     assert last_written(place) == 0.0
+
+
+def test_labels_and_what_was_erased_are_as_in_a_folder(remote_lake: Lake, put_text: Put) -> None:
+    gone, kept = put_folder(remote_lake, "gone"), put_text(remote_lake, "kept")
+    remote_lake.tag("v1")
+    remote_lake.label([kept.id], {"rating": 4}, "looked at")
+    assert select(remote_lake, "label_rating = 4", columns=["name"]).to_pylist() == [{"name": "kept"}]
+    erasure = remote_lake.erase([gone.id], "asked to")
+    assert (erasure.objects, erasure.tags, erasure.kept) == ((gone.object,), ("v1",), {})
+    assert not (remote_lake.objects.path(str(gone.object))).is_dir()
+    with pytest.raises(NotFoundError, match="was erased from all versions"):
+        remote_lake.object_path(str(gone.object))
+    assert [finding.kind for finding in doctor(Lake.open(str(remote_lake.path)), grace=NOW)] == ["erased"]
 
 
 def test_erasing_stops_where_its_lock_was_lost_on_the_way(
