@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from http.client import HTTPConnection
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from threading import Thread
 from typing import ClassVar
 from urllib.request import Request, urlopen
@@ -23,6 +24,14 @@ server.start()
 print("http://%s:%d" % server.get_host_and_port(), flush=True)
 threading.Event().wait()
 """
+_READ_ONLY = """
+import sys, threading
+from tests.s3 import ReadOnly, serving
+ReadOnly.store = sys.argv[1]
+with serving(ReadOnly) as address:
+    print(address, flush=True)
+    threading.Event().wait()
+"""
 SECRETS = {
     "AWS_ACCESS_KEY_ID": "AKIAEXAMPLEEXAMPLE01",
     "AWS_SECRET_ACCESS_KEY": "secret/of/nobody+0123456789",
@@ -35,12 +44,26 @@ SECRETS = {
 def moto() -> Iterator[str]:
     """The address of moto's server, with an empty bucket; in a process of its own, since the Delta library keeps
     Python's lock while it waits for an answer."""
-    with subprocess.Popen([sys.executable, "-c", _SERVER], stdout=subprocess.PIPE) as process:
+    with _process(_SERVER) as address:
+        urlopen(Request(f"{address}/{BUCKET}", method="PUT")).close()
+        yield address
+
+
+@contextmanager
+def read_only(store: str) -> Iterator[str]:
+    """The address of a server that passes reads on to another one; in a process of its own, as moto's."""
+    with _process(_READ_ONLY, store.removeprefix("http://")) as address:
+        yield address
+
+
+@contextmanager
+def _process(program: str, *arguments: str) -> Iterator[str]:
+    """The address that a server in a process of its own prints."""
+    command = [sys.executable, "-c", program, *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, cwd=Path(__file__).parents[1]) as process:
         assert process.stdout is not None
-        address = process.stdout.readline().decode().strip()
         try:
-            urlopen(Request(f"{address}/{BUCKET}", method="PUT")).close()
-            yield address
+            yield process.stdout.readline().decode().strip()
         finally:
             process.kill()
 

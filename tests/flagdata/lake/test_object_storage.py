@@ -30,7 +30,7 @@ from flagdata.storage import RemotePath
 from flagdata.storage import cache as object_cache
 from flagdata.storage.connection import plain
 from tests.program import invoke
-from tests.s3 import SECRETS, Careless, Denying, ReadOnly, serving
+from tests.s3 import SECRETS, Careless, Denying, read_only, serving
 
 NOW = timedelta(0)
 Put = Callable[..., Artifact]
@@ -166,11 +166,10 @@ def test_a_lake_at_another_storage_is_refused_and_makes_no_folder(
 
 
 def test_with_credentials_that_permit_reading_alone_rows_are_read_and_nothing_is_written(
-    remote_lake: Lake, put_text: Put, use_store: Use, s3_server: str, monkeypatch: pytest.MonkeyPatch
+    remote_lake: Lake, put_text: Put, use_store: Use, s3_server: str
 ) -> None:
     name = str(put_text(remote_lake, "gusts").object)
-    monkeypatch.setattr(ReadOnly, "store", s3_server.removeprefix("http://"))
-    with serving(ReadOnly) as address:
+    with read_only(s3_server) as address:
         use_store(address)
         lake = Lake.open(str(remote_lake.path))
         assert lake.rows()["name"].to_pylist() == ["gusts"]
