@@ -311,7 +311,10 @@ class Catalog:
         if self._history is None or self._history[0] != head:
             table = self._open(head)
             with self._log_errors():
-                entries = [self._stated(entry) for entry in table.history()]
+                found = table.history()
+            # The Delta library lists the log as it is by now, and counts its versions down from the table's.
+            later = max(0, len(found) - (head + 1))
+            entries = [self._stated({**entry, "version": entry["version"] + later}) for entry in found[later:]]
             self._history = (head, entries)
         return self._history[1][:limit]
 

@@ -47,11 +47,11 @@ def test_what_is_no_address_stays_the_path_it_is() -> None:
 
 
 ADDRESSED = [
-    "init s3://bucket/lake", "init --lake gs://bucket/lake", "ls --lake s3://bucket/lake",
+    "init gs://bucket/lake", "init --lake gs://bucket/lake", "ls --lake gs://bucket/lake",
     "ingest rtsp://127.0.0.1:9/x --lake lake", "ingest a.csv --sensor https://example.org/a.toml --lake lake",
     "export csv --to s3://bucket/out --lake lake", "recover http://example.org/a.mcap b.mcap --lake lake",
-    "simulate https://example.org/flag --lake lake", "build flagsim-small --lake s3://bucket/lake",
-    "build s3://bucket/recipe.toml --lake lake", "train sdn --lake s3://bucket/lake", "measure rtsp://127.0.0.1:9/x",
+    "simulate https://example.org/flag --lake lake", "build flagsim-small --lake abfss://bucket/lake",
+    "build s3://bucket/recipe.toml --lake lake", "train sdn --lake gs://bucket/lake", "measure rtsp://127.0.0.1:9/x",
     "measure film.mp4 --report s3://bucket/page.html", "close-loop s3://bucket/tracks.csv",
 ]  # fmt: skip
 
@@ -76,7 +76,7 @@ def test_the_library_refuses_them_too(tmp_path: Path, monkeypatch: pytest.Monkey
     uses = [flagdata.open, Lake.open, Lake.create, open_camera, read_log, sniff]
     for use in (*uses, lambda path: DecodedCache(path, limit=1)):
         with pytest.raises(UsageError, match="object storage"):
-            use("s3://bucket/a")
+            use("gs://bucket/a")
     assert list(tmp_path.iterdir()) == []
 
 

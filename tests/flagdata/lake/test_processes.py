@@ -8,6 +8,8 @@ from collections.abc import Callable
 from datetime import timedelta
 from typing import Any
 
+import pytest
+
 from flagdata.findings import Severity
 from flagdata.lake import Lake
 from flagdata.lake.collect import collect
@@ -30,6 +32,25 @@ def test_four_processes_ingesting_at_once_lose_no_row(lake: Lake, start_worker: 
     assert len(merges) == 2  # of the catalog's files, after each 32 of some 72 versions, overtaken by no commit
     assert doctor(lake, grace=NOW) == ()
     assert verify(lake, object_names(lake)) == ()
+
+
+def test_the_history_at_a_head_is_the_same_while_others_commit(
+    lake: Lake, put_text: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put_text(lake, "before")
+    expected = Lake.open(lake.path).catalog.history()
+    assert [entry["version"] for entry in expected] == list(range(len(expected)))[::-1]
+    reader = Lake.open(lake.path).catalog
+    opened = reader._open
+
+    def then_others_commit(version: int) -> object:
+        table = opened(version)
+        for text in ("one", "two", "three"):
+            put_text(lake, text)
+        return table
+
+    monkeypatch.setattr(reader, "_open", then_others_commit)
+    assert reader.history() == expected
 
 
 def test_collection_beside_ingests_deletes_nothing_that_they_publish(

@@ -25,7 +25,7 @@ def batch(specimen: Specimen, *, speed: float) -> NullBatch:
 
 def usual(nulls: NullBatch) -> np.ndarray:
     """Positions by the first attempt, in steps that are not halved."""
-    return nulls._run(*nulls._mesh(), 0)
+    return nulls._run(*nulls._mesh(), *nulls._method(0))
 
 
 def test_a_run_that_diverges_is_run_anew_in_smaller_steps(specimen: Specimen) -> None:
