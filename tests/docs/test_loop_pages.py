@@ -19,6 +19,8 @@ from flagdata.lake import Lake
 from flagdata.lake.meshes import MeshSequence
 from flagdata.schema import Kind
 from measure.demo.tracked import TrackedRecipe, make_tracks
+from measure.nulls.bank import build
+from measure.nulls.simulation import NullBatch
 from measure.observe.recipe import load
 from measure.observe.trajectory import Experiment
 from measure.propose.outcome import Decision, Outcome
@@ -81,7 +83,11 @@ def test_every_command_of_closing_the_loop_runs(folder: Path, monkeypatch: pytes
         judged.append(experiment)
         return concluded()
 
+    def first_kind(bank: Path, batches: Sequence[NullBatch], **given: Any) -> None:
+        build(bank, batches[:1], **given)
+
     monkeypatch.setattr("measure.closing.close.close_loop", instead)
+    monkeypatch.setattr("measure.nulls.bank.build", first_kind)
     monkeypatch.chdir(folder)
     shell = Shell(patch=monkeypatch)
     for command in commands("closing-the-loop.md"):
