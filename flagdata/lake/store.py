@@ -115,13 +115,13 @@ class Store:
     def table(self, view: View) -> pa.Table:
         """All rows of a view, its base first. An identity is on one branch of a view only."""
         *later, first = view
-        rows = self._own(first)
+        rows, lineage = self._own(first), self.lineage()
         for part in reversed(later):
-            hidden = self.lineage().hidden(part)
+            hidden = lineage.hidden(part)
             if hidden:
                 rows = rows.filter(~pc.field("artifact").isin(sorted(hidden)))
             rows = pa.concat_tables([rows, self._own(part)])
-        return with_labels(rows, folded(self.lineage().labelled(view[0])))
+        return with_labels(rows, folded(lineage.labelled(view[0])))
 
     def lineage(self) -> Lineage:
         """How branches came to be, as known at the head."""

@@ -21,7 +21,6 @@ from models.conditioning import Conditioning, Follower, conditioning_of
 from models.conditioning.conditioning import LEAST, SAMPLE
 from models.conditioning.regions import MOMENT
 from models.conditioning.repeats import TimedFrame
-from models.conditioning.whole import CUT, SIDES
 
 _HELD = 200_000_000
 """Bytes of frames that are held, so that a short film is decoded once."""
@@ -172,7 +171,7 @@ class ConditionedFilm:
             ],
             "chosen": found.chosen + 1 if found.regions else None,
             "square": [found.square.x, found.square.y, found.square.side],
-            "cut_off": dict(zip(SIDES, (found.cut > CUT).mean(axis=0).tolist(), strict=True)),
+            "cut_off": found.cut_share,
         }  # fmt: skip
 
 

@@ -11,7 +11,6 @@ from flagdata.findings import Finding, Severity
 from measure.gate.reasons import REASONS
 from measure.gate.watch import FilmWatch
 from models.conditioning import Conditioning, Follower
-from models.conditioning.whole import CUT, SIDES
 
 COUNTED = frozenset({"scene-cut", "low-frame-rate", "repeated-frames", "too-dark", "moving-camera", "cut-off", "scale"})
 """Kinds of faults that are counted here, and while the frames are read: no statistic of a window need look for them."""
@@ -74,8 +73,7 @@ def _all(watch: FilmWatch, found: Conditioning, follower: Follower) -> Iterator[
     if follower.lost > _LOST * total:
         what = f"in {follower.lost} of {total} frames the background was not found"
         yield _reason("moving-camera", follower.lost / total, what)
-    shares_cut = dict(zip(SIDES, (found.cut > CUT).mean(axis=0).tolist(), strict=True))
-    if edges := {name: share for name, share in shares_cut.items() if share > _AT_EDGE}:
+    if edges := {name: share for name, share in found.cut_share.items() if share > _AT_EDGE}:
         what = ", ".join(f"at the {name} edge in {share:.0%} of the frames" for name, share in edges.items())
         yield _reason("cut-off", max(edges.values()), what)
     elif not len(found.camera.corners) and watch.resting() < _RESTING:  # cloth that is cut off hides what stands still

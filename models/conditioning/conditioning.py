@@ -15,7 +15,7 @@ from models.conditioning import framing, noise
 from models.conditioning.camera import STILL, WORK, Camera, Transform, by_edges, camera_of, path
 from models.conditioning.framing import Square
 from models.conditioning.regions import Region, regions_of
-from models.conditioning.whole import SIDES, at_edges
+from models.conditioning.whole import CUT, SIDES, at_edges
 
 VERSION = 2
 """Raised whenever the same film gives other pictures: what networks are trained on is then made anew."""
@@ -82,6 +82,11 @@ class Conditioning:
     def region(self) -> Region | None:
         """The flag's; None where nothing moves."""
         return self.regions[self.chosen] if self.regions else None
+
+    @property
+    def cut_share(self) -> dict[str, float]:
+        """Share of the sample in which the edge on each of `whole.SIDES` cuts the cloth off, 0 to 1."""
+        return dict(zip(SIDES, (self.cut > CUT).mean(axis=0).tolist(), strict=True))
 
     def follow(self, frame: NDArray[np.uint8], guess: Transform) -> Transform | None:
         """Where the reference picture is in a frame; None where the background's features are not found.
