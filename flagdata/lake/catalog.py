@@ -19,7 +19,6 @@ from __future__ import annotations
 import errno
 import hashlib
 import json
-import os
 import random
 import threading
 import time
@@ -38,6 +37,7 @@ from deltalake.exceptions import CommitFailedError, DeltaError
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.files import open_regular
+from flagdata.forks import OneProcess
 from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder, put_if_absent, write_durably
 from flagdata.lake.log import FILE_HASH, PREVIOUS_HASH, Log
 from flagdata.lake.older_rows import with_data_sets
@@ -61,7 +61,7 @@ _PATIENCE = 120.0  # s, how long a commit competes with other writers before it 
 _FIRST_WAIT = 0.01  # s
 _LONGEST_WAIT = 0.5  # s
 _LATEST = 253_402_300_800_000  # ms since 1970: the year 10000
-_user_pid: int | None = None
+_PROCESS = OneProcess("the catalog", fix="resolve the query in the parent, or start workers by spawn")
 
 
 class Moved(Exception):  # noqa: N818 — an outcome to act on, never shown to a user
@@ -74,15 +74,7 @@ def _one_at_a_time(method: Callable[Concatenate[Catalog, P], T]) -> Callable[Con
 
     @wraps(method)
     def guarded(self: Catalog, *args: P.args, **kwargs: P.kwargs) -> T:
-        global _user_pid
-        if _user_pid is None:
-            _user_pid = os.getpid()
-        elif _user_pid != os.getpid():
-            raise FlagdataError(
-                "the catalog was used before this process was forked, and cannot be used in the child",
-                where=f"process {os.getpid()}",
-                fix="resolve the query in the parent, or start workers by spawn",
-            )
+        _PROCESS.check()
         with self._lock:
             return method(self, *args, **kwargs)
 

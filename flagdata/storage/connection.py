@@ -15,7 +15,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flagdata.errors import FlagdataError, UsageError
+from flagdata.errors import UsageError
+from flagdata.forks import OneProcess
 
 if TYPE_CHECKING:
     from obstore.store import S3Store
@@ -82,7 +83,7 @@ def delta_options() -> dict[str, str]:
     }
 
 
-_client_pid: int | None = None
+_PROCESS = OneProcess("object storage", fix="start workers by spawn")
 
 
 def client(bucket: str) -> S3Store:
@@ -92,15 +93,7 @@ def client(bucket: str) -> S3Store:
         FlagdataError: the package obstore is not installed; or a forked child of a process that used one: it would
             hang there.
     """
-    global _client_pid
-    if _client_pid is None:
-        _client_pid = os.getpid()
-    elif _client_pid != os.getpid():
-        raise FlagdataError(
-            "object storage was used before this process was forked, and cannot be used in the child",
-            where=f"process {os.getpid()}",
-            fix="start workers by spawn",
-        )
+    _PROCESS.check()
     return _client(bucket)
 
 
