@@ -5,7 +5,7 @@ An interrupted calibration goes on where it was, and another one of the same fil
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from io import BytesIO
@@ -103,7 +103,14 @@ def simulated(
     Raises:
         CorruptError: a kept batch that cannot be read.
     """
-    batches = design.batches()
+    return read(design.batches(), folder=folder, workers=workers, advance=advance)[:, 0]
+
+
+def read(
+    batches: Sequence[Batch], *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
+) -> Floats:
+    """(flag, place, window, observable) of batches, in order; those that the folder lacks are simulated. As
+    `simulated`."""
     paths = [folder / f"{digest(canonical(dict(batch.content())))[:32]}.npz" for batch in batches]
     missing = [place for place, path in enumerate(paths) if not path.exists()]
     if advance is not None and len(missing) < len(batches):
@@ -118,7 +125,7 @@ def simulated(
                 done.result()
                 if advance is not None:
                     advance(len(batches[running[done]].seeds))
-    return np.concatenate([_read(path) for path in paths])[:, 0]
+    return np.concatenate([_read(path) for path in paths])
 
 
 def _make(batch: Batch, path: Path) -> None:

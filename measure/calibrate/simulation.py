@@ -9,21 +9,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
 from flagdata.rng import child_seed, stream
+from measure.calibrate.discretisation import Discretisation
 from measure.calibrate.prior import Floats
 from measure.calibrate.wind import RATE as WIND_RATE
 from measure.calibrate.wind import Log, blown
 from measure.forecasting.observer import SegmentWind
+from measure.forecasting.regressors import EffectColumn
 from measure.observables import OBSERVABLES, Observable, View, seen_from
 from measure.observables.cloth import edges_of
 from measure.observables.observable import WINDOW
 from sim import handles as held
+from sim.effects import apply
 from sim.handles import Handles
 from sim.integrate.implicit import BackwardEuler
 from sim.material import Material, named
@@ -99,6 +102,9 @@ class Batch:
         seeds: (flag,) of the start and the turbulence.
         columns: of the mesh.
         observables: names.
+        effects: what acts beside the base model, each with its strengths beyond the null one, (flag,).
+        until: the film's part that is simulated, in the wind of all of it [s]; None for all.
+        discretisation: the mesh and the steps where they are others than the fit's.
     """
 
     flag: Flag
@@ -109,11 +115,18 @@ class Batch:
     seeds: tuple[int, ...]
     columns: int = COLUMNS
     observables: tuple[str, ...] = OBSERVED
+    effects: tuple[tuple[EffectColumn, Floats], ...] = field(default_factory=tuple)
+    until: float | None = None
+    discretisation: Discretisation | None = None
 
     @property
     def windows(self) -> int:
-        """Windows of the film."""
-        return math.floor(self.duration / WINDOW + 1e-9)
+        """Windows of the film that are simulated."""
+        return math.floor(self._simulated / WINDOW + 1e-9)
+
+    @property
+    def _simulated(self) -> float:
+        return self.duration if self.until is None else self.until
 
     def content(self) -> Mapping[str, object]:
         """All that shapes what it gives, as JSON values."""
@@ -124,12 +137,24 @@ class Batch:
             "averaging": log.averaging,
             "duration": self.duration, "values": {name: own.tolist() for name, own in sorted(self.values.items())},
             "places": self.places.tolist(), "seeds": list(self.seeds), "columns": self.columns,
-            "observables": list(self.observables),
+            "observables": list(self.observables), **self._beside(),
         }  # fmt: skip
+
+    def _beside(self) -> dict[str, object]:
+        """What differs from a calibration's simulations, whose hash is older."""
+        found: dict[str, object] = {}
+        if self.effects:
+            found["effects"] = [[one.name, dict(one.shapes), own.tolist()] for one, own in self.effects]
+        if self.until is not None:
+            found["until"] = self.until
+        if self.discretisation is not None:
+            found["discretisation"] = self.discretisation.content()
+        return found
 
     def read(self) -> Floats:
         """(flag, place, window, observable), NaN where a window does not show one or a flag diverged."""
-        mesh = self.flag.mesh(self.columns)
+        own = self.discretisation
+        mesh = self.flag.mesh(self.columns) if own is None else own.mesh(self.flag.mesh(self.columns))
         positions = self._positions(mesh)
         found = np.full((len(self.seeds), self.places.shape[1], self.windows, len(self.observables)), np.nan)
         for place, flag in enumerate(np.moveaxis(positions, -1, 0)):
@@ -146,10 +171,11 @@ class Batch:
         """(frame, vertex, 3, flag) [m] of the film's frames."""
         system, state = assemble(self._scenes(mesh))
         system = replace(system, wind=self._wind(system))
+        system, state = apply([one.at(torch.from_numpy(own)) for one, own in self.effects], system, state)
         integrator = BackwardEuler(step=self.step, tolerance=_TOLERANCE)
         frames: list[Floats] = []
         with torch.no_grad():
-            for frame in range(round((SETTLE + self.duration) * RATE)):
+            for frame in range(round((SETTLE + self._simulated) * RATE)):
                 state = integrator.advance(system, state, 1 / RATE)
                 if frame >= round(SETTLE * RATE):
                     frames.append(state.position.double().numpy().copy())
@@ -188,6 +214,8 @@ class Batch:
     @property
     def step(self) -> float:
         """Of backward Euler, which damps as much by itself [s]."""
+        if self.discretisation is not None:
+            return self.discretisation.step
         least = float(self.values["damping"].min())
         return max((step for step in _STEPS if step <= least), default=min(_STEPS))
 

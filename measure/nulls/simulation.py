@@ -102,7 +102,7 @@ class NullBatch:
         diagonals = list(Diagonals)[rng.integers(2)]
         flat = grid(width=float(size[0]), height=float(size[1]), columns=columns, rows=rows, diagonals=diagonals)
         if rng.random() < 0.5:
-            flat = _irregular(flat, spacing, rng)
+            flat = irregular(flat, spacing, rng)
         flat = replace(flat, rest=flat.rest + low)
         held = (int(np.argmin(np.linalg.norm(flat.rest - rest[vertex], axis=1))) for vertex in self.specimen.held)
         return flat, tuple(held)
@@ -190,7 +190,7 @@ class NullBatch:
         return SplitEuler(base=base) if self.effects else base, step
 
 
-def _irregular(flat: Mesh, spacing: float, rng: np.random.Generator) -> Mesh:
+def irregular(flat: Mesh, spacing: float, rng: np.random.Generator) -> Mesh:
     """A grid's vertices, those inside moved by up to `_UNEVEN` of the spacing [m] along each axis, joined anew."""
     low, high = flat.rest.min(axis=0), flat.rest.max(axis=0)
     inside = ((flat.rest > low + spacing / 2) & (flat.rest < high - spacing / 2)).all(axis=1)

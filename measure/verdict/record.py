@@ -41,7 +41,8 @@ class Candidate:
         z: of the strength against the null distribution.
         p_value: of |z| for this candidate alone.
         p_family: of the largest |z| of all candidates.
-        gain: held-out improvement of the fit over the base model, in units of log likelihood; higher is better.
+        gain: held-out improvement of the fit over the base model, in units of log likelihood; higher is better. On
+            films the logarithm of the Bayes factor.
         gain_error: its standard error.
         behind: how many standard errors of the paired difference it lies behind the best candidate; 0 for the best.
         leftover: p-value of what the model with it still leaves unexplained.
@@ -50,6 +51,7 @@ class Candidate:
         heterogeneity: p-value of the same strength in all of these (Cochran's Q); None of a single recording, and
             of gusts.
         why_not: why it was not named; empty where it was.
+        probability: on films, given that one effect of the library is missing; None on trajectories.
     """
 
     effect: str
@@ -66,6 +68,7 @@ class Candidate:
     heterogeneity: float | None = None
     why_not: str = ""
     null: float = 0.0
+    probability: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

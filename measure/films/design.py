@@ -1,0 +1,116 @@
+"""What is simulated for a verdict on a film: the base model, each effect, and null experiments of other numerics.
+
+The base model's simulations are those of `flagdata calibrate`, so that a loop after a calibration makes none of them
+anew. Those with an effect are pairs of some of these: the same cloth, place and turbulence, so that the difference is
+the effect's and chaos's alone. Null experiments are of the same minutes of wind, of cloths and places over the same
+priors, each kind of numerics a batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.rng import child_seed, stream
+from measure.calibrate.design import Design
+from measure.calibrate.discretisation import Discretisation
+from measure.calibrate.prior import CLOTH, NUISANCES, Floats, draws
+from measure.calibrate.simulation import Batch
+from measure.films.library import Weighable
+from measure.observables.observable import WINDOW
+
+TOGETHER = 8
+"""Flags of a batch: eight take as long as one, and sixteen take 2.7 times as long."""
+PAIRS = 16
+"""Flags with each effect, for each recording."""
+LONGEST_PAIRS = 120.0
+"""s of all recordings together in which flags with an effect are simulated, a minute of each at most."""
+MINUTE = 60.0
+FEWEST_WINDOWS = 8
+
+
+def lasting(designs: Sequence[Design]) -> float:
+    """s of each recording in which flags with an effect are simulated: a whole number of windows."""
+    most = min(MINUTE, LONGEST_PAIRS / len(designs))
+    return WINDOW * max(FEWEST_WINDOWS, int(most / WINDOW + 1e-9))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Pairs:
+    """Flags with one effect, each a pair of one without.
+
+    Attributes:
+        effect: which.
+        places: (pair,) among the design's simulations.
+        strengths: (pair,) beyond the null value.
+        batches: of them, in that order.
+    """
+
+    effect: Weighable
+    places: NDArray[np.int64]
+    strengths: Floats
+    batches: tuple[Batch, ...]
+
+
+def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
+    """The flags of a recording's design that are simulated with an effect, those of its longest steps.
+
+    Args:
+        until: part of the film that is simulated [s].
+    """
+    own = design.batches()
+    size = len(own[0].seeds)
+    longest = max(batch.step for batch in own)
+    candidates = np.concatenate([
+        place * size + np.arange(len(batch.seeds)) for place, batch in enumerate(own) if batch.step == longest
+    ])  # fmt: skip
+    rng = stream(design.seed, "films", "pairs", effect.name)
+    count = min(PAIRS, len(candidates))
+    places = np.sort(rng.choice(candidates, count, replace=False))
+    shares = (rng.permutation(count) + rng.random(count)) / count
+    strengths = effect.prior.at(shares)
+    first, values = own[0], design.values()
+    seen = np.stack([values["azimuth"], values["elevation"], np.full(design.count, design.distance)], axis=1)
+    seeds = [seed for batch in own for seed in batch.seeds]
+    batches = []
+    for begin in range(0, count, TOGETHER):
+        part = places[begin : begin + TOGETHER]
+        batches.append(
+            replace(
+                first, values={name: values[name][part] for name in first.values}, places=seen[part][:, None],
+                seeds=tuple(seeds[place] for place in part), until=min(until, design.duration),
+                effects=((effect.column, strengths[begin : begin + TOGETHER]),),
+            )
+        )  # fmt: skip
+    return Pairs(effect=effect, places=places, strengths=strengths, batches=tuple(batches))
+
+
+def nulls(designs: Sequence[Design], *, kinds: int, seed: int) -> list[list[Batch]]:
+    """Null experiments: for each recording a batch a kind of numerics, of `TOGETHER` cloths each. A cloth is the same
+    in all recordings, its place and anemometer are not."""
+    count = kinds * TOGETHER
+    fabric = (*CLOTH, *(one for one in NUISANCES if one.name == "stretching"))
+    cloths = draws(fabric, count, seed=seed, name="null cloths")
+    found = []
+    for number, design in enumerate(designs):
+        own = dict(draws(design.quantities(), count, seed=child_seed(seed, "films", number), name="null places"))
+        own |= cloths
+        if design.log.distance is not None:
+            own["distance_constant"] = np.full(count, design.log.distance)
+        seen = np.stack([own["azimuth"], own["elevation"], np.full(count, design.distance)], axis=1)
+        first = design.batches()[0]
+        batches = []
+        for kind in range(kinds):
+            part = np.arange(kind, count, kinds)
+            batches.append(
+                replace(
+                    first, values={name: own[name][part] for name in first.values}, places=seen[part][:, None],
+                    seeds=tuple(child_seed(seed, "films", "null", int(place)) for place in part),
+                    discretisation=Discretisation.drawn(stream(seed, "films", "kind", kind)),
+                )
+            )  # fmt: skip
+        found.append(batches)
+    return found

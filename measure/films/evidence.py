@@ -1,0 +1,195 @@
+"""How well the base model and each effect predict what recordings show, averaged over all that is not known.
+
+    p(y | e) = ∫ p(θ) p(s) ∏_j p(place_j) t(y_j | θ, s, place_j)
+
+in normal scores, in which the prior is standard normal, by importance sampling from normal distributions about the
+posterior's modes (two, since a strength may have two signs), which Gauss–Newton steps find. Many experiments are
+evaluated at once: null experiments go the same way as the recordings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln, logsumexp, ndtr
+
+from measure.calibrate.emulator import BESIDE
+from measure.calibrate.prior import CLOTH, NUISANCES, Floats, Uncertain
+from measure.films.model import Model, log_t
+
+_STEPS = 14
+_DIFFERENCE = 1e-3
+_STARTS = (-0.7, 0.7)
+"""Normal scores of the strength at which a search begins."""
+_DRAWS = 256
+"""Importance samples of each experiment."""
+_WIDER = 1.3
+"""Standard deviations of what they are drawn from over those of the posterior's normal approximation."""
+_TAIL = 6.0
+"""Degrees of freedom of what they are drawn from."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sight:
+    """One recording's model and place.
+
+    Attributes:
+        model: of its summaries.
+        azimuth, elevation: their priors.
+    """
+
+    model: Model
+    azimuth: Uncertain
+    elevation: Uncertain
+
+    @property
+    def quantities(self) -> tuple[Uncertain, ...]:
+        """That are fitted for it alone."""
+        return (*(one for one in NUISANCES if one.name in BESIDE), self.azimuth, self.elevation)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """A model fitted to experiments.
+
+    Attributes:
+        evidence: (n,) logarithms of p(y | e).
+        misfit: (n,) squared standardised distance at the mode, that of the scores from their prior included.
+        scores: (n, draw, dimension) of importance samples.
+        weights: (n, draw) of them, of sum 1.
+    """
+
+    evidence: Floats
+    misfit: Floats
+    scores: Floats
+    weights: Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Hypothesis:
+    """The base model, or it with an effect, for several recordings of one cloth.
+
+    Attributes:
+        sights: of the recordings.
+        cloth: priors of area weight, bending and damping.
+        effect: the strength's prior; None for the base model.
+    """
+
+    sights: tuple[Sight, ...]
+    cloth: tuple[Uncertain, ...] = CLOTH
+    effect: Uncertain | None = None
+
+    @property
+    def dimension(self) -> int:
+        """Of the scores: cloth, then each recording's place, then the strength."""
+        return len(self.cloth) + sum(len(one.quantities) for one in self.sights) + (self.effect is not None)
+
+    def values(self, scores: Floats) -> tuple[dict[str, Floats], list[dict[str, Floats]], Floats | None]:
+        """Cloths, places of each recording, and strengths beyond null, at normal scores (n, dimension)."""
+        shares = iter(ndtr(scores).T)
+        cloth = {one.name: one.at(next(shares)) for one in self.cloth}
+        places = [{one.name: one.at(next(shares)) for one in sight.quantities} for sight in self.sights]
+        return cloth, places, None if self.effect is None else self.effect.at(next(shares))
+
+    def predicted(self, scores: Floats) -> list[tuple[Floats, Floats]]:
+        """For each recording means (n, k) and factors of the scale (n,)."""
+        cloth, places, strength = self.values(scores)
+        name = None if self.effect is None else self.effect.name
+        return [
+            sight.model.predict({**cloth, **place}, name, strength)
+            for sight, place in zip(self.sights, places, strict=True)
+        ]
+
+    def log_posterior(self, scores: Floats, observed: Sequence[Floats]) -> Floats:
+        """(n,) logarithm of likelihood times prior, of summaries (n, k) of each recording."""
+        total = -0.5 * np.square(scores).sum(axis=1) - 0.5 * scores.shape[1] * np.log(2 * np.pi)
+        for sight, y, (mean, stretch) in zip(self.sights, observed, self.predicted(scores), strict=True):
+            total += log_t(y - mean, sight.model.factor, stretch, sight.model.base.freedom)
+        return total
+
+    def fit(self, observed: Sequence[Floats], rng: np.random.Generator) -> Fit:
+        """Fit it to experiments, each by itself.
+
+        Args:
+            observed: for each recording (n, used summary).
+        """
+        n, d = len(observed[0]), self.dimension
+        modes = []
+        for begin in _STARTS if self.effect is not None else (0.0,):
+            at = np.zeros((n, d))
+            if self.effect is not None:
+                at[:, -1] = begin
+            modes.append(self._climbed(at, observed))
+        drawn, density = [], []
+        size = _DRAWS // len(modes)
+        for at, curvature, _ in modes:
+            root = np.linalg.cholesky(np.linalg.inv(curvature)) * _WIDER
+            heavy = np.sqrt(_TAIL / rng.chisquare(_TAIL, (n, size, 1)))
+            drawn.append(at[:, None] + np.einsum("nij,nmj->nmi", root, rng.standard_normal((n, size, d))) * heavy)
+        scores = np.concatenate(drawn, axis=1)
+        for at, curvature, _ in modes:
+            density.append(_log_t(scores - at[:, None], curvature / _WIDER**2))
+        proposal = logsumexp(density, axis=0) - np.log(len(modes))
+        flat = scores.reshape(-1, d)
+        repeated = [np.repeat(y, scores.shape[1], axis=0) for y in observed]
+        ratio = self.log_posterior(flat, repeated).reshape(n, -1) - proposal
+        evidence = logsumexp(ratio, axis=1) - np.log(scores.shape[1])
+        return Fit(
+            evidence=evidence, misfit=np.min([misfit for _, _, misfit in modes], axis=0), scores=scores,
+            weights=np.exp(ratio - logsumexp(ratio, axis=1, keepdims=True)),
+        )  # fmt: skip
+
+    def _climbed(self, at: Floats, observed: Sequence[Floats]) -> tuple[Floats, Floats, Floats]:
+        """A mode (n, d) from a start, the curvature there (n, d, d), and the misfit (n,)."""
+        value, damping = self.log_posterior(at, observed), np.full(len(at), 1.0)
+        for _ in range(_STEPS):
+            gradient, curvature = self._slope(at, observed)
+            step = np.linalg.solve(curvature * (1 + damping[:, None, None] * np.eye(at.shape[1])), gradient[..., None])
+            tried = np.clip(at + np.clip(step[..., 0], -2.0, 2.0), -5.0, 5.0)
+            found = self.log_posterior(tried, observed)
+            better = found > value
+            at, value = np.where(better[:, None], tried, at), np.where(better, found, value)
+            damping = np.where(better, damping / 5, damping * 4).clip(1e-6, 1e6)
+        _, curvature = self._slope(at, observed)
+        misfit = np.square(at).sum(axis=1)
+        for sight, y, (mean, stretch) in zip(self.sights, observed, self.predicted(at), strict=True):
+            misfit += np.square(np.linalg.solve(sight.model.factor, (y - mean).T)).sum(axis=0) / stretch
+        return at, curvature, misfit
+
+    def _slope(self, at: Floats, observed: Sequence[Floats]) -> tuple[Floats, Floats]:
+        """Gradient (n, d) and Gauss–Newton's curvature (n, d, d) of minus the logarithm, at scores (n, d)."""
+        n, d = at.shape
+        moved = at[:, None] + _DIFFERENCE * np.concatenate([np.zeros((1, d)), np.eye(d)])
+        gradient, curvature = -at.copy(), np.broadcast_to(np.eye(d), (n, d, d)).copy()
+        for sight, y, (mean, stretch) in zip(
+            self.sights, observed, self.predicted(moved.reshape(-1, d)), strict=True
+        ):  # fmt: skip
+            factor, freedom = sight.model.factor, sight.model.base.freedom
+            mean, stretch = mean.reshape(n, d + 1, -1), stretch.reshape(n, d + 1)[:, 0]
+            slopes = (mean[:, 1:] - mean[:, :1]) / _DIFFERENCE  # (n, d, k)
+            inverse = np.linalg.inv(factor)
+            white = (y - mean[:, 0]) @ inverse.T
+            slopes = slopes @ inverse.T
+            weight = (freedom + y.shape[1]) / (freedom * stretch + np.square(white).sum(axis=1))
+            gradient += weight[:, None] * np.einsum("ndk,nk->nd", slopes, white)
+            curvature += weight[:, None, None] * np.einsum("ndk,nek->nde", slopes, slopes)
+        return gradient, curvature
+
+
+def _log_t(offset: Floats, precision: Floats) -> Floats:
+    """(n, m) logarithm of multivariate t with `_TAIL` degrees of freedom, at offsets (n, m, d) from its middle."""
+    d = offset.shape[2]
+    distance = np.einsum("nmi,nij,nmj->nm", offset, precision, offset)
+    _, determinant = np.linalg.slogdet(precision)
+    constant = gammaln((_TAIL + d) / 2) - gammaln(_TAIL / 2) - 0.5 * d * np.log(_TAIL * np.pi)
+    return constant + 0.5 * determinant[:, None] - 0.5 * (_TAIL + d) * np.log1p(distance / _TAIL)
+
+
+def quantiles(values: Floats, weights: Floats, shares: Sequence[float]) -> list[float]:
+    """Of weighted draws (m,)."""
+    order = np.argsort(values)
+    total: NDArray[np.float64] = np.cumsum(weights[order])
+    return [float(values[order][min(int(np.searchsorted(total, share)), len(order) - 1)]) for share in shares]

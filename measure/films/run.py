@@ -1,0 +1,297 @@
+"""Closing the loop on films with logs of the wind: recordings in, a verdict in numbers and sentences out.
+
+    verdict = close_loop(recordings, Options(calibration=...), folder=..., workers=2)
+
+`recordings` are `measure.calibrate.observed.Observed`, of a film (`measure.calibrate.filmed`), of a table of
+observables, or built directly; `calibration` are the options of `flagdata calibrate`. Simulations are kept in the
+folder by their design: a run that was interrupted goes on, and a second one simulates nothing.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtr
+
+from flagdata.errors import InputError, UsageError
+from flagdata.provenance import code_version
+from measure.calibrate.calibrate import Options as Calibrating
+from measure.calibrate.observed import Observed
+from measure.calibrate.prior import CLOTH, Floats, Normal, Uncertain
+from measure.films.evidence import Fit, Sight, quantiles
+from measure.films.judge import Judged, judge
+from measure.films.library import Weighable, weighable
+from measure.films.simulations import Simulations, Stage, experiments, gathered, sight
+from measure.films.statement import stated
+from measure.films.unseen import compared
+from measure.films.weigh import Weighing, fitted, hypothesis, weigh
+from measure.nulls.conformal import GroupedConformal
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.record import Candidate, Conclusion, Estimate, NullTest, Parameter, Verdict
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """How the loop is closed.
+
+    Attributes:
+        calibration: the flag, its view, the number of simulations and the seed, as for `flagdata calibrate`.
+        area_weight: mean and standard deviation of a cloth that was weighed [kg/m²]; None for the prior of all cloths.
+        level: of the test.
+        kinds: of numerics among null experiments.
+        only: names of the effects that are weighed; empty for all.
+
+    Raises:
+        UsageError: a level or number that makes no sense, or an effect that is not weighed.
+    """
+
+    calibration: Calibrating
+    area_weight: tuple[float, float] | None = None
+    level: float = CRITERIA.level
+    kinds: int = CRITERIA.simulated_kinds
+    only: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not 0 < self.level < 1 or self.kinds < CRITERIA.fewest_kinds:
+            raise UsageError(
+                f"a level of {self.level!r} by {self.kinds} kinds of numerics", where="close-loop",
+                fix=f"give a level between 0 and 1, and {CRITERIA.fewest_kinds} kinds or more",
+            )  # fmt: skip
+        known = {one.name for one in weighable(self.calibration.flag)}
+        if unknown := set(self.only) - known:
+            raise UsageError(f"{', '.join(sorted(unknown))}: not weighed on films", fix=f"give {', '.join(known)}")
+
+    @property
+    def effects(self) -> tuple[Weighable, ...]:
+        """That are weighed."""
+        return tuple(one for one in weighable(self.calibration.flag) if not self.only or one.name in self.only)
+
+    @property
+    def cloth(self) -> tuple[Uncertain, ...]:
+        """Priors of area weight, bending and damping."""
+        if self.area_weight is None:
+            return CLOTH
+        mean, sigma = self.area_weight
+        first, *rest = CLOTH
+        return (replace(first, prior=Normal(mean=mean, sigma=sigma), source="stated"), *rest)
+
+    def recipe(self) -> dict[str, Any]:
+        """JSON values."""
+        return {
+            **self.calibration.recipe(), "area_weight": None if self.area_weight is None else list(self.area_weight),
+            "test_level": self.level, "kinds": self.kinds, "only": list(self.only),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outcome:
+    """All that a verdict was made from.
+
+    Attributes:
+        options, recordings, simulations, sights: what went in.
+        weighing: of the recordings.
+        nulls: of null experiments.
+        judged: what was decided.
+        base: the base model fitted to the recordings.
+        best: the most probable effect's model fitted to them; None where nothing was weighed.
+    """
+
+    options: Options
+    recordings: tuple[Observed, ...]
+    simulations: Simulations
+    sights: tuple[Sight, ...]
+    weighing: Weighing
+    nulls: Weighing
+    judged: Judged
+    base: Fit
+    best: tuple[Weighable, Fit] | None
+
+
+def close_loop(
+    recordings: Sequence[Observed],
+    options: Options,
+    *,
+    folder: Path,
+    workers: int = 1,
+    stage: Stage | None = None,
+) -> Verdict:
+    """The verdict on recordings of one flag.
+
+    Args:
+        recordings: each cut to what is to be used; in different winds they say most.
+        folder: where simulations are kept.
+        workers: processes that simulate.
+        stage: called with what is simulated, and how many flags of how many are done.
+
+    Raises:
+        InputError: recordings that too few simulations resemble.
+        CorruptError: a kept batch that cannot be read.
+    """
+    return verdict_of(solve(recordings, options, folder=folder, workers=workers, stage=stage))[0]
+
+
+def solve(
+    recordings: Sequence[Observed],
+    options: Options,
+    *,
+    folder: Path,
+    workers: int = 1,
+    stage: Stage | None = None,
+) -> Outcome:
+    """What a verdict is made from; as `close_loop`."""
+    if not recordings:
+        raise InputError("no recordings", where="close-loop", fix="give one or more")
+    effects, seed = options.effects, options.calibration.seed
+    simulations = gathered(
+        recordings, options.calibration, effects, kinds=options.kinds, folder=folder, workers=workers, stage=stage
+    )
+    sights = tuple(
+        sight(one, design, base, own)
+        for one, design, base, own in zip(
+            recordings, simulations.designs, simulations.base, simulations.pairs, strict=True
+        )
+    )
+    effects = tuple(one for one in effects if all(one.name in own.model.responses for own in sights))
+    null = experiments(sights, recordings, simulations.nulls, seed=seed)
+    whole = np.all([np.isfinite(own).all(axis=1) for own in null], axis=0)
+    kinds = simulations.kinds[whole]
+    seen: list[Floats] = [own.summary[None, one.model.used] for one, own in zip(sights, recordings, strict=True)]
+    stacked = [np.concatenate([own, rest[whole]]) for own, rest in zip(seen, null, strict=True)]
+    both = weigh(sights, stacked, effects, cloth=CLOTH, seed=seed)
+    own, nulls = both.rows(slice(0, 1)), both.rows(slice(1, None))
+    if options.area_weight is not None:  # null experiments were not weighed
+        own = weigh(sights, seen, effects, cloth=options.cloth, seed=seed)
+    judged = judge(own, nulls, kinds, level=options.level)
+    best = None
+    if effects:
+        first = effects[judged.confident[0]]
+        best = first, fitted(sights, seen, first, cloth=options.cloth, seed=seed)
+    return Outcome(
+        options=options, recordings=tuple(recordings), simulations=simulations, sights=sights, weighing=own,
+        nulls=nulls, judged=judged, base=fitted(sights, seen, None, cloth=options.cloth, seed=seed), best=best,
+    )  # fmt: skip
+
+
+def verdict_of(outcome: Outcome) -> tuple[Verdict, Outcome]:
+    """The verdict in numbers and sentences, and what it was made from."""
+    begun = time.monotonic()
+    judged, options = outcome.judged, outcome.options
+    effects = outcome.weighing.effects
+    named = tuple(dict.fromkeys(effects[place].column.effect for place in judged.named))
+    acting = outcome.best if judged.named else None
+    others = [place for place in np.argsort(-judged.probability) if place not in judged.confident]
+    comparisons = compared(
+        outcome.recordings, outcome.simulations, outcome.sights, effect=None if acting is None else acting[0],
+        control=effects[others[0]] if others and acting is not None else None, cloth=options.cloth,
+        seed=options.calibration.seed,
+    )  # fmt: skip
+    verdict = Verdict(
+        conclusion=judged.conclusion, named=named, words="", test=_test(outcome), parameters=_parameters(outcome),
+        ranking=_ranking(outcome), comparisons=comparisons, residuals=(),
+        provenance={"seed": options.calibration.seed, "code": code_version(), "options": options.recipe()},
+        findings=tuple((f.kind, f.what) for one in outcome.recordings for f in one.noticed()),
+    )  # fmt: skip
+    verdict = stated(verdict, outcome.recordings, judged, effects, weighed=options.area_weight is not None)
+    return replace(verdict, seconds=time.monotonic() - begun), outcome
+
+
+def _test(outcome: Outcome) -> NullTest:
+    judged, level = outcome.judged, outcome.options.level
+    conformal, statistic = judged.conformal, judged.statistic
+    low, high = conformal.interval(statistic, level=CRITERIA.interval)
+    return NullTest(
+        statistic=statistic, null=conformal.null.tolist(), kinds=conformal.count, level=level,
+        p_value=Estimate(value=judged.p_value, low=low, high=high, unit="1", level=CRITERIA.interval),
+        critical=conformal.critical(level), open=low <= level <= high,
+        settling=conformal.settling(statistic, at=level, level=CRITERIA.interval) if low <= level <= high else None,
+        nulls=f"{len(conformal.null)} flags of {conformal.count} meshes and methods in the same minutes of wind, over "
+        "the priors of cloth, view and anemometer",
+    )  # fmt: skip
+
+
+def _parameters(outcome: Outcome) -> tuple[Parameter, ...]:
+    """Area weight, bending and damping, of the base model and with the effect."""
+    options = outcome.options
+    before = _cloths(outcome, None, outcome.base)
+    after = None
+    if outcome.judged.named and outcome.best is not None:
+        after = _cloths(outcome, *outcome.best)
+    made = []
+    for place, one in enumerate(options.cloth):
+        later = None if after is None else after[place]
+        made.append(
+            Parameter(
+                name=one.name, before=before[place][0], after=None if later is None else later[0],
+                shift=None if later is None else (later[0].value - before[place][0].value) / before[place][1],
+            )
+        )  # fmt: skip
+    return tuple(made)
+
+
+def _cloths(outcome: Outcome, effect: Weighable | None, fit: Fit) -> list[tuple[Estimate, float]]:
+    own, _, _ = hypothesis(outcome.sights, effect, outcome.options.cloth).values(fit.scores[0])
+    return [_marginal(own[one.name], fit.weights[0], one.unit) for one in outcome.options.cloth]
+
+
+def _marginal(values: Floats, weights: Floats, unit: str) -> tuple[Estimate, float]:
+    tail = (1 - CRITERIA.interval) / 2
+    low, middle, high = quantiles(values, weights, (tail, 0.5, 1 - tail))
+    mean = float(weights @ values)
+    sigma = float(np.sqrt(weights @ np.square(values - mean)))
+    return Estimate(value=middle, low=low, high=high, unit=unit, level=CRITERIA.interval), sigma
+
+
+def strength_of(outcome: Outcome, effect: Weighable, fit: Fit) -> Estimate:
+    """A strength, its interval widened by what meshes and cloths do to effects, as on trajectories."""
+    strengths = effect.prior.at(ndtr(fit.scores[0][:, -1]))  # the last coordinate
+    found, _ = _marginal(strengths, fit.weights[0], effect.column.unit)
+    whole = np.exp(CRITERIA.reach * CRITERIA.strength_factor)
+    value, size, null = found.value, abs(found.value), effect.column.described.null
+    inward, outward = size * (1 - 1 / whole), size * (whole - 1)
+    below, above = (inward, outward) if value > 0 else (outward, inward)
+    return Estimate(
+        value=null + value, low=null + value - float(np.hypot(below, value - found.low)),
+        high=null + value + float(np.hypot(above, found.high - value)), unit=found.unit, level=found.level,
+    )  # fmt: skip
+
+
+def _ranking(outcome: Outcome) -> tuple[Candidate, ...]:
+    judged, own, nulls = outcome.judged, outcome.weighing, outcome.nulls
+    seen = [o.summary[None, one.model.used] for one, o in zip(outcome.sights, outcome.recordings, strict=True)]
+    if not own.effects:
+        return ()
+    largest = GroupedConformal(null=nulls.factors.max(axis=1), kinds=judged.conformal.kinds)
+    made = []
+    for place in np.argsort(-judged.probability).tolist():
+        effect = own.effects[place]
+        fit = fitted(outcome.sights, seen, effect, cloth=outcome.options.cloth, seed=outcome.options.calibration.seed)
+        factor = float(own.factors[0, place])
+        alone = GroupedConformal(null=nulls.factors[:, place], kinds=judged.conformal.kinds)
+        made.append(
+            Candidate(
+                effect=effect.column.effect, parameter=effect.column.parameter,
+                strength=strength_of(outcome, effect, fit), z=float("nan"), p_value=alone.p(factor),
+                p_family=largest.p(factor), gain=factor, gain_error=float("nan"), behind=0.0,
+                leftover=float(judged.leftover[place]), null=effect.column.described.null,
+                probability=float(judged.probability[place]), why_not=_why_not(outcome, place),
+            )
+        )  # fmt: skip
+    return tuple(made)
+
+
+def _why_not(outcome: Outcome, place: int) -> str:
+    judged = outcome.judged
+    if place in judged.named:
+        return ""
+    if judged.conclusion in (Conclusion.UNTESTED, Conclusion.SUFFICIENT):
+        return "the base model is not rejected"
+    if judged.leftover[place] <= outcome.options.level:
+        return "what remains with it is larger than in null experiments"
+    if place in judged.confident:
+        return "another effect explains more"
+    return f"its probability is {judged.probability[place]:.1g}, given that one effect is missing"

@@ -1,0 +1,170 @@
+"""All simulations of a verdict, gathered: each is read from the folder where it is kept, or made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.rng import stream
+from measure.calibrate.calibrate import Options as Calibrating
+from measure.calibrate.calibrate import with_errors
+from measure.calibrate.design import Design, read
+from measure.calibrate.observed import Observed
+from measure.calibrate.prior import Floats
+from measure.calibrate.summary import Projection, shown
+from measure.films.design import TOGETHER, Pairs, lasting, nulls, pairs
+from measure.films.evidence import Sight
+from measure.films.library import Weighable
+from measure.films.model import fit, responded
+
+Stage = Callable[[str, int, int], None]
+"""Called with what is simulated, how many flags of how many are done."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Simulations:
+    """Of all recordings.
+
+    Attributes:
+        designs: one a recording.
+        base: for each recording (simulation, window, observable) of the base model.
+        pairs: for each recording, of each effect: what was simulated, and (pair, window, observable) of it.
+        nulls: for each recording (null, window, observable).
+        kinds: (null,) of numerics.
+    """
+
+    designs: tuple[Design, ...]
+    base: tuple[Floats, ...]
+    pairs: tuple[tuple[tuple[Pairs, Floats], ...], ...]
+    nulls: tuple[Floats, ...]
+    kinds: NDArray[np.int64]
+
+
+def design_of(observed: Observed, options: Calibrating) -> Design:
+    """A calibration's design for a recording."""
+    return Design(
+        flag=options.flag, log=observed.log, duration=observed.duration, azimuth=options.azimuth,
+        elevation=options.elevation, count=options.simulations, seed=options.seed, distance=options.distance,
+    )  # fmt: skip
+
+
+def gathered(
+    recordings: Sequence[Observed],
+    options: Calibrating,
+    effects: Sequence[Weighable],
+    *,
+    kinds: int,
+    folder: Path,
+    workers: int = 1,
+    stage: Stage | None = None,
+) -> Simulations:
+    """All that a verdict needs.
+
+    Args:
+        effects: that are weighed.
+        kinds: of numerics among null experiments.
+        folder: where simulations are kept.
+
+    Raises:
+        CorruptError: a kept batch that cannot be read.
+    """
+    designs = [design_of(one, options) for one in recordings]
+    until = lasting(designs)
+    made = [[pairs(design, effect, until=until) for effect in effects] for design in designs]
+    null = nulls(designs, kinds=kinds, seed=options.seed)
+
+    def all_of(what: str, batches: list) -> Floats:
+        total, done = sum(len(batch.seeds) for batch in batches), 0
+
+        def advance(more: int) -> None:
+            nonlocal done
+            done += more
+            if stage is not None:
+                stage(what, done, total)
+
+        return read(batches, folder=folder, workers=workers, advance=advance)[:, 0]
+
+    base = [
+        all_of(f"base model, {one.name}", design.batches()) for one, design in zip(recordings, designs, strict=True)
+    ]
+    beside = []
+    for one, own in zip(recordings, made, strict=True):
+        found = all_of(f"effects, {one.name}", [batch for each in own for batch in each.batches])
+        ends = np.cumsum([len(each.places) for each in own])[:-1]
+        beside.append(tuple(zip(own, np.split(found, ends), strict=True)))
+    read_nulls = [all_of(f"nulls, {one.name}", own) for one, own in zip(recordings, null, strict=True)]
+    return Simulations(
+        designs=tuple(designs), base=tuple(base), pairs=tuple(beside), nulls=tuple(read_nulls),
+        kinds=np.repeat(np.arange(kinds), TOGETHER),
+    )  # fmt: skip
+
+
+def sight(
+    observed: Observed, design: Design, base: Floats, own: Sequence[tuple[Pairs, Floats]], *,
+    windows: slice | None = None,
+) -> Sight:  # fmt: skip
+    """A recording's model, fitted to simulations.
+
+    Args:
+        base: (simulation, window, observable) of the base model.
+        own: of each effect the pairs that were simulated, and their readings.
+        windows: a part of it, of which means alone are modelled; None for all of it.
+
+    Raises:
+        InputError: as `measure.films.model.fit`.
+    """
+    seen = observed if windows is None else part_of(observed, windows)
+    summaries = with_errors(seen, base if windows is None else base[:, windows], seed=design.seed)
+    changes = seen.projection.changes
+    model = fit(design.values(), summaries, np.tile(shown(seen.readings), 1 + changes), name=observed.name)
+    values, found = design.values(), {}
+    for made, readings in own:
+        count = readings.shape[1]
+        projection = Projection(speed=observed.speed[:count], changes=changes)
+        with_it = projection.of(readings).reshape(len(readings), -1)
+        without = projection.of(base[made.places][:, :count]).reshape(len(readings), -1)
+        paired = {name: v[made.places] for name, v in values.items()}
+        response = responded(model, made.effect, made.strengths, paired, with_it, without)
+        if response is not None:
+            found[made.effect.name] = response
+    return Sight(model=replace(model, responses=found), azimuth=design.azimuth, elevation=design.elevation)
+
+
+def part_of(observed: Observed, windows: slice) -> Observed:
+    """Some windows of a recording, of which means alone are taken."""
+    return _Part(
+        name=observed.name, source=observed.source, readings=observed.readings[windows], log=observed.log,
+        first=observed.first, sigma=observed.sigma, speeds=observed.speed[windows],
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Part(Observed):
+    """Windows of a recording, with the winds of these."""
+
+    speeds: Floats
+
+    @property
+    def speed(self) -> Floats:
+        return self.speeds
+
+    @property
+    def projection(self) -> Projection:
+        return Projection(speed=self.speeds, changes=False)
+
+
+def experiments(
+    sights: Sequence[Sight], recordings: Sequence[Observed], readings: Sequence[Floats], *, seed: int
+) -> list[Floats]:
+    """For each recording (n, used summary) of simulated experiments (n, window, observable), with pixels' errors; NaN
+    where one does not show all."""
+    found = []
+    for number, (one, own, seen) in enumerate(zip(sights, recordings, readings, strict=True)):
+        summaries = own.projection.of(seen)
+        summaries[:, 0] += own.sigma * stream(seed, "films", "pixels", number).standard_normal(summaries[:, 0].shape)
+        found.append(summaries.reshape(len(seen), -1)[:, one.model.used])
+    return found

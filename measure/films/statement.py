@@ -1,0 +1,82 @@
+"""The verdict on films in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from measure.calibrate.observed import Observed
+from measure.films.judge import CONFIDENCE, Judged
+from measure.films.library import Weighable
+from measure.nulls.conformal import kinds_needed
+from measure.report.sentences import listed, readable, titles
+from measure.verdict.quantity import number, probability, with_level
+from measure.verdict.record import Conclusion, Verdict
+
+
+def stated(
+    verdict: Verdict, recordings: Sequence[Observed], judged: Judged, effects: Sequence[Weighable], *, weighed: bool
+) -> Verdict:
+    """The verdict with all that it says in sentences.
+
+    Args:
+        weighed: whether the cloth's area weight was stated.
+    """
+    return replace(
+        verdict, words=sentence(verdict), assumptions=assumptions(recordings, weighed=weighed),
+        separating=separating(verdict),
+    )  # fmt: skip
+
+
+def sentence(verdict: Verdict) -> str:
+    """The verdict in words."""
+    test = f"p = {probability(verdict.test.p_value.value)} against nulls of {verdict.test.kinds} kinds of numerics"
+    if verdict.conclusion is Conclusion.UNTESTED:
+        return (
+            f"The base model cannot be tested at a level of {verdict.test.level:g} by nulls of {verdict.test.kinds} "
+            f"kinds of numerics; {kinds_needed(verdict.test.level)} are needed."
+        )
+    if verdict.conclusion is Conclusion.SUFFICIENT:
+        return f"The base model is not rejected ({test}): no effect is needed to explain what the film shows."
+    rejected = f"The base model is rejected ({test})."
+    if verdict.conclusion is Conclusion.OUTSIDE:
+        return f"{rejected} No effect of the library explains what it lacks."
+    found = " and ".join(
+        f"{c.effect}, {readable(c.parameter)} {with_level(c.strength)}" for c in verdict.ranking if not c.why_not
+    )  # fmt: skip
+    if verdict.conclusion is Conclusion.PARTLY:
+        return f"{rejected} It is partly explained by {found}; what remains is more than null experiments leave."
+    if verdict.conclusion is Conclusion.ONE_OF:
+        return (
+            f"{rejected} One of {listed(titles(verdict))} explains it, with {number(100 * CONFIDENCE)} % of the "
+            f"probability; the film does not decide which. They would be: {found}."
+        )
+    return f"{rejected} It lacks {found}. With that added, what remains is no more than null experiments leave."
+
+
+def separating(verdict: Verdict) -> str:
+    """What would decide between several effects."""
+    if verdict.conclusion is not Conclusion.ONE_OF:
+        return ""
+    return "a recording in another wind, or the cloth weighed (--area-weight)"
+
+
+def assumptions(recordings: Sequence[Observed], *, weighed: bool) -> tuple[str, ...]:
+    """What was taken as given."""
+    steady = all(one.steady for one in recordings) and len(recordings) == 1
+    made = [
+        "the flag has the stated size and is held as stated, and the camera is where it is stated to be",
+        "area weight, bending and damping are calibrated, so that what only changes them is not an effect",
+    ]
+    if not weighed:
+        made.append(
+            "the cloth was not weighed: its weight, the air's density and drag, holes in the cloth, wetness and the "
+            "anemometer's gain act alike in a film, so that none of them is found beyond what is assumed of them"
+        )
+    if steady:
+        made.append(
+            "the wind hardly changes: a film in one steady wind shows only the ratio of the air's pressure to the "
+            "cloth's weight"
+        )
+    made.append("a wind that is turned from its log looks like another place of the camera, and is not weighed")
+    return tuple(made)

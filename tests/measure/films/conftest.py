@@ -1,0 +1,99 @@
+"""Simulations that cost nothing: observables that are a known function of cloth, view and effects."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flagdata.rng import stream
+from measure.calibrate.calibrate import Options as Calibrating
+from measure.calibrate.design import Design
+from measure.calibrate.observed import Observed
+from measure.calibrate.prior import Floats, Normal, Uncertain
+from measure.calibrate.simulation import OBSERVED, Batch, Flag
+from measure.calibrate.wind import Log
+from measure.films import simulations
+from measure.films.library import weighable
+from measure.films.run import Options
+from measure.observables.observable import WINDOW
+
+NOISE = 0.02
+"""Scatter of a window's readings."""
+WINDOWS = 20
+EFFECTS = ("lift.coefficient", "shear.exponent", "tangential-linear-drag.coefficient")
+ALIKE = ("air-density.change", "power-law-drag.exponent")
+"""Two that act alike here."""
+AZIMUTH = Uncertain(
+    name="azimuth", unit="rad", prior=Normal(mean=math.radians(70), sigma=math.radians(7)), source="stated"
+)
+
+
+def readings(batch: Batch, *, foreign: float = 0.0) -> Floats:
+    """(flag, window, observable): droop follows weight over dynamic pressure, extension the damping, the third the
+    azimuth, the fourth bending; each effect moves others by a share of its strongest strength.
+
+    Args:
+        foreign: what something outside the library does.
+    """
+    values, seeds = batch.values, batch.seeds
+    starts = np.arange(batch.windows) * WINDOW
+    speed = batch.log.mean_speed(starts, starts + WINDOW)
+    out = np.empty((len(seeds), batch.windows, len(OBSERVED)))
+    for place, seed in enumerate(seeds):
+        out[place] = NOISE * stream(seed, "tests", "noise").standard_normal(out[place].shape)
+    ratio = values["area_weight"][:, None] / (values["gain"][:, None] * speed) ** 2
+    out[..., 0] += 0.3 * np.log(ratio / 0.006)
+    out[..., 1] += 0.9 + 0.1 * np.log(values["damping"] / 0.01)[:, None]
+    out[..., 2] += np.cos(batch.places[:, 0, 0])[:, None]
+    out[..., 3] += 0.1 * np.log(values["bending"] / 1e-4)[:, None]
+    patterns = {
+        "lift.coefficient": (4, 0.2), "shear.exponent": (5, 0.3), "tangential-linear-drag.coefficient": (6, 0.2),
+        "air-density.change": (7, 0.4), "power-law-drag.exponent": (7, 0.4),
+    }  # fmt: skip
+    most = {"lift.coefficient": 8.0, "tangential-linear-drag.coefficient": 1.5}
+    for column, strength in batch.effects:
+        which, size = patterns[column.name]
+        out[..., which] += size * (strength / most.get(column.name, 0.8))[:, None]
+    out[..., 4] += foreign
+    out[..., 5] -= foreign
+    return out
+
+
+@pytest.fixture
+def cheap(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Batches simulated as `readings`; how many flags were asked for, each time."""
+    asked: list[int] = []
+
+    def read(batches: Sequence[Batch], *, folder: Path, workers: int, advance: object) -> Floats:
+        asked.append(sum(len(batch.seeds) for batch in batches))
+        return np.concatenate([readings(batch) for batch in batches])[:, None]
+
+    monkeypatch.setattr(simulations, "read", read)
+    return asked
+
+
+def recording(*, mean: float, seed: int, foreign: float = 0.0, effects: Mapping[str, float] | None = None) -> Observed:
+    """One recording of a cloth that no simulation has, with effects of strengths beyond null."""
+    times = np.arange(-30.0, WINDOWS * WINDOW + 1)
+    log = Log(times=times, speed=mean * (1 + 0.15 * np.sin(times / 6.0)), distance=3.0)
+    design = Design(flag=options().calibration.flag, log=log, duration=WINDOWS * WINDOW, azimuth=AZIMUTH, seed=seed)
+    first = design.batches()[3]
+    known = {one.name: one.column for one in weighable(design.flag)}
+    one = Batch(
+        flag=design.flag, log=log, duration=design.duration, values={k: v[:1] for k, v in first.values.items()},
+        places=first.places[:1], seeds=(seed,),
+        effects=tuple((known[name], np.array([strength])) for name, strength in (effects or {}).items()),
+    )  # fmt: skip
+    return Observed(name=f"{mean:g} m/s", source="", readings=readings(one, foreign=foreign)[0], log=log)
+
+
+def options(
+    *, kinds: int = 40, only: tuple[str, ...] = EFFECTS, area_weight: tuple[float, float] | None = None
+) -> Options:
+    """Of a flag seen from a stated azimuth."""
+    calibration = Calibrating(flag=Flag(length=1.5, height=1.0), azimuth=AZIMUTH, simulations=64)
+    return Options(calibration=calibration, kinds=kinds, only=only, area_weight=area_weight)

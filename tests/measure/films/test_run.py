@@ -1,0 +1,84 @@
+"""A verdict on recordings of which simulations are a known function."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from flagdata.errors import UsageError
+from measure.calibrate.observed import Observed
+from measure.films.run import close_loop
+from measure.verdict.record import Conclusion
+from tests.measure.films.conftest import ALIKE, EFFECTS, options, recording
+
+DRAG = {"tangential-linear-drag.coefficient": 0.9}
+
+
+def both(effects: Mapping[str, float] | None = None, *, foreign: float = 0.0) -> list[Observed]:
+    """Two recordings of one cloth."""
+    return [recording(mean=mean, seed=5, foreign=foreign, effects=effects) for mean in (4.0, 6.5)]
+
+
+def test_a_flag_on_which_nothing_acts_needs_no_effect(cheap: list[int], tmp_path: Path) -> None:
+    verdict = close_loop(both(), options(), folder=tmp_path)
+    assert verdict.conclusion is Conclusion.SUFFICIENT
+    assert verdict.test.p_value.value > 0.05
+    assert verdict.named == ()
+
+
+def test_an_effect_is_named_with_its_strength(cheap: list[int], tmp_path: Path) -> None:
+    verdict = close_loop(both(DRAG), options(), folder=tmp_path)
+    assert verdict.conclusion is Conclusion.EFFECT
+    assert verdict.named == ("tangential-linear-drag",)
+    assert verdict.test.p_value.value == pytest.approx(1 / 41)
+    strength = verdict.ranking[0].strength
+    assert strength.low < 0.9 < strength.high
+    assert strength.value == pytest.approx(0.9, rel=0.15)
+    assert verdict.ranking[0].probability == pytest.approx(1.0, abs=0.05)
+
+
+def test_the_effect_lowers_the_error_on_unseen_windows_in_the_observables_own_unit(
+    cheap: list[int], tmp_path: Path
+) -> None:
+    verdict = close_loop(both(DRAG), options(), folder=tmp_path)
+    moved = {one.what: one for one in verdict.comparisons if one.what.startswith("amplitude-across")}
+    assert set(moved) == {"amplitude-across, other halves", "amplitude-across, recordings left out"}
+    for one in moved.values():
+        assert one.before.unit == "1"
+        assert one.before.value > 0.08  # of 0.12 that the effect makes
+        assert one.after.value < 0.03
+        assert one.reduction.low > 0
+        assert one.control is not None
+        assert one.control.value > 0.08
+
+
+def test_two_effects_that_act_alike_are_named_together(cheap: list[int], tmp_path: Path) -> None:
+    found = close_loop(both({"air-density.change": 0.5}), options(only=(*EFFECTS, *ALIKE)), folder=tmp_path)
+    assert found.conclusion is Conclusion.ONE_OF
+    assert set(found.named) == {"air-density", "power-law-drag"}
+
+
+def test_what_no_effect_explains_is_none_of_the_library(cheap: list[int], tmp_path: Path) -> None:
+    recordings = both(foreign=0.3)
+    found = close_loop(recordings, options(only=("tangential-linear-drag.coefficient",)), folder=tmp_path)
+    assert found.conclusion is Conclusion.OUTSIDE
+    assert found.named == ()
+
+
+def test_an_effect_beside_something_else_is_a_part(cheap: list[int], tmp_path: Path) -> None:
+    recordings = both(DRAG, foreign=0.3)
+    found = close_loop(recordings, options(only=("tangential-linear-drag.coefficient",)), folder=tmp_path)
+    assert found.conclusion is Conclusion.PARTLY
+    assert found.named == ("tangential-linear-drag",)
+
+
+def test_too_few_kinds_of_numerics_cannot_test(cheap: list[int], tmp_path: Path) -> None:
+    found = close_loop(both(), options(kinds=10), folder=tmp_path)
+    assert found.conclusion is Conclusion.UNTESTED
+
+
+def test_an_effect_that_is_not_weighed_is_refused() -> None:
+    with pytest.raises(UsageError, match="direction-change"):
+        options(only=("direction-change.angle",))
