@@ -84,6 +84,7 @@ UNITS: dict[str, Unit] = _Table(
         "s": Unit(si="s", scale=1.0),
         "ms": Unit(si="s", scale=1e-3),
         "Hz": Unit(si="Hz", scale=1.0),
+        "1/s": Unit(si="1/s", scale=1.0),
         "px": Unit(si="px", scale=1.0),
     }
 )
@@ -131,6 +132,7 @@ SPELLINGS: dict[str, str] = {
     "mb": "hPa", "mbar": "hPa", "millib": "hPa", "millibar": "hPa", "millibars": "hPa", "hpa": "hPa", "kpa": "kPa",
     "hectopascal": "hPa", "hectopascals": "hPa", "pa": "Pa", "pascal": "Pa", "pascals": "Pa", "inhg": "inHg",
     "percent": "%", "%rh": "%", "pct": "%", "%r.h.": "%", "rh%": "%", "hz": "Hz",
+    "s-1": "1/s", "persecond": "1/s",
 }  # fmt: skip
 
 

@@ -101,6 +101,24 @@ def log_clock(
         InputError: a log without wind speed or with too few samples.
         RefusedError: the logs are not of one wind, or no offset can be estimated, with the reason.
     """
+    model, line, whole = clock_between(
+        reference, sensor, names=names, search=search, generator=generator, progress=progress
+    )
+    return LogClock(model=model, line=line, whole=whole, gain=gain_of(reference, sensor, model))
+
+
+def clock_between(
+    reference: WindSeries,
+    sensor: WindSeries,
+    *,
+    names: tuple[str, str],
+    search: LagSearch,
+    generator: np.random.Generator,
+    progress: Progress | None = None,
+) -> tuple[ClockModel, ClockLine, LagEstimate]:
+    """Offset and drift of `sensor` against `reference`, with the line and the first hour that they are from; parameters
+    and refusals as for `log_clock`. The sensor may be anything that follows the wind.
+    """
     slow_is_sensor = _spacing(sensor) >= _spacing(reference)
     slow, fast = (sensor, reference) if slow_is_sensor else (reference, sensor)
     slow, fast = _alike(slow, fast)
@@ -117,8 +135,7 @@ def log_clock(
     crooked = [finding.what for finding in line.findings]
     if crooked:
         raise _refused(names, crooked)
-    model = _model(line, sensor, names=names, confidence=whole.confidence, turned=slow_is_sensor)
-    return LogClock(model=model, line=line, whole=whole, gain=gain_of(reference, sensor, model))
+    return _model(line, sensor, names=names, confidence=whole.confidence, turned=slow_is_sensor), line, whole
 
 
 def gain_of(reference: WindSeries, sensor: WindSeries, model: ClockModel) -> Gain:

@@ -16,7 +16,7 @@ from flagdata.rng import child_seed, stream
 from measure.calibrate import numerics
 from measure.calibrate.design import FAR, Design, simulated
 from measure.calibrate.emulator import SOUGHT, Emulator, Posterior, Sight, posterior, weighed
-from measure.calibrate.observed import Observed
+from measure.calibrate.observed import Observed, constant_wind
 from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Floats, Uncertain
 from measure.calibrate.simulation import OBSERVED, Flag
 from measure.calibrate.summary import shown
@@ -229,7 +229,13 @@ def calibrate(
         emulator = Emulator.fit(design.values(), summaries, used)
         made.append((one, design.values(), summaries, used))
         sights.append(
-            Sight(emulator=emulator, observed=one.summary, azimuth=options.azimuth, elevation=options.elevation)
+            Sight(
+                emulator=emulator,
+                observed=one.summary,
+                azimuth=options.azimuth,
+                elevation=options.elevation,
+                place=one.place,
+            )
         )
     found = posterior(sights, seed=options.seed)
     fitted = tuple(
@@ -334,9 +340,9 @@ def _fitted(
 
 
 def _findings(calibration: Calibration) -> tuple[Finding, ...]:
-    found: list[Finding] = []
+    found = list(constant_wind([one.observed for one in calibration.recordings]))
     for one in calibration.recordings:
-        found.extend(one.observed.noticed())
+        found.extend(one.observed.findings)
         if one.misfit < _UNUSUAL:
             what = (
                 f"no simulated flag looks like {one.observed.name} (p = {one.misfit:.1g}): something acts on it that "

@@ -37,6 +37,10 @@ if TYPE_CHECKING:
 )
 @click.option("--flag", type=click.IntRange(min=1), metavar="N",
               help="Which moving cloth; by default the one that moves most.")  # fmt: skip
+@click.option("--log", metavar="ARTIFACT", help="Log of the wind beside tables that have no wind column: a wind of "
+              "--lake, by its id.")  # fmt: skip
+@click.option("--offset", type=STATED, metavar="S±SIGMA", help="Seconds added to the tables' clock to reach the log's, "
+              "as in 0.3±0.1; by default estimated.")  # fmt: skip
 @click.option("--start", "first", type=DURATION, default="0s", metavar="TIME", help="Where to begin, as in 12s.")
 @click.option("--end", "last", type=DURATION, metavar="TIME", help="Where to end; two minutes are used at most.")
 @click.option("--simulations", type=click.IntRange(min=64), default=128, show_default=True,
@@ -64,6 +68,8 @@ def calibrate(
     distance: float,
     crop: str | None,
     flag: int | None,
+    log: str | None,
+    offset: Stated | None,
     first: float,
     last: float | None,
     simulations: int,
@@ -81,14 +87,16 @@ def calibrate(
     with intervals.
 
     RECORDING is a film with its log, a recording of --lake by its name or id. Or it is a table of observables, Parquet
-    or comma-separated, one row a window of 2.5 s, as flagdata observe --parquet writes: its columns are `time` [s],
-    `wind`, the logged mean over the window [m/s], and observables by their names (droop, extension, middle-speed,
-    frequency, bandwidth, amplitude-up, amplitude-across, area), each perhaps with NAME-sigma, what it is off by.
-    Several recordings are of one flag.
+    or text, as flagdata observe --parquet, another tracker or a paper gives it: rows against `time` [s], with `wind`, the
+    logged mean over the row [m/s], or with a --log of the lake; or rows against `wind` alone, each with its `duration`
+    [s]. Its other columns are observables by their names (droop, extension, middle-speed, frequency, bandwidth,
+    amplitude-up, amplitude-across, area), each perhaps with a unit, as in `droop [deg]`, and with NAME-sigma, what it
+    is off by. Several recordings are of one flag.
 
     \b
       flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --azimuth 70±7 --report page.html
       flagdata calibrate monday.csv tuesday.csv --flag-size 1.5x1.0 --lake lake --json
+      flagdata calibrate tracked.csv --log 3f2a9c --offset 0.3±0.1 --lake lake --flag-size 0.9x0.6
     """
     if flag_size is None:
         raise UsageError(
@@ -123,15 +131,26 @@ def calibrate(
     reading = Reading(crop=box_of(crop), flag=flag, aspect=size.aspect)
     with progress(None, label="observe", unit="window") as advance:
         read = [
-            of_source(source, size, reading, lake=lake, at=branch, first=first, last=last, advance=advance)
+            of_source(
+                source,
+                size,
+                reading,
+                lake=lake,
+                at=branch,
+                first=first,
+                last=last,
+                log=log,
+                offset=offset,
+                advance=advance,
+            )
             for source in sources
         ]
-    observed = [one for one, _ in read]
+    observed = [one for own, _ in read for one in own]
     with progress(simulations * len(observed), label="calibrate", unit="flag") as advance:
         found = calibrated(
             observed, options, folder=(cache or user_cache() / "calibrate"), workers=workers, advance=advance
         )
-    parents = tuple(recording for _, recording in read if recording is not None)
+    parents = tuple(dict.fromkeys(parent for _, parent in read if parent is not None))
     wanted = None if lake is None or read_only else artifact(found, reading, parents).id
     text = None if report is None else page(found, _provenance(found, wanted))
     new = lake is not None and wanted is not None and keep(lake, found, reading, parents, branch=branch)

@@ -26,6 +26,7 @@ from measure.calibrate.prior import (
     NUISANCES,
     Floats,
     Uncertain,
+    clock_error,
     draws,
 )
 from measure.calibrate.simulation import BATCH, Batch, Flag
@@ -62,7 +63,10 @@ class Design:
     def quantities(self) -> tuple[Uncertain, ...]:
         """What differs among the simulations."""
         known = self.log.distance is not None
-        return (*CLOTH, *NUISANCES, self.azimuth, self.elevation, *(() if known else (DISTANCE,)))
+        return (
+            *CLOTH, *NUISANCES, self.azimuth, self.elevation, *(() if known else (DISTANCE,)),
+            *((clock_error(self.log.clock),) if self.log.clock else ()),
+        )  # fmt: skip
 
     def values(self) -> Mapping[str, Floats]:
         """Name → (count,), by ascending damping, so that batches can be simulated in long steps."""

@@ -118,12 +118,14 @@ class Sight:
         emulator: of its simulations.
         observed: (k,) summaries.
         azimuth, elevation: their priors.
+        place: what recordings from one place with one anemometer share; None for a place of its own.
     """
 
     emulator: Emulator
     observed: Floats
     azimuth: Uncertain
     elevation: Uncertain
+    place: str | None = None
 
     @property
     def quantities(self) -> tuple[Uncertain, ...]:
@@ -147,7 +149,7 @@ class Posterior:
 def posterior(sights: Sequence[Sight], *, seed: int) -> Posterior:
     """Draws of the cloth that several recordings show, and of their places."""
     rng = stream(seed, "calibrate", "posterior")
-    dimension = len(CLOTH) + sum(len(sight.quantities) for sight in sights)
+    dimension = len(CLOTH) + sum(len(sights[first].quantities) for first in sorted(set(_places(sights))))
 
     def likelihood(scores: Floats) -> Floats:
         cloth, places = _values(scores[0], sights)
@@ -184,7 +186,15 @@ def _values(scores: Floats, sights: Sequence[Sight]) -> tuple[dict[str, Floats],
     """Cloths and each sight's places at normal scores (n, dimension)."""
     shares = iter(ndtr(scores).T)
     cloth = {quantity.name: quantity.at(next(shares)) for quantity in CLOTH}
-    return cloth, [{q.name: q.at(next(shares)) for q in sight.quantities} for sight in sights]
+    owners = _places(sights)
+    own = {first: {q.name: q.at(next(shares)) for q in sights[first].quantities} for first in sorted(set(owners))}
+    return cloth, [own[first] for first in owners]
+
+
+def _places(sights: Sequence[Sight]) -> list[int]:
+    """For each sight the first one of its place."""
+    names = [sight.place for sight in sights]
+    return [number if name is None else names.index(name) for number, name in enumerate(names)]
 
 
 def _left_out(x: Floats, y: Floats) -> Floats:

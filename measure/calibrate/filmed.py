@@ -11,8 +11,11 @@ import numpy as np
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.findings import Finding
 from flagdata.lake import Lake
-from measure.calibrate.observed import LONGEST, Observed, cut, first_part, of_table
+from flagdata.stated import Stated
+from measure.calibrate.beside import joined
+from measure.calibrate.observed import LONGEST, Observed, cut, first_part
 from measure.calibrate.simulation import OBSERVED
+from measure.calibrate.tables import of_table
 from measure.calibrate.wind import Log
 from measure.estimate.similarity import FlagSize
 from measure.estimate.source import Reading, Subject, subjects
@@ -27,16 +30,21 @@ _LOST = 0.2
 
 def of_source(
     source: str, size: FlagSize, reading: Reading, *, lake: Lake | None, at: str, first: float, last: float | None,
-    advance: Callable[[int], object] | None = None,
-) -> tuple[Observed, str | None]:  # fmt: skip
-    """What a table or a recording of a lake shows from `first` to `last` [s], and the recording's id.
+    log: str | None = None, offset: Stated | None = None, advance: Callable[[int], object] | None = None,
+) -> tuple[tuple[Observed, ...], str | None]:  # fmt: skip
+    """What a table or a recording of a lake shows from `first` to `last` [s], and the id of the recording, or of
+    the log beside a table.
+
+    A table of rows against wind is a recording a row, everything else is one.
 
     Args:
         reading: how a film is read.
-        advance: called with the number of its windows that were read.
+        log: a wind artifact of the lake, beside a table that has no wind of its own.
+        offset: seconds added to the table's clock to reach the log's; None to estimate it.
+        advance: called with the number of a film's windows that were read.
 
     Raises:
-        UsageError: a table, and a crop or a flag's number.
+        UsageError: a table, and a crop or a flag's number; a film, and a log or an offset; no lake that a log is in.
         InputError: a film without a log, or a log that does not cover it.
         FlagdataError: nothing of that name; a film in which no flag is found.
     """
@@ -46,10 +54,35 @@ def of_source(
             raise UsageError(
                 "a table of observables has no pictures", where="--crop, --flag", fix="give them to flagdata observe"
             )
-        return cut(of_table(path), first, last), None
+        return _of_table(path, size, lake=lake, at=at, first=first, last=last, log=log, offset=offset)
+    if log is not None or offset is not None:
+        raise UsageError(
+            "a recording has its log and its clock",
+            where="--log, --offset",
+            fix="give them with a table of observables",
+        )
     (subject,) = subjects(source, query=None, lake=lake, at=at, reading=reading)
     found = of_film(subject, size, first=first, last=last, advance=advance)
-    return found, None if subject.artifact is None else subject.artifact.id
+    return (found,), None if subject.artifact is None else subject.artifact.id
+
+
+def _of_table(
+    path: Path, size: FlagSize, *, lake: Lake | None, at: str, first: float, last: float | None, log: str | None,
+    offset: Stated | None,
+) -> tuple[tuple[Observed, ...], str | None]:  # fmt: skip
+    beside, parent = None, None
+    if log is not None:
+        if lake is None:
+            raise UsageError("a log of no lake", where="--log", fix="name the lake that it was ingested into: --lake")
+        beside, parent = joined(path, size, lake=lake, log=log, at=at, offset=offset)
+    elif offset is not None:
+        raise UsageError("an offset without a log", where="--offset", fix="name the log: --log ARTIFACT --lake LAKE")
+    found = of_table(path, size, beside=beside)
+    if found[0].place is None:
+        return tuple(cut(one, first, last) for one in found), parent
+    if first > 0 or last is not None:
+        raise UsageError("rows against wind have no times", where="--start, --end", fix="leave out the rows themselves")
+    return found, parent
 
 
 def of_film(

@@ -120,6 +120,13 @@ DISTANCE = Uncertain(
     name="distance_constant", unit="m", prior=_log(1.5, 5.0), source="cups (ISO 17713-1; WMO-No. 8)",
 )  # fmt: skip
 """Of an anemometer whose recipe states none."""
+
+
+def clock_error(sigma: float) -> Uncertain:
+    """Of a log's times beside the film's, their standard uncertainty [s]."""
+    return Uncertain(name="clock_error", unit="s", prior=Normal(mean=0.0, sigma=sigma), source="the log's clock model")
+
+
 DIRECTION = math.radians(5.0)
 """Standard uncertainty of the logged wind's direction: north, or a tunnel's axis, lined up by eye and compass [rad]."""
 AZIMUTH = Uncertain(

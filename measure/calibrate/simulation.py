@@ -97,7 +97,7 @@ class Batch:
         log: of the wind beside it.
         duration: of the film, a whole number of windows [s].
         values: name of a quantity → (flag,): area_weight, bending, damping, stretching, gain, scale, eddies,
-            distance_constant.
+            distance_constant; clock_error [s] where the log's clock is uncertain.
         places: azimuth, elevation [rad] and distance [m] of each place, (flag, place, 3).
         seeds: (flag,) of the start and the turbulence.
         columns: of the mesh.
@@ -204,8 +204,8 @@ class Batch:
         for place, seed in enumerate(self.seeds):
             own = {name: float(values[place]) for name, values in self.values.items()}
             velocity = blown(
-                self.log, before=SETTLE, duration=self.duration, distance=own["distance_constant"],
-                eddies=own["eddies"], seed=child_seed(seed, "calibrate", "wind"),
+                self.log.moved(own.get("clock_error", 0.0)), before=SETTLE, duration=self.duration,
+                distance=own["distance_constant"], eddies=own["eddies"], seed=child_seed(seed, "calibrate", "wind"),
             )  # fmt: skip
             made.append(velocity * own["gain"])
         samples = torch.as_tensor(np.stack(made, axis=-1), dtype=system.cloth.dtype)

@@ -12,7 +12,7 @@ is a turbulence of the same spectrum which that instrument logs as m. Each simul
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -53,6 +53,7 @@ class Log:
             where no direction was logged.
         distance: distance constant of the instrument [m]; None where it is not known, 0 for one without lag.
         averaging: what a sample is the mean over, with its time in the middle [s]; 0 for one instant.
+        clock: standard uncertainty of all its times together beside the film's [s].
 
     Raises:
         InputError: shapes that disagree, fewer than four samples, no wind.
@@ -63,6 +64,7 @@ class Log:
     turn: Floats | None = None
     distance: float | None = None
     averaging: float = 0.0
+    clock: float = 0.0
 
     def __post_init__(self) -> None:
         shapes = {self.times.shape, self.speed.shape} | (set() if self.turn is None else {self.turn.shape})
@@ -75,11 +77,12 @@ class Log:
             )  # fmt: skip
 
     @classmethod
-    def of(cls, series: WindSeries, *, start: int) -> Log:
+    def of(cls, series: WindSeries, *, start: int, clock: float = 0.0) -> Log:
         """The usable samples of a recording's log.
 
         Args:
             start: of the film [UTC ns].
+            clock: standard uncertainty of that [s].
 
         Raises:
             InputError: a log without speeds, or as for `Log`.
@@ -97,7 +100,7 @@ class Log:
         averaging = series.sensor.averaging or 0.0
         return cls(
             times=(series.time[usable] - start) / NANOSECONDS - averaging / 2, speed=speed[usable].copy(), turn=turn,
-            distance=series.sensor.distance_constant, averaging=averaging,
+            distance=series.sensor.distance_constant, averaging=averaging, clock=clock,
         )  # fmt: skip
 
     def cut(self, start: float, end: float) -> Log:
@@ -123,8 +126,12 @@ class Log:
             )  # fmt: skip
         return Log(
             times=inside - start, speed=self.speed[near], turn=None if self.turn is None else self.turn[near],
-            distance=self.distance, averaging=self.averaging,
+            distance=self.distance, averaging=self.averaging, clock=self.clock,
         )  # fmt: skip
+
+    def moved(self, late: float) -> Log:
+        """The same samples that much later [s]."""
+        return replace(self, times=self.times + late)
 
     def velocity(self, distance: float) -> Floats:
         """(n, 2) along the mean wind and to its left at `times`, a lag of that distance constant undone [m/s]."""

@@ -16,4 +16,5 @@ AMPLITUDE_UP = Observable(
     meaning="standard deviation of the middle of the free edge up and down in the picture, in flag heights",
     blind="motion along the line of sight; slower changes of the wind than a window",
     pixels=amplitude_up, geometry=amplitude_up, bias=-0.011, sigma=0.021,
+    counted_in="height", quadratic=True,
 )  # fmt: skip

@@ -21,4 +21,5 @@ BANDWIDTH = Observable(
     meaning="standard deviation of the frequencies in the same spectrum",
     blind="whether a broad spectrum is of many waves or of one whose frequency follows the wind",
     pixels=bandwidth, geometry=bandwidth, bias=0.395, sigma=0.237,
+    quadratic=True,
 )  # fmt: skip

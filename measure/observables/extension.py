@@ -18,4 +18,5 @@ EXTENSION = Observable(
     meaning="mean length of the line from the middle of the hoist to that of the free edge over the flag's length",
     blind="folds along the hoist, and turns of the flag towards the camera, which the view's azimuth has to explain",
     pixels=extension, geometry=extension, bias=-0.017, sigma=0.032,
+    counted_in="length",
 )  # fmt: skip

@@ -17,4 +17,5 @@ MIDDLE_SPEED = Observable(
     meaning="root mean square speed, in flag lengths, of the centroid of the middle third of the silhouette",
     blind="motion along the line of sight",
     pixels=middle_speed, geometry=middle_speed, bias=-0.026, sigma=0.020,
+    counted_in="length", quadratic=True,
 )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 from measure.observables.cloth import ClothWindow
 from measure.observables.film import FilmWindow
@@ -45,6 +45,9 @@ class Observable:
         sigma: robust deviation (1.48 times the median one) of the same for one window: what segmentation, blur and
             folds leave. Both are measured
             by `python -m tests.validation observables` (docs/results/validate-observables.md).
+        counted_in: what of the flag the value is counted in; None where it is of no length.
+        quadratic: whether it is a root mean square or a standard deviation, so that parts of a window are averaged in
+            squares.
     """
 
     name: str
@@ -55,6 +58,13 @@ class Observable:
     geometry: Callable[[ClothWindow], float]
     bias: float
     sigma: float
+    counted_in: Literal["length", "height"] | None = None
+    quadratic: bool = False
+
+    @property
+    def measured_in(self) -> str | None:
+        """The unit of the value before it is divided by the flag's length or height."""
+        return None if self.counted_in is None else "m" if self.unit == "1" else "m/s"
 
     def of_film(self, window: FilmWindow) -> Reading:
         """The reading of pixels, less the bias."""

@@ -32,4 +32,5 @@ OUTLINE_SPEED = Observable(
     "second, over the free edges' length (twice 85 % of the flag's length and its height)",
     blind="motion inside the outline and along the line of sight",
     pixels=outline_speed, geometry=outline_speed, bias=-0.023, sigma=0.022,
+    counted_in="length",
 )  # fmt: skip

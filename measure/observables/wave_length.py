@@ -20,4 +20,5 @@ WAVE_LENGTH = Observable(
     meaning="length, in flag lengths along the picture, of the wave that travels along the silhouette's middle line",
     blind="waves whose crests are along the line of sight's direction of motion, and standing waves",
     pixels=wave_length, geometry=wave_length, bias=-0.026, sigma=0.213,
+    counted_in="length",
 )  # fmt: skip

@@ -20,4 +20,5 @@ WAVE_SPEED = Observable(
     meaning="speed, in flag lengths a second, at which the silhouette's middle line travels away from the hoist",
     blind="waves whose crests are along the line of sight's direction of motion, and standing waves",
     pixels=wave_speed, geometry=wave_speed, bias=-0.011, sigma=0.378,
+    counted_in="length",
 )  # fmt: skip

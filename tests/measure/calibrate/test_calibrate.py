@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -133,3 +134,16 @@ def test_draws_fill_the_priors_range_evenly() -> None:
     shares = np.sort(np.log(found / low) / np.log(high / low))
     # A Sobol sequence of 64 has one point in each of 64 equal parts of every axis.
     assert np.array_equal(np.floor(shares * 64), np.arange(64))
+
+
+@pytest.mark.usefixtures("cheap")
+def test_rows_of_one_place_share_the_anemometers_gain() -> None:
+    """Three winds of one place tell the weight no better than the gain allows: to 6 %; of three places, to 6 %/√3."""
+    winds = (4.0, 6.0, 9.0)
+    apart = [_observed(0.17, speed=np.full(190, wind), seed=number) for number, wind in enumerate(winds)]
+    together = [replace(one, place="tunnel") for one in apart]
+    shared = _found(*together)
+    assert shared.weight.sigma / 0.17 == pytest.approx(0.06, rel=0.3)
+    assert _found(*apart).weight.sigma / shared.weight.sigma == pytest.approx(1 / math.sqrt(3), rel=0.25)
+    assert len({place[0].value for place in shared.places}) == 1
+    assert "constant-wind" not in {finding.kind for finding in shared.findings}

@@ -13,9 +13,14 @@ import pytest
 from click.testing import CliRunner, Result
 from pyarrow import csv
 
-from flagdata.lake import Lake
+from flagdata.lake import Artifact, Lake
+from flagdata.record import RecordWriter
+from flagdata.schema import Kind
+from flagdata.signals import Sensor, WindSeries
+from flagdata.timebase import NANOSECONDS
 from measure.calibrate.command import calibrate
-from measure.calibrate.observed import of_table
+from measure.calibrate.tables import of_table
+from measure.estimate.similarity import FlagSize
 from tests.measure.calibrate.conftest import readings
 
 
@@ -97,12 +102,12 @@ def test_a_table_of_other_columns_is_refused(tmp_path: Path, heading: str, said:
 
 
 def test_parquet_with_reasons_is_read_as_the_text(tmp_path: Path) -> None:
-    text = of_table(_table(tmp_path / "t.csv"))
+    (text,) = of_table(_table(tmp_path / "t.csv"), FlagSize(length=1.5, height=1.0))
     table = csv.read_csv(tmp_path / "t.csv")
     table = table.append_column("droop-reason", pa.array([None] * len(table), pa.string()))
     table = table.append_column("droop-sigma", pa.array([0.03] * len(table)))
     pq.write_table(table, tmp_path / "t.parquet")
-    found = of_table(tmp_path / "t.parquet")
+    (found,) = of_table(tmp_path / "t.parquet", FlagSize(length=1.5, height=1.0))
     assert found.sigma.tolist() == [0.03] + [0.0] * 7
     assert np.array_equal(found.readings, text.readings, equal_nan=True)
     assert np.array_equal(found.log.speed, text.log.speed)
@@ -114,3 +119,44 @@ def test_a_table_without_a_flag_is_refused(tmp_path: Path) -> None:
     path.write_text("\n".join(["time,wind,droop", *rows]) + "\n")
     done = _run(path, "--flag-size", "1.5x1.0")
     assert "no flag is found" in f"{done.exception}"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--log", "cup"), "name the lake that it was ingested into"),
+        (("--offset", "1±0.1"), "an offset without a log"),
+        (("--end", "30s"), "rows against wind have no times"),
+    ],
+)
+def test_options_that_a_table_has_no_use_for_are_refused(tmp_path: Path, arguments: tuple[str, ...], said: str) -> None:
+    path = tmp_path / "t.csv"
+    path.write_text("wind,duration,droop\n5.0,60,0.3\n")
+    done = _run(path, "--flag-size", "1.5x1.0", *arguments)
+    assert said in f"{done.exception}"
+
+
+@pytest.mark.usefixtures("cheap")
+def test_a_table_beside_a_log_of_the_lake_is_weighed_and_the_log_is_its_parent(tmp_path: Path) -> None:
+    seconds = np.arange(-30, 160, dtype=np.int64)
+    series = WindSeries(
+        time=(1_780_000_000 + seconds) * NANOSECONDS, flags=np.zeros(len(seconds), dtype=np.uint16),
+        channels={"wind_speed": 5.0 + 1.5 * np.sin(seconds / 4.0)}, sensor=Sensor(name="cup", distance_constant=0.0),
+    )  # fmt: skip
+    lake = Lake.create(tmp_path / "lake")
+    with lake.transaction("a log") as transaction:
+        staged = transaction.staging(".mcap")
+        with RecordWriter(staged, metadata={}) as writer:
+            writer.wind(series)
+        log = Artifact(kind=Kind.WIND, name="cup", object=transaction.put(staged), recipe={"of": "log"})
+        transaction.add(log)
+    path = _table(tmp_path / "t.csv")
+    rows = [line.split(",") for line in path.read_text().splitlines()]
+    without = [[rows[0][0], *rows[0][2:]], *([str(1_780_000_000 + float(row[0])), *row[2:]] for row in rows[1:])]
+    path.write_text("\n".join(",".join(row) for row in without) + "\n")
+    given = (path, "--flag-size", "1.5x1.0", "--lake", tmp_path / "lake", "--log", log.id, "--offset", "2.5±0.1")
+    done = _run(*given, "--json")
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    assert list(Lake.open(tmp_path / "lake").artifact(found["artifact"]).parents) == [log.id]
+    assert "+2.500 ± 0.100 s" in found["recordings"][0]["source"]

@@ -1,0 +1,212 @@
+"""Tables of observables, as trackers and papers give them: rows against time, or rows against wind.
+
+Rows against time, `time` and `wind` or a log beside it, are of one recording. A row is of the span about its time that
+reaches halfway to its neighbours, and no farther than half of the usual spacing; a window is the mean of the spans
+in it, by their lengths, and of root mean squares and deviations the quadratic mean. So rows may come faster or more
+slowly than windows, with gaps or without.
+
+Rows against wind, `wind` and `duration` or `count` (of windows), are each of a steady wind of its own: a recording a
+row, all from one place and with one anemometer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from flagdata.align.clock import ClockModel
+from flagdata.errors import InputError
+from flagdata.findings import Finding, Severity
+from flagdata.provenance import file_hash
+from flagdata.signals import Instants, WindSeries
+from flagdata.timebase import NANOSECONDS
+from measure.calibrate.columns import COUNT, DURATION, SIGMA, TIME, WIND, Columns, read
+from measure.calibrate.observed import LONGEST, Observed
+from measure.calibrate.prior import Floats
+from measure.calibrate.simulation import OBSERVED
+from measure.calibrate.summary import LEAST_WINDOWS
+from measure.calibrate.wind import Log
+from measure.estimate.similarity import FlagSize
+from measure.observables import OBSERVABLES
+from measure.observables.observable import WINDOW
+
+_FEWEST_ROWS = 4
+_COVERED = 0.5
+"""Share of a window that rows are to cover for it to have a value."""
+_SHORT = 1.0
+"""s of a row below which a spectrum or a deviation of its own span means nothing."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Beside:
+    """A log of the wind that was kept beside a table.
+
+    Attributes:
+        series: its samples, on its own clock.
+        clock: of the table, on the log's.
+    """
+
+    series: WindSeries
+    clock: ClockModel
+
+
+def of_table(path: Path, size: FlagSize, *, beside: Beside | None = None) -> tuple[Observed, ...]:
+    """The recordings of a table: one of rows against time, one a row of rows against wind.
+
+    Args:
+        size: of the flag.
+        beside: the log, where the table has no wind.
+
+    Raises:
+        InputError: no such table, or one whose columns do not say what its rows are of.
+        FlagdataError: a file that cannot be read.
+    """
+    table = read(path, size)
+    if not any(name in table for name in OBSERVED):
+        raise InputError("no column is an observable", where=table.where, fix=f"name one of {', '.join(OBSERVED)}")
+    if (WIND in table) == (beside is not None):
+        what = "no column wind" if beside is None else "a column wind, and a log of the wind beside it"
+        raise InputError(what, where=table.where, fix="give the wind in the table or as a log (--log), in one of them")
+    identity = file_hash(path)
+    if TIME not in table:
+        if beside is not None:
+            raise InputError("no column time to join the log by", where=table.where, fix="add the rows' times")
+        return _against_wind(table, name=path.stem, identity=identity)
+    if extra := [name for name in (DURATION, COUNT) if name in table]:
+        raise InputError(f"columns {TIME} and {', '.join(extra)}", where=table.where, fix="keep one of them")
+    return (_against_time(table, name=path.stem, identity=identity, beside=beside),)
+
+
+def rows_of(path: Path, size: FlagSize) -> Columns:
+    """A table of rows against time, for what joins it to a log.
+
+    Raises:
+        InputError: as `of_table`; no times, or times that do not ascend.
+    """
+    table = read(path, size)
+    if TIME not in table:
+        raise InputError("no column time", where=table.where, fix="add the rows' times")
+    spacing(table)
+    return table
+
+
+def spacing(table: Columns) -> float:
+    """The usual time between rows [s].
+
+    Raises:
+        InputError: fewer than four rows, or times that do not ascend.
+    """
+    times = table[TIME]
+    if len(times) < _FEWEST_ROWS:
+        raise InputError(f"{len(times)} rows", where=table.where, fix=f"give {_FEWEST_ROWS} or more")
+    steps = np.diff(times)
+    if not (steps > 0).all():
+        line = table.lines[int(np.flatnonzero(steps <= 0)[0]) + 1]
+        raise InputError(
+            "a time that is not after the one before it", where=f"{table.where}, line {line}", fix="sort the rows"
+        )
+    return float(np.median(steps))
+
+
+def instants(table: Columns) -> Instants:
+    """(n,) of its rows on its own clock [UTC ns]."""
+    return table.origin + np.round(table[TIME] * NANOSECONDS).astype(np.int64)
+
+
+def _against_time(table: Columns, *, name: str, identity: str, beside: Beside | None) -> Observed:
+    step = spacing(table)
+    times = table[TIME]
+    begin = float(times[0]) - step / 2
+    middles = (times[1:] + times[:-1]) / 2
+    low = np.maximum(times - step / 2, np.concatenate([[begin], middles]))
+    high = np.minimum(times + step / 2, np.concatenate([middles, [times[-1] + step / 2]]))
+    edges: Floats = begin + WINDOW * np.arange(int((float(high[-1]) - begin) / WINDOW + 1e-6) + 1, dtype=np.float64)
+    if beside is None:
+        there = np.isfinite(table[WIND])
+        if there.sum() < _FEWEST_ROWS:
+            raise InputError("no wind", where=table.where, fix="fill the column in, or give a log beside the table")
+        log = Log(times=times[there] - begin, speed=table[WIND][there], averaging=step)
+    else:
+        start = instants(table)[:1] - round(step / 2 * NANOSECONDS)
+        common, sigma = int(beside.clock.to_common(start)[0]), float(beside.clock.sigma(start)[0])
+        log = Log.of(beside.series, start=common, clock=sigma)
+        identity = f"{identity}, its clock {(common - int(start[0])) / NANOSECONDS:+.3f} ± {sigma:.3f} s"
+    readings = np.stack(
+        [_windows(edges, low, high, table.of(one), quadratic=OBSERVABLES[one].quadratic) for one in OBSERVED], axis=1
+    )
+    return Observed(
+        name=name, source=identity, readings=readings, log=log, findings=_of_rows(table, step),
+        sigma=np.array([_mean(table.of(f"{one}{SIGMA}")) for one in OBSERVED]),
+    )  # fmt: skip
+
+
+def _windows(edges: Floats, low: Floats, high: Floats, values: Floats, *, quadratic: bool) -> Floats:
+    """(window,) means of values (n,) that hold from `low` to `high`; NaN where they cover too little."""
+    there = np.isfinite(values)
+    if not there.any():
+        return np.full(len(edges) - 1, np.nan)
+    low, high, held = low[there], high[there], np.square(values[there]) if quadratic else values[there]
+    places = np.stack([low, high], axis=1).ravel()
+
+    def between(height: Floats) -> Floats:
+        """Integral of a step function over each window."""
+        total = np.concatenate([[0.0], np.cumsum(height * (high - low))])
+        return np.diff(np.interp(edges, places, np.repeat(total, 2)[1:-1]))
+
+    covered, found = between(np.ones_like(held)), between(held)
+    mean = np.where(covered >= _COVERED * WINDOW, found / np.maximum(covered, 1e-9), np.nan)
+    return np.sqrt(np.maximum(mean, 0.0)) if quadratic else mean
+
+
+def _against_wind(table: Columns, *, name: str, identity: str) -> tuple[Observed, ...]:
+    lengths = [one for one in (DURATION, COUNT) if one in table]
+    if len(lengths) != 1:
+        raise InputError(
+            f"rows against wind with {'both columns' if lengths else 'no column'} {DURATION} and {COUNT}",
+            where=table.where,
+            fix=f"give how long each was observed: {DURATION} [s], or {COUNT}, of windows of {WINDOW:g} s; rows "
+            f"against time have a column {TIME}",
+        )  # fmt: skip
+    windows = table[lengths[0]] / (WINDOW if lengths[0] == DURATION else 1.0)
+    for line, wind, own in zip(table.lines, table[WIND].tolist(), windows.tolist(), strict=True):
+        if not (wind > 0 and own >= LEAST_WINDOWS - 1e-6):
+            raise InputError(
+                f"a row of {own * WINDOW:g} s in a wind of {wind:g} m/s", where=f"{table.where}, line {line}",
+                fix=f"leave out rows in still air or of less than {LEAST_WINDOWS * WINDOW:g} s",
+            )  # fmt: skip
+    most = max(LEAST_WINDOWS, round(LONGEST / WINDOW) // len(windows))
+    recordings = []
+    for row, (line, wind) in enumerate(zip(table.lines, table[WIND].tolist(), strict=True)):
+        count = min(int(windows[row] + 1e-6), most)
+        steady: Floats = WINDOW * np.arange(count + 1, dtype=np.float64)
+        recordings.append(
+            Observed(
+                name=f"{name}, {wind:g} m/s (line {line})",
+                source=f"{identity}, line {line}",
+                place=identity,
+                readings=np.tile([table.of(one)[row] for one in OBSERVED], (count, 1)),
+                log=Log(times=steady, speed=np.full(len(steady), wind), distance=0.0, averaging=WINDOW),
+                sigma=np.array([_mean(table.of(f"{one}{SIGMA}")[row : row + 1]) for one in OBSERVED]),
+            )
+        )
+    return tuple(recordings)
+
+
+def _mean(values: Floats) -> float:
+    """Of what is stated; 0 where nothing is."""
+    return float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
+
+
+def _of_rows(table: Columns, step: float) -> tuple[Finding, ...]:
+    """What rows that come faster than a spectrum takes are reported with."""
+    own = [name for name in OBSERVED if name in table and (OBSERVABLES[name].quadratic or name == "frequency")]
+    if step >= _SHORT or not own:
+        return ()
+    what = (
+        f"its rows come every {step:.2g} s: their {', '.join(own)} are taken as of spans of {WINDOW:g} s, over which "
+        "the tracker has to have formed them"
+    )
+    fix = "check the length of the tracker's own window; give rows of 2.5 s where it is shorter"
+    return (Finding(kind="short-rows", severity=Severity.NOTE, what=what, fix=fix),)
