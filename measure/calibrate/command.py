@@ -90,8 +90,8 @@ def calibrate(
     or text, as flagdata observe --parquet, another tracker or a paper gives it: rows against `time` [s], with `wind`,
     the logged mean over the row [m/s], or with a --log of the lake; or rows against `wind` alone, each with its `duration`
     [s]. Its other columns are observables by their names (droop, extension, middle-speed, frequency, bandwidth,
-    amplitude-up, amplitude-across, area), each perhaps with a unit, as in `droop [deg]`, and with NAME-sigma, what it
-    is off by. Several recordings are of one flag.
+    amplitude-up, amplitude-across, area), each perhaps with a unit, as in `droop [deg]`, and with NAME-sigma, what
+    it is off by. Several recordings are of one flag.
 
     \b
       flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --azimuth 70±7 --report page.html
