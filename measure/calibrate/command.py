@@ -86,12 +86,12 @@ def calibrate(
     """Weigh the cloth of a flag from its motion and the log of the wind beside it: area weight, bending and damping,
     with intervals.
 
-    RECORDING is a film with its log, a recording of --lake by its name or id. Or it is a table of observables, Parquet
-    or text, as flagdata observe --parquet, another tracker or a paper gives it: rows against `time` [s], with `wind`,
-    the logged mean over the row [m/s], or with a --log of the lake; or rows against `wind` alone, each with its `duration`
-    [s]. Its other columns are observables by their names (droop, extension, middle-speed, frequency, bandwidth,
-    amplitude-up, amplitude-across, area), each perhaps with a unit, as in `droop [deg]`, and with NAME-sigma, what
-    it is off by. Several recordings are of one flag.
+    RECORDING is a film with its log, a recording of --lake by its name or id. Or it is a table of observables,
+    Parquet or text, as flagdata observe --parquet, another tracker or a paper gives it: rows against `time` [s], with
+    `wind`, the logged mean over the row [m/s], or with a --log of the lake; or rows against `wind` alone, each with
+    its `duration` [s]. Its other columns are observables by their names (droop, extension, middle-speed, frequency,
+    bandwidth, amplitude-up, amplitude-across, area), each perhaps with a unit, as in `droop [deg]`, and with
+    NAME-sigma, what it is off by. Several recordings are of one flag.
 
     \b
       flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --azimuth 70±7 --report page.html
