@@ -42,6 +42,10 @@ from flagdata.errors import UsageError
     help="MCAP of other programs: the topic of pictures or numbers to read. LeRobot: the camera.",
 )
 @click.option("--episode", type=click.IntRange(min=0), metavar="N", help="LeRobot: the episode to read.")
+@click.option("--join", is_flag=True,
+              help="Camera: the SOURCEs are the chapters of one recording, which become one artifact.")  # fmt: skip
+@click.option("--stream", type=click.IntRange(min=0), metavar="N",
+              help="Camera: number of the video stream in its file; the first by default.")  # fmt: skip
 @click.option("--zone", metavar="ZONE", help="Zone of a clock that does not say: Europe/Amsterdam, +02:00, UTC.")
 @click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")
 @click.option(
@@ -130,6 +134,8 @@ def ingest(
     name: str | None,
     topic: str | None,
     episode: int | None,
+    join: bool,
+    stream: int | None,
     zone: str | None,
     branch: str,
     start: str | None,
@@ -168,6 +174,7 @@ def ingest(
     \b
       flagdata ingest --sniff DSC_0001.MP4 TOA5_1234.dat
       flagdata ingest DSC_0001.MP4 --start 2026-05-01T12:00:00+02:00 --crop auto --crop-picture crop.png
+      flagdata ingest GH010042.MP4 GH020042.MP4 --join
       flagdata ingest mast.csv --sensor generic-csv --zone +01:00 --session field-1
       flagdata ingest station.csv --unit km/h --zone Europe/Amsterdam
       flagdata ingest arcsim-output --name reference-4ms
@@ -186,11 +193,17 @@ def ingest(
         raise UsageError("--crop-picture without --crop auto", where=str(crop_picture), fix="add --crop auto")
     if crop_picture is not None:
         check_file(crop_picture, command="ingest")
+    chapters: tuple[Path, ...] = ()
+    if join:
+        from flagdata.ingest.camera.joined import in_order
+
+        first, *later = in_order(sources)
+        sources, chapters = (first,), tuple(later)
     options = Given(
         camera=camera_options(
             start=start, zone_name=zone, true_fps=true_fps, sequence_fps=sequence_fps, rate=rate, crop=crop,
             exposure=exposure, archive=archive, topic=topic,
-            episode=episode,
+            episode=episode, stream=stream, chapters=chapters,
         ),
         wind=wind_options(
             format_name=None if format_name in ("camera", "meshes", "markers") else format_name, sensor=sensor,

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from flagdata.ingest.store import CameraIngest, Labels, WindIngest
 
 # Parameters that mean something for one kind of source only, those of --sniff, and those that name or time one source.
-CAMERA_ONLY = ("episode", "true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
+CAMERA_ONLY = ("episode", "join", "stream", "true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
 WIND_ONLY = (
     "sensor", "date", "date_order", "platform", "talker", "azimuth", "clock", "zero_offset", "encoding", "wind",
     "columns", "missing", "expect", "accept",
@@ -35,7 +35,7 @@ FOREIGN = {
 """What each kind of source is called, and the options that mean nothing for it."""
 SNIFF = (
     "sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture", "unit", "wind",
-    "date_order", "columns", "topic", "episode",
+    "date_order", "columns", "topic", "episode", "join", "stream",
 )  # fmt: skip
 ONE_SOURCE = ("start", "date", "name", "crop_picture", "accept")
 
@@ -73,6 +73,8 @@ def camera_options(
     archive: str,
     topic: str | None = None,
     episode: int | None = None,
+    stream: int | None = None,
+    chapters: tuple[Path, ...] = (),
 ) -> CameraIngest:
     """Those of a camera.
 
@@ -103,6 +105,8 @@ def camera_options(
         exposure=exposure,
         topic=topic,
         episode=episode,
+        stream=stream,
+        chapters=chapters,
     )
     return CameraIngest(camera=options, coding=Coding(archive))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,11 +20,13 @@ class Source:
     Attributes:
         hash: SHA-256 of the file, or of the names and hashes of the folder's files that are not hidden.
         state: name, size and time of change of each file.
+        others: each further file of the source, with its state.
     """
 
     path: Path
     hash: str
     state: tuple[tuple[str, int, int], ...]
+    others: tuple[tuple[Path, tuple[tuple[str, int, int], ...]], ...] = ()
 
     @property
     def name(self) -> str:
@@ -36,15 +38,22 @@ class Source:
         return Path(self.name).stem
 
     @classmethod
-    def of(cls, path: Path) -> Source:
+    def of(cls, path: Path, *, with_files: Sequence[Path] = ()) -> Source:
         """The source as it is now.
+
+        Args:
+            with_files: that make one source with it, in order; they are hashed with it.
 
         Raises:
             InputError: it cannot be read, or is empty, a pipe or a device.
         """
-        if not is_folder(path):
-            check_input(path)
+        for one in (path, *with_files):
+            if not is_folder(one):
+                check_input(one)
         before = _state(path)
+        if with_files:
+            parts = [file_hash(one) for one in (path, *with_files)]
+            return cls(path=path, hash=digest("\n".join(parts)), state=before, others=_states(with_files))
         if path.is_dir():
             parts = [f"{os.fsencode(name).hex()} {file_hash(path / name)}" for name, _, _ in before]
             return cls(path=path, hash=digest("\n".join(parts)), state=before)
@@ -59,10 +68,11 @@ class Source:
         Raises:
             ConflictError: something was.
         """
-        if _state(self.path) != self.state:
-            raise ConflictError(
-                "the file changed while it was read", where=str(self.path), fix="ingest it when it is complete"
-            )
+        for path, state in ((self.path, self.state), *self.others):
+            if _state(path) != state:
+                raise ConflictError(
+                    "the file changed while it was read", where=str(path), fix="ingest it when it is complete"
+                )
 
     def provenance(self, recipe: Mapping[str, Any]) -> dict[str, str]:
         """For the metadata of a record."""
@@ -73,6 +83,10 @@ class Source:
             "recipe_hash": recipe_hash(recipe),
             "code_version": code_version(),
         }
+
+
+def _states(paths: Sequence[Path]) -> tuple[tuple[Path, tuple[tuple[str, int, int], ...]], ...]:
+    return tuple((path, _state(path)) for path in paths)
 
 
 def _state(path: Path) -> tuple[tuple[str, int, int], ...]:

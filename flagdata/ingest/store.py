@@ -143,7 +143,7 @@ def ingest_camera(
     from flagdata.ingest.camera.chapters import chapter_of
 
     options, labels = options or CameraIngest(), labels or Labels()
-    source = Source.of(path)
+    source = Source.of(path, with_files=options.camera.chapters)
     recipe = options.recipe()
     chapter = chapter_of(path) if options.camera.start is None else None
     if chapter is not None and chapter.before:

@@ -21,6 +21,7 @@ from flagdata.ingest.camera.options import Limits
 
 _NEW = re.compile(r"(?P<head>G[HXLS])(?P<chapter>\d\d)(?P<file>\d{4}\.\w+)", re.IGNORECASE)
 _OLD = re.compile(r"(?P<head>GP)(?P<chapter>\d\d)(?P<file>\d{4}\.\w+)", re.IGNORECASE)
+_FIRST = re.compile(r"GOPR(?P<file>\d{4}\.\w+)", re.IGNORECASE)
 # The last number of a name, of as many digits as cameras count with.
 _COUNTED = re.compile(r"(?P<head>.*?)(?P<number>\d{3,})(?P<rest>\D*\.\w+)")
 
@@ -75,6 +76,17 @@ def _not_placed(what: str, *, fix: str) -> Chapter:
     return Chapter(
         before=0.0, finding=Finding(kind="chapter-not-placed", severity=Severity.WARNING, what=what, fix=fix)
     )
+
+
+def place_by_name(name: str) -> tuple[str, int] | None:
+    """The recording that a GoPro's file name states, and its chapter from 1 on; None for any other name."""
+    if match := _NEW.fullmatch(name):
+        return f"{match['head']}{match['file']}".upper(), int(match["chapter"])
+    if match := _OLD.fullmatch(name):
+        return match["file"].upper(), int(match["chapter"]) + 1
+    if match := _FIRST.fullmatch(name):
+        return match["file"].upper(), 1
+    return None
 
 
 def _earlier(name: str) -> list[str]:

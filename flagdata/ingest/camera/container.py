@@ -94,11 +94,17 @@ def _too_large(width: int, height: int, limits: Limits, path: Path) -> LimitErro
     )  # fmt: skip
 
 
-def open_container(path: Path, limits: Limits, *, threads: int) -> tuple[InputContainer, VideoStream]:
-    """The container and its first real video stream, ready to decode; nothing is decoded yet.
+def open_container(
+    path: Path, limits: Limits, *, threads: int, wanted: int | None = None
+) -> tuple[InputContainer, VideoStream]:
+    """The container and a video stream, ready to decode; nothing is decoded yet.
+
+    Args:
+        wanted: number of the stream in the file; None for the first real one.
 
     Raises:
         InputError: not a video.
+        UsageError: no such stream of pictures that can be decoded.
         LimitError: its header states frames beyond the limit.
     """
     with _reading(path):
@@ -114,7 +120,7 @@ def open_container(path: Path, limits: Limits, *, threads: int) -> tuple[InputCo
             metadata_errors="replace",
         )
     try:
-        stream = _choose(container, path)
+        stream = _choose(container, path, wanted)
         context = stream.codec_context
         if context.width * context.height > limits.frame_pixels:
             raise _too_large(context.width, context.height, limits, path)
@@ -128,8 +134,9 @@ def open_container(path: Path, limits: Limits, *, threads: int) -> tuple[InputCo
     return container, stream
 
 
-def _choose(container: InputContainer, path: Path) -> VideoStream:
-    """The first video stream that is not a cover picture and that there is a decoder for."""
+def _choose(container: InputContainer, path: Path, wanted: int | None) -> VideoStream:
+    """The stream of that number, or the first one, that is not a cover picture and that there is a decoder for."""
+    there = []
     for stream in container.streams.video:
         if stream.disposition & av.stream.Disposition.attached_pic:
             continue
@@ -138,7 +145,14 @@ def _choose(container: InputContainer, path: Path) -> VideoStream:
         except (RuntimeError, av.error.FFmpegError, AttributeError):
             continue
         if stream.codec_context is not None:
-            return stream
+            if wanted in (None, stream.index):
+                return stream
+            there.append(str(stream.index))
+    if there:
+        raise UsageError(
+            f"stream {wanted} is no video that can be decoded", where=str(path),
+            fix=f"give --stream {' or '.join(there)}",
+        )  # fmt: skip
     kinds = sorted({stream.type for stream in container.streams}) or ["nothing"]
     raise InputError(
         f"the file holds {', '.join(kinds)} but no video that can be decoded",
@@ -183,7 +197,7 @@ def survey_file(path: Path, options: CameraOptions) -> tuple[Timing, list[Findin
         TimeError: a raw stream and no `sequence_fps`.
         UsageError: `sequence_fps` for a file with stamps of its own.
     """
-    container, stream = open_container(path, options.limits, threads=1)
+    container, stream = open_container(path, options.limits, threads=1, wanted=options.stream)
     with container:
         tally = _tally(container, stream, path, options.limits)
         own = tally if container.format.name in UNTIMED else _before_restart(tally, tick=_tick(stream))

@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import dataclass, field
 from fractions import Fraction
+from pathlib import Path
 from typing import Any, Literal
 
 from flagdata.errors import UsageError
@@ -101,6 +102,8 @@ class CameraOptions:
         threads: decoder threads; frames do not depend on it.
         topic: of pictures in an MCAP file, or camera of a LeRobot data set; `None` takes the only one.
         episode: of a LeRobot data set; `None` takes the only one.
+        chapters: files of the same recording that follow the one that is opened, in order; see `joined`.
+        stream: number of the video stream in its container; `None` takes the first.
     """
 
     start: int | None = None
@@ -116,6 +119,8 @@ class CameraOptions:
     limits: Limits = field(default_factory=Limits)
     topic: str | None = None
     episode: int | None = None
+    chapters: tuple[Path, ...] = ()
+    stream: int | None = None
 
     def __post_init__(self) -> None:
         rates = {"true_fps": self.true_fps, "sequence_fps": self.sequence_fps}
@@ -139,11 +144,12 @@ class CameraOptions:
             zone(self.zone, where="zone")
 
     def recipe(self) -> dict[str, Any]:
-        """All options that shape the frames or their times, as JSON values; threads and limits do not.
+        """All options that shape the frames or their times, as JSON values; threads and limits do not. Chapters are a
+        part of the source.
 
-        A topic and an episode are there only where they are given, so that older artifacts keep their hash.
+        A topic, an episode and a stream are there only where they are given, so that older artifacts keep their hash.
         """
-        chosen = {"topic": self.topic, "episode": self.episode}
+        chosen = {"topic": self.topic, "episode": self.episode, "stream": self.stream}
         return {
             "start": self.start,
             "zone": self.zone,

@@ -18,6 +18,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.chapters import chapter_of
 from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
 from flagdata.ingest.camera.grid import EveryFrame, GridReport, Pick, Resampler, Sampler
+from flagdata.ingest.camera.joined import JoinedSource
 from flagdata.ingest.camera.motion import CropProposal, cut_off, propose
 from flagdata.ingest.camera.options import CameraOptions, CropBox, exact
 from flagdata.ingest.camera.sequence import SequenceSource
@@ -336,18 +337,33 @@ def open_source(path: Path, options: CameraOptions) -> Source:
     if is_lerobot(path):
         from flagdata.ingest.camera.lerobot import EpisodeSource
 
+        _no_stream(path, options)
         return EpisodeSource(path, options)
     if options.episode is not None:
         raise UsageError("an episode of what is no LeRobot data set", where=str(path), fix="leave out --episode")
     if is_mcap(path):
         from flagdata.ingest.mcap.pictures import TopicSource
 
+        _no_stream(path, options)
         return TopicSource(path, options)
     if options.topic is not None:
         raise UsageError(
             "a topic of what is no MCAP file or LeRobot data set", where=str(path), fix="leave out --topic"
         )
-    return SequenceSource(path, options) if is_folder(path) else VideoSource(path, options)
+    if options.chapters:
+        for chapter in (path, *options.chapters):
+            if is_folder(chapter):
+                raise UsageError("a folder is no chapter", where=str(chapter), fix="join video files")
+        return JoinedSource((path, *options.chapters), options)
+    if is_folder(path):
+        _no_stream(path, options)
+        return SequenceSource(path, options)
+    return VideoSource(path, options)
+
+
+def _no_stream(path: Path, options: CameraOptions) -> None:
+    if options.stream is not None:
+        raise UsageError("a stream of what is no video file", where=str(path), fix="leave out --stream")
 
 
 def propose_crop(path: Path | str, options: CameraOptions | None = None) -> CropProposal:

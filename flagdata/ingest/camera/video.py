@@ -15,6 +15,7 @@ from typing import cast
 import av
 import av.error
 import numpy as np
+from av.container import InputContainer
 from av.sidedata.sidedata import SideData, Type
 from av.video.stream import VideoStream
 
@@ -58,7 +59,7 @@ class VideoSource:
         check_file(path, options.limits)
         timing, surveyed = survey_file(path, options)
         self._timing = timing
-        self._container, self._stream = open_container(path, options.limits, threads=options.threads)
+        self._container, self._stream = self._open()
         try:
             self._decoded = self._decode()
             first = next(self._decoded, None)
@@ -72,6 +73,10 @@ class VideoSource:
         except BaseException:
             self._container.close()
             raise
+
+    def _open(self) -> tuple[InputContainer, VideoStream]:
+        options = self._options
+        return open_container(self._path, options.limits, threads=options.threads, wanted=options.stream)
 
     def _describe(self, first: av.VideoFrame, findings: list[Finding]) -> SourceFacts:
         context = self._stream.codec_context
@@ -128,6 +133,7 @@ class VideoSource:
                 Finding(
                     kind="more-video-streams", severity=Severity.NOTE,
                     what=f"stream {self._stream.index} was taken, {others} other video streams were not", count=others,
+                    fix="choose another with --stream",
                 )
             )  # fmt: skip
         return found
@@ -143,7 +149,7 @@ class VideoSource:
             yield Picture(stamp=stamp, luma=partial(luma_of_frame, frame, codec=codec))
 
     def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
-        container, stream = open_container(self._path, self._options.limits, threads=self._options.threads)
+        container, stream = self._open()
         with container:
             keys: set[int | None] = set()
             for run in range(runs):

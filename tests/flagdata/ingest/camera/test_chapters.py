@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from flagdata.errors import UsageError
 from flagdata.findings import Severity
 from flagdata.ingest.camera import CameraOptions, open_camera, probe
+from flagdata.ingest.camera.joined import in_order
 from flagdata.ingest.store import CameraIngest, ingest_camera
 from flagdata.lake import Lake
 from flagdata.timebase import parse
@@ -97,3 +99,55 @@ def test_a_chapter_is_another_artifact_once_the_earlier_one_is_there(tmp_path: P
     before = next(f for f in beside.report["findings"] if f["kind"] == "ingested-before")
     assert alone.artifact.id[:12] in before["what"]
     assert not ingest_camera(lake, second, options).created
+
+
+def joined(*paths: Path, true_fps: float | None = None) -> tuple[list[int], dict[str, Severity]]:
+    """Instants of the frames of chapters since the creation time [ns], and the findings about chapters."""
+    first, *later = in_order(paths)
+    with open_camera(first, CameraOptions(size=96, rate="native", chapters=tuple(later), true_fps=true_fps)) as stream:
+        times = [frame.time - TEN for frame in stream]
+        return times, {f.kind: f.severity for f in stream.findings if f.kind.startswith("chapter")}
+
+
+def test_chapters_are_joined_frame_after_frame_whatever_their_order(film: Callable[..., Path]) -> None:
+    third, first, second = (film(f"{n}0042.MP4", k) for n, k in (("GP02", 5), ("GOPR", 10), ("GP01", 20)))
+    times, found = joined(third, first, second)
+    assert times == [k * 40_000_000 for k in range(35)]
+    assert found == {"chapters-joined": Severity.NOTE}
+    # At twice the rate that the containers state.
+    assert joined(first, second, true_fps=50.0)[0] == [k * 20_000_000 for k in range(30)]
+
+
+def test_files_that_state_their_own_time_are_joined_where_one_begins_as_the_other_ends(
+    film: Callable[..., Path],
+) -> None:
+    first = film("DJI_0009.MP4", 100)
+    second = film("DJI_0010.MP4", 25, "2026-05-01T10:00:04.000000Z")
+    assert joined(second, first)[0] == [k * 40_000_000 for k in range(125)]
+    later = film("DJI_0011.MP4", 25, "2026-05-01T10:00:15.000000Z")
+    with pytest.raises(UsageError, match=r"begins 10\.0 s after the end of DJI_0010"):
+        joined(first, second, later)
+
+
+def test_what_is_not_one_recording_is_not_joined(film: Callable[..., Path], tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="not successive chapters"):
+        joined(film("GH010042.MP4", 10), film("GH030042.MP4", 10))
+    with pytest.raises(UsageError, match="not successive chapters"):
+        joined(film("GH010042.MP4", 10), film("GH020043.MP4", 10))
+    with pytest.raises(UsageError, match="one file to join"):
+        joined(tmp_path / "GH010042.MP4")
+    with pytest.raises(UsageError, match="named twice"):
+        joined(tmp_path / "GH010042.MP4", tmp_path / "GH010042.MP4")
+
+
+def test_joined_chapters_are_one_artifact_of_all_their_bytes(tmp_path: Path, film: Callable[..., Path]) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    first, second = film("GH010042.MP4", 10), film("GH020042.MP4", 15)
+    options = CameraIngest(camera=CameraOptions(size=96, chapters=(second,)))
+    made = ingest_camera(lake, first, options)
+    assert (made.artifact.frame_count, made.artifact.start) == (25, TEN)
+    assert made.artifact.end is not None
+    assert made.artifact.end - TEN == 24 * 40_000_000
+    assert not ingest_camera(lake, first, options).created
+    film("GH020042.MP4", 16)
+    assert ingest_camera(lake, first, options).artifact.frame_count == 26

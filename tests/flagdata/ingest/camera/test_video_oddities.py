@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flagdata.errors import InputError, NotFoundError, TimeError
+from flagdata.errors import InputError, NotFoundError, TimeError, UsageError
 from flagdata.findings import Severity
 from flagdata.ingest.camera import CameraOptions, CropBox, open_camera, probe
 from tests.flagdata.ingest.camera.reading import grid_of, read
@@ -232,3 +232,24 @@ def test_a_gifs_rate_is_known_to_half_a_hundredth(tmp_path: Path, plain: CameraO
         (finding,) = [f for f in film.findings if f.kind == "gif-delays"]
     # 1/35 ms and 1/25 ms
     assert "between 28.6 and 40 Hz" in finding.what
+
+
+def test_a_video_stream_is_chosen_by_its_number(tmp_path: Path) -> None:
+    path = tmp_path / "two.mkv"
+    with av.open(str(path), "w") as out:
+        streams = [out.add_stream("ffv1", rate=25) for _ in range(2)]
+        for stream, side in zip(streams, (64, 96), strict=True):
+            stream.width, stream.height, stream.pix_fmt = side, side, "gray"
+        for _ in range(5):
+            for stream in streams:
+                shown = np.full((stream.height, stream.width), 90, dtype=np.uint8)
+                out.mux(stream.encode(av.VideoFrame.from_ndarray(shown, format="gray")))
+        for stream in streams:
+            out.mux(stream.encode(None))
+    for number, side in ((None, 64), (0, 64), (1, 96)):
+        with open_camera(path, CameraOptions(start=0, stream=number)) as stream:
+            assert stream.info.width == side
+            assert "more-video-streams" in {finding.kind for finding in stream.findings}
+    with pytest.raises(UsageError, match="stream 2 is no video") as refused:
+        open_camera(path, CameraOptions(start=0, stream=2))
+    assert refused.value.fix == "give --stream 0 or 1"

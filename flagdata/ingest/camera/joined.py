@@ -1,0 +1,220 @@
+"""Chapters of one recording read as one file: the user names them, and each has to begin where the one before ends.
+
+What proves it is what the files state. Cameras that stamp all chapters with the creation time of the whole number them
+by their names (GoPro); others stamp each by itself (DJI, dash cameras), and its creation time is the end of the one
+before, to within the whole seconds in which both are stated.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from flagdata.errors import FlagdataError, InputError, TimeError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.chapters import place_by_name
+from flagdata.ingest.camera.options import CameraOptions
+from flagdata.ingest.camera.source import Picture, SourceFacts
+from flagdata.ingest.camera.stamps import Timing
+from flagdata.ingest.camera.video import VideoSource
+from flagdata.timebase import NANOSECONDS, parse
+
+_ROUNDED = 2.5
+"""s by which a chapter may seem to begin beside the end of the one before: both times are stated in whole seconds, and
+a camera takes up to a second to open a file."""
+_DIGITS = re.compile(r"(\d+)")
+
+
+def in_order(paths: Sequence[Path]) -> tuple[Path, ...]:
+    """Chapters by the numbers in their names.
+
+    Raises:
+        UsageError: fewer than two, or one of them twice.
+    """
+    if len(paths) < 2:
+        raise UsageError("one file to join", where="--join", fix="name all chapters of the recording")
+    if len({path.resolve() for path in paths}) < len(paths):
+        raise UsageError("a file is named twice", where="--join", fix="name each chapter once")
+
+    def key(path: Path) -> tuple[object, ...]:
+        named = place_by_name(path.name)
+        if named is not None:
+            return (0, named)
+        parts = _DIGITS.split(path.name)
+        return (1, *(int(part) if part.isdigit() else part.lower() for part in parts))
+
+    return tuple(sorted(paths, key=key))
+
+
+class JoinedSource:
+    """Several video files, one after another. See `Source`.
+
+    Stamps are counted in the first file's ticks from its first frame; a later chapter's first frame comes one period
+    after the last of the one before.
+
+    Args:
+        paths: in the order of the recording.
+
+    Raises:
+        UsageError: chapters of different recordings.
+        FlagdataError: as `VideoSource`.
+    """
+
+    def __init__(self, paths: Sequence[Path], options: CameraOptions) -> None:
+        self._paths = tuple(paths)
+        self._parts: list[VideoSource] = []
+        try:
+            for path in paths:
+                self._parts.append(VideoSource(path, options))
+            found = self._check()
+            self._offsets = _offsets([part.facts.timing for part in self._parts])
+            self.facts = self._describe(found)
+        except BaseException:
+            self.close()
+            raise
+
+    def _check(self) -> list[Finding]:
+        """Whether the files are of one recording, and what to report of it."""
+        first = self._parts[0].facts
+        for path, part in zip(self._paths[1:], self._parts[1:], strict=True):
+            own = part.facts
+            for what, mine, theirs in (
+                ("pictures", (own.width, own.height), (first.width, first.height)),
+                ("coding", own.codec, first.codec),
+                ("orientation", own.orientation, first.orientation),
+                ("unit of time stamps", own.timing.tick, first.timing.tick),
+            ):
+                if mine != theirs:
+                    raise UsageError(
+                        f"the {what} differ from those of {self._paths[0].name} ({mine} and "
+                        f"{theirs}): not one recording",
+                        where=str(path), fix="ingest it by itself, without --join",
+                    )  # fmt: skip
+        for path, part in zip(self._paths, self._parts, strict=True):
+            if part.facts.timing.end is not None or part.facts.sequence:
+                raise InputError(
+                    "its time stamps start anew within the file, or are none", where=str(path),
+                    fix="ingest the files by themselves, without --join",
+                )  # fmt: skip
+        return self._follow()
+
+    def _follow(self) -> list[Finding]:
+        """Refuse chapters that do not follow one another, by their creation times.
+
+        Returns:
+            what to report: how they were joined, and a warning where nothing states that they follow one another.
+        """
+        stated = [_created(part.facts) for part in self._parts]
+        lengths = [_length(part.facts.timing) for part in self._parts]
+        names = ", ".join(path.name for path in self._paths)
+        by_name = [place_by_name(path.name) for path in self._paths]
+        joined = Finding(
+            kind="chapters-joined", severity=Severity.NOTE, count=len(self._paths),
+            what=f"{len(self._paths)} chapters of one recording were joined: {names}",
+        )  # fmt: skip
+        known = [one for one in by_name if one is not None]
+        if len(known) == len(by_name) and len(set(stated)) == 1 and stated[0] is not None:
+            chapters = [chapter for _, chapter in known]
+            if len({recording for recording, _ in known}) > 1 or chapters != list(range(chapters[0], chapters[-1] + 1)):
+                raise UsageError(
+                    f"by their names {names} are not successive chapters of one recording", where="--join",
+                    fix="name all chapters of one recording, and no others",
+                )  # fmt: skip
+            return [joined]
+        for place, (before, after) in enumerate(pairwise(stated)):
+            if before is None or after is None:
+                continue
+            between = (after - before) / NANOSECONDS - float(lengths[place])
+            if abs(between) > _ROUNDED:
+                raise UsageError(
+                    f"by its creation time it begins {abs(between):.1f} s {'after' if between > 0 else 'before'} the "
+                    f"end of {self._paths[place].name}",
+                    where=str(self._paths[place + 1]), fix="name chapters that follow one another, or leave out --join",
+                )  # fmt: skip
+        if None in stated:
+            return [
+                joined,
+                Finding(
+                    kind="chapters-unproven", severity=Severity.WARNING,
+                    what="nothing in the files states that each begins where the one before ends; it is taken as given",
+                ),
+            ]  # fmt: skip
+        return [joined]
+
+    def _describe(self, found: list[Finding]) -> SourceFacts:
+        timings = [part.facts.timing for part in self._parts]
+        first, last = timings[0], timings[-1]
+        span = self._offsets[-1] + last.span
+        count = sum(timing.count for timing in timings)
+        variable = any(timing.variable for timing in timings)
+        steps = sum(timing.count - 1 for timing in timings)
+        mean = sum((timing.period * (timing.count - 1) for timing in timings), Fraction(0)) / max(1, steps)
+        timing = Timing(
+            tick=first.tick, origin=0, period=first.period if variable or not steps else mean, variable=variable,
+            span=span, shortest=min(one.shortest for one in timings), longest=max(one.longest for one in timings),
+            count=count, missing=sum(one.missing for one in timings),
+        )  # fmt: skip
+        findings = [
+            replace(one, where=path.name if one.where is None else f"{path.name}, {one.where}")
+            for path, part in zip(self._paths, self._parts, strict=True)
+            for one in part.facts.findings
+        ]
+        return replace(self._parts[0].facts, timing=timing, findings=(*found, *findings))
+
+    def pictures(self) -> Iterator[Picture]:
+        for part, offset in zip(self._parts, self._offsets, strict=True):
+            origin = part.facts.timing.origin
+            for picture in part.pictures():
+                yield _moved(picture, offset - origin)
+
+    def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
+        spans = np.array([max(1, part.facts.timing.count) for part in self._parts], dtype=np.float64)
+        ends = np.rint(np.cumsum(spans) / spans.sum() * runs).astype(int).tolist()
+        for part, offset, begin, end in zip(self._parts, self._offsets, [0, *ends], ends, strict=False):
+            if end > begin:
+                origin = part.facts.timing.origin
+                for run in part.samples(end - begin, count, stride):
+                    yield [_moved(picture, offset - origin) for picture in run]
+
+    def damage(self) -> list[Finding]:
+        return [
+            replace(one, where=path.name if one.where is None else f"{path.name}, {one.where}")
+            for path, part in zip(self._paths, self._parts, strict=True)
+            for one in part.damage()
+        ]
+
+    def close(self) -> None:
+        for part in self._parts:
+            part.close()
+
+
+def _offsets(timings: Sequence[Timing]) -> list[int]:
+    """Stamps of the chapters' first frames [ticks]."""
+    found = [0]
+    for timing in timings[:-1]:
+        found.append(found[-1] + timing.span + round(timing.period))
+    return found
+
+
+def _length(timing: Timing) -> Fraction:
+    """From the first frame to the end of the last [s]."""
+    return (timing.span + timing.period) * timing.tick
+
+
+def _created(facts: SourceFacts) -> int | None:
+    """Its creation time [UTC ns]; None where it states none that can be read."""
+    text = facts.metadata.get("creation_time")
+    try:
+        return None if text is None else parse(text)
+    except (TimeError, FlagdataError):
+        return None
+
+
+def _moved(picture: Picture, by: int) -> Picture:
+    return replace(picture, stamp=None if picture.stamp is None else picture.stamp + by)
