@@ -8,6 +8,7 @@ catalog that some version is made of stay.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
@@ -16,8 +17,8 @@ from flagdata.findings import Severity
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.lake import Lake
 from flagdata.lake.layout import check_own
-from flagdata.lake.leases import collecting, last_written, leases, unleased
-from flagdata.lake.marking import catalog_files, mark
+from flagdata.lake.leases import LeaseState, collecting, last_written, leases, unleased
+from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import Objects, bytes_at
 from flagdata.storage import Place
 
@@ -74,6 +75,17 @@ def _find(lake: Lake, grace: timedelta) -> Garbage:
             where=first.where,
             fix=first.fix or "run flagdata doctor",
         )
+    return unneeded(lake, marked, states, grace=grace)
+
+
+def unneeded(lake: Lake, marked: Marked, states: Sequence[LeaseState], *, grace: timedelta) -> Garbage:
+    """What neither a marked row nor a living transaction needs, and what is older than the grace period.
+
+    Args:
+        marked: what is needed, read after `states`.
+        states: of all staging folders. Without the lock of `collecting`, what a transaction has put since, and which is
+            not younger than the grace period, may be among what is found.
+    """
     held = {name for state in states if state.alive for name in state.objects}
     limit = (datetime.now(UTC) - grace).timestamp()
     objects = [o for o in lake.objects if o.name not in marked.objects and o.name not in held and o.modified <= limit]

@@ -178,7 +178,7 @@ def _sure() -> None:
 def leases(staging: Place) -> list[LeaseState]:
     """All staging folders, by name."""
     states = []
-    for folder in sorted(p for p in staging.iterdir() if _is_folder(p)):  # type: ignore[type-var]
+    for folder in sorted(path for path in _entries(staging) if _is_folder(path)):  # type: ignore[type-var]
         if folder.name == remote_leases.SHARED:
             continue
         leased = True
@@ -206,8 +206,16 @@ def unleased(staging: Place) -> list[Place]:
     """Entries of staging without a lease: folders without one, and files, by name."""
     own = (_COLLECT, _TURN, remote_leases.COLLECT, remote_leases.MADE)
     folders = [state.folder for state in leases(staging) if not state.leased]
-    files = [path for path in staging.iterdir() if not _is_folder(path) and path.name not in own]
+    files = [path for path in _entries(staging) if not _is_folder(path) and path.name not in own]
     return sorted([*folders, *files])  # type: ignore[type-var]
+
+
+def _entries(staging: Place) -> list[Place]:
+    """What lies in staging; nothing in a copy of a lake that came without its empty folders."""
+    try:
+        return list(staging.iterdir())
+    except FileNotFoundError:
+        return []
 
 
 def last_written(path: Place) -> float:

@@ -1,0 +1,122 @@
+"""`flagdata lineage|du|view`: looking at what is in a lake."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from datetime import timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from flagdata.commands.lake import size_text
+from flagdata.commands.upkeep import grace_option
+from flagdata.console import LocalPath, at_option, document, json_option, lake_option, say, table
+from flagdata.errors import UsageError
+from flagdata.printable import printable
+
+if TYPE_CHECKING:
+    from flagdata.lake.ancestry import Ancestry, Line, Relative
+
+
+@click.command()
+@click.argument("artifact")
+@click.option("--details", is_flag=True, help="With recipe hash, code version and seed.")
+@click.option("--all", "whole", is_flag=True, help="List all relatives, also where there are many of a kind.")
+@click.option("--picture", metavar="FILE", type=LocalPath(), help="Write the lineage as an SVG picture, too.")
+@at_option
+@json_option
+@lake_option
+def lineage(
+    artifact: str, details: bool, whole: bool, picture: Path | None, at: str | None, as_json: bool, lake_path: str
+) -> None:
+    """Show what an artifact was made from and what was made from it, over all generations."""
+    from flagdata.lake import Lake
+    from flagdata.lake.ancestry import ancestry
+    from flagdata.outputs import check_file, write_file
+    from flagdata.pages.lineage import MOST
+    from flagdata.pages.lineage import picture as drawn
+
+    if picture is not None:
+        if picture.suffix.lower() != ".svg":
+            raise UsageError("the picture of a lineage is an SVG file", where=str(picture), fix="name a .svg file")
+        check_file(picture)
+    lake = Lake.open(lake_path)
+    found = ancestry(lake.table(lake.view(at)), lake.identity(artifact, at=at))
+    most = None if whole else MOST
+    if picture is not None:
+        write_file(picture, drawn(found, details=details, most=most))
+    if as_json:
+        relatives = [asdict(relative) for relative in found.relatives.values()]
+        document("lineage", {"at": at, "artifact": found.artifact, "relatives": relatives, "edges": found.edges})
+        return
+    for text in _lines(found, details=details, most=most):
+        click.echo(text)
+
+
+def _lines(found: Ancestry, *, details: bool, most: int | None) -> Iterator[str]:
+    from flagdata.lake.ancestry import tree
+
+    yield _relative(found.relatives[found.artifact], details=details)
+    for title, up in (("made from", True), ("made into", False)):
+        lines = list(tree(found, up=up, most=most))
+        yield title if lines else f"{title} no other artifact"
+        yield from (_tree_line(line, details=details) for line in lines)
+
+
+def _tree_line(line: Line, *, details: bool) -> str:
+    outer, last = line.ends[:-1], line.ends[-1]
+    stem = "".join("   " if ended else "│  " for ended in outer) + ("└─ " if last else "├─ ")
+    first, *others = line.relatives
+    if others:
+        text = f"{len(line.relatives):,} × {first.kind or 'artifact'} (--all lists them)"
+    else:
+        text = _relative(first, details=details and not line.repeated)
+    return f"{stem}{text}{' (see above)' if line.repeated else ''}"
+
+
+def _relative(relative: Relative, *, details: bool) -> str:
+    from flagdata.pages.lineage import SHORT, detail_lines
+
+    if relative.kind is None:
+        return f"{relative.artifact[:SHORT]} not at this version"
+    more = f"  ({', '.join(detail_lines(relative))})" if details else ""
+    return f"{relative.artifact[:SHORT]} {relative.kind} {printable(relative.name or '')}{more}"
+
+
+@click.command()
+@grace_option
+@at_option
+@json_option
+@lake_option
+def du(grace: timedelta, at: str | None, as_json: bool, lake_path: str) -> None:
+    """Show what takes space: by kind, by branch and tag, shared or own, and what gc would free.
+
+    With --at the kinds are those of that version alone. A version's own bytes are those that no other branch or tag
+    shows.
+    """
+    from flagdata.lake import Lake
+    from flagdata.lake.usage import usage
+
+    found = usage(Lake.open(lake_path), at=at, grace=grace)
+    if as_json:
+        versions = [{**asdict(version), "shared": version.share.size - version.own} for version in found.versions]
+        shares = {name: asdict(share) for name, share in found.kinds.items()}
+        document("du", {"at": at, "total": found.total, "kinds": shares, "versions": versions, "gc_frees": found.freed})
+        return
+    kinds = [(name, one.artifacts or "", one.objects or "", size_text(one.size)) for name, one in found.kinds.items()]
+    whole = sum(one.size for one in found.kinds.values())
+    table(("kind", "artifacts", "objects", "size"), [*kinds, ("total", "", "", size_text(whole))])
+    click.echo()
+    table(
+        ("shown by", "", "artifacts", "size", "own", "shared", "lost"),
+        [
+            (
+                version.name, version.noun, version.share.artifacts, size_text(version.share.size),
+                size_text(version.own), size_text(version.share.size - version.own), version.lost or "",
+            )
+            for version in found.versions
+        ],
+    )  # fmt: skip
+    say(f"{size_text(found.total)} in all; gc would free {size_text(found.freed)} (flagdata gc --dry-run lists it)")

@@ -1,0 +1,200 @@
+"""A graph of boxes in columns, drawn as SVG: the lineage of an artifact, what it was made from on its left.
+
+Boxes of a column are ordered by where their neighbours are (the barycentre method of Sugiyama, Tagawa and Toda, 1981);
+a line that passes a column gets a place in it, so that it crosses no box. Colours are attributes, which a page's style
+overrides by the classes.
+"""
+
+from __future__ import annotations
+
+import html
+import unicodedata
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from flagdata.printable import printable
+
+WIDTH = 184  # px of a box
+_GAP_X, _GAP_Y = 56, 14
+_PASS = 8  # px that a passing line takes
+_MARGIN = 12
+_FIRST, _NEXT = 32, 14  # px of a box's height that its title takes, and each line
+_SWEEPS = 4
+_TITLE_CELLS, _LINE_CELLS = 19, 27  # of a monospaced guess at a proportional font: what fits a box
+INK, QUIET, RULE, PAPER, MARKED = "#1c2326", "#56646b", "#9aa7ad", "#ffffff", "#1f6286"
+COLOURS = {
+    "camera": "#b5541c", "wind": "#1f6fa8", "recording": "#3b7d6b", "clip": "#7aa69a", "meshes": "#7b5ea7",
+    "markers": "#a0568c", "model": "#8a7a2d", "network": "#555fb0", "measurement": "#a8402c",
+}  # fmt: skip
+"""Colour of a box's edge, by kind."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box:
+    """One node.
+
+    Attributes:
+        key: names it in the edges.
+        column: place from the left, any integers.
+        kind: chooses its colour; `None` for an unknown one.
+        title, lines: texts in it, plain, cut where they do not fit.
+        about: shown when pointed at.
+        link: where a click leads.
+        marked: drawn as the one that the graph is about.
+    """
+
+    key: str
+    column: int
+    kind: str | None
+    title: str
+    lines: Sequence[str]
+    about: str
+    link: str | None = None
+    marked: bool = False
+
+
+@dataclass(kw_only=True)
+class _Place:
+    """A box, or the passage of a line, in a column."""
+
+    key: str
+    height: int
+    y: float = 0.0
+
+
+def svg(boxes: Sequence[Box], edges: Collection[tuple[str, str]], *, title: str) -> str:
+    """The drawing as an SVG document, which can also be a part of a page.
+
+    Args:
+        edges: (from, to) by key, each from a column to one further right; others are left out.
+        title: what it shows, for those who do not see it.
+    """
+    tall = _FIRST + _NEXT * max(len(box.lines) for box in boxes)
+    columns, ways = _placed(boxes, edges, tall)
+    height = max(_stacked(column) for column in columns)
+    _order(columns, ways)
+    for column in columns:
+        y = _MARGIN + (height - _stacked(column)) / 2
+        for place in column:
+            place.y = y + place.height / 2
+            y += place.height + _GAP_Y
+    at = {place.key: (number, place) for number, column in enumerate(columns) for place in column}
+    whole = 2 * _MARGIN + len(columns) * WIDTH + (len(columns) - 1) * _GAP_X, 2 * _MARGIN + height
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="graph" role="img" width="{whole[0]:.0f}" '
+        f'height="{whole[1]:.0f}" viewBox="0 0 {whole[0]:.0f} {whole[1]:.0f}" '
+        f'font-family="system-ui, sans-serif" font-size="13">'
+    )
+    parts = [
+        head,
+        f"<title>{_text(title)}</title>",
+        f'<rect class="paper" width="100%" height="100%" fill="{PAPER}"/>',
+        *(_line([at[key] for key in way]) for way in ways),
+        *(_box(box, *at[box.key]) for box in boxes),
+        "</svg>",
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def _placed(
+    boxes: Sequence[Box], edges: Collection[tuple[str, str]], tall: int
+) -> tuple[list[list[_Place]], list[tuple[str, ...]]]:
+    """The places of each column, and the keys that each line leads through."""
+    numbers = {column: number for number, column in enumerate(sorted({box.column for box in boxes}))}
+    columns: list[list[_Place]] = [[] for _ in numbers]
+    where = {box.key: numbers[box.column] for box in boxes}
+    for box in boxes:
+        columns[where[box.key]].append(_Place(key=box.key, height=tall))
+    ways: list[tuple[str, ...]] = []
+    for begin, end in edges:
+        first, last = where[begin], where[end]
+        if first >= last:
+            continue
+        between = [f"{begin} {end} {number}" for number in range(first + 1, last)]
+        for number, key in enumerate(between, first + 1):
+            columns[number].append(_Place(key=key, height=_PASS))
+        ways.append((begin, *between, end))
+    return columns, ways
+
+
+def _order(columns: Sequence[list[_Place]], ways: Sequence[Sequence[str]]) -> None:
+    """Sort each column by the mean place of its neighbours, from left to right and back, a few times."""
+    before: dict[str, list[str]] = {}
+    behind: dict[str, list[str]] = {}
+    for way in ways:
+        for one, other in pairwise(way):
+            before.setdefault(other, []).append(one)
+            behind.setdefault(one, []).append(other)
+    for sweep in range(_SWEEPS):
+        forth = sweep % 2 == 0
+        neighbours = before if forth else behind
+        for column in columns if forth else reversed(columns):
+            rank = {place.key: number / max(1, len(c) - 1) for c in columns for number, place in enumerate(c)}
+            column.sort(key=lambda place: _mean([rank[key] for key in neighbours.get(place.key, [place.key])]))
+
+
+def _mean(values: Sequence[float]) -> float:
+    return sum(values) / len(values)
+
+
+def _stacked(column: Sequence[_Place]) -> float:
+    return sum(place.height for place in column) + _GAP_Y * (len(column) - 1)
+
+
+def _left(column: int) -> float:
+    return _MARGIN + column * (WIDTH + _GAP_X)
+
+
+def _line(way: Sequence[tuple[int, _Place]]) -> str:
+    (number, place), *others = way
+    path = [f"M{_left(number) + WIDTH:.0f} {place.y:.1f}"]
+    x, y = _left(number) + WIDTH, place.y
+    for number, place in others:
+        left = _left(number)
+        middle = (x + left) / 2
+        path.append(f"C{middle:.1f} {y:.1f} {middle:.1f} {place.y:.1f} {left:.0f} {place.y:.1f}")
+        x, y = left, place.y
+        if place.height == _PASS:
+            x = left + WIDTH
+            path.append(f"H{x:.0f}")
+    return f'<path class="edge" d="{" ".join(path)}" fill="none" stroke="{RULE}" stroke-width="1.5"/>'
+
+
+def _box(box: Box, column: int, place: _Place) -> str:
+    x, y = _left(column), place.y - place.height / 2
+    colour = COLOURS.get(box.kind or "", QUIET)
+    frame = (MARKED, 2.5) if box.marked else (RULE, 1)
+    title = f'<text class="title" x="{x + 14:.0f}" y="{y + 20:.1f}" font-weight="600" fill="{INK}">'
+    line = f'<text class="line" x="{x + 14:.0f}" y="{{:.1f}}" font-size="11" fill="{QUIET}">'
+    texts = [f"{title}{_text(cut(box.title, _TITLE_CELLS))}</text>"]
+    texts += [
+        f"{line.format(y + 36 + _NEXT * number)}{_text(cut(text, _LINE_CELLS))}</text>"
+        for number, text in enumerate(box.lines)
+    ]
+    drawn = (
+        f"<title>{_text(box.about)}</title>"
+        f'<rect class="box{" marked" if box.marked else ""}" x="{x:.0f}" y="{y:.1f}" width="{WIDTH}" '
+        f'height="{place.height}" rx="6" fill="{PAPER}" stroke="{frame[0]}" stroke-width="{frame[1]}"/>'
+        f'<rect x="{x + 5:.0f}" y="{y + 8:.1f}" width="3" height="{place.height - 16}" rx="1.5" fill="{colour}"/>'
+        + "".join(texts)
+    )
+    return f"<g>{drawn}</g>" if box.link is None else f'<a href="{html.escape(box.link)}">{drawn}</a>'
+
+
+def _text(text: str) -> str:
+    """Text of XML, in which characters that a page cannot hold are escaped."""
+    return html.escape(printable(text))
+
+
+def cut(text: str, cells: int) -> str:
+    """The text, or so much of it as fits a width [cells of a digit], with an ellipsis."""
+    widths = [2 if unicodedata.east_asian_width(one) in "WF" else 1 for one in text]
+    if sum(widths) <= cells:
+        return text
+    taken, used = 0, 1
+    for width in widths:
+        if used + width > cells:
+            break
+        taken, used = taken + 1, used + width
+    return text[:taken] + "…"

@@ -1,0 +1,74 @@
+"""The picture of a lineage: generations in columns, from the oldest sources on the left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from flagdata.lake.ancestry import Ancestry, Relative, grouped
+from flagdata.pages.graph import Box, svg
+
+SHORT = 12  # characters of an id that are shown; look-ups take any unique beginning
+MOST = 8
+"""More relatives of a kind in one generation are one box."""
+
+
+def picture(
+    found: Ancestry, *, details: bool = False, most: int | None = MOST, link: Callable[[str], str] | None = None
+) -> str:
+    """The lineage as SVG.
+
+    Args:
+        details: with recipe hash, code version and seed.
+        most: more relatives of a kind in one generation are one box that counts them; `None` draws all.
+        link: gives the address to which the box of an id leads.
+    """
+    boxes: list[Box] = []
+    key_of: dict[str, str] = {}
+    generations: dict[int, list[Relative]] = {}
+    for relative in found.relatives.values():
+        generations.setdefault(relative.generation, []).append(relative)
+    for generation, members in generations.items():
+        for group in grouped(members, most=most):
+            first = group[0]
+            key_of |= {one.artifact: first.artifact for one in group}
+            if len(group) > 1:
+                boxes.append(_several(group, generation))
+            else:
+                boxes.append(_single(first, details=details, link=link, marked=first.artifact == found.artifact))
+    edges = dict.fromkeys((key_of[parent], key_of[child]) for parent, child in found.edges)
+    name = found.relatives[found.artifact].name or found.artifact
+    return svg(boxes, list(edges), title=f"Lineage of {name}")
+
+
+def detail_lines(relative: Relative) -> list[str]:
+    """What shaped it: recipe, code and seed, as far as they are known."""
+    lines = []
+    if relative.recipe_hash is not None:
+        lines.append(f"recipe {relative.recipe_hash[:SHORT]}")
+    if relative.code_version is not None:
+        lines.append(f"code {relative.code_version}")
+    if relative.seed is not None:
+        lines.append(f"seed {relative.seed}")
+    return lines
+
+
+def _single(relative: Relative, *, details: bool, link: Callable[[str], str] | None, marked: bool) -> Box:
+    known = relative.kind is not None
+    what = detail_lines(relative)
+    return Box(
+        key=relative.artifact, column=relative.generation, kind=relative.kind, marked=marked,
+        title=relative.name or "not at this version",
+        lines=[f"{relative.kind or 'artifact'} {relative.artifact[:SHORT]}", *(what if details else ())],
+        about="\n".join([relative.name or "", relative.artifact, *what]),
+        link=link(relative.artifact) if link is not None and known else None,
+    )  # fmt: skip
+
+
+def _several(group: Sequence[Relative], generation: int) -> Box:
+    kind = group[0].kind
+    names = sorted({one.name for one in group if one.name is not None})
+    shown = names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}" if names else ""
+    return Box(
+        key=group[0].artifact, column=generation, kind=kind, title=f"{len(group):,} × {kind or 'artifact'}",
+        lines=[shown], about=f"{len(group)} artifacts of one kind in one generation",
+    )  # fmt: skip
