@@ -101,7 +101,8 @@ def of_film(
             "no log of the wind is beside the film", where=film.name,
             fix="align a film and a log (flagdata align), and name the recording that comes out",
         )  # fmt: skip
-    log = Log.of(wind, start=film.start)
+    clock = None if subject.artifact is None else subject.artifact.clock_sigma
+    log = Log.of(wind, start=film.start, clock=clock or 0.0)
     end = min(film.duration, math.inf if last is None else last)
     findings: tuple[Finding, ...] = ()
     if end - first > LONGEST + WINDOW:

@@ -95,8 +95,8 @@ CLOTH = (
         source="mean coefficient of the fabrics of Wang et al. 2011, a tenth to ten times, as Runia et al. 2020 search",
     ),
     Uncertain(
-        name="damping", unit="s", prior=_log(2e-3, 4e-2),
-        source="hardly ever measured; the upper part of 0.25 to 40 ms, which the nulls of verdicts vary it by",
+        name="damping", unit="s", prior=_log(2.5e-4, 4e-2),
+        source="hardly ever measured; what the nulls of verdicts vary it by",
     ),
 )  # fmt: skip
 """What is sought."""

@@ -29,7 +29,7 @@ class View:
         azimuth: horizontal angle from the wind's heading to the camera's axis, counter-clockwise from above [rad]: π/2
             looks across the wind, and the air goes to the right. As `RenderParameters.camera_angle`.
         elevation: of the axis above the horizontal [rad]: positive looks up at the flag.
-        distance: from the middle of the hoist [m]; infinite for a parallel projection.
+        distance: from the middle of the flag, which the axis goes through [m]; infinite for a parallel projection.
     """
 
     azimuth: float = math.pi / 2
@@ -147,16 +147,20 @@ def seen_from(
     Raises:
         InputError: as `ClothWindow`, or cloth behind the camera.
     """
-    ends = positions[:, [int(hoist[0]), int(hoist[-1])]].mean(axis=(0, 1))
-    seen = (np.asarray(positions, np.float64) - ends) @ view.axes(heading).T
+    upper, lower = int(hoist[0]), int(hoist[-1])
+    ends = positions[:, [upper, lower]].mean(axis=(0, 1))
+    # People aim at the flag's middle: from near by the hoist is then seen at another angle than the axis'.
+    aim = ends + length / 2 * np.array([math.cos(heading), math.sin(heading), 0.0])
+    seen = (np.asarray(positions, np.float64) - aim) @ view.axes(heading).T
     places = seen[..., :2]
     if math.isfinite(view.distance):
         depth = view.distance + seen[..., 2]
         if depth.min() < 0.05 * view.distance:
             raise InputError("cloth reaches to the camera or behind it", where="view", fix="enlarge the distance")
         places = places * (view.distance / depth)[..., None]
-    # An upright hoist looks shorter from above or below, and its known height is what gives the scale.
-    places = places / math.cos(view.elevation)
+    # The hoist looks shorter from above or below and by its distance, and its known height is what gives the scale.
+    upright = (positions[:, upper, 2] - positions[:, lower, 2]).mean()
+    places = places * (upright / (places[:, upper, 1] - places[:, lower, 1]).mean())
     return ClothWindow(
         times=times, points=places, faces=np.asarray(faces, np.int64), hoist=np.asarray(hoist, np.int64),
         free=np.asarray(free, np.int64), length=length, height=height,

@@ -27,7 +27,7 @@ def _subject(*, logged: float = 200.0, findings: tuple[Finding, ...] = ()) -> An
         sensor=Sensor(name="cup", distance_constant=2.5),
     )  # fmt: skip
     film = SimpleNamespace(name="film", start=_START, duration=300.0, findings=lambda: findings)
-    artifact = SimpleNamespace(id="0123abcd")
+    artifact = SimpleNamespace(id="0123abcd", clock_sigma=0.3)
     return SimpleNamespace(
         film=film, artifact=artifact, record=SimpleNamespace(wind=lambda: wind), identity="0123abcd",
     )  # fmt: skip
@@ -52,7 +52,7 @@ def test_two_minutes_are_read_with_the_log_on_the_films_clock() -> None:
     assert found.readings.shape == (48, len(OBSERVED))
     assert np.isnan(found.readings[2]).all()
     assert found.readings[5, 0] == 5.0
-    assert found.log.distance == 2.5
+    assert (found.log.distance, found.log.clock) == (2.5, 0.3)
     # The log rises by 2/199 m/s a second, and is at its 70th second where the part begins.
     assert found.speed[0] == pytest.approx(4.0 + 2 / 199 * 71.25, abs=0.01)
     assert found.first == 10.0

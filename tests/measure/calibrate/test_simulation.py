@@ -15,6 +15,8 @@ from measure.calibrate.design import Design, simulated
 from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED, Batch, Flag, cloth, mean_bending
 from measure.calibrate.wind import Log
+from sim.integrate.implicit import BackwardEuler
+from sim.integrate.symplectic import Symplectic
 from sim.material import named
 
 _LOG = Log(times=np.arange(-10.0, 20.0), speed=np.full(30, 5.0), distance=0.0)
@@ -49,8 +51,28 @@ def test_a_cloth_has_the_bending_it_is_given() -> None:
 
 
 def test_simulations_draw_their_fabrics() -> None:
-    drawn = {scene.material.name for scene in _batch([0.2] * 12)._scenes(Flag(length=1.5, height=1.0).mesh(4))}
+    scenes = _batch([0.2] * 12)._scenes(Flag(length=1.5, height=1.0).mesh(4), damped=0.0)
+    drawn = {scene.material.name for scene in scenes}
     assert len(drawn) > 3
+
+
+def test_no_integrator_damps_more_than_its_cloths() -> None:
+    """Backward Euler damps by its step, so that a damping below its shortest one takes leapfrog."""
+    flags = _batch([0.1, 0.2])
+    cases = ((3e-4, Symplectic, 3e-4), (1.5e-3, BackwardEuler, 0.5e-3), (2e-2, BackwardEuler, 16e-3))
+    for damping, kind, material in cases:
+        damped = replace(flags, values={**flags.values, "damping": np.full(2, damping)})
+        system, _, integrator = damped._assembled(flags.flag.mesh(4))
+        assert isinstance(integrator, kind)
+        assert np.allclose(system.cloth.damping.numpy(), material, rtol=1e-5)
+
+
+def test_a_clock_moves_the_wind() -> None:
+    ramp = replace(_batch([0.2]), log=Log(times=_LOG.times, speed=5 + 0.1 * _LOG.times, distance=0.0))
+    early = replace(ramp, values={**ramp.values, "clock_error": np.array([-2.0])})
+    mesh = ramp.flag.mesh(4)
+    before, after = (one._wind(one._assembled(mesh)[0]).samples[:, 0].mean().item() for one in (ramp, early))
+    assert after - before == pytest.approx(0.2, abs=0.05)  # 0.1 m/s a second, for two seconds
 
 
 def test_kept_simulations_are_not_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -40,18 +40,20 @@ def test_a_view_shortens_what_is_along_it(azimuth: float) -> None:
 
 def test_the_hoist_gives_the_scale_from_any_elevation() -> None:
     """An upright hoist has the flag's height in the picture, as it is by it that people scale."""
-    for elevation in (-0.3, 0.0, 0.4):
-        seen = window(hinged(lambda t: 0.1), view=View(elevation=elevation, azimuth=1.2))
+    for elevation, distance in ((-0.3, math.inf), (0.0, 5.0), (0.4, 5.0)):
+        seen = window(hinged(lambda t: 0.1), view=View(elevation=elevation, azimuth=1.2, distance=distance))
         ends = seen.points[:, [seen.hoist[0], seen.hoist[-1]]]
         np.testing.assert_allclose(ends[:, 0, 1] - ends[:, 1, 1], HEIGHT, rtol=1e-9)
 
 
 def test_what_is_nearer_looks_larger() -> None:
-    """The free edge of a flag that flies at 45° to a camera 6 m away, against the pinhole's formula."""
+    """The free edge of a flag that flies at 45° to a camera 6 m from its middle, against the pinhole's formula:
+    the hoist is nearer by a, the free edge farther by a, both a aside; lengths are scaled by the hoist's."""
     view = View(azimuth=math.radians(45), distance=6.0)
     seen = window(hinged(lambda t: 0.0), view=view)
-    along = LENGTH / math.sqrt(2)
-    np.testing.assert_allclose(seen.free_edge[:, 0], along * 6.0 / (6.0 + along), rtol=1e-9)
+    a = LENGTH / 2 / math.sqrt(2)
+    aside = a * 6.0 / (6.0 + a) + a * 6.0 / (6.0 - a)
+    np.testing.assert_allclose(seen.free_edge[:, 0], aside * (6.0 - a) / 6.0, rtol=1e-9)
 
 
 def test_a_swing_has_its_speed_frequency_and_amplitude() -> None:
