@@ -63,9 +63,9 @@ def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
     """
     own = design.batches()
     size = len(own[0].seeds)
-    longest = max(batch.step for batch in own)
+    steps = [batch.step or 0.0 for batch in own]
     candidates = np.concatenate([
-        place * size + np.arange(len(batch.seeds)) for place, batch in enumerate(own) if batch.step == longest
+        place * size + np.arange(len(batch.seeds)) for place, batch in enumerate(own) if steps[place] == max(steps)
     ])  # fmt: skip
     rng = stream(design.seed, "films", "pairs", effect.name)
     count = min(PAIRS, len(candidates))
