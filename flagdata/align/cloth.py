@@ -98,6 +98,6 @@ def _without_wind(
             report=json.dumps(report, allow_nan=False, ensure_ascii=False),
         )  # fmt: skip
         transaction.add(recording)
-        for clip in clip_rows(Record.open(lake.object_path(str(recording.object))), recording, window=TRUTH_WINDOW):
+        for clip in clip_rows(Record.open(lake.record_place(str(recording.object))), recording, window=TRUTH_WINDOW):
             transaction.add(clip)
     return recorded(transaction, recording)

@@ -260,7 +260,7 @@ def add_recording(
     _write(staged, pair, alignment, wind, first=int(frames[0]), progress=progress)
     recording = _artifact(pair, alignment, frames, stored=transaction.put(staged), name=name, session=session)
     transaction.add(recording)
-    for clip in clip_rows(Record.open(lake.object_path(str(recording.object))), recording, window=window):
+    for clip in clip_rows(Record.open(lake.record_place(str(recording.object))), recording, window=window):
         transaction.add(clip)
     return recording
 

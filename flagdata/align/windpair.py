@@ -54,7 +54,7 @@ class WindPair:
             raise UsageError("a log and itself", where=found[0].id, fix="name two wind artifacts")
         series = []
         for artifact in found:
-            samples = Record.open(lake.object_path(str(artifact.object))).wind()
+            samples = Record.open(lake.record_place(str(artifact.object))).wind()
             if samples is None or not len(samples):
                 raise InputError("the wind artifact holds no samples", where=artifact.id, fix="ingest the log anew")
             series.append(samples)

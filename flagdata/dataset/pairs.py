@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from flagdata.dataset.sample import Sample
 from flagdata.dataset.table import PairTable
 from flagdata.dataset.tolerance import Refusal
 from flagdata.record import Record
+from flagdata.storage import Place
 from flagdata.timebase import NANOSECONDS
 
 OPEN_RECORDS = 64  # record files that a thread keeps open
@@ -34,7 +34,7 @@ class Pairs(Batchable):
     """Pairs of a query, a map-style dataset. Made by `Source.pairs`.
 
     Workers, forked or spawned, get flat arrays and paths; they never touch the catalog. Each opens a record when it
-    first needs it; of a lake in a bucket it fetches the object then, which forked workers cannot. With a
+    first needs it; of a lake in a bucket it fetches what is needed then, which forked workers cannot. With a
     `torch.utils.data.DataLoader` of your own, pass `collate_fn=flagdata.dataset.collate`.
 
     Attributes:
@@ -49,7 +49,7 @@ class Pairs(Batchable):
         self,
         table: PairTable,
         *,
-        openers: tuple[Callable[[], Path], ...],
+        openers: tuple[Callable[[], Place], ...],
         refused: tuple[Refusal, ...],
         at: str | None,
         seed: int,

@@ -186,7 +186,7 @@ def _with_window(lake: Lake, table: PairTable, windows: NDArray[np.float64], win
         values.copy() for values in (table.wind, table.wind_sigma, table.coverage, table.staleness)
     )
     for number in np.unique(table.object[other]):
-        record = Record.open(lake.object_path(str(table.objects[number])))
+        record = Record.open(lake.record_place(str(table.objects[number])))
         known = (record.truth or {}).get(TRUTH_SPEED)
         series = truth_series(record)
         for k in other[table.object[other] == number]:

@@ -9,7 +9,6 @@ and says how many they are.
 from __future__ import annotations
 
 import json
-import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
@@ -26,8 +25,9 @@ from flagdata.errors import CorruptError
 from flagdata.export.source import FILMED, Entry, Source, label_units
 from flagdata.record import Coding, messages
 from flagdata.record.checksums import ChecksummedWriter
-from flagdata.record.container import Messages, check_parts, open_file, read_exact, read_messages, read_summary
+from flagdata.record.container import Messages, check_parts, read_exact, read_messages, read_summary
 from flagdata.record.key_frames import is_key
+from flagdata.record.source import open_bytes
 from flagdata.record.writer import PROFILE
 from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, Kind
 from flagdata.timebase import NANOSECONDS
@@ -71,7 +71,7 @@ class _Original:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._where = str(path)
-        self._file = open_file(path)
+        self._file = open_bytes(path)
         self.summary = read_summary(self._file, where=self._where)
         self.messages: dict[str, Messages] = {
             topic: read_messages(self._file, self.summary, topic, where=self._where)
@@ -88,7 +88,7 @@ class _Original:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        os.close(self._file)
+        self._file.close()
 
     def decodable_from(self, frame: int) -> int:
         """Index of the last key frame up to `frame`, of a record in H.264.

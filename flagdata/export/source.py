@@ -178,7 +178,7 @@ class Source:
                 yield self._entry(row, opened[1])
 
     def _entry(self, row: Mapping[str, Any], record: Record) -> Entry:
-        present = len(record.frame_times)
+        present = record.frame_count
         whole = row["frame_first"] is None
         first = 0 if whole else row["frame_first"]
         count = present if whole or row["frame_count"] is None else row["frame_count"]

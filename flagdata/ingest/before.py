@@ -70,7 +70,7 @@ def earlier(
     for artifact in others:
         if artifact.source_hash == source_hash and _options(artifact.recipe) == _options(recipe):
             try:
-                before = Record.open(lake.object_path(str(artifact.object))).wind()
+                before = Record.open(lake.record_place(str(artifact.object))).wind()
             except FlagdataError:
                 continue  # damage of another artifact is found by verify; it does not keep this log out
             if before is not None and _same(before, series):

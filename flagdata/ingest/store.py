@@ -151,7 +151,7 @@ def ingest_camera(
     present = find(lake, Kind.CAMERA, source, recipe, labels, branch=branch)
     if present is not None:
         if crop_picture is not None:
-            crop_picture(Record.open(lake.object_path(str(present.artifact.object))).attachment(CROP_PICTURE))
+            crop_picture(Record.open(lake.record_place(str(present.artifact.object))).attachment(CROP_PICTURE))
         return present
     with lake.transaction(f"ingest camera {source.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
@@ -353,7 +353,7 @@ def _beside(
     found: list[Finding] = []
     for artifact in near[:NEIGHBOURS]:
         try:
-            other = Record.open(lake.object_path(str(artifact.object))).wind()
+            other = Record.open(lake.record_place(str(artifact.object))).wind()
         except FlagdataError:
             continue  # damage of another artifact is found by verify; it does not keep this log out
         finding = hours_off(series, other, name=artifact.name) if other is not None else None

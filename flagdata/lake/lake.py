@@ -168,9 +168,20 @@ class Lake(Store):
         except NotFoundError as error:
             raise explained(self, object, error) from None
 
-    def openers(self, objects: Sequence[str]) -> tuple[Callable[[], Path], ...]:
-        """For each object a function that gives its place as `object_path` does, when it is needed; workers that read
-        objects take these with them.
+    def record_place(self, object: str) -> Place:  # noqa: A002 — the catalog's name for it
+        """Where `flagdata.record.Record.open` reads a record from: of a large one in a bucket the parts that are used.
+
+        Raises:
+            InputError, NotFoundError: as `object_path`.
+        """
+        try:
+            return self.objects.readable(object)
+        except NotFoundError as error:
+            raise explained(self, object, error) from None
+
+    def openers(self, objects: Sequence[str]) -> tuple[Callable[[], Place], ...]:
+        """For each record a function that gives its place as `record_place` does, when it is needed; workers that read
+        records take these with them.
 
         Raises:
             NotFoundError: as `object_path`.

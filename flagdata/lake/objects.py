@@ -66,8 +66,16 @@ class Objects:
             raise self.missing(name)
         return path
 
-    def openers(self, names: Sequence[str]) -> tuple[Callable[[], Path], ...]:
-        """For each object a function that says where it is, which other processes may call, too.
+    def readable(self, name: str) -> Place:
+        """Where the record called `name` is read from, see `flagdata.record.Record`.
+
+        Raises:
+            NotFoundError: it is not there.
+        """
+        return self.existing(name)
+
+    def openers(self, names: Sequence[str]) -> tuple[Callable[[], Place], ...]:
+        """For each record a function that says where it is read from, which other processes may call, too.
 
         Raises:
             NotFoundError: one is not there.

@@ -1,7 +1,8 @@
 """Immutable objects in a bucket: `mcap/<sha256>.mcap`, and folders as `zarr/<treehash>.zarr/…`.
 
 A folder's files are put first and `.sums`, the lines whose SHA-256 is its name, last: without it the folder is not
-there. It is deleted first. Objects are read from a local copy, see `flagdata.storage.cache`.
+there. It is deleted first. Objects are read from a local copy, see `flagdata.storage.cache`; of large records only the
+parts that are needed are fetched, see `flagdata.storage.ranges`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from flagdata.storage import Place, RemotePath
 from flagdata.storage.cache import copy_of, fetched, forget, kept
 
 SUMS = ".sums"
+WHOLE = 8 << 20
+"""Records of at most so many bytes are fetched whole, and compared with their hash."""
 _AT_ONCE = 8
 """Files of a folder that are moved at the same time."""
 
@@ -55,14 +58,24 @@ class RemoteObjects(Objects):
         size = self.size(name)
         return fetched(name, place.suffix, size=size, fetch=partial(self._fetch, name), where=str(place))
 
-    def openers(self, names: Sequence[str]) -> tuple[Callable[[], Path], ...]:
-        """As for a disk; each object is fetched when its function is called."""
-        if any(copy_of(name, self.path(name).suffix) is None for name in names):
+    def readable(self, name: str) -> Place:
+        """A local copy, or the place in the bucket of a record that is larger than `WHOLE`: of it only what is needed
+        is fetched.
+
+        Raises:
+            NotFoundError, CorruptError: see `existing`.
+        """
+        place = self.path(name)
+        return self.existing(name) if self._copied(name) or self.size(name) <= WHOLE else place
+
+    def openers(self, names: Sequence[str]) -> tuple[Callable[[], Place], ...]:
+        """As for a disk; what is needed is fetched once its function was called."""
+        if not all(map(self._copied, names)):
             there = {stored.name for stored in self}
             for name in names:
                 if name not in there:
                     raise self.missing(name)
-        return tuple(partial(self.existing, name) for name in names)
+        return tuple(partial(self.readable, name) for name in names)
 
     def whole(self, name: str) -> Path:
         """A local copy, whose bytes are compared with its name again."""
@@ -134,6 +147,9 @@ class RemoteObjects(Objects):
             forget(f"{path.parent.name}/{path.stem}", path.suffix)  # what is erased stays nowhere on this machine
         else:
             Objects.remove(path)
+
+    def _copied(self, name: str) -> bool:
+        return copy_of(name, self.path(name).suffix) is not None
 
     def _whole_by(self, name: str) -> RemotePath:
         """What was put last of an object."""

@@ -7,13 +7,12 @@ Source: the MCAP specification, https://mcap.dev/spec.
 
 from __future__ import annotations
 
-import os
 import struct
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
-from pathlib import Path
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -23,15 +22,20 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, AttachmentIndex, Channel, ChunkIndex, Metadata, MetadataIndex, Schema
 from numpy.typing import NDArray
 
-from flagdata.errors import CorruptError, InputError, NotFoundError
+from flagdata.errors import CorruptError, InputError
 from flagdata.record.checksums import CHECKSUMS, FIX, HEAD_BYTES, ChannelChecksums, Checksums, metadata_checksum
+from flagdata.record.source import Bytes
 
 MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = 9  # opcode, uint64 length
 MESSAGE_HEAD = RECORD_HEAD + 22  # channel, sequence, log_time, publish_time; then the data
 CHUNK_HEAD = RECORD_HEAD + 8 + 8 + 8 + 4 + 4 + 8  # and the name of the compression; then the records
 _FOOTER = struct.Struct("<BQQQI")
+_INDEX = struct.Struct("<BQHI")  # opcode, length, channel, bytes of the entries
+_INDEX_ENTRY = 16  # log time, offset
 _TAIL = _FOOTER.size + len(MAGIC)
+_LAST = 512 << 10
+"""Bytes at the end of a record that hold its summary and checksums, unless it is very long."""
 _MESSAGE = np.dtype(
     [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")]
 )
@@ -66,6 +70,7 @@ class Messages:
         offset, length: of the message's data in the file [B].
         checksums: (n,) uint32, of each message's data; `None` where the channel has one checksum, or none.
         checksum: of the data of all messages in file order; `None` where each has its own, or there are none.
+        first: number of the topic's message in row 0.
     """
 
     log_time: NDArray[np.int64]
@@ -74,46 +79,36 @@ class Messages:
     length: NDArray[np.int64]
     checksums: NDArray[np.uint32] | None = None
     checksum: int | None = None
+    first: int = 0
 
     def __len__(self) -> int:
         return len(self.log_time)
 
 
-def open_file(path: Path) -> int:
-    """A file descriptor for reading by offset.
-
-    Raises:
-        NotFoundError: no such file.
-    """
-    try:
-        return os.open(path, os.O_RDONLY | os.O_CLOEXEC)
-    except (FileNotFoundError, NotADirectoryError):
-        raise NotFoundError("no such record", where=str(path), fix="check the path, or run flagdata doctor") from None
-
-
-def read_exact(file: int, length: int, offset: int, *, where: str) -> bytes:
+def read_exact(file: Bytes, length: int, offset: int, *, where: str) -> bytes:
     """`length` bytes at `offset`.
 
     Raises:
         CorruptError: the file ends before.
     """
-    data = os.pread(file, length, offset)
+    data = file.read(length, offset)
     while len(data) < length:
-        more = os.pread(file, length - len(data), offset + len(data))
+        more = file.read(length - len(data), offset + len(data))
         if not more:
             raise CorruptError(f"the record ends before byte {offset + length}", where=where, fix=_RECOVER)
         data += more
     return data
 
 
-def read_summary(file: int, *, where: str) -> Summary:
+def read_summary(file: Bytes, *, where: str) -> Summary:
     """Read and check the summary section.
 
     Raises:
         CorruptError: not an MCAP file, cut off, or a summary whose checksum or offsets are wrong.
     """
-    size = os.fstat(file).st_size
-    if size < len(MAGIC) + _TAIL or os.pread(file, len(MAGIC), 0) != MAGIC:
+    size = file.size
+    file.prepare([(0, len(MAGIC)), (size - _LAST, size)])
+    if size < len(MAGIC) + _TAIL or file.read(len(MAGIC), 0) != MAGIC:
         raise CorruptError("not an MCAP record", where=where, fix="check that it is the right file")
     tail = read_exact(file, _TAIL, size - _TAIL, where=where)
     if tail[-len(MAGIC) :] != MAGIC:
@@ -129,7 +124,7 @@ def read_summary(file: int, *, where: str) -> Summary:
     return _with_checksums(file, _summary(body, start, where=where), where=where)
 
 
-def _with_checksums(file: int, summary: Summary, *, where: str) -> Summary:
+def _with_checksums(file: Bytes, summary: Summary, *, where: str) -> Summary:
     for entry in summary.metadata:
         if entry.name == CHECKSUMS:
             record = _record_at(file, entry.offset, entry.length, Opcode.METADATA, where=where)
@@ -218,8 +213,13 @@ def data_start(chunk: ChunkIndex) -> int:
     return chunk.chunk_start_offset + CHUNK_HEAD + len(chunk.compression.encode())
 
 
-def read_messages(file: int, summary: Summary, topic: str, *, where: str) -> Messages:
+def read_messages(
+    file: Bytes, summary: Summary, topic: str, *, where: str, span: tuple[int, int] | None = None
+) -> Messages:
     """Where each message of `topic` lies; every head is read and compared with the index. None if the topic is absent.
+
+    Args:
+        span: only these messages, (first, count) of a topic in order, see `in_order`; no head of others is read.
 
     Raises:
         CorruptError: an index that does not fit the messages, or heads that have changed since they were written.
@@ -228,25 +228,9 @@ def read_messages(file: int, summary: Summary, topic: str, *, where: str) -> Mes
     channel = summary.channels.get(topic)
     if channel is None:
         return Messages(log_time=_empty(), publish_time=_empty(), offset=_empty(), length=_empty())
-    times, places, limits = [_empty()], [_empty()], [_empty()]
-    for chunk in summary.chunks:
-        at = chunk.message_index_offsets.get(channel.id)
-        if at is None:
-            continue
-        if chunk.compression:
-            raise InputError(
-                f"the record's chunks are compressed ({chunk.compression})",
-                where=where,
-                fix=_RECOVER + " to rewrite it",
-            )
-        time, offset = _message_index(file, at, channel.id, summary.data_end, where=where)
-        times.append(time)
-        places.append(offset + data_start(chunk))
-        limits.append(np.full(len(time), data_start(chunk) + chunk.compressed_size))
-        if len(offset) and (offset.min() < 0 or offset.max() + MESSAGE_HEAD > chunk.compressed_size):
-            raise CorruptError("a message index points out of its chunk", where=where, fix=_RECOVER)
-    time, place, limit = np.concatenate(times), np.concatenate(places), np.concatenate(limits)
-    heads = b"".join([os.pread(file, MESSAGE_HEAD, at) for at in place.tolist()])
+    time, place, limit = _places(file, summary, channel.id, where=where, span=span)
+    first = 0 if span is None else span[0]
+    heads = b"".join([file.read(MESSAGE_HEAD, at) for at in place.tolist()])
     if len(heads) != MESSAGE_HEAD * len(place):
         raise CorruptError("the record ends before its last message", where=where, fix=_RECOVER)
     head = np.frombuffer(heads, dtype=_MESSAGE)
@@ -261,12 +245,17 @@ def read_messages(file: int, summary: Summary, topic: str, *, where: str) -> Mes
     if not bool(sound.all()):
         bad = int(np.flatnonzero(~sound)[0])
         raise CorruptError(
-            f"message {bad} of {topic} is not where the index says", where=f"{where}, byte {place[bad]}", fix=_RECOVER
+            f"message {first + bad} of {topic} is not where the index says",
+            where=f"{where}, byte {place[bad]}",
+            fix=_RECOVER,
         )
     kept = None
     if summary.checksums is not None:
-        kept = _check_heads(head, summary.checksums.channels.get(topic), topic, where=where)
+        kept = summary.checksums.channels.get(topic)
+        kept = _check_heads(head, kept, topic, where=where) if span is None else _of_span(kept, span)
     order = np.argsort(time, kind="stable")
+    if span is not None and not np.array_equal(order, np.arange(len(time))):
+        raise CorruptError(f"the messages of {topic} are not in order of time", where=where, fix=_RECOVER)
     return Messages(
         log_time=time[order],
         publish_time=head["publish"].astype(np.int64)[order],
@@ -274,7 +263,98 @@ def read_messages(file: int, summary: Summary, topic: str, *, where: str) -> Mes
         length=length[order],
         checksums=None if kept is None or kept.messages is None else kept.messages[order],
         checksum=None if kept is None else kept.data,
+        first=first,
     )
+
+
+def in_order(file: Bytes, summary: Summary, topic: str, *, where: str) -> bool:
+    """Whether a topic's messages lie in order of time from chunk to chunk, each with a checksum of its own, so that
+    `read_messages` may read a span of them. The summary states from when to when each chunk has messages; an index is
+    read only of chunks in which other topics overlap with the next.
+
+    Raises:
+        CorruptError: an index that is damaged.
+    """
+    kept = None if summary.checksums is None else summary.checksums.channels.get(topic)
+    if kept is None or kept.messages is None or topic not in summary.channels:
+        return False
+    channel = summary.channels[topic].id
+    chunks = [chunk for chunk in summary.chunks if channel in chunk.message_index_offsets]
+    if any(chunk.compression for chunk in chunks) or sum(_count(chunk, channel) for chunk in chunks) != kept.count:
+        return False
+    bounds = [(chunk.message_start_time, chunk.message_end_time) for chunk in chunks]
+    overlaps = {i + k for i, (one, other) in enumerate(pairwise(bounds)) if other[0] <= one[1] for k in (0, 1)}
+    shared = [i for i in sorted(overlaps) if len(chunks[i].message_index_offsets) > 1]
+    file.prepare([_index_span(chunks[i], channel) for i in shared])
+    for i in shared:
+        time, _ = _message_index(
+            file, chunks[i].message_index_offsets[channel], channel, summary.data_end, where=where
+        )  # fmt: skip
+        bounds[i] = (int(time.min(initial=0)), int(time.max(initial=0)))
+    return all(one[1] < other[0] for one, other in pairwise(bounds))
+
+
+def _index_span(chunk: ChunkIndex, channel: int) -> tuple[int, int]:
+    """Where the index of a channel's messages in a chunk begins and ends [B]: indexes follow their chunk in a row."""
+    first = chunk.message_index_offsets[channel]
+    later = [at for at in chunk.message_index_offsets.values() if at > first]
+    return first, min(later, default=chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length)
+
+
+def _count(chunk: ChunkIndex, channel: int) -> int:
+    """How many messages of a channel a chunk has, by the length of their index."""
+    first, end = _index_span(chunk, channel)
+    return (end - first - _INDEX.size) // _INDEX_ENTRY
+
+
+def _places(
+    file: Bytes, summary: Summary, channel: int, *, where: str, span: tuple[int, int] | None
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Log time of messages, where their heads lie, and where the records of their chunks end, in file order.
+
+    Args:
+        span: see `read_messages`; what is read of these messages next is prepared.
+    """
+    parts: list[tuple[ChunkIndex, int, int]] = []
+    before = 0
+    for chunk in summary.chunks:
+        if channel in chunk.message_index_offsets:
+            if chunk.compression:
+                raise InputError(
+                    f"the record's chunks are compressed ({chunk.compression})", where=where,
+                    fix=_RECOVER + " to rewrite it",
+                )  # fmt: skip
+            count = _count(chunk, channel)
+            first, last = (0, count) if span is None else (span[0] - before, span[0] + span[1] - before)
+            if span is None or (first < count and last > 0):
+                parts.append((chunk, max(first, 0), last))
+            before += count
+    if span is not None:
+        file.prepare([_index_span(chunk, channel) for chunk, _, _ in parts])
+    times, places, limits, used = [_empty()], [_empty()], [_empty()], []
+    for chunk, first, last in parts:
+        at = chunk.message_index_offsets[channel]
+        time, offset = _message_index(file, at, channel, summary.data_end, where=where)
+        if len(offset) and (offset.min() < 0 or offset.max() + MESSAGE_HEAD > chunk.compressed_size):
+            raise CorruptError("a message index points out of its chunk", where=where, fix=_RECOVER)
+        limit = data_start(chunk) + chunk.compressed_size
+        rows = slice(None) if span is None else slice(first, last)
+        times.append(time[rows])
+        places.append(offset[rows] + data_start(chunk))
+        limits.append(np.full(len(time[rows]), limit))
+        if span is not None and len(time[rows]):
+            end = data_start(chunk) + int(offset[last]) if last < len(offset) else limit
+            used.append((int(places[-1][0]), end))
+    if span is not None:
+        file.prepare(used)
+    return np.concatenate(times), np.concatenate(places), np.concatenate(limits)
+
+
+def _of_span(kept: ChannelChecksums | None, span: tuple[int, int]) -> ChannelChecksums | None:
+    if kept is None or kept.messages is None:
+        return None
+    first, count = span
+    return replace(kept, messages=kept.messages[first : first + count], count=count)
 
 
 def _check_heads(head: NDArray[np.void], kept: ChannelChecksums | None, topic: str, *, where: str) -> ChannelChecksums:
@@ -289,7 +369,7 @@ def _check_heads(head: NDArray[np.void], kept: ChannelChecksums | None, topic: s
 
 
 def check_parts(parts: Sequence[bytes | memoryview], table: Messages, topic: str, *, first: int, where: str) -> None:
-    """Hold the payloads of consecutive messages from index `first` against their checksums, where there are any.
+    """Hold the payloads of consecutive messages from row `first` on against their checksums, where there are any.
 
     Of a channel with one checksum, `parts` are all messages.
 
@@ -300,7 +380,7 @@ def check_parts(parts: Sequence[bytes | memoryview], table: Messages, topic: str
         for index, part in enumerate(parts, start=first):
             if zlib.crc32(part) != table.checksums[index]:
                 raise CorruptError(
-                    f"message {index} of {topic} has changed since it was written: its checksum is wrong",
+                    f"message {table.first + index} of {topic} has changed since it was written: its checksum is wrong",
                     where=f"{where}, byte {table.offset[index]}", fix=FIX,
                 )  # fmt: skip
     elif table.checksum is not None:
@@ -314,7 +394,7 @@ def check_parts(parts: Sequence[bytes | memoryview], table: Messages, topic: str
             )  # fmt: skip
 
 
-def check_chunk(file: int, chunk: ChunkIndex, *, where: str) -> None:
+def check_chunk(file: Bytes, chunk: ChunkIndex, *, where: str) -> None:
     """Hold the records of an uncompressed chunk against the chunk's own checksum, where it has one.
 
     Raises:
@@ -335,19 +415,19 @@ def _empty() -> NDArray[np.int64]:
 
 
 def _message_index(
-    file: int, at: int, channel: int, end: int, *, where: str
+    file: Bytes, at: int, channel: int, end: int, *, where: str
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    head = struct.Struct("<BQHI")
-    if at + head.size > end:
+    if at + _INDEX.size > end:
         raise CorruptError("a message index lies beyond the data", where=where, fix=_RECOVER)
-    opcode, length, owner, size = head.unpack(read_exact(file, head.size, at, where=where))
-    if opcode != Opcode.MESSAGE_INDEX or owner != channel or size + 6 != length or size % 16 or at + size > end:
+    opcode, length, owner, size = _INDEX.unpack(read_exact(file, _INDEX.size, at, where=where))
+    whole = size + 6 == length and size % _INDEX_ENTRY == 0
+    if opcode != Opcode.MESSAGE_INDEX or owner != channel or not whole or at + size > end:
         raise CorruptError("no message index where the summary says", where=f"{where}, byte {at}", fix=_RECOVER)
-    pairs = np.frombuffer(read_exact(file, size, at + head.size, where=where), dtype="<u8").astype(np.int64)
+    pairs = np.frombuffer(read_exact(file, size, at + _INDEX.size, where=where), dtype="<u8").astype(np.int64)
     return pairs[0::2], pairs[1::2]
 
 
-def read_metadata(file: int, summary: Summary, *, where: str) -> dict[str, dict[str, str]]:
+def read_metadata(file: Bytes, summary: Summary, *, where: str) -> dict[str, dict[str, str]]:
     """All metadata records but the checksums, by name.
 
     Raises:
@@ -371,7 +451,7 @@ def read_metadata(file: int, summary: Summary, *, where: str) -> dict[str, dict[
     return found
 
 
-def read_attachment(file: int, entry: AttachmentIndex, *, where: str) -> bytes:
+def read_attachment(file: Bytes, entry: AttachmentIndex, *, where: str) -> bytes:
     """The bytes of an attachment as stored, checked.
 
     Raises:
@@ -383,7 +463,7 @@ def read_attachment(file: int, entry: AttachmentIndex, *, where: str) -> bytes:
     return parse(Attachment.read, record, where=where).data
 
 
-def _record_at(file: int, offset: int, length: int, opcode: Opcode, *, where: str) -> bytes:
+def _record_at(file: Bytes, offset: int, length: int, opcode: Opcode, *, where: str) -> bytes:
     whole = read_exact(file, length, offset, where=where)
     records = list(split_records(whole, where=where))
     if len(records) != 1 or records[0][0] != opcode:

@@ -7,7 +7,6 @@ checksums; in a record without any, whole chunks against MCAP's own, once each.
 from __future__ import annotations
 
 import functools
-import os
 import weakref
 import zlib
 from collections.abc import Mapping, Sequence
@@ -24,9 +23,11 @@ from flagdata.errors import CorruptError, InputError, NotFoundError, UsageError
 from flagdata.record import container, messages
 from flagdata.record.key_frames import is_key
 from flagdata.record.metadata import sensor_of
+from flagdata.record.source import Bytes, open_bytes
 from flagdata.record.writer import ATTACHMENT_LIMIT, GZIP_SUFFIX, Coding, encode_jpeg
 from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 from flagdata.signals import WindAverage, WindSeries
+from flagdata.storage import Place
 
 FRAME_PIXELS = 1 << 26
 """No frame of a record is larger [px]; a header that says so is damaged."""
@@ -40,23 +41,26 @@ class Record:
     """A record opened for reading. Cheap to open and to pickle: each process opens the file itself, when first needed,
     and reads the summary and the frame index once. Reads are by offset, so that a fork or threads share nothing.
 
+    Of a record in a bucket the frames that are asked for are fetched, with the summary and their own part of the index;
+    `frame_times`, `device_frame_times` and the wind need the heads of all messages of their topic.
+
     Attributes:
-        path: the file.
+        path: the file, or its place in a bucket.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Place) -> None:
         self.path = path
         self._sound: set[int] = set()  # indices of the chunks that were checked
 
     @classmethod
-    def open(cls, path: Path) -> Record:
+    def open(cls, path: Place) -> Record:
         """Open the record at `path` and check its container.
 
         Raises:
             NotFoundError: no such file.
             CorruptError: not a whole MCAP record.
         """
-        record = cls(local_path(path))
+        record = cls(local_path(path) if isinstance(path, Path) else path)
         record._summary  # noqa: B018  read and checked here, kept for later
         return record
 
@@ -67,9 +71,9 @@ class Record:
         return f"Record({str(self.path)!r})"
 
     @functools.cached_property
-    def _file(self) -> int:
-        file = container.open_file(self.path)
-        weakref.finalize(self, os.close, file)
+    def _file(self) -> Bytes:
+        file = open_bytes(self.path)
+        weakref.finalize(self, file.close)
         return file
 
     @functools.cached_property
@@ -111,9 +115,16 @@ class Record:
             raise InputError(f"{TOPIC_IMAGE} holds {schema}", where=where, fix=f"write it as one of {', '.join(names)}")
         return names[schema]
 
+    @functools.cached_property
+    def _in_spans(self) -> bool:
+        """Whether frames are found without the heads of all others."""
+        remote = not isinstance(self.path, Path)
+        return remote and container.in_order(self._file, self._summary, TOPIC_IMAGE, where=str(self.path))
+
     @property
     def frame_count(self) -> int:
-        return len(self._frames)
+        kept = self._summary.checksums
+        return kept.channels[TOPIC_IMAGE].count if kept is not None and self._in_spans else len(self._frames)
 
     @property
     def frame_times(self) -> NDArray[np.int64]:
@@ -124,6 +135,15 @@ class Record:
     def device_frame_times(self) -> NDArray[np.int64]:
         """(n,) instants of the frames on the camera's own clock [UTC ns]."""
         return self._frames.publish_time
+
+    def times(self, first: int, count: int) -> NDArray[np.int64]:
+        """(count,) instants of consecutive frames from index `first` on the common clock [UTC ns].
+
+        Raises:
+            NotFoundError: the record has no such frames.
+        """
+        table = self._span(first, count)
+        return table.log_time[first - table.first :][:count]
 
     def frames(self, first: int, count: int) -> NDArray[np.uint8]:
         """`count` consecutive frames from index `first`: (count, height, width) gray.
@@ -176,7 +196,7 @@ class Record:
         """
         kind = _CODINGS[self.coding]
         try:
-            decoded = [kind.FromString(bytes(part)) for part in self._read(TOPIC_IMAGE, self._frames, first, count)]
+            decoded = [kind.FromString(bytes(part)) for part in self._read_frames(first, count)]
         except DecodeError as error:
             raise CorruptError(f"{TOPIC_IMAGE}: {error}", where=str(self.path), fix=_VERIFY) from None
         return np.array([messages.timestamp_of(m.timestamp) for m in decoded], dtype=np.int64)
@@ -271,11 +291,33 @@ class Record:
 
     def _payloads(self, first: int, count: int) -> list[memoryview]:
         field = messages.data_field(_CODINGS[self.coding])
-        parts = self._read(TOPIC_IMAGE, self._frames, first, count)
-        return [messages.payload(part, field=field) for part in parts]
+        return [messages.payload(part, field=field) for part in self._read_frames(first, count)]
+
+    def _read_frames(self, first: int, count: int) -> Sequence[memoryview]:
+        table = self._span(first, count)
+        return self._read(TOPIC_IMAGE, table, first - table.first, count)
+
+    def _span(self, first: int, count: int) -> container.Messages:
+        """Where consecutive frames lie, and maybe others.
+
+        Raises:
+            UsageError: no frames are asked for.
+            NotFoundError: the record has no such frames.
+        """
+        if count < 1 or first < 0:
+            raise UsageError(f"{count} frames from {first} were asked for", fix="ask for at least one, from 0 or later")
+        if first + count > self.frame_count:
+            raise NotFoundError(
+                f"frames {first} to {first + count - 1} of {self.frame_count}", where=str(self.path),
+                fix="ask for fewer",
+            )  # fmt: skip
+        if not self._in_spans:
+            return self._frames
+        where, span = str(self.path), (first, count)
+        return container.read_messages(self._file, self._summary, TOPIC_IMAGE, where=where, span=span)
 
     def _read(self, topic: str, table: container.Messages, first: int, count: int) -> Sequence[memoryview]:
-        """The payloads of consecutive messages, checked; of any channel but that of the frames, all its messages."""
+        """The payloads of consecutive rows, checked; of any channel but that of the frames, all its messages."""
         parts = self._parts(table, first, count)
         if self.has_checksums:
             container.check_parts(parts, table, topic, first=first, where=str(self.path))
@@ -291,12 +333,6 @@ class Record:
                 self._sound.add(index)
 
     def _parts(self, table: container.Messages, first: int, count: int) -> Sequence[memoryview]:
-        if count < 1 or first < 0:
-            raise UsageError(f"{count} frames from {first} were asked for", fix="ask for at least one, from 0 or later")
-        if first + count > len(table):
-            raise NotFoundError(
-                f"frames {first} to {first + count - 1} of {len(table)}", where=str(self.path), fix="ask for fewer"
-            )
         offsets = table.offset[first : first + count].tolist()
         lengths = table.length[first : first + count].tolist()
         start, end = offsets[0], offsets[-1] + lengths[-1]

@@ -29,9 +29,10 @@ from flagdata.errors import CorruptError, FlagdataError, NotFoundError
 from flagdata.findings import Finding, Severity
 from flagdata.record import messages
 from flagdata.record.checksums import CHECKSUMS, ChecksummedWriter
-from flagdata.record.container import CHUNK_HEAD, MAGIC, MESSAGE_HEAD, RECORD_HEAD, open_file, parse, read_summary
+from flagdata.record.container import CHUNK_HEAD, MAGIC, MESSAGE_HEAD, RECORD_HEAD, parse, read_summary
 from flagdata.record.metadata import SALVAGE
 from flagdata.record.output import Output
+from flagdata.record.source import open_bytes
 from flagdata.record.writer import CHUNK_BYTES, PROFILE, Chunking, library_name
 from flagdata.timebase import iso
 
@@ -94,13 +95,13 @@ def salvage(source: Path, target: Path) -> tuple[Finding, ...]:
 
 def _definitions(source: Path, copy: _Copy) -> None:
     """Schemas and channels from the summary, where it is sound: the chunk that holds them first may be damaged."""
-    file = open_file(source)
+    file = open_bytes(source)
     try:
         summary = read_summary(file, where=str(source))
     except CorruptError:
         return
     finally:
-        os.close(file)
+        file.close()
     for schema in summary.schemas.values():
         copy.schema(schema)
     for channel in summary.channels.values():

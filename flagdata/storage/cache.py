@@ -3,7 +3,8 @@
 The folder is `objects` in the user's cache (see `flagdata.caches`); it keeps at most FLAGDATA_CACHE_LIMIT bytes, 20 GB
 if that is not set, of all lakes together. When it is full, the copies that were used least recently go, but none that
 was used within the last 15 minutes, by which a process may be reading it. Each copy is compared with its hash before it
-appears.
+appears. Of large objects that are read in parts there are blocks instead, `<object>.blocks/<block>`, each with its own
+CRC-32 behind it.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ import os
 import shutil
 import time
 import uuid
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -24,8 +26,12 @@ from flagdata.locks import LOCK, alone_in
 LIMIT = 20 * 10**9
 """Most bytes that are kept where FLAGDATA_CACHE_LIMIT does not say."""
 _IN_USE = 900.0  # s
+_FILLED = 0.9
+"""Share of the limit that is kept once it was reached, so that room is not made for each new copy alone."""
 _PART = "part-"
 _TALLY = "tally"
+_BLOCKS = ".blocks"
+_CRC = 4  # B
 
 
 def copy_of(name: str, suffix: str) -> Path | None:
@@ -83,9 +89,44 @@ def kept(name: str, suffix: str, finished: Path) -> None:
         _remove(finished)
 
 
+def block_of(name: str, block: str) -> bytes | None:
+    """A block of an object as it was kept, if it was; it counts as used now."""
+    path = _place(name, _BLOCKS) / block
+    try:
+        content = path.read_bytes()
+        os.utime(path)
+    except FileNotFoundError:
+        return None
+    data, stated = content[:-_CRC], content[-_CRC:]
+    return data if stated == _crc(data) else None  # the machine stopped before its disk had it
+
+
+def keep_blocks(name: str, blocks: Mapping[str, bytes]) -> None:
+    """Keep blocks of an object, by their names.
+
+    Raises:
+        UsageError: FLAGDATA_CACHE_LIMIT is no number of bytes.
+    """
+    folder = _place(name, _BLOCKS)
+    _take_room(folder.parent, sum(map(len, blocks.values())) + _CRC * len(blocks))
+    folder.mkdir(exist_ok=True)
+    for block, data in blocks.items():
+        part = folder.parent / f"{_PART}{uuid.uuid4().hex}"
+        part.write_bytes(data + _crc(data))
+        try:
+            part.rename(folder / block)
+        except FileNotFoundError:  # another process has forgotten the object
+            _remove(part)
+
+
 def forget(name: str, suffix: str) -> None:
-    """Delete the local copy of an object, if there is one."""
+    """Delete what there is of an object on this machine."""
     _remove(_place(name, suffix))
+    _remove(_place(name, _BLOCKS))
+
+
+def _crc(data: bytes) -> bytes:
+    return zlib.crc32(data).to_bytes(_CRC, "little")
 
 
 def _place(name: str, suffix: str) -> Path:
@@ -119,11 +160,14 @@ def _swept(folder: Path, size: int, limit: int) -> int:
     entries: list[tuple[float, Path, int]] = []
     for path in folder.iterdir():
         if path.name not in (LOCK, _TALLY):
-            with suppress(FileNotFoundError, InputError):  # another process has just renamed its part
-                entries.append((path.lstat().st_mtime, path, size_of(path)))
+            for entry in path.iterdir() if path.suffix == _BLOCKS else (path,):
+                with suppress(FileNotFoundError, InputError):  # another process has just renamed its part
+                    entries.append((entry.lstat().st_mtime, entry, size_of(entry)))
     total = sum(held for _, _, held in entries) + size
+    kept = limit if total <= limit else limit * _FILLED
     for used, path, held in sorted(entries):
-        if used < old and (total > limit or path.name.startswith(_PART)):
+        block = path.parent != folder  # is read as a whole before anything else happens
+        if (used < old or block) and (total > kept or path.name.startswith(_PART)):
             _remove(path)
             total -= held
     return total

@@ -14,6 +14,7 @@ from flagdata.errors import InputError
 from flagdata.findings import Finding
 from flagdata.ingest.camera import CameraOptions, open_camera, probe
 from flagdata.record import Record
+from flagdata.storage import Place
 from flagdata.timebase import NANOSECONDS
 
 _AT_ONCE = 64  # frames read from a record together
@@ -130,14 +131,14 @@ class RecordFilm:
         NotFoundError, CorruptError: see `flagdata.record.Record`.
     """
 
-    def __init__(self, path: Path, *, name: str, first: int = 0, count: int | None = None) -> None:
+    def __init__(self, path: Place, *, name: str, first: int = 0, count: int | None = None) -> None:
         self.record = Record.open(path)
         self._name, self._first = name, first
-        times = self.record.frame_times[first : None if count is None else first + count]
-        if len(times) < 2:
-            raise InputError(f"{len(times)} frames", where=name, fix="name a recording or clip with frames")
-        self.times = times
-        self._seconds = (times - times[0]) / NANOSECONDS
+        count = self.record.frame_count - first if count is None else count
+        if count < 2:
+            raise InputError(f"{count} frames", where=name, fix="name a recording or clip with frames")
+        self.times = self.record.times(first, count)
+        self._seconds = (self.times - self.times[0]) / NANOSECONDS
         self.height, self.width = self.record.frames(first, 1).shape[1:]
 
     @property

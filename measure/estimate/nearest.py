@@ -66,9 +66,10 @@ def nearest(
     found: list[Neighbour] = []
     for place in chosen:
         row = rows[place]
-        record = Record.open(lake.object_path(row["object"]))
+        record = Record.open(lake.record_place(row["object"]))
         first = row["frame_first"]
-        times = (record.frame_times[first : first + count] - record.frame_times[first]) / NANOSECONDS
+        times = record.times(first, count)
+        times = (times - times[0]) / NANOSECONDS
         frames = FitFilm.of(record.frames(first, count), times).frames
         own = model.summaries(model.inputs(frames[None]))[0].cpu().numpy()
         distance = float(np.linalg.norm(whitening @ (own.astype(np.float64) - summary)))

@@ -172,7 +172,7 @@ def _stored(lake: Lake, artifact: Artifact, reading: Reading) -> Subject:
         raise InputError(f"the {artifact.kind} has no frames of its own", where=artifact.name, fix="name its recording")
     clip = artifact.kind is Kind.CLIP
     film = RecordFilm(
-        lake.object_path(artifact.object), name=artifact.name,
+        lake.record_place(artifact.object), name=artifact.name,
         first=(artifact.frame_first or 0) if clip else 0, count=artifact.frame_count if clip else None,
     )  # fmt: skip
     return Subject(film=reading.conditioned(film), artifact=artifact, record=film.record)

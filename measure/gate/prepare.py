@@ -125,7 +125,7 @@ class FilmsOf(Sequence[Film]):
     def __getitem__(self, index: int) -> Film:  # pyright: ignore[reportIncompatibleMethodOverride]
         from flagdata.record import Record
 
-        record = Record.open(self._lake.object_path(self._objects[index]))
+        record = Record.open(self._lake.record_place(self._objects[index]))
         film = record.frames(0, record.frame_count)
         if self._rate is None:
             return film

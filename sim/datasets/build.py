@@ -219,7 +219,7 @@ class Build:
                 staged = transaction.staging(".mcap")
                 staged.write_bytes(done.data)
                 stored = transaction.put(staged)
-                record = Record.open(self.lake.object_path(stored))
+                record = Record.open(self.lake.record_place(stored))
                 recording = _recording(done, record, stored=stored)
                 transaction.add(replace(recording, branch=self.branch))
                 for clip in clip_rows(record, recording):

@@ -163,8 +163,8 @@ def _sheet(lake: Lake, recipe: DatasetRecipe, rows: Sequence[dict[str, Any]]) ->
     order = stream(recipe.seed, "card").permutation(len(rows))[:_SHOWN].tolist()
     pictures: list[NDArray[np.uint8]] = []
     for number in order:
-        record = Record.open(lake.object_path(rows[number]["object"]))
-        frame = record.frames(len(record.frame_times) // 2, 1)[0]
+        record = Record.open(lake.record_place(rows[number]["object"]))
+        frame = record.frames(record.frame_count // 2, 1)[0]
         shape = Image.fromarray(frame)
         shape.thumbnail((_PICTURE, _PICTURE))
         cell = np.full((_PICTURE, _PICTURE), 255, dtype=np.uint8)

@@ -16,7 +16,8 @@ from flagdata.checksums import content_hash
 from flagdata.errors import CorruptError, FlagdataError
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter
-from flagdata.record.container import open_file, read_messages, read_summary
+from flagdata.record.container import read_messages, read_summary
+from flagdata.record.source import open_bytes
 from flagdata.rng import stream
 from flagdata.schema import TOPIC_IMAGE, TOPIC_WIND, Kind
 from flagdata.signals import Sensor, WindSeries
@@ -111,7 +112,7 @@ def object_of(folder: Path, artifact: str) -> Path:
 
 def payload_bytes(path: Path, topic: str) -> np.ndarray:
     """Offsets of all bytes of the messages of a topic, with the times in their heads."""
-    file = open_file(path)
+    file = open_bytes(path)
     table = read_messages(file, read_summary(file, where=""), topic, where="")
     return np.concatenate(
         [np.arange(start - 16, start + length) for start, length in zip(table.offset, table.length, strict=True)]

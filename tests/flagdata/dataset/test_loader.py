@@ -17,7 +17,8 @@ import flagdata
 from flagdata.dataset import DecodedCache, collate
 from flagdata.errors import CorruptError, RefusedError, UsageError
 from flagdata.lake import Lake
-from flagdata.record.container import open_file, read_messages, read_summary
+from flagdata.record.container import read_messages, read_summary
+from flagdata.record.source import open_bytes
 from flagdata.rng import stream
 from flagdata.schema import TOPIC_IMAGE
 
@@ -281,7 +282,7 @@ def test_the_loader_refuses_every_flipped_bit_of_a_frame_and_names_object_and_pl
     lake = Lake.create(tmp_path / "lake")
     recording = lake.artifact(add_recording(lake, made(number=1, frames=30)))
     path = lake.object_path(str(recording.object))
-    file = open_file(path)
+    file = open_bytes(path)
     table = read_messages(file, read_summary(file, where=""), TOPIC_IMAGE, where="")
     sound = path.read_bytes()
     path.chmod(0o644)

@@ -14,7 +14,8 @@ from mcap.reader import make_reader
 from flagdata.errors import CorruptError
 from flagdata.record import Coding, Record, salvage
 from flagdata.record.checksums import CHECKSUMS
-from flagdata.record.container import open_file, read_messages, read_summary
+from flagdata.record.container import read_messages, read_summary
+from flagdata.record.source import open_bytes
 from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 
 OLD = Path(__file__).parents[2] / "compat" / "record-v1.mcap"
@@ -31,7 +32,7 @@ def flip(path: Path, place: int, target: Path) -> Path:
 
 
 def messages(path: Path, topic: str):
-    file = open_file(path)
+    file = open_bytes(path)
     return read_messages(file, read_summary(file, where=""), topic, where="")
 
 
