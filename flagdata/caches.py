@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from pathlib import Path
 
@@ -20,4 +21,5 @@ def beside(lake: Place, suffix: str) -> Path:
     if isinstance(lake, Path):
         whole = lake.absolute()
         return whole.with_name(whole.name + suffix)
-    return user_cache() / f"{lake.bucket}-{lake.key.replace('/', '-')}{suffix}"
+    address = hashlib.sha256(str(lake).encode()).hexdigest()[:12]  # "a/b-c" and "a/b/c" would have one name without
+    return user_cache() / f"{lake.bucket}-{lake.key.replace('/', '-')}-{address}{suffix}"

@@ -264,8 +264,12 @@ def _ahead(staging: RemotePath) -> float:
 
 
 def _now() -> float:
-    """Seconds that go on while the machine sleeps."""
-    return time.clock_gettime(time.CLOCK_BOOTTIME)
+    """Seconds that go on while the machine sleeps: by CLOCK_BOOTTIME, or by CLOCK_MONOTONIC where there is none.
+
+    The latter goes on in sleep on macOS. Where it does not, a machine that slept while it published may publish after
+    others took it for dead; then a collection may have deleted an object of its commit, which `doctor` reports.
+    """
+    return time.clock_gettime(getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC))
 
 
 @cache

@@ -15,6 +15,7 @@ BENCHMARKS = {
     "render": "tests.benchmarks.bench_render",
     "sim": "tests.benchmarks.bench_sim",
     "sim-cost": "tests.benchmarks.bench_sim_cost",
+    "storage": "tests.benchmarks.bench_storage",
     "verdict": "tests.benchmarks.bench_verdict",
 }
 

@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 import flagdata
+from flagdata.caches import beside
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError, RefusedError, UsageError
 from flagdata.lake import Artifact, Lake, remote_leases
 from flagdata.lake.collect import collect
@@ -279,6 +280,20 @@ def test_a_long_wait_for_a_lock_is_reported_once(
     tries = list(itertools.islice(remote_leases._pauses(RemotePath("bucket", "lake/staging")), 4))
     assert len(tries) == 4
     assert caplog.text.count("waiting for another process") == 1
+
+
+def test_a_lease_is_renewed_and_counts_where_the_system_has_no_clock_of_its_time_since_start(
+    remote_lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(time, "CLOCK_BOOTTIME")
+    put_text(remote_lake, "gusts")
+    assert remote_lake.rows().num_rows == 1
+
+
+def test_lakes_of_other_prefixes_have_other_folders_in_the_cache() -> None:
+    one, other = (beside(RemotePath("bucket", key), ".inputs") for key in ("a/b-c", "a/b/c"))
+    assert one != other
+    assert one.name.startswith("bucket-a-b-c-")
 
 
 def test_the_exclusive_lock_keeps_writers_waiting(remote_lake: Lake, put_text: Put) -> None:
