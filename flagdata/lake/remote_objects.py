@@ -66,7 +66,14 @@ class RemoteObjects(Objects):
             NotFoundError, CorruptError: see `existing`.
         """
         place = self.path(name)
-        return self.existing(name) if self._copied(name) or self.size(name) <= WHOLE else place
+        if self._copied(name):
+            return self.existing(name)
+        try:
+            status = place.stat()
+        except FileNotFoundError:
+            raise self.missing(name) from None
+        large = status.st_size > WHOLE
+        return RemotePath(place.bucket, place.key, status=status) if large else self.existing(name)
 
     def openers(self, names: Sequence[str]) -> tuple[Callable[[], Place], ...]:
         """As for a disk; what is needed is fetched once its function was called."""

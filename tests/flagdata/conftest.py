@@ -66,6 +66,8 @@ def wind_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def lake(tmp_path: Path, request: pytest.FixtureRequest) -> Lake:
     """An empty lake: in a folder, or with FLAGDATA_TEST_STORAGE=s3 in a bucket."""
     if os.environ.get("FLAGDATA_TEST_STORAGE") == "s3":
+        if (marker := request.node.get_closest_marker("disk")) is not None:
+            pytest.skip(f"of a disk: {marker.args[0]}")
         return Lake.create(request.getfixturevalue("bucket_folder"))
     return Lake.create(tmp_path / "lake")
 

@@ -16,7 +16,12 @@ import pytest
 
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
+from flagdata.storage import Place
 
+AGES = "it sets the age of files, which a store gives them itself"
+LINKS = "a bucket has no links, pipes and permissions of files"
+LOCKS = "a bucket has no locks of the kernel; `test_object_storage.py` has those that it has instead"
+"""Why a test is marked `disk`."""
 _WORKER = Path(__file__).with_name("ingest_worker.py")
 _ENDS = {"done", "failed", "killed"}
 
@@ -37,6 +42,13 @@ def put_text() -> Callable[..., Artifact]:
         return artifact
 
     return put
+
+
+def overwrite(place: Place, data: bytes) -> None:
+    """Change a file of a lake behind its back."""
+    if isinstance(place, Path):
+        place.chmod(0o644)
+    place.write_bytes(data)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,6 +20,8 @@ from flagdata.lake.difference import difference
 from flagdata.lake.health import doctor, is_healthy, object_names, sampled, verify, verify_catalog
 from flagdata.lake.leases import collecting, keeping_collectors_out, leases
 from flagdata.schema import Kind
+from flagdata.storage import Place
+from tests.flagdata.lake.conftest import AGES, LINKS, LOCKS, overwrite
 
 NOW = timedelta(0)
 DAY = timedelta(hours=24)
@@ -30,9 +32,9 @@ def kinds(findings: tuple[Finding, ...]) -> list[str]:
     return [finding.kind for finding in findings]
 
 
-def object_of(lake: Lake, artifact: Artifact) -> Path:
+def object_of(lake: Lake, artifact: Artifact) -> Place:
     assert artifact.object is not None
-    return lake.object_path(artifact.object)
+    return lake.objects.path(artifact.object)
 
 
 def abandon(lake: Lake, text: str) -> str:
@@ -77,23 +79,21 @@ def test_a_missing_object_is_a_dangling_row(lake: Lake, put_text: Put) -> None:
 
 def test_a_truncated_object_is_found_by_its_size_and_a_changed_one_by_its_hash(lake: Lake, put_text: Put) -> None:
     short, changed = object_of(lake, put_text(lake, "long enough")), object_of(lake, put_text(lake, "same size"))
-    for path in (short, changed):
-        path.chmod(0o644)
-    short.write_text("long")
-    changed.write_text("some size")
+    overwrite(short, b"long")
+    overwrite(changed, b"some size")
     assert kinds(doctor(lake)) == ["object-size"]
     assert kinds(verify(lake, object_names(lake))) == ["object-changed", "object-changed"]
 
 
 def test_ingesting_again_heals_a_damaged_object(lake: Lake, put_text: Put) -> None:
     path = object_of(lake, put_text(lake, "a"))
-    path.chmod(0o644)
-    path.write_text("b")
+    overwrite(path, b"b")
     put_text(lake, "a")
-    assert path.read_text() == "a"
+    assert path.read_bytes() == b"a"
     assert doctor(lake, grace=NOW) == ()
 
 
+@pytest.mark.disk("what a folder of a bucket holds is said by its `.sums`; another file of it is not read")
 def test_a_folder_with_one_file_more_is_not_the_object_any_more(lake: Lake) -> None:
     with lake.transaction("folder") as tx:
         path = tx.staging(".zarr")
@@ -116,7 +116,7 @@ def test_a_ref_that_cannot_be_read_is_an_error_and_stops_collection(lake: Lake, 
     put_text(lake, "a")
     lake.tag("v1")
     name = abandon(lake, "orphan")
-    (lake.path / "refs" / "tags" / "v1.json").write_text("{")
+    (lake.path / "refs" / "tags" / "v1.json").write_bytes(b"{")
     assert kinds(doctor(lake)) == ["ref-unreadable"]
     with pytest.raises(CorruptError):
         collect(lake, grace=NOW)
@@ -161,7 +161,7 @@ def test_losing_the_last_commits_can_be_accepted_as_the_fix_says(lake: Lake, put
     assert lake.rows()["name"].to_pylist() == ["a", "c"]
 
 
-def flip(path: Path, position: int) -> None:
+def flip(path: Place, position: int) -> None:
     data = bytearray(path.read_bytes())
     data[position] ^= 1
     path.write_bytes(data)
@@ -199,7 +199,7 @@ def test_a_branch_whose_ref_is_lost_is_reported_and_its_objects_are_kept(lake: L
 
 def test_files_that_are_no_objects_are_strays_and_are_not_deleted(lake: Lake) -> None:
     stray = lake.path / "mcap" / "holiday.mcap"
-    stray.write_text("mine")
+    stray.write_bytes(b"mine")
     findings = doctor(lake)
     assert kinds(findings) == ["stray-file"]
     assert "move it out of the lake" in str(findings[0].fix)
@@ -207,6 +207,7 @@ def test_files_that_are_no_objects_are_strays_and_are_not_deleted(lake: Lake) ->
     assert stray.exists()
 
 
+@pytest.mark.disk(AGES)
 def test_an_orphan_is_left_alone_for_the_grace_period(lake: Lake) -> None:
     name = abandon(lake, "orphan")
     young = doctor(lake, grace=DAY)
@@ -238,6 +239,7 @@ def test_collection_spares_what_a_running_transaction_has_put(lake: Lake) -> Non
     assert doctor(lake, grace=NOW) == ()
 
 
+@pytest.mark.disk(AGES)
 def test_collection_spares_an_old_orphan_that_a_running_transaction_has_found_again(lake: Lake) -> None:
     name = abandon(lake, "again")
     age(lake.object_path(name), timedelta(days=30))
@@ -269,6 +271,7 @@ def test_a_transaction_ends_only_when_no_collector_can_see_it_half_gone(lake: La
     assert leases(lake.staging) == []
 
 
+@pytest.mark.disk(LOCKS)
 def test_a_collector_is_let_in_though_writers_never_pause(lake: Lake) -> None:
     stop = threading.Event()
 
@@ -292,6 +295,7 @@ def test_a_collector_is_let_in_though_writers_never_pause(lake: Lake) -> None:
     assert took < 10  # 20 times what is left of the holders' 0.02 s, with room for a busy machine
 
 
+@pytest.mark.disk(AGES)
 def test_a_withdrawn_row_leaves_the_branch_stays_at_tags_and_keeps_its_object_while_a_tag_needs_it(
     lake: Lake, put_text: Put
 ) -> None:
@@ -306,7 +310,7 @@ def test_a_withdrawn_row_leaves_the_branch_stays_at_tags_and_keeps_its_object_wh
     assert collect(lake, grace=DAY).objects == ()  # old, but withdrawn only now
     time.sleep(0.01)  # so that the withdrawal is older than no time at all
     assert collect(lake, grace=NOW).objects == (untagged.object,)
-    assert object_of(lake, tagged).read_text() == "tagged"
+    assert object_of(lake, tagged).read_bytes() == b"tagged"
     assert [(f.kind, f.severity) for f in doctor(lake, grace=NOW)] == [("withdrawn-collected", Severity.NOTE)]
     assert put_text(lake, "untagged").id == untagged.id
     assert doctor(lake, grace=NOW) == ()
@@ -375,6 +379,7 @@ def test_a_difference_names_rows_and_objects_both_ways(lake: Lake, put_text: Put
     assert back.removed["artifact"].to_pylist() == [came.id]
 
 
+@pytest.mark.disk(LOCKS)
 def test_leftovers_of_the_commit_protocol_are_explained_and_collected(lake: Lake, put_text: Put) -> None:
     put_text(lake, "a")
     orphan = abandon(lake, "orphan")
@@ -399,6 +404,7 @@ def test_leftovers_of_the_commit_protocol_are_explained_and_collected(lake: Lake
     assert lake.rows().num_rows == 1
 
 
+@pytest.mark.disk(AGES)
 def test_staged_files_without_a_lease_are_reported_and_collected_after_the_grace_period(lake: Lake) -> None:
     file, folder = lake.staging / "notes.txt", lake.staging / "mine"
     folder.mkdir()
@@ -420,6 +426,7 @@ def test_staged_files_without_a_lease_are_reported_and_collected_after_the_grace
     assert doctor(lake, grace=NOW) == ()
 
 
+@pytest.mark.disk(LINKS)
 def test_a_link_in_staging_is_deleted_and_what_it_leads_to_is_not(lake: Lake, tmp_path: Path) -> None:
     target = tmp_path / "mine"
     target.mkdir()
@@ -443,7 +450,7 @@ def test_a_sample_is_of_the_size_asked_for_and_never_larger_than_all() -> None:
 def test_values_in_the_log_that_no_writer_writes_are_refused(lake: Lake, put_text: Put) -> None:
     put_text(lake, "a")
     entry = max((lake.path / "catalog" / "_delta_log").glob("*.json"))
-    sound = entry.read_text()
+    sound = entry.read_bytes().decode()
     assert Lake.open(lake.path).catalog.history()
     for key, value in (
         ("timestamp", "now"), ("timestamp", 10**18), ("timestamp", -1), ("timestamp", None), ("operation", 3),
@@ -455,7 +462,7 @@ def test_values_in_the_log_that_no_writer_writes_are_refused(lake: Lake, put_tex
         holder[key] = value
         if value is None:
             del holder[key]
-        entry.write_text("\n".join(map(json.dumps, lines)))
+        entry.write_bytes("\n".join(map(json.dumps, lines)).encode())
         with pytest.raises(CorruptError, match="log"):
             Lake.open(lake.path).catalog.history()
 
