@@ -1,4 +1,4 @@
-"""`flagdata calibrate`: the cloth of a filmed flag weighed with the log of the wind beside it."""
+"""`flagdata calibrate`: a filmed flag, with the log of the wind beside it, is weighed and made an anemometer."""
 
 from __future__ import annotations
 
@@ -9,21 +9,34 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from flagdata.commands.durations import DURATION
 from flagdata.commands.statements import STATED
 from flagdata.console import LakePlace, LocalPath, document, following, json_option, progress, say
-from flagdata.errors import UsageError
+from flagdata.errors import InputError, RefusedError, UsageError
+from flagdata.findings import Severity
 from flagdata.stated import Stated
 from flagdata.storage import Place
 
 if TYPE_CHECKING:
+    from flagdata.lake import Lake
+    from measure.anemometer.making import Made
     from measure.calibrate.calibrate import Calibration
     from measure.calibrate.prior import Uncertain
+    from measure.estimate.page import Section
+    from measure.estimate.similarity import FlagSize
+    from measure.estimate.source import Reading
 
 
 @click.command()
 @click.argument("sources", nargs=-1, required=True, metavar="RECORDING...")
+@click.option("--only", type=click.Choice(["weight", "anemometer"]), help="Do one of both: weighing simulates, which "
+              "takes minutes, a reading model takes as long as reading the film.")  # fmt: skip
+@click.option("--name", metavar="NAME", help="Of the reading model, by which flagdata measure --model finds it; by "
+              "default the first recording's with -anemometer.")  # fmt: skip
+@click.option("--model", metavar="NAME|FOLDER|ID", help="Network whose summary the reading model uses; by default "
+              "flow-outdoor.")  # fmt: skip
 @click.option("--flag-size", metavar="LxH", help="Length along the wind and height along the pole [m], as in 1.5x1.0.")
 @click.option("--attachment", type=click.Choice(["corners", "hoist"]), default="corners", show_default=True,
               help="How the flag is held: at both ends of its hoist, or along all of it.")  # fmt: skip
@@ -42,7 +55,7 @@ if TYPE_CHECKING:
 @click.option("--offset", type=STATED, metavar="S±SIGMA", help="Seconds added to the tables' clock to reach the log's, "
               "as in 0.3±0.1; by default estimated.")  # fmt: skip
 @click.option("--start", "first", type=DURATION, default="0s", metavar="TIME", help="Where to begin, as in 12s.")
-@click.option("--end", "last", type=DURATION, metavar="TIME", help="Where to end; two minutes are used at most.")
+@click.option("--end", "last", type=DURATION, metavar="TIME", help="Where to end; weighing uses two minutes at most.")
 @click.option("--simulations", type=click.IntRange(min=64), default=128, show_default=True,
               help="Simulated flags for each recording.")  # fmt: skip
 @click.option("--workers", type=click.IntRange(min=1), default=lambda: os.cpu_count() or 1, show_default="all cores",
@@ -61,6 +74,9 @@ if TYPE_CHECKING:
 @json_option
 def calibrate(
     sources: tuple[str, ...],
+    only: str | None,
+    name: str | None,
+    model: str | None,
     flag_size: str | None,
     attachment: str,
     azimuth: Stated | None,
@@ -84,7 +100,8 @@ def calibrate(
     as_json: bool,
 ) -> None:
     """Weigh the cloth of a flag from its motion and the log of the wind beside it: area weight, bending and damping,
-    with intervals.
+    with intervals. And make the flag an anemometer: a reading model of this flag from this place, which flagdata
+    measure --model takes for other films of it.
 
     RECORDING is a film with its log, a recording of --lake by its name or id. Or it is a table of observables,
     Parquet or text, as flagdata observe --parquet, another tracker or a paper gives it: rows against `time` [s], with
@@ -97,10 +114,12 @@ def calibrate(
       flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --azimuth 70±7 --report page.html
       flagdata calibrate monday.csv tuesday.csv --flag-size 1.5x1.0 --lake lake --json
       flagdata calibrate tracked.csv --log 3f2a9c --offset 0.3±0.1 --lake lake --flag-size 0.9x0.6
+      flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --only anemometer --name garden
     """
+    _check_only(only)
     if flag_size is None:
         raise UsageError(
-            "the flag's size is missing: what is simulated is a flag of its size", where="--flag-size",
+            "the flag's size is missing: windows are as long as its size requires", where="--flag-size",
             fix="give length x height in metres, as in 1.5x1.0",
         )  # fmt: skip
     from flagdata.caches import user_cache
@@ -122,13 +141,22 @@ def calibrate(
     if lake is not None and not read_only:
         lake.check_writable()
     size = parse_size(flag_size)
+    reading = Reading(crop=box_of(crop), flag=flag, aspect=size.aspect)
+    anemometer = None
+    if only != "weight":
+        anemometer = _anemometer(
+            sources, size, reading, only=only, name=name, model=model, lake=lake, branch=branch, commit=not read_only,
+            first=first, last=last, level=level,
+        )  # fmt: skip
+    if only == "anemometer" and anemometer is not None:
+        _report(anemometer, report, as_json=as_json)
+        return
     options = Options(
         flag=Flag(length=size.length, height=size.height, attachment=attachment),
         azimuth=AZIMUTH if azimuth is None else known(AZIMUTH, azimuth, where="--azimuth"),
         elevation=ELEVATION if elevation is None else known(ELEVATION, elevation, where="--elevation"),
         distance=distance, simulations=simulations, level=level, seed=seed,
     )  # fmt: skip
-    reading = Reading(crop=box_of(crop), flag=flag, aspect=size.aspect)
     with progress(None, label="observe", unit="window") as advance:
         read = [
             of_source(
@@ -152,7 +180,7 @@ def calibrate(
         )
     parents = tuple(dict.fromkeys(parent for _, parent in read if parent is not None))
     wanted = None if lake is None or read_only else artifact(found, reading, parents).id
-    text = None if report is None else page(found, _provenance(found, wanted))
+    text = None if report is None else page(found, _provenance(found, wanted), sections=_sections(anemometer))
     new = lake is not None and wanted is not None and keep(lake, found, reading, parents, branch=branch)
     if wanted is not None:
         say(f"{wanted[:12]}  measurement, {'committed' if new else 'there already'}")
@@ -161,9 +189,89 @@ def calibrate(
             write_file(report, text, command="calibrate")
             say(f"report: {report}")
     if as_json:
-        document("calibrate", {**found.as_dict(), "artifact": wanted})
+        own = None if anemometer is None else anemometer.as_dict()
+        document("calibrate", {**found.as_dict(), "artifact": wanted, "anemometer": own})
     else:
         _print(found)
+
+
+_OF_WEIGHT = (
+    "attachment", "azimuth", "elevation", "distance", "log", "offset", "simulations", "workers", "cache", "seed",
+)  # fmt: skip
+_OF_ANEMOMETER = ("name", "model")
+
+
+def _check_only(only: str | None) -> None:
+    """Raises:
+    UsageError: an option of what is not to be done.
+    """
+    context = click.get_current_context()
+    for option in {"weight": _OF_ANEMOMETER, "anemometer": _OF_WEIGHT}.get(only or "", ()):
+        if context.get_parameter_source(option) is ParameterSource.COMMANDLINE:
+            raise UsageError(f"--{option} with --only {only}", where=f"--{option}", fix=f"leave --{option} out")
+
+
+def _anemometer(
+    sources: tuple[str, ...], size: FlagSize, reading: Reading, *, only: str | None, name: str | None,
+    model: str | None, lake: Lake | None, branch: str, commit: bool, first: float, last: float | None, level: float,
+) -> Made | None:  # fmt: skip
+    """The reading model; None with the reason on stderr where none can be made and the weight was asked for as well."""
+    from measure.anemometer.making import made
+    from measure.calibrate.filmed import is_table
+
+    if any(is_table(source) for source in sources):
+        if only is None and name is None and model is None:
+            return None
+        raise UsageError(
+            "a table of observables has no pictures, which a reading model takes", where="RECORDING",
+            fix="name recordings of a lake, or give --only weight",
+        )  # fmt: skip
+    try:
+        with progress(None, label="read", unit="window") as advance:
+            done = made(
+                sources, size, reading, name=name, model=model, lake=lake, branch=branch, commit=commit, first=first,
+                last=last, level=level, advance=advance,
+            )  # fmt: skip
+    except (InputError, RefusedError) as error:
+        if only is not None:
+            raise
+        say(f"no reading model: {error.what}" + (f"; {error.fix}" if error.fix else ""))
+        return None
+    say(f"the flag as an anemometer {done.found.sentence}")
+    for finding in done.found.findings:
+        if finding.severity is not Severity.NOTE:
+            say(f"{finding.severity.value}: {finding.what}" + (f"; {finding.fix}" if finding.fix else ""))
+    if done.artifact is not None:
+        say(f"{done.artifact[:12]}  reading model, {'committed' if done.new else 'there already'}")
+        say(f"for flagdata measure: --model {done.name}")
+    return done
+
+
+def _sections(anemometer: Made | None) -> tuple[Section, ...]:
+    if anemometer is None:
+        return ()
+    from measure.anemometer.section import section
+
+    return (section(anemometer.found),)
+
+
+def _report(anemometer: Made, report: Path | None, *, as_json: bool) -> None:
+    """What is said of a reading model that was made alone."""
+    from flagdata.outputs import write_file
+    from measure.anemometer.section import page
+
+    if report is not None:
+        rows = {one.name: f"recording {one.identity}" for one in anemometer.found.recordings}
+        rows |= {"network": f"{anemometer.found.model.network}, SHA-256 {anemometer.found.model.identity}"}
+        rows |= {} if anemometer.artifact is None else {"artifact": anemometer.artifact}
+        text = page(anemometer.found, anemometer.name, rows)
+        with following(f"the reading model {anemometer.artifact}", "writing its report"):
+            write_file(report, text, command="calibrate")
+            say(f"report: {report}")
+    if as_json:
+        document("calibrate", {"anemometer": anemometer.as_dict()})
+    else:
+        click.echo(anemometer.found.sentence)
 
 
 def known(about: Uncertain, stated: Stated, *, where: str) -> Uncertain:

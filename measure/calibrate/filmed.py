@@ -28,6 +28,12 @@ _LOST = 0.2
 """Share of the frames that could not be registered from which on a film is refused."""
 
 
+def is_table(source: str) -> bool:
+    """Whether a source is a file of a table of observables, not a recording."""
+    path = Path(source)
+    return path.suffix.lower() in _TABLES and path.is_file()
+
+
 def of_source(
     source: str, size: FlagSize, reading: Reading, *, lake: Lake | None, at: str, first: float, last: float | None,
     log: str | None = None, offset: Stated | None = None, advance: Callable[[int], object] | None = None,
@@ -48,13 +54,12 @@ def of_source(
         InputError: a film without a log, or a log that does not cover it.
         FlagdataError: nothing of that name; a film in which no flag is found.
     """
-    path = Path(source)
-    if path.suffix.lower() in _TABLES and path.is_file():
+    if is_table(source):
         if reading.crop is not None or reading.flag is not None:
             raise UsageError(
                 "a table of observables has no pictures", where="--crop, --flag", fix="give them to flagdata observe"
             )
-        return _of_table(path, size, lake=lake, at=at, first=first, last=last, log=log, offset=offset)
+        return _of_table(Path(source), size, lake=lake, at=at, first=first, last=last, log=log, offset=offset)
     if log is not None or offset is not None:
         raise UsageError(
             "a recording has its log and its clock",

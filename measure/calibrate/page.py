@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -14,17 +14,19 @@ from flagdata.tables import Range, Scale
 from measure.calibrate.calibrate import Calibration, Fitted, Quantity
 from measure.calibrate.prior import CLOTH
 from measure.calibrate.simulation import OBSERVED
+from measure.estimate.page import Section
 from measure.observables import OBSERVABLES
 
 _BLUE, _RUST = "#2b6f8f", "#c4622d"
 _DEGREES = ("azimuth", "elevation")
 
 
-def page(found: Calibration, provenance: Mapping[str, str]) -> str:
+def page(found: Calibration, provenance: Mapping[str, str], *, sections: Sequence[Section] = ()) -> str:
     """The page.
 
     Args:
         provenance: rows of a table, in order.
+        sections: what comes before it, each under its own heading.
     """
     check = found.check
     values = {
@@ -41,7 +43,7 @@ def page(found: Calibration, provenance: Mapping[str, str]) -> str:
             for one, place in zip(found.recordings, found.places, strict=True)
         ],
         "check": {"count": check.count, "held": check.held, "error": f"{check.error:.1%}"},
-        "provenance": {**provenance, "code": code_version()},
+        "sections": list(sections), "provenance": {**provenance, "code": code_version()},
     }  # fmt: skip
     return render("measure.calibrate", "page.html.j2", values)
 

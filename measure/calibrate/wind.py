@@ -133,6 +133,21 @@ class Log:
         """The same samples that much later [s]."""
         return replace(self, times=self.times + late)
 
+    def covers(self, starts: NDArray[np.floating], ends: NDArray[np.floating]) -> NDArray[np.bool_]:
+        """(k,) whether no silence of the log longer than two of its periods, or two seconds, is in a window [s]."""
+        gaps = np.diff(self.times)
+        silent = gaps > max(2.0 * float(np.median(gaps)), 2.0)
+        begins, stops = self.times[:-1][silent], self.times[1:][silent]
+        free = [not ((begins < end) & (stops > start)).any() for start, end in zip(starts, ends, strict=True)]
+        return np.array(free) & (starts >= self.times[0]) & (ends <= self.times[-1])
+
+    def unlagged(self) -> Log:
+        """The same with its instrument's lag undone; itself where that is not known."""
+        if not self.distance:
+            return self
+        speed = _undone(self.times, self.speed[:, None], lag=self.distance / float(self.speed.mean()))[:, 0]
+        return replace(self, speed=np.maximum(speed, 0.0), distance=0.0)
+
     def velocity(self, distance: float) -> Floats:
         """(n, 2) along the mean wind and to its left at `times`, a lag of that distance constant undone [m/s]."""
         turn = np.zeros_like(self.speed) if self.turn is None else self.turn

@@ -49,7 +49,8 @@ if TYPE_CHECKING:
 @click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.9, show_default=True,
               help="Level of the intervals.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of all draws.")
-@click.option("--model", metavar="NAME|FOLDER|ID", help="Network that measures; by default flow, of flags.")
+@click.option("--model", metavar="NAME|FOLDER|ID", help="Network that measures, or reading model of flagdata "
+              "calibrate; by default flow-outdoor, of flags.")  # fmt: skip
 @click.option("--refine", type=click.IntRange(min=20), metavar="N",
               help="Refine the first window by N simulated clips, 20 or more; 50 take minutes.")  # fmt: skip
 @click.option("--cache", type=LocalPath(), metavar="FOLDER",
@@ -299,7 +300,7 @@ class _Job:
         rows = {
             "film": f"{film.name}, {film.duration:.2f} s at {film.rate:.4g} frames a second",
             "source": f"SHA-256 {source}" if subject.artifact is None else f"{subject.artifact.kind} {source}",
-            "network": f"{self.network.estimator.name}, SHA-256 {self.network.identity}",
+            "network": self.network.described,
             "options": ", ".join(f"{k} {v}" for k, v in _given(self.options, self.reading).items()),
             "seed": str(self.options.seed),
         }

@@ -13,6 +13,7 @@ from flagdata.ingest.camera import CropBox
 from flagdata.lake import Lake
 from flagdata.measured import Answer, Estimate, Measured, Windows
 from flagdata.stated import Stated
+from measure.anemometer.measuring import measure_by
 from measure.estimate.answer import Quantity
 from measure.estimate.dependence import of_model
 from measure.estimate.material import weight_of
@@ -24,7 +25,8 @@ from measure.estimate.source import Network, Reading, Subject, gate_beside, netw
 def run(
     subject: Subject, network: Network, options: Options, *, advance: Callable[[int, int], None] | None = None
 ) -> Measurement:
-    """Measure one film by a network, with the gate and the dependence of windows that belong to it.
+    """Measure one film by a network, with the gate and the dependence of windows that belong to it, or by a reading
+    model.
 
     Args:
         advance: called after each window with how many there are and 1.
@@ -32,6 +34,10 @@ def run(
     Raises:
         FlagdataError: see `measure.estimate.measuring.measure`.
     """
+    if network.reading is not None and network.artifact is not None:
+        return measure_by(
+            subject.film, network.reading, network.estimator, options, name=network.artifact.name, advance=advance
+        )
     gate = gate_beside(network, false_alarm=options.false_alarm)
     return measure(
         subject.film, network.estimator, gate=gate, dependence=of_model(network.estimator), options=options,

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,8 @@ from flagdata.lake.matching import matching
 from flagdata.provenance import digest, file_hash
 from flagdata.record import Record
 from flagdata.schema import Kind
+from measure.anemometer.reading import ReadingModel
+from measure.anemometer.storage import read as read_reading_model
 from measure.estimate.checked import CheckedGate
 from measure.estimate.conditioned import ConditionedFilm, WholeFilm
 from measure.estimate.film import CameraFilm, RecordFilm
@@ -28,6 +31,8 @@ from models.storage import CARD, WEIGHTS
 FILMED = (Kind.RECORDING, Kind.CLIP, Kind.CAMERA)
 """Kinds of artifacts that have frames."""
 _LEAST_PREFIX = 6
+CALIBRATED = "anemometer"
+"""Key of the recipes of reading models (`measure.anemometer`)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,28 +202,38 @@ class Network:
 
     Attributes:
         estimator: at work.
-        identity: SHA-256 of its card and weights.
+        identity: SHA-256 of its card and weights; of a reading model the id of its artifact.
         artifact: of the lake; None of a folder or of a model that comes with the package.
         folder: of its files, where what belongs to it may lie beside them.
+        reading: the reading model that uses its summary; None where the network itself measures.
     """
 
     estimator: Estimator
     identity: str
     artifact: Artifact | None
     folder: Path
+    reading: ReadingModel | None = None
+
+    @property
+    def described(self) -> str:
+        """Which one it is, for people."""
+        if self.reading is not None and self.artifact is not None:
+            return f"reading model {self.artifact.name}, {self.identity}, on the network {self.estimator.name}"
+        return f"{self.estimator.name}, SHA-256 {self.identity}"
 
 
 def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
     """The model of a name.
 
     Args:
-        name: of a model that comes with the package, a folder, or a network of the lake by its name or id; None is the
-            package's default.
+        name: of a model that comes with the package, a folder, or a network or reading model of the lake by its name or
+            id; None is the package's default.
 
     Raises:
         UnknownNameError: none of these.
-        UsageError: several networks of the lake.
+        UsageError: several models of the lake.
         CorruptError: the model is damaged.
+        InputError: a reading model whose network is another one now.
     """
     shipped = {path.name for path in estimator.SHIPPED.iterdir() if (path / CARD).is_file()}
     chosen = name if name is not None else estimator.DEFAULT
@@ -226,17 +241,34 @@ def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
         return _loaded(Path(chosen), None)
     if chosen in shipped:
         return _loaded(estimator.SHIPPED / chosen, None)
-    rows: Sequence[Mapping[str, Any]] = []
-    if lake is not None:
-        rows = lake.rows({"kind": Kind.NETWORK}, at=at, columns=["artifact", "name"]).to_pylist()
+    rows = [] if lake is None else _models(lake, at)
     meant = [row for row in rows if row["name"] == chosen]
     meant = meant or [row for row in rows if len(chosen) >= _LEAST_PREFIX and row["artifact"].startswith(chosen)]
     if not meant or lake is None:
         raise UnknownNameError.of("model", chosen, shipped | {str(row["name"]) for row in rows}, where="--model")
     if len(meant) > 1:
-        raise UsageError(f"{len(meant)} networks are called {chosen!r}", where="--model", fix="give the id of one")
+        raise UsageError(f"{len(meant)} models are called {chosen!r}", where="--model", fix="give the id of one")
     artifact = lake.artifact(meant[0]["artifact"], at=at)
-    return _loaded(lake.object_path(str(artifact.object)), artifact)
+    folder = lake.object_path(str(artifact.object))
+    return _loaded(folder, artifact) if artifact.kind is Kind.NETWORK else _calibrated(folder, artifact, lake, at)
+
+
+def _models(lake: Lake, at: str | None) -> list[dict[str, Any]]:
+    """Networks and reading models of a lake: artifact and name."""
+    columns = ["artifact", "name", "kind", "recipe"]
+    rows = lake.rows({"kind": (Kind.NETWORK, Kind.MEASUREMENT)}, at=at, columns=columns).to_pylist()
+    return [row for row in rows if row["kind"] == Kind.NETWORK or CALIBRATED in json.loads(row["recipe"] or "{}")]
+
+
+def _calibrated(folder: Path, artifact: Artifact, lake: Lake, at: str | None) -> Network:
+    reading = read_reading_model(folder)
+    own = network(reading.network, lake=lake, at=at)
+    if own.identity != reading.identity:
+        raise InputError(
+            f"the network {reading.network!r} is another one than when the flag was calibrated", where=artifact.name,
+            fix="calibrate the flag again",
+        )  # fmt: skip
+    return replace(own, identity=artifact.id, artifact=artifact, reading=reading)
 
 
 def _loaded(folder: Path, artifact: Artifact | None) -> Network:

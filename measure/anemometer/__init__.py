@@ -1,0 +1,11 @@
+"""A flag beside an anemometer becomes an anemometer: what its film shows is regressed on the log.
+
+features    what each window of a film shows: the network's summary, its wind, the observables; and the picture's place
+regression  ridge regression with neighbouring windows, chosen by cross-validation over blocks of time
+intervals   conformal intervals and draws from the errors of blocks that were left out
+novelty     whether a film is of the same flag, seen from the same place
+reading     the reading model: from features to winds
+calibration recordings and their logs → a reading model
+artifact    a reading model in the lake
+measuring   a film by a reading model, in the form of any other measurement
+"""

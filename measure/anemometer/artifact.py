@@ -1,0 +1,54 @@
+"""A reading model in the lake: a measurement of its recordings, whose object is a Zarr folder of plain arrays.
+
+Its identity is a hash of what went in: the recordings and their parts, the network, the flag's size and how films were
+read.
+"""
+
+from __future__ import annotations
+
+from flagdata.findings import quality_flags
+from flagdata.lake import Artifact, Lake
+from flagdata.provenance import canonical
+from flagdata.schema import Kind
+from measure.anemometer.calibration import ANSWER, Calibrated
+from measure.anemometer.features import VERSION
+from measure.anemometer.storage import write
+from measure.estimate.source import CALIBRATED, Reading
+from models.conditioning.conditioning import VERSION as CONDITIONED
+
+
+def artifact(found: Calibrated, name: str, reading: Reading, *, stored: str | None = None) -> Artifact:
+    """The row of a reading model.
+
+    Args:
+        name: under which `flagdata measure --model` finds it.
+        reading: how films were read.
+    """
+    model = found.model
+    spans = [[float(one.features.starts[0]), len(one.features.starts) * model.step] for one in found.recordings]
+    return Artifact(
+        kind=Kind.MEASUREMENT, name=name, object=stored, parents=[one.identity for one in found.recordings],
+        recipe={
+            CALIBRATED: ANSWER, "features": VERSION, "conditioned": CONDITIONED, "network": model.identity,
+            "flag_size": [model.size.length, model.size.height], "spans": spans, "level": found.level,
+            **reading.recipe(),
+        },
+        quality=quality_flags(found.findings),
+        report=canonical({"schema": "flagdata.anemometer-report/1", **found.as_dict()}),
+    )  # fmt: skip
+
+
+def keep(lake: Lake, found: Calibrated, name: str, reading: Reading, *, branch: str) -> tuple[str, bool]:
+    """Commit a reading model: its id, and whether it is new; the same one again adds nothing.
+
+    Raises:
+        FlagdataError: as `Lake.transaction`.
+    """
+    wanted = artifact(found, name, reading)
+    with lake.transaction(f"calibrate {name}", branch=branch) as transaction:
+        if transaction.find(wanted.id) is not None:
+            return wanted.id, False
+        staged = transaction.staging(".zarr")
+        write(staged, found.model, found.as_dict())
+        transaction.add(artifact(found, name, reading, stored=transaction.put(staged)))
+    return wanted.id, wanted.id in transaction.result.added

@@ -1,0 +1,297 @@
+"""Films of a flag and the logs beside them become a reading model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError, RefusedError
+from flagdata.findings import Finding, Severity
+from flagdata.signals import Sensor
+from measure.anemometer.features import Features, features_of
+from measure.anemometer.intervals import half_width
+from measure.anemometer.novelty import Familiar
+from measure.anemometer.reading import ReadingModel, filled
+from measure.anemometer.regression import BLOCK, Ridge, blocks_of, validated, with_neighbours
+from measure.calibrate.wind import STEADY, Log
+from measure.estimate.similarity import FlagSize
+from measure.estimate.source import Network, Subject
+from measure.gate.reasons import REASONS
+
+Floats = NDArray[np.float64]
+
+ANSWER = 1
+"""Raised when the same recordings give another reading model."""
+LEAST = 60.0
+"""s of film beside a log: three blocks of time."""
+ENOUGH = 240.0
+"""s of film from which on intervals rest on enough blocks of time."""
+SHOWN = 0.8
+"""Share of the windows that must show a feature for it to be used."""
+_OFFSETS = np.linspace(-2.0, 2.0, 9)
+"""Errors of the clock that are tried, in its standard uncertainties."""
+_CLOCK = 0.05
+"""s below which a clock's uncertainty matters for no window."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recording:
+    """A film and the log beside it, looked at.
+
+    Attributes:
+        name, identity: of the artifact.
+        features: of the film's windows.
+        log: its times since the film's first frame.
+        sensor: that logged.
+        findings: on the film.
+    """
+
+    name: str
+    identity: str
+    features: Features
+    log: Log
+    sensor: Sensor
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """(w,) windows with all their frames beside which the log is not silent."""
+        starts = self.features.starts
+        return self.features.whole & self.log.covers(starts, starts + self.features.layout.step)
+
+    def winds(self, offset: float) -> Floats:
+        """(w,) mean of the log over each window, the log `offset` seconds later than its stamps [m/s]."""
+        starts = self.features.starts - offset
+        return self.log.mean_speed(starts, starts + self.features.layout.step)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Calibrated:
+    """A reading model and what it rests on.
+
+    Attributes:
+        model: the reading model.
+        recordings: that it was fitted to.
+        offset: by which the logs are later than their stamps, as fitted [s].
+        clock: prior standard uncertainty of that [s].
+        uncalibrated: RMSE of the network's own wind against the log over the same windows [m/s].
+        level: of the intervals that are stated.
+        findings: on films, log and fit.
+    """
+
+    model: ReadingModel
+    recordings: tuple[Recording, ...]
+    offset: float
+    clock: float
+    uncalibrated: float
+    level: float
+    findings: tuple[Finding, ...]
+
+    @property
+    def half_width(self) -> float:
+        """Of a window's interval [m/s]."""
+        return half_width(self.model.errors, self.level)
+
+    @property
+    def sentence(self) -> str:
+        """In one line."""
+        low, high = self.model.range
+        return (
+            f"reads the wind of {self.model.step:.2g} s to {self.model.rmse:.2f} m/s (RMSE in blocks of time that were "
+            f"left out, n = {len(self.model.winds)} windows; {self.level:.0%} within ±{self.half_width:.2f} m/s) "
+            f"between {low:.1f} and {high:.1f} m/s; the network alone {self.uncalibrated:.2f} m/s"
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        model, (low, high) = self.model, self.model.range
+        return {
+            "sentence": self.sentence, "network": model.network, "flag_size": [model.size.length, model.size.height],
+            "window": model.step, "windows": len(model.winds), "range": [low, high], "rmse": model.rmse,
+            "uncalibrated_rmse": self.uncalibrated, "level": self.level, "half_width": _plain(self.half_width),
+            "clock_offset": self.offset, "clock_sigma": self.clock, "penalty": model.ridge.penalty,
+            "features": list(model.names),
+            "recordings": [
+                {
+                    "name": one.name, "artifact": one.identity, "windows": int(one.usable.sum()),
+                    "anemometer": one.sensor.name, "accuracy": one.sensor.accuracy,
+                    "distance_constant": one.sensor.distance_constant,
+                }
+                for one in self.recordings
+            ],
+            "findings": [finding.as_dict() for finding in self.findings],
+        }  # fmt: skip
+
+
+def recorded(
+    subject: Subject, network: Network, size: FlagSize, *, first: float, last: float | None,
+    advance: Callable[[int, int], None] | None = None,
+) -> Recording:  # fmt: skip
+    """Look at a recording of a lake.
+
+    Args:
+        first, last: part of the film [s].
+        advance: called after each window with how many there are and 1.
+
+    Raises:
+        InputError: no log beside the film, or one that does not cover it.
+        RefusedError: a film with a fault that nothing can be measured with.
+    """
+    film, wind = subject.film, None if subject.record is None else subject.record.wind()
+    if wind is None or film.start is None or subject.artifact is None:
+        raise InputError(
+            "no log of the wind is beside the film", where=film.name,
+            fix="align a film and a log (flagdata align), and name the recording that comes out",
+        )  # fmt: skip
+    log = Log.of(wind, start=film.start, clock=subject.artifact.clock_sigma or 0.0)
+    if log.times[0] > min(film.duration, math.inf if last is None else last) or log.times[-1] < first:
+        raise InputError(
+            f"the log runs from {log.times[0]:.1f} to {log.times[-1]:.1f} s of the film's time and covers none of it",
+            where=film.name, fix="align the film with the log of its own time (flagdata align)",
+        )  # fmt: skip
+    features = features_of(film, network.estimator, size, first=first, last=last, advance=advance)
+    findings = film.findings()
+    if faults := [one for one in findings if one.kind in REASONS]:
+        raise RefusedError(faults[0].what, where=film.name, fix=faults[0].fix or "give another film")
+    return Recording(
+        name=film.name, identity=subject.artifact.id, features=features, log=log.unlagged(),
+        sensor=wind.sensor, findings=findings,
+    )  # fmt: skip
+
+
+def calibrated(
+    recordings: Sequence[Recording], *, network: Network, size: FlagSize, level: float
+) -> Calibrated:  # fmt: skip
+    """Fit a reading model.
+
+    Raises:
+        InputError: too little film.
+        RefusedError: a wind that hardly changes; films of several places; a film that does not show the wind.
+    """
+    step = recordings[0].features.layout.step
+    usable = [one.usable for one in recordings]
+    count = sum(int(one.sum()) for one in usable)
+    if count * step < LEAST / 2:
+        raise InputError(
+            f"only {count * step:.0f} s of film have all their frames and a log beside them", where=recordings[0].name,
+            fix=f"give {LEAST:.0f} s or more that the log covers; {ENOUGH / 60:.0f} minutes are better",
+        )  # fmt: skip
+    _check_wind(recordings, usable)
+    names = _names(recordings, usable)
+    rows, plain = _rows(recordings, usable, names)
+    numbers = np.repeat(np.arange(len(recordings)), [int(one.sum()) for one in usable])
+    times = np.concatenate([one.features.starts[own] for one, own in zip(recordings, usable, strict=True)])
+    blocks = blocks_of(times, numbers)
+
+    def winds(offset: float) -> Floats:
+        return np.concatenate([one.winds(offset)[own] for one, own in zip(recordings, usable, strict=True)])
+
+    clock = max(one.log.clock for one in recordings)
+    offset = _best_offset(plain, winds, blocks, clock)
+    logged = winds(offset)
+    checked = validated(rows, logged, blocks)
+    spread = float(logged.std())
+    if checked.rmse >= spread:
+        raise RefusedError(
+            f"the film does not show the wind: what is read of windows left out errs by {checked.rmse:.2f} m/s, as "
+            f"much as their mean would ({spread:.2f} m/s)",
+            where=recordings[0].name, fix="check the flag with --crop or --flag, and the clocks with flagdata align",
+        )  # fmt: skip
+    model = ReadingModel(
+        network=network.estimator.name, identity=network.identity, size=size, step=step, names=names,
+        ridge=Ridge.fitted(rows, logged, checked.penalty), winds=logged, errors=logged - checked.predicted,
+        block=round(BLOCK / step), familiar=Familiar.of(plain, checked.predicted, blocks),
+        places=tuple(one.features.place for one in recordings),
+    )  # fmt: skip
+    return Calibrated(
+        model=model, recordings=tuple(recordings), offset=offset, clock=clock, level=level,
+        uncalibrated=_uncalibrated(recordings, usable, logged),
+        findings=(*(f for one in recordings for f in one.findings), *_noticed(recordings, count * step, offset, clock)),
+    )  # fmt: skip
+
+
+def _check_wind(recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]]) -> None:
+    every = np.concatenate([one.winds(0.0)[own] for one, own in zip(recordings, usable, strict=True)])
+    if every.std() < STEADY * every.mean():
+        raise RefusedError(
+            f"the wind hardly changes ({every.mean():.1f} m/s, its windows within {every.std():.2f} m/s), so that "
+            "nothing shows how the flag follows it",
+            where=recordings[0].name, fix="film for longer, or in gusts; several recordings are taken together",
+        )  # fmt: skip
+
+
+def _names(recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]]) -> tuple[str, ...]:
+    """The features that enough windows of every recording show."""
+    shares = np.min(
+        [np.isfinite(one.features.values[own]).mean(axis=0) for one, own in zip(recordings, usable, strict=True)],
+        axis=0,
+    )
+    names = recordings[0].features.names
+    return tuple(name for name, share in zip(names, shares, strict=True) if share >= SHOWN)
+
+
+def _rows(
+    recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]], names: tuple[str, ...]
+) -> tuple[Floats, Floats]:
+    """(n, 3 · column) features with the neighbours', and (n, column) without, of all whole windows."""
+    rows, plain = [], []
+    for one, own in zip(recordings, usable, strict=True):
+        columns = [one.features.names.index(name) for name in names]
+        values = filled(one.features.values[:, columns], own, names, where=one.name)
+        rows.append(with_neighbours(values)[own])
+        plain.append(values[own])
+    return np.concatenate(rows), np.concatenate(plain)
+
+
+def _best_offset(plain: Floats, winds: Callable[[float], Floats], blocks: NDArray[np.int_], clock: float) -> float:
+    """The most probable error of the clock [s], of windows without their neighbours, which could make up for it."""
+    if clock <= _CLOCK:
+        return 0.0
+    errors = [validated(plain, winds(share * clock), blocks).rmse for share in _OFFSETS.tolist()]
+    misfit = len(plain) * np.log(errors) + np.square(_OFFSETS) / 2
+    return float(_OFFSETS[misfit.argmin()]) * clock
+
+
+def _uncalibrated(recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]], logged: Floats) -> float:
+    own = np.concatenate([one.features.winds[whole] for one, whole in zip(recordings, usable, strict=True)])
+    return float(np.sqrt(np.mean((own - logged) ** 2)))
+
+
+def _noticed(recordings: Sequence[Recording], seconds: float, offset: float, clock: float) -> list[Finding]:
+    found = []
+    if seconds < ENOUGH:
+        found.append(
+            Finding(
+                kind="short-calibration", severity=Severity.WARNING, value=seconds,
+                what=f"{seconds:.0f} s of film beside a log are few: the intervals rest on {seconds / BLOCK:.0f} "
+                "blocks of time",
+                fix=f"give {ENOUGH / 60:.0f} minutes or more",
+            )
+        )  # fmt: skip
+    if abs(offset) > 1.5 * clock > 0:
+        found.append(
+            Finding(
+                kind="clock-at-limit", severity=Severity.WARNING, value=offset,
+                what=f"the log fits best {offset:+.2f} s later than its stamps, whose uncertainty is {clock:.2f} s",
+                fix="check the clocks with flagdata align",
+            )
+        )  # fmt: skip
+    accuracy = max((one.sensor.accuracy or 0.0 for one in recordings), default=0.0)
+    if accuracy:
+        found.append(
+            Finding(
+                kind="anemometer-accuracy", severity=Severity.NOTE, value=accuracy,
+                what=f"the anemometer states ±{accuracy:g} m/s, which the reading model takes over and no interval "
+                "contains",
+            )
+        )  # fmt: skip
+    return found
+
+
+def _plain(value: float) -> float | None:
+    return value if math.isfinite(value) else None

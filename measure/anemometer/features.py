@@ -1,0 +1,172 @@
+"""What each window of a film shows, in numbers, and where in its picture the flag is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.errors import RefusedError
+from measure.estimate.conditioned import ConditionedFilm
+from measure.estimate.joint import WIND
+from measure.estimate.similarity import POWERS, FlagSize, spacing, trained_on
+from measure.estimate.windows import Layout, cut, lay_out
+from measure.observables import OBSERVABLES
+from measure.observables.observable import Observable
+from measure.observables.watching import watched
+from models.conditioning.repeats import Distinct
+from models.estimator import Estimator
+
+OBSERVED = (
+    "droop", "extension", "middle-speed", "outline-speed", "amplitude-up", "amplitude-across", "area", "asymmetry",
+)  # fmt: skip
+"""Observables of a window: those that one of 1.2 s shows. Spectra and waves take longer ones."""
+VERSION = 1
+"""Raised when the same film gives other features."""
+THUMBNAIL = 64
+"""Longer side of the picture by which a place is known again [px]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Place:
+    """Where the camera stands, as far as its picture shows it.
+
+    Attributes:
+        hoist: (2, 2) upper and lower end of the hoist: column and row, in longer sides of the picture; NaN where it was
+            not found.
+        side: 1 where the flag flies to the right, -1 to the left.
+        background: (rows, columns) float32 the picture averaged down to `THUMBNAIL` [gray levels].
+        bare: (rows, columns) where no cloth moves.
+    """
+
+    hoist: NDArray[np.float64]
+    side: float
+    background: NDArray[np.float32]
+    bare: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Features:
+    """Windows of a film, one after another.
+
+    Attributes:
+        film: its name.
+        starts: (w,) of the windows [s from the film's first frame], `layout.step` apart.
+        layout: of the windows.
+        values: (w, feature), NaN where a window does not show one; a row of NaN where frames are missing.
+        names: of the features.
+        summaries: (w, dimension) of the network, for whoever compares films; NaN likewise.
+        winds: (w,) that the network reads by itself [m/s]; NaN likewise.
+        clip: (frames, height, width) of the first whole window.
+        place: of the camera.
+    """
+
+    film: str
+    starts: NDArray[np.float64]
+    layout: Layout
+    values: NDArray[np.float64]
+    names: tuple[str, ...]
+    summaries: NDArray[np.float32]
+    winds: NDArray[np.float64]
+    clip: NDArray[np.uint8]
+    place: Place
+
+    @property
+    def whole(self) -> NDArray[np.bool_]:
+        """(w,) windows that have all their frames."""
+        return np.asarray(np.isfinite(self.summaries).all(axis=1))
+
+
+@torch.no_grad()
+def features_of(
+    film: ConditionedFilm, model: Estimator, size: FlagSize, *, first: float | None = None, last: float | None = None,
+    advance: Callable[[int, int], None] | None = None,
+) -> Features:  # fmt: skip
+    """Look at a film.
+
+    Args:
+        size: of the flag.
+        first, last: part of the film [s].
+        advance: called after each window with how many there are and 1.
+
+    Raises:
+        RefusedError: nothing moves like cloth, or no window is whole.
+        UsageError, InputError: a part that the film does not have.
+    """
+    scale = size.scale(trained_on(model.targets))
+    layout = lay_out(
+        frames=model.front_end.frames, spacings=(spacing(scale, rate=model.front_end.rate),), rate=film.rate,
+        duration=film.duration, step=None, first=first, last=last,
+    )  # fmt: skip
+    summaries: NDArray[np.float32] | None = None
+    winds = np.full(layout.count, np.nan)
+    clip: NDArray[np.uint8] | None = None
+    margin = 2 * layout.period
+    for window in cut(Distinct(film.frames(layout.first - margin, layout.last + margin)), layout):
+        embeddings = model.embeddings(model.inputs(window.clips))
+        summary = embeddings[0][0].cpu().numpy().astype(np.float32)
+        if summaries is None:
+            summaries, clip = np.full((layout.count, len(summary)), np.nan, np.float32), window.clips[0]
+        summaries[window.index] = summary
+        values = model.learners[0].scaling.values(model.posterior(embeddings).mean().float())
+        winds[window.index] = float(values[0, 0]) * scale ** POWERS[WIND]
+        if advance is not None:
+            advance(layout.count, 1)
+    if summaries is None or clip is None:
+        raise RefusedError(
+            "no window of the film has all its frames", where=film.name, fix="choose another part by --start and --end"
+        )
+    shown, hoist, side = _observed(film, size, layout)
+    return Features(
+        film=film.name, starts=layout.first + layout.step * np.arange(layout.count, dtype=np.float64), layout=layout,
+        values=np.concatenate([summaries, winds[:, None], shown], axis=1, dtype=np.float64),
+        names=(*(f"summary-{k}" for k in range(summaries.shape[1])), "network-wind", *OBSERVED),
+        summaries=summaries, winds=winds, clip=clip, place=_place(film, hoist, side),
+    )  # fmt: skip
+
+
+def _observed(
+    film: ConditionedFilm, size: FlagSize, layout: Layout
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """(w, observable), the hoist's ends (2, 2) in the conditioned picture's sides, and the side the flag flies to."""
+    seen = watched(
+        film, size, first=layout.first, last=layout.first + layout.count * layout.step, seconds=layout.step
+    )  # fmt: skip
+    shown = np.full((layout.count, len(OBSERVED)), np.nan)
+    for row, window in zip(shown, seen.windows, strict=False):
+        if window is not None:
+            for column, name in enumerate(OBSERVED):
+                observable: Observable = OBSERVABLES[name]
+                row[column] = observable.of_film(window).value
+    whole = [window for window in seen.windows if window is not None]
+    if not whole:
+        return shown, np.full((2, 2), np.nan), 0.0
+    hoist = np.median([window.hoist / window.masks.shape[2] for window in whole], axis=0)
+    return shown, hoist, float(np.sign(sum(window.side for window in whole)))
+
+
+def _place(film: ConditionedFilm, hoist: NDArray[np.float64], side: float) -> Place:
+    """The place, of what the last reading of the film found."""
+    found, reference = film.found, film.reference
+    if found is None or reference is None or found.region is None:
+        raise RefusedError(
+            "nothing moves like cloth in the film", where=film.name, fix="give another film, or --crop around the flag"
+        )
+    rows, columns = reference.shape
+    longer = max(rows, columns)
+    shape = (max(1, round(THUMBNAIL * rows / longer)), max(1, round(THUMBNAIL * columns / longer)))
+    background = cv2.resize(reference.astype(np.float32), shape[::-1], interpolation=cv2.INTER_AREA)
+    bare = np.ones(shape, bool)
+    for region in found.regions:
+        left, top, right, bottom = (edge / found.scale / longer * THUMBNAIL for edge in region.box)
+        bare[max(0, int(top) - 1) : int(np.ceil(bottom)) + 1, max(0, int(left) - 1) : int(np.ceil(right)) + 1] = False
+    square = found.square
+    corner = np.array([square.x, square.y], dtype=np.float64)
+    return Place(
+        hoist=(corner + hoist * square.side) / longer, side=side, background=np.asarray(background, np.float32),
+        bare=bare,
+    )  # fmt: skip

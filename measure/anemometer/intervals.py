@@ -1,0 +1,37 @@
+"""Intervals of winds from the errors that a fit makes in blocks of time that it was not fitted to.
+
+The interval of a window is conformal (Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World, 2005): the
+quantile of the absolute errors of all windows, each predicted without its block (cross-conformal prediction). It is of
+what the anemometer would log, whose noise is among the errors.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def half_width(errors: Floats, level: float) -> float:
+    """Half of the interval that holds with `level` [m/s], of errors (n,); infinite where these are too few for it."""
+    n = len(errors)
+    rank = math.ceil(level * (n + 1))
+    return math.inf if rank > n else float(np.sort(np.abs(errors))[rank - 1])
+
+
+def mean_errors(errors: Floats, *, count: int, length: int, draws: int, generator: np.random.Generator) -> Floats:
+    """(draw,) errors of the mean over `count` windows [m/s]: blocks of neighbouring errors drawn with replacement
+    (moving blocks: Künsch, Annals of Statistics 17, 1989).
+
+    Args:
+        errors: (n,) in the order of time.
+        length: windows of a block.
+    """
+    own = min(length, len(errors), count)
+    needed = -(-count // own)
+    starts = generator.integers(len(errors) - own + 1, size=(draws, needed))
+    drawn = errors[starts[:, :, None] + np.arange(own)].reshape(draws, -1)[:, :count]
+    return drawn.mean(axis=1)

@@ -1,0 +1,76 @@
+"""From the recordings that a user names to a reading model in the lake."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flagdata.errors import InputError
+from flagdata.lake import Lake
+from measure.anemometer.artifact import keep
+from measure.anemometer.calibration import ENOUGH, LEAST, Calibrated, calibrated, recorded
+from measure.estimate.similarity import FlagSize
+from measure.estimate.source import Reading, network, subjects
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Made:
+    """A reading model that was made.
+
+    Attributes:
+        name: by which `flagdata measure --model` finds it.
+        found: what it is.
+        artifact: its id in the lake; None where it is not to be there.
+        new: whether it was not there before.
+    """
+
+    name: str
+    found: Calibrated
+    artifact: str | None
+    new: bool
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON values."""
+        return {"name": self.name, "artifact": self.artifact, **self.found.as_dict()}
+
+
+def made(
+    sources: Sequence[str], size: FlagSize, reading: Reading, *, name: str | None, model: str | None, lake: Lake | None,
+    branch: str, commit: bool, first: float, last: float | None, level: float,
+    advance: Callable[[int], object] | None = None,
+) -> Made:  # fmt: skip
+    """Make a reading model of recordings of one flag from one place.
+
+    Args:
+        name: of the model; None for the first recording's with "-anemometer".
+        model: network whose summary is used.
+        commit: whether it goes into the lake.
+        first, last: part of the films [s].
+        advance: called with the number of windows that were looked at.
+
+    Raises:
+        InputError, RefusedError: see `recorded` and `calibrated`.
+        UsageError, UnknownNameError: nothing of these names.
+    """
+    found = [subjects(source, query=None, lake=lake, at=branch, reading=reading)[0] for source in sources]
+    own = network(model, lake=lake, at=branch)
+    seconds = sum(min(one.film.duration, math.inf if last is None else last) - first for one in found)
+    if seconds < LEAST:
+        raise InputError(
+            f"{max(seconds, 0.0):.0f} s of film beside a log", where=found[0].film.name,
+            fix=f"give {LEAST:.0f} s or more; {ENOUGH / 60:.0f} minutes are better",
+        )  # fmt: skip
+
+    def step(_: int, count: int) -> None:
+        if advance is not None:
+            advance(count)
+
+    recordings = [recorded(one, own, size, first=first, last=last, advance=step) for one in found]
+    result = calibrated(recordings, network=own, size=size, level=level)
+    title = name if name is not None else f"{recordings[0].name}-anemometer"
+    if lake is None or not commit:
+        return Made(name=title, found=result, artifact=None, new=False)
+    identity, new = keep(lake, result, title, reading, branch=branch)
+    return Made(name=title, found=result, artifact=identity, new=new)

@@ -1,0 +1,196 @@
+"""A film read by a reading model, in the form of any other measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.rng import stream
+from measure.anemometer.features import Features, features_of
+from measure.anemometer.intervals import half_width, mean_errors
+from measure.anemometer.novelty import framing, likeness, reasons
+from measure.anemometer.reading import ReadingModel
+from measure.ends import Span, limits_of
+from measure.estimate.answer import Quantity, information
+from measure.estimate.combine import Dependence
+from measure.estimate.conditioned import ConditionedFilm
+from measure.estimate.gate import Reason, Verdict
+from measure.estimate.joint import DRAWS, WIND, WindowAnswer
+from measure.estimate.measuring import Measurement
+from measure.estimate.options import Options
+from measure.estimate.similarity import FlagSize, Sizes, trained_on
+from measure.gate.reasons import REASONS
+from models.estimator import Estimator
+
+Floats = NDArray[np.float64]
+
+_SAME_SIZE = 0.01
+"""Share by which a stated size may differ from that of the calibration: printed sizes are rounded."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Familiarity(Verdict):
+    """A verdict by the film of the calibration.
+
+    Attributes:
+        figures: what was compared, in words.
+    """
+
+    figures: str
+
+    @property
+    def sentence(self) -> str:
+        if self.faults:
+            others = len(self.faults) - 1
+            more = "" if not others else f" ({others} more {'reasons' if others > 1 else 'reason'})"
+            return f"{self.faults[0].what}{more}"
+        return f"like the film of the calibration: {self.figures}"
+
+
+def measure_by(
+    film: ConditionedFilm, model: ReadingModel, estimator: Estimator, options: Options, *, name: str,
+    advance: Callable[[int, int], None] | None = None,
+) -> Measurement:  # fmt: skip
+    """Measure a film by a reading model.
+
+    Args:
+        estimator: the network whose summary the model uses.
+        options: size, part, level and seed; the others belong to networks.
+        name: of the model.
+        advance: called after each window with how many there are and 1.
+
+    Raises:
+        UsageError: an option that belongs to networks.
+        RefusedError: nothing moves like cloth, or no window is whole.
+        InputError: a film that does not show what the model uses.
+    """
+    _check(options, model)
+    features = features_of(film, estimator, model.size, first=options.first, last=options.last, advance=advance)
+    findings = film.findings()
+    used = model.used(features)
+    winds = model.read(used)
+    shown = np.flatnonzero(np.isfinite(winds))
+    judged = _verdict(film, features, used, winds, model, options, findings)
+    half = half_width(model.errors, options.level)
+    windows = tuple(_window(features, k, float(winds[k]), half, judged, model, options) for k in shown.tolist())
+    rng = stream(options.seed, "anemometer", "mean")
+    errors = mean_errors(model.errors, count=len(shown), length=model.block, draws=DRAWS, generator=rng)
+    draws = np.maximum(winds[shown].mean() + errors, 0.0)
+    low, high = (float(end) for end in np.quantile(draws, [(1 - options.level) / 2, (1 + options.level) / 2]))
+    own = Quantity(
+        name=WIND, unit="m/s", value=float(draws.mean()), sigma=float(draws.std()),
+        span=Span(low=low, high=high, level=options.level, bound=None, estimated=True), assumed=model.range,
+        information=information(draws, model.winds),
+    )  # fmt: skip
+    middle = shown[len(shown) // 2]
+    scale = model.size.scale(trained_on(estimator.targets))
+    return Measurement(
+        film=film.name, rate=film.rate, duration=film.duration, model=name, options=replace(options, size=model.size),
+        names=(WIND,), draws=draws[:, None], quantities=(own,), windows=windows, combined=len(shown),
+        dependence=_dependence(errors, model, len(shown)), verdict=judged,
+        sizes=Sizes(given=model.size, scale=np.array([scale]), draws=np.full((1, DRAWS), scale), findings=()),
+        summary=features.summaries[middle], clip=features.clip,
+        findings=(*findings, *_about(winds[shown], features, model)), bounds=(),
+    )  # fmt: skip
+
+
+def _check(options: Options, model: ReadingModel) -> None:
+    for where, given in (
+        ("--area-weight", options.area_weight is not None), ("--refine", options.refine is not None),
+        ("--windows", options.step is not None and abs(options.step - model.step) > 1e-6),
+    ):  # fmt: skip
+        if given:
+            raise UsageError(
+                f"a reading model knows its flag, and its windows are {model.step:.4g} s long", where=where,
+                fix=f"leave {where} out, or choose a network by --model",
+            )  # fmt: skip
+
+
+def _size_reason(given: FlagSize | None, model: ReadingModel) -> list[Finding]:
+    own = model.size
+    if given is None or max(abs(given.length / own.length - 1), abs(given.height / own.height - 1)) <= _SAME_SIZE:
+        return []
+    return [
+        Finding(
+            kind="another-size", severity=Severity.WARNING, value=given.length / own.length,
+            what=f"the flag is stated as {given.length:g} m × {given.height:g} m, that of the calibration as "
+            f"{own.length:g} m × {own.height:g} m",
+            fix="check --flag-size, or calibrate this flag",
+        )
+    ]  # fmt: skip
+
+
+def _verdict(
+    film: ConditionedFilm, features: Features, used: Floats, winds: Floats, model: ReadingModel, options: Options,
+    findings: Sequence[Finding],
+) -> Familiarity:  # fmt: skip
+    shown = np.isfinite(winds)
+    away, alike = framing(features.place, model.places), likeness(features.place, model.places)
+    shift = model.familiar.shift(used[shown], winds[shown])
+    figures = [f"its windows are shifted by {shift:.2f} standard deviations"]
+    if np.isfinite(away):
+        figures.append(f"the hoist by {away:.2f} of its height")
+    if np.isfinite(alike):
+        figures.append(f"the backgrounds correlate by {alike:.2f}")
+    faults = [one for one in findings if one.kind in REASONS]
+    faults += [*_size_reason(options.size, model), *reasons(shift=shift, framing=away, likeness=alike)]
+    p = model.familiar.p_value(used[shown], winds[shown])
+    return Familiarity(
+        false_alarm=options.false_alarm, level=0.0, refusing=len(p), sizes=(0,), size=0, p=float(np.median(p)),
+        window_p=tuple(p.tolist()), blank=(False,) * len(p), faults=tuple(Reason.counted(one) for one in faults),
+        window_reasons=(
+            Reason(kind="familiar", what=f"the median p of its windows is {np.median(p):.2f}", p=float(np.median(p))),
+        ),
+        figures=", ".join(figures),
+    )  # fmt: skip
+
+
+def _window(
+    features: Features, k: int, wind: float, half: float, judged: Verdict, model: ReadingModel, options: Options
+) -> WindowAnswer:
+    least, _ = limits_of(WIND)
+    value = max(wind, least)
+    place = int(np.count_nonzero(features.whole[:k]))
+    own = Quantity(
+        name=WIND, unit="m/s", value=value, sigma=model.rmse,
+        span=Span(low=max(wind - half, least), high=wind + half, level=options.level, bound=None, estimated=True),
+        assumed=model.range, information=information(wind + model.errors, model.winds),
+    )  # fmt: skip
+    start = float(features.starts[k])
+    return WindowAnswer(start=start, end=start + features.layout.length, quantities=(own,), p=judged.window_p[place])
+
+
+def _dependence(errors: Floats, model: ReadingModel, count: int) -> Dependence:
+    """The correlation of windows at which the mean of so many errs as `errors` do."""
+    ratio = float(errors.var() / model.errors.var()) * count
+    correlation = 0.0 if count < 2 else float(np.clip((ratio - 1) / (count - 1), 0.0, 1.0))
+    return Dependence(wind=correlation, cloth=1.0, source="blocks of the calibration that were left out")
+
+
+def _about(winds: Floats, features: Features, model: ReadingModel) -> list[Finding]:
+    found = []
+    low, high = model.range
+    beyond = int(np.count_nonzero((winds < low) | (winds > high)))
+    if beyond:
+        found.append(
+            Finding(
+                kind="beyond-calibration", severity=Severity.WARNING, count=beyond, value=beyond / len(winds),
+                what=f"{beyond} of {len(winds)} windows read winds beyond those of the calibration ({low:.1f} to "
+                f"{high:.1f} m/s), where nothing checked the intervals",
+                fix="calibrate in stronger and weaker winds as well",
+            )
+        )  # fmt: skip
+    missing = len(features.starts) - len(winds)
+    if missing:
+        found.append(
+            Finding(
+                kind="windows-left-out", severity=Severity.WARNING, count=missing,
+                what=f"{missing} of {len(features.starts)} windows lack frames and were left out",
+            )
+        )  # fmt: skip
+    return found

@@ -1,0 +1,126 @@
+"""Ridge regression of the log's wind on what windows show, chosen by cross-validation over blocks of time.
+
+*Neighbours.* A window is joined by the one before and the one after it, since a flag follows the wind and a cup follows
+it later. A neighbour that is missing is replaced by the window itself.
+
+*Errors in both.* The log's noise widens the residuals and biases no coefficient. The features' own errors are those of
+any later film of this flag from this place, so that the regression of wind on features as they are read is the one that
+predicts (Fuller, Measurement Error Models, 1987, section 1.6.3); correcting it for attenuation would make it worse. The
+clock between film and log has one error for the whole recording, which is fitted before the rest, without neighbours,
+since these would make up for it: an offset is as probable as its prior and the errors of the blocks left out make it.
+
+*Blocks.* Windows of one gust are alike, so that whole blocks of time are left out, and the windows next to a block are
+not fitted either when it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+BLOCK = 20.0
+"""Length of a block [s]: gusts last some seconds."""
+PENALTIES = tuple(float(v) for v in np.geomspace(1.0, 1e5, 21))
+"""Penalties that are tried, in squares of standardised features."""
+_BESIDE = 2
+"""Windows beside a block that are left out with it: they share its neighbours."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ridge:
+    """A linear predictor.
+
+    Attributes:
+        centre, spread: (column,) of the features that it was fitted to.
+        coefficients: (column,) of standardised features [m/s].
+        offset: [m/s].
+        penalty: that was chosen.
+    """
+
+    centre: Floats
+    spread: Floats
+    coefficients: Floats
+    offset: float
+    penalty: float
+
+    @classmethod
+    def fitted(cls, rows: Floats, winds: Floats, penalty: float) -> Ridge:
+        """To rows (n, column) and winds (n,) [m/s], all finite."""
+        centre, spread = rows.mean(axis=0), rows.std(axis=0)
+        spread = np.where(spread > 0, spread, 1.0)
+        offset = float(winds.mean())
+        coefficients = _solved((rows - centre) / spread, winds - offset, [penalty])[0]
+        return cls(centre=centre, spread=spread, coefficients=coefficients, offset=offset, penalty=penalty)
+
+    def __call__(self, rows: Floats) -> Floats:
+        """(n,) winds [m/s] of rows (n, column)."""
+        return self.offset + (rows - self.centre) / self.spread @ self.coefficients
+
+
+def _solved(rows: Floats, winds: Floats, penalties: Sequence[float]) -> Floats:
+    """(penalty, column) coefficients of centred rows (n, column) and winds (n,)."""
+    left, values, right = np.linalg.svd(rows, full_matrices=False)
+    along = left.T @ winds
+    return np.stack([(values / (values**2 + penalty) * along) @ right for penalty in penalties])
+
+
+def with_neighbours(values: Floats) -> Floats:
+    """(w, 3 · feature) each window's features (w, feature) with those of the one before and the one after."""
+    before, after = np.roll(values, 1, axis=0), np.roll(values, -1, axis=0)
+    before[0], after[-1] = np.nan, np.nan
+    return np.concatenate([values, *(np.where(np.isfinite(one), one, values) for one in (before, after))], axis=1)
+
+
+def blocks_of(times: Floats, recordings: NDArray[np.int_]) -> NDArray[np.int_]:
+    """(n,) number of the block of time that each window is in; none is of two recordings.
+
+    Args:
+        times: (n,) [s].
+        recordings: (n,) number of each window's recording.
+    """
+    own = np.floor((times - times.min()) / BLOCK).astype(int)
+    _, numbers = np.unique(np.stack([recordings, own]), axis=1, return_inverse=True)
+    return np.asarray(numbers).reshape(-1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Validated:
+    """What cross-validation over blocks found.
+
+    Attributes:
+        penalty: with the least error.
+        predicted: (n,) of each window by the fit without its block [m/s].
+        rmse: root mean square of their errors [m/s].
+    """
+
+    penalty: float
+    predicted: Floats
+    rmse: float
+
+
+def validated(rows: Floats, winds: Floats, blocks: NDArray[np.int_]) -> Validated:
+    """Leave each block out in turn, with the windows beside it.
+
+    Args:
+        rows: (n, column).
+        winds: (n,) [m/s].
+        blocks: (n,) of each window; two or more.
+    """
+    predicted = np.empty((len(PENALTIES), len(winds)))
+    for block in np.unique(blocks):
+        inside = np.flatnonzero(blocks == block)
+        fitted = np.ones(len(winds), bool)
+        fitted[max(0, inside[0] - _BESIDE) : inside[-1] + _BESIDE + 1] = False
+        centre, spread = rows[fitted].mean(axis=0), rows[fitted].std(axis=0)
+        spread = np.where(spread > 0, spread, 1.0)
+        offset = winds[fitted].mean()
+        coefficients = _solved((rows[fitted] - centre) / spread, winds[fitted] - offset, PENALTIES)
+        predicted[:, inside] = offset + coefficients @ ((rows[inside] - centre) / spread).T
+    errors = np.sqrt(np.square(predicted - winds).mean(axis=1))
+    best = int(errors.argmin())
+    return Validated(penalty=PENALTIES[best], predicted=predicted[best], rmse=float(errors[best]))

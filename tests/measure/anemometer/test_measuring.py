@@ -1,0 +1,122 @@
+"""Films read by a reading model, and why one is refused. What is looked at in a film is replaced."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flagdata.errors import CorruptError, UsageError
+from flagdata.findings import Finding, Severity
+from flagdata.stated import Stated
+from measure.anemometer import measuring
+from measure.anemometer.calibration import Calibrated
+from measure.anemometer.features import Features
+from measure.anemometer.storage import read, write
+from measure.estimate.measuring import Measurement
+from measure.estimate.options import Options
+from measure.estimate.series import beside
+from measure.estimate.similarity import FlagSize
+from models.targets import TARGETS
+from tests.measure.anemometer.made import SIZE, STEP, features, gusts, model, place
+
+Measure = Callable[..., Measurement]
+
+
+@pytest.fixture(scope="module")
+def found() -> Calibrated:
+    return model()
+
+
+@pytest.fixture
+def measure(found: Calibrated, monkeypatch: pytest.MonkeyPatch) -> Measure:
+    """Measure a film of these features."""
+    estimator: Any = SimpleNamespace(targets=(TARGETS["wind_speed"],))
+
+    def measured(own: Features, *, options: Options | None = None, findings: tuple[Finding, ...] = ()) -> Measurement:
+        film: Any = SimpleNamespace(name="film", rate=25.0, duration=240.0, findings=lambda: findings)
+        monkeypatch.setattr(measuring, "features_of", lambda *_, **__: own)
+        return measuring.measure_by(film, found.model, estimator, options or Options(), name="garden")
+
+    return measured
+
+
+def test_the_same_flag_on_another_day_is_read_window_by_window(measure: Measure, found: Calibrated) -> None:
+    wind = gusts(120.0, seed=21)
+    own = measure(features(wind, seed=21))
+    assert not own.verdict.refused
+    assert own.model == "garden"
+    times, speed = wind
+    truth = np.array([speed[(times >= a) & (times < a + STEP)].mean() for a in STEP * np.arange(100)])
+    series = beside(own, start=None, wind=None)
+    assert np.sqrt(np.mean((series.wind - truth) ** 2)) < 0.2
+    np.testing.assert_allclose(series.high - series.low, 2 * found.half_width)
+    (whole,) = own.quantities
+    assert whole.span.low < truth.mean() < whole.span.high
+    # The mean of 100 windows is known better than a window, but not as if they were independent.
+    assert found.model.rmse / 10 < (whole.sigma or 0.0) < found.model.rmse / 2
+    assert "wind" in own.sentence
+
+
+@pytest.mark.parametrize(
+    ("changed", "kind"),
+    [
+        ({"other": 4.0}, "another-flag"),
+        ({"where": place(seed=5)}, "another-place"),
+        ({"where": place(shifted=1.0)}, "another-framing"),
+    ],
+)
+def test_another_flag_or_place_is_refused_with_its_figure(measure: Measure, changed: dict[str, Any], kind: str) -> None:
+    own = measure(features(gusts(120.0, seed=21), seed=21, **changed))
+    assert own.verdict.refused
+    assert [reason.kind for reason in own.verdict.reasons if reason.p is None] == [kind]
+    assert f"{own.verdict.reasons[0].value:.2f}" in own.verdict.sentence
+
+
+def test_another_size_and_a_fault_of_the_film_refuse_it(measure: Measure) -> None:
+    own = features(gusts(120.0, seed=21), seed=21)
+    fault = Finding(kind="cut-off", severity=Severity.WARNING, what="the edge cuts the cloth off", value=0.5)
+    both = measure(own, options=Options(size=FlagSize(length=2.0, height=1.0)), findings=(fault,))
+    assert [reason.kind for reason in both.verdict.faults] == ["cut-off", "another-size"]
+    assert "1 more reason" in both.verdict.sentence
+    assert not measure(own, options=Options(size=SIZE)).verdict.refused
+
+
+def test_a_flag_to_the_other_side_is_refused(measure: Measure) -> None:
+    own = features(gusts(120.0, seed=21), seed=21, where=replace(place(), side=-1.0))
+    assert "on the other side" in measure(own).verdict.sentence
+
+
+def test_winds_beyond_the_calibration_are_reported(measure: Measure, found: Calibrated) -> None:
+    times, speed = gusts(120.0, seed=21)
+    own = measure(features((times, speed + 3.0), seed=21))
+    (beyond,) = (one for one in own.findings if one.kind == "beyond-calibration")
+    high = found.model.range[1]
+    assert beyond.count == sum(w.quantity("wind_speed").value > high for w in own.windows)  # type: ignore[operator]
+    assert beyond.count > 50
+
+
+def test_options_of_networks_are_refused(measure: Measure) -> None:
+    own = features(gusts(120.0, seed=21), seed=21)
+    with pytest.raises(UsageError, match="knows its flag") as told:
+        measure(own, options=Options(area_weight=Stated(low=0.1, high=0.2)))
+    assert told.value.where == "--area-weight"
+    with pytest.raises(UsageError, match=r"1\.2 s long"):
+        measure(own, options=Options(step=0.6))
+
+
+def test_a_model_is_the_same_once_it_was_stored(found: Calibrated, tmp_path: Path) -> None:
+    write(tmp_path / "model.zarr", found.model, found.as_dict())
+    again = read(tmp_path / "model.zarr")
+    own = features(gusts(120.0, seed=21), seed=21)
+    np.testing.assert_array_equal(again.read(again.used(own)), found.model.read(found.model.used(own)))
+    assert (again.size, again.names, again.block) == (found.model.size, found.model.names, found.model.block)
+    used, winds = again.used(own), again.read(again.used(own))
+    assert again.familiar.shift(used, winds) == found.model.familiar.shift(used, winds)
+    with pytest.raises(CorruptError, match="damaged"):
+        read(tmp_path / "nothing.zarr")
