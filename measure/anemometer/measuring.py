@@ -71,6 +71,13 @@ def measure_by(
     """
     _check(options, model)
     features = features_of(film, estimator, model.size, first=options.first, last=options.last, advance=advance)
+    return measured_from(film, features, model, estimator, options, name=name)
+
+
+def measured_from(
+    film: ConditionedFilm, features: Features, model: ReadingModel, estimator: Estimator, options: Options, *, name: str
+) -> Measurement:
+    """The same of a film that was looked at."""
     findings = film.findings()
     used = model.used(features)
     winds = model.read(used)

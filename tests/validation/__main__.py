@@ -5,6 +5,7 @@ from __future__ import annotations
 from tests.evidence import run_all
 
 VALIDATIONS = {
+    "anemometer": "tests.validation.anemometer",
     "arcsim": "tests.validation.arcsim",
     "arcsim-jittered": "tests.validation.arcsim_jittered",
     "clock-recovery": "tests.validation.clock_recovery",
