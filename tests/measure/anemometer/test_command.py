@@ -1,0 +1,120 @@
+"""From a recording in a lake to a reading model by which another film is measured; what is looked at is replaced."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from flagdata.errors import InputError, UsageError
+from flagdata.lake import Artifact, Lake
+from flagdata.record import RecordWriter
+from flagdata.schema import Kind
+from flagdata.signals import Sensor, WindSeries
+from flagdata.timebase import NANOSECONDS
+from measure.anemometer import calibration, measuring
+from measure.calibrate.command import calibrate
+from measure.estimate.command import measure
+from measure.estimate.source import network
+from tests.measure.anemometer.made import features, gusts, place
+
+_START = 1_700_000_000 * NANOSECONDS
+_SECONDS = 120
+
+
+@pytest.fixture
+def lake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A recording "monday" of two minutes with a gusty log, whose windows show what `made.features` says."""
+    wind = gusts(float(_SECONDS), seed=1)
+    samples = np.arange(-29, _SECONDS + 29, dtype=np.int64)
+    picture = np.zeros((8, 8), np.uint8)
+    made = Lake.create(tmp_path / "lake")
+    with made.transaction("a film with its log") as transaction:
+        staged = transaction.staging(".mcap")
+        with RecordWriter(staged, metadata={"camera": {"name": "monday"}}) as writer:
+            for time in (_START + np.arange(_SECONDS + 1, dtype=np.int64) * NANOSECONDS).tolist():
+                writer.frame(log_time=time, publish_time=time, timestamp=time, image=picture)
+            writer.wind(
+                WindSeries(
+                    time=_START + samples * NANOSECONDS, flags=np.zeros(len(samples), dtype=np.uint16),
+                    channels={"wind_speed": np.interp(samples, *wind)}, sensor=Sensor(name="cup"),
+                )
+            )  # fmt: skip
+        transaction.add(
+            Artifact(kind=Kind.RECORDING, name="monday", object=transaction.put(staged), start=_START, rate=1.0)
+        )
+    _shown(monkeypatch, seed=1)
+    return tmp_path / "lake"
+
+
+def _shown(patch: pytest.MonkeyPatch, **changes: Any) -> None:
+    own = features(gusts(float(_SECONDS), seed=changes["seed"]), **changes)
+    for module in (calibration, measuring):
+        patch.setattr(module, "features_of", lambda *_, **__: own)
+
+
+def _run(command: Any, *arguments: str | Path) -> Result:
+    return CliRunner().invoke(command, [str(one) for one in arguments])
+
+
+def test_a_recording_becomes_a_model_by_which_another_film_is_read(
+    lake: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = ("monday", "--lake", lake, "--flag-size", "1.5x1.0", "--only", "anemometer", "--name", "garden")
+    done = _run(calibrate, *given, "--json", "--report", tmp_path / "garden.html")
+    assert done.exit_code == 0, done.output
+    said = json.loads(done.stdout)["anemometer"]
+    assert (said["name"], said["windows"]) == ("garden", 100)
+    row = Lake.open(lake).artifact(said["artifact"])
+    recording = Lake.open(lake).rows({"kind": Kind.RECORDING})["artifact"][0].as_py()
+    assert (row.kind, list(row.parents)) == (Kind.MEASUREMENT, [recording])
+    assert "monday" in (tmp_path / "garden.html").read_text()
+    assert "there already" in _run(calibrate, *given).stderr
+
+    _shown(monkeypatch, seed=2)
+    later = _run(measure, "monday", "--lake", lake, "--model", "garden", "--json")
+    assert later.exit_code == 0, later.output
+    found = json.loads(later.stdout)
+    assert found["model"] == "garden"
+    assert len(found["windows"]) == 100
+    mean = gusts(float(_SECONDS), seed=2)[1][300:1500].mean()
+    low, high = found["quantities"]["wind_speed"]["interval"]
+    assert low - 0.1 < mean < high + 0.1
+    assert said["artifact"] in Lake.open(lake).artifact(found["artifact"]).parents
+
+    _shown(monkeypatch, seed=2, where=place(seed=9))
+    refused = _run(measure, "monday", "--lake", lake, "--model", said["artifact"])
+    assert "another place" in str(refused.exception)
+
+
+def test_a_model_whose_network_has_changed_is_refused(lake: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = ("monday", "--lake", lake, "--flag-size", "1.5x1.0", "--only", "anemometer")
+    assert _run(calibrate, *given).exit_code == 0
+    monkeypatch.setattr("measure.estimate.source.file_hash", lambda _: "another")
+    with pytest.raises(InputError, match="is another one"):
+        network("monday-anemometer", lake=Lake.open(lake), at=None)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("--only", "anemometer", "--azimuth", "70±7"), "--azimuth with --only anemometer"),
+        (("--only", "weight", "--name", "garden"), "--name with --only weight"),
+    ],
+)
+def test_options_of_what_is_not_done_are_refused(lake: Path, given: tuple[str, ...], said: str) -> None:
+    done = _run(calibrate, "monday", "--lake", lake, "--flag-size", "1.5x1.0", *given)
+    assert isinstance(done.exception, UsageError)
+    assert said in str(done.exception)
+
+
+def test_a_table_makes_no_reading_model(tmp_path: Path) -> None:
+    table = tmp_path / "table.csv"
+    table.write_text("time,wind,droop\n")
+    done = _run(calibrate, table, "--flag-size", "1.5x1.0", "--only", "anemometer")
+    assert isinstance(done.exception, UsageError)
+    assert "no pictures" in str(done.exception)
