@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -16,9 +16,10 @@ from measure.estimate.joint import WIND
 from measure.estimate.similarity import POWERS, FlagSize, spacing, trained_on
 from measure.estimate.windows import Layout, cut, lay_out
 from measure.observables import OBSERVABLES
+from measure.observables.film import FilmWindow
 from measure.observables.observable import Observable
-from measure.observables.watching import watched
-from models.conditioning.repeats import Distinct
+from measure.observables.watching import Watcher
+from models.conditioning.repeats import Distinct, TimedFrame
 from models.estimator import Estimator
 
 OBSERVED = (
@@ -105,8 +106,17 @@ def features_of(
     summaries: NDArray[np.float32] | None = None
     winds = np.full(layout.count, np.nan)
     clip: NDArray[np.uint8] | None = None
+    observed = _Observed(count=layout.count)
+    watcher = Watcher(film, size, begin=layout.first, count=layout.count, seconds=layout.step, found=observed.take)
     margin = 2 * layout.period
-    for window in cut(Distinct(film.frames(layout.first - margin, layout.last + margin)), layout):
+
+    def watched() -> Iterator[TimedFrame]:
+        for time, frame in film.frames(layout.first - margin, layout.last + margin):
+            watcher.look(time, frame)
+            yield time, frame
+
+    frames = Distinct(watched())
+    for window in cut(frames, layout):
         embeddings = model.embeddings(model.inputs(window.clips))
         summary = embeddings[0][0].cpu().numpy().astype(np.float32)
         if summaries is None:
@@ -120,33 +130,40 @@ def features_of(
         raise RefusedError(
             "no window of the film has all its frames", where=film.name, fix="choose another part by --start and --end"
         )
-    shown, hoist, side = _observed(film, size, layout)
+    watcher.finish()
     return Features(
         film=film.name, starts=layout.first + layout.step * np.arange(layout.count, dtype=np.float64), layout=layout,
-        values=np.concatenate([summaries, winds[:, None], shown], axis=1, dtype=np.float64),
+        values=np.concatenate([summaries, winds[:, None], observed.values], axis=1, dtype=np.float64),
         names=(*(f"summary-{k}" for k in range(summaries.shape[1])), "network-wind", *OBSERVED),
-        summaries=summaries, winds=winds, clip=clip, place=_place(film, hoist, side),
+        summaries=summaries, winds=winds, clip=clip, place=_place(film, *observed.hoist()),
     )  # fmt: skip
 
 
-def _observed(
-    film: ConditionedFilm, size: FlagSize, layout: Layout
-) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """(w, observable), the hoist's ends (2, 2) in the conditioned picture's sides, and the side the flag flies to."""
-    seen = watched(
-        film, size, first=layout.first, last=layout.first + layout.count * layout.step, seconds=layout.step
-    )  # fmt: skip
-    shown = np.full((layout.count, len(OBSERVED)), np.nan)
-    for row, window in zip(shown, seen.windows, strict=False):
-        if window is not None:
-            for column, name in enumerate(OBSERVED):
-                observable: Observable = OBSERVABLES[name]
-                row[column] = observable.of_film(window).value
-    whole = [window for window in seen.windows if window is not None]
-    if not whole:
-        return shown, np.full((2, 2), np.nan), 0.0
-    hoist = np.median([window.hoist / window.masks.shape[2] for window in whole], axis=0)
-    return shown, hoist, float(np.sign(sum(window.side for window in whole)))
+class _Observed:
+    """The observables of windows, and where the hoist is in them."""
+
+    def __init__(self, *, count: int) -> None:
+        self.values = np.full((count, len(OBSERVED)), np.nan)
+        self._done = 0
+        self._hoists: list[NDArray[np.float64]] = []
+        self._side = 0.0
+
+    def take(self, windows: Sequence[FilmWindow | None]) -> None:
+        """The next windows."""
+        for window in windows:
+            if window is not None:
+                observables: list[Observable] = [OBSERVABLES[name] for name in OBSERVED]
+                self.values[self._done] = [one.of_film(window).value for one in observables]
+                self._hoists.append(window.hoist / window.masks.shape[2])
+                self._side += window.side
+            self._done += 1
+
+    def hoist(self) -> tuple[NDArray[np.float64], float]:
+        """Its ends (2, 2) in the conditioned picture's sides, NaN where no window shows them, and the side the flag
+        flies to."""
+        if not self._hoists:
+            return np.full((2, 2), np.nan), 0.0
+        return np.median(self._hoists, axis=0), float(np.sign(self._side))
 
 
 def _place(film: ConditionedFilm, hoist: NDArray[np.float64], side: float) -> Place:

@@ -62,28 +62,72 @@ def watched(
             f"{end - begin:.1f} s of film have no window of {seconds:g} s", where=film.name,
             fix="give a longer part of the film",
         )  # fmt: skip
-    a_chunk = max(1, round(CHUNK / seconds))
     windows: list[FilmWindow | None] = []
 
-    def read(own: Sequence[tuple[float, NDArray[np.uint8]]], some: int) -> None:
-        windows.extend(_chunk(film, own, begin + len(windows) * seconds, some, seconds, size))
+    def keep(some: Sequence[FilmWindow | None]) -> None:
+        windows.extend(some)
         if advance is not None:
-            advance(some)
+            advance(len(some))
 
-    held: list[tuple[float, NDArray[np.uint8]]] = []
+    watcher = Watcher(film, size, begin=begin, count=count, seconds=seconds, found=keep)
     for time, frame in film.frames(begin, begin + count * seconds):
-        held.append((time, frame))
-        if time >= begin + (len(windows) + a_chunk) * seconds:
-            read(held[:-1], a_chunk)
-            held = held[-1:]
-    if len(windows) < count:
-        read(held, count - len(windows))
-    if film.found is None or film.found.region is None:
-        raise RefusedError(
-            "nothing moves like cloth in the film", where=film.name, fix="give another film, or --crop around the flag"
-        )
+        watcher.look(time, frame)
+    watcher.finish()
     starts = np.array([begin + seconds * k for k in range(count)])
     return Watched(starts=starts, windows=tuple(windows), seconds=seconds)
+
+
+class Watcher:
+    """Makes windows of frames that it is shown one after another, and holds no more than a still picture is of.
+
+    Args:
+        film: that the frames are read from.
+        size: of the flag.
+        begin: of the first window [s].
+        count: of windows.
+        seconds: length of a window.
+        found: called with the windows of each still picture, in order.
+    """
+
+    def __init__(
+        self, film: ConditionedFilm, size: FlagSize, *, begin: float, count: int, seconds: float,
+        found: Callable[[Sequence[FilmWindow | None]], object],
+    ) -> None:  # fmt: skip
+        self._film, self._size, self._found = film, size, found
+        self._begin, self._count, self._seconds = begin, count, seconds
+        self._a_chunk = max(1, round(CHUNK / seconds))
+        self._done = 0
+        self._held: list[tuple[float, NDArray[np.uint8]]] = []
+
+    def look(self, time: float, frame: NDArray[np.uint8]) -> None:
+        """Take the next frame, conditioned, and its time [s]; frames before the first window are left out."""
+        if time < self._begin:
+            return
+        self._held.append((time, frame))
+        if time >= self._begin + (self._done + self._a_chunk) * self._seconds:
+            self._read(self._held[:-1], self._a_chunk)
+            self._held = self._held[-1:]
+
+    def finish(self) -> None:
+        """Make what is left of the windows.
+
+        Raises:
+            RefusedError: nothing moves like cloth.
+        """
+        self._read(self._held, self._count - self._done)
+        self._held = []
+        if self._film.found is None or self._film.found.region is None:
+            raise RefusedError(
+                "nothing moves like cloth in the film", where=self._film.name,
+                fix="give another film, or --crop around the flag",
+            )  # fmt: skip
+
+    def _read(self, held: Sequence[tuple[float, NDArray[np.uint8]]], some: int) -> None:
+        some = min(some, self._count - self._done)
+        if some > 0:
+            begin = self._begin + self._done * self._seconds
+            self._done += some
+            self._found(_chunk(self._film, held, begin, some, self._seconds, self._size))
 
 
 def _chunk(
