@@ -27,6 +27,7 @@ TIME, WIND, DURATION, COUNT = "time", "wind", "duration", "count"
 SIGMA, _REASON = "-sigma", "-reason"
 _Value = TypeVar("_Value", int, float)
 _LIMIT = 1 << 26  # B
+_LONGEST_HEADING = 1 << 16  # B
 _UNITS = {TIME: "s", WIND: "m/s", DURATION: "s", COUNT: "1"}
 _HEADING = re.compile(r"(?P<name>[^\[\](),/]+?)\s*(?:[\[(](?P<bracketed>[^\])]*)[\])]|[,/]\s*(?P<after>\S.*))?\s*")
 
@@ -102,6 +103,21 @@ def read(path: Path, size: FlagSize) -> Columns:
             numbers = _converted(cells, lines, name, where, float)
             values[name] = np.array([math.nan if one is None else one * scale for one in numbers])
     return Columns(where=where, values=values, origin=origin, lines=lines)
+
+
+def names(path: Path) -> set[str]:
+    """Names of a table's columns, without its rows being read; none where it has no heading that can be read."""
+    if path.suffix.lower() == ".parquet":
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            return {_named(one) for one in pq.read_schema(path).names}
+        except pa.ArrowException:
+            return set()
+    with path.open("rb") as file:
+        line = file.readline(_LONGEST_HEADING).decode("utf-8-sig", errors="replace").strip()
+    return {_named(cell) for cell in next(csv.reader([line], delimiter=delimiter_of(line)), [])}
 
 
 def _named(heading: str) -> str:

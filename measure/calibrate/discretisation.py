@@ -14,12 +14,14 @@ from flagdata.rng import stream
 from measure.nulls.simulation import irregular
 from sim.mesh import Diagonals, Mesh, grid
 
-FINER = (0.9, 1.3)
-"""Vertices along a side over the fit's, by its mean area a vertex: 12 to 17 columns. Up to 1.75 on trajectories; here a
+FINER = (0.85, 1.2)
+"""Vertices along a side over the fit's, by its mean area a vertex: 11 to 16 columns. Up to 1.75 on trajectories; here a
 minute of film costs as much as 30 of their segments, and what finer meshes do is measured and part of the scatter
 (`measure.calibrate.numerics`)."""
 STEPS = (2e-3, 3e-3, 4e-3)
 """Of backward Euler [s]."""
+LITTLE = 1e-3
+"""s of damping below which cloths are simulated by leapfrog, whose steps may be the longer the less they damp."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,22 +32,26 @@ class Discretisation:
         finer: vertices along a side over the fit's.
         diagonals: which way a grid's faces are cut: 0 or 1 of `Diagonals`.
         uneven: seed of an irregular mesh; None for a grid.
-        step: of backward Euler [s].
+        step: of backward Euler [s]; None for leapfrog.
     """
 
     finer: float
     diagonals: int
     uneven: int | None
-    step: float
+    step: float | None
 
     @classmethod
-    def drawn(cls, rng: np.random.Generator) -> Discretisation:
-        """One at random: half of the meshes are irregular, as other codes' are."""
+    def drawn(cls, rng: np.random.Generator, *, explicit: float) -> Discretisation:
+        """One at random: half of the meshes are irregular, as other codes' are.
+
+        Args:
+            explicit: share of leapfrog.
+        """
         low, high = FINER
         return cls(
             finer=float(rng.uniform(low, high)), diagonals=int(rng.integers(2)),
             uneven=int(rng.integers(2**31)) if rng.random() < 0.5 else None,
-            step=float(STEPS[rng.integers(len(STEPS))]),
+            step=None if rng.random() < explicit else float(STEPS[rng.integers(len(STEPS))]),
         )  # fmt: skip
 
     def mesh(self, fit: Mesh) -> Mesh:

@@ -72,21 +72,22 @@ def keep(lake: Lake, closed: Closed, *, branch: str = "main") -> Kept:
     models = [_model(closed, model, measurement) for model in closed.models]
     with lake.transaction(f"close loop: {closed.name}", branch=branch) as transaction:
         if transaction.find(measurement.id) is not None:
-            return Kept(measurement=measurement.id, models=_models_of(lake, measurement.id, branch), existing=True)
+            return Kept(measurement=measurement.id, models=models_of(lake, measurement.id, branch), existing=True)
         staged = transaction.staging(".zarr")
-        write(staged, closed.verdict)
+        write(staged, closed.verdict, page=page(closed.verdict))
         transaction.add(_measurement(closed, stored=transaction.put(staged)))
         for model in models:
             transaction.add(model)
     return Kept(measurement=measurement.id, models=tuple(m.id for m in models), existing=False)
 
 
-def _models_of(lake: Lake, measurement: str, branch: str) -> tuple[str, ...]:
+def models_of(lake: Lake, measurement: str, branch: str) -> tuple[str, ...]:
+    """Ids of the models that a measurement left."""
     rows = lake.rows("kind = 'model'", at=branch, columns=["artifact", "parents"]).to_pylist()
     return tuple(row["artifact"] for row in rows if measurement in row["parents"])
 
 
-def write(path: Path, verdict: Verdict) -> None:
+def write(path: Path, verdict: Verdict, *, page: str) -> None:
     """A new Zarr folder: `verdict` (UTF-8 JSON), `report` (UTF-8 HTML) and `nulls` (statistic of each)."""
     import zarr
 
@@ -95,7 +96,7 @@ def write(path: Path, verdict: Verdict) -> None:
         _HEAD: {"format": _FORMAT}, "conclusion": verdict.conclusion.value, "named": list(verdict.named),
         "words": verdict.words,
     })  # fmt: skip
-    texts = {"verdict": json.dumps(as_document(verdict), allow_nan=False), "report": page(verdict)}
+    texts = {"verdict": json.dumps(as_document(verdict), allow_nan=False), "report": page}
     for name, text in texts.items():
         write_plain(group, name, np.frombuffer(text.encode(), dtype=np.uint8))
     write_plain(group, "nulls", np.array(verdict.test.null, dtype=np.float64))

@@ -20,6 +20,7 @@ from flagdata.errors import UnknownNameError, UsageError
 from flagdata.findings import Finding
 from flagdata.storage import Place
 from measure.closing.command_line import finding_text, null_options, nulls_given, refuse, stage_bars
+from measure.films.command_line import Given, film_options, refuse_of_others
 
 if TYPE_CHECKING:
     from measure.closing.artifacts import Closed, Kept
@@ -94,6 +95,7 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside", "still-
     type=click.FloatRange(min=0),
     help="Standard deviation of a marker's coordinate [m]; by default it is estimated.",
 )
+@film_options
 @null_options(level="Significance level of the global test; 0.05 by default.")
 @click.option("--most-nulls", type=click.IntRange(min=1), default=320, show_default=True,
               help="Number up to which more are simulated where p is within a factor of two of the level.")  # fmt: skip
@@ -107,6 +109,7 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside", "still-
 @click.pass_context
 def close_loop(
     context: click.Context,
+    film: Given,
     sources: tuple[str, ...],
     recipe_path: Path | None,
     winds: tuple[str, ...],
@@ -143,10 +146,14 @@ def close_loop(
     Several are recordings of one cloth, best in different winds. With --lake the verdict and both models become
     artifacts; `flagdata simulate` runs a model by its name.
 
+    Or SOURCE is a film with its log, a recording of --lake by its name or id, or a table of observables as `flagdata
+    calibrate` takes it: then what a flag shows in windows of 2.5 s is compared, and --flag-size is needed.
+
     \b
       flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8
       flagdata close-loop tracks.csv --wind anemometer.csv --material camel-ponte-roma --pins hoist-corners
       flagdata close-loop --recipe flag.toml --lake lake
+      flagdata close-loop monday tuesday --lake lake --flag-size 1.5x1.0 --azimuth 70±7
     """
     from flagdata.lake import Lake
     from flagdata.outputs import check_files
@@ -154,6 +161,7 @@ def close_loop(
     from measure.closing.close import close_loop as close
     from measure.closing.models import models
     from measure.closing.sources import Reading, read
+    from measure.films.sources import all_films
     from measure.loop.run import Options
     from measure.observe import Setup, observe
     from measure.observe import recipe as recipes
@@ -167,6 +175,16 @@ def close_loop(
     lake = None if lake_path is None else Lake.open(lake_path)
     if lake is not None:
         lake.check_writable()
+    films = all_films(sources, lake=lake, at=branch, sized=film.flag_size is not None)
+    refuse_of_others(context, films=films)
+    if films:
+        from measure.films.command import close_films
+
+        close_films(
+            sources, film, lake=lake, branch=branch, name=name, out=out, level=level, nulls=nulls, seed=seed,
+            workers=workers, as_json=as_json,
+        )  # fmt: skip
+        return
     said = nulls_given(recipe, level=level, nulls=nulls, bank=bank)
     options = Options(
         seed=seed, bank=bank, most_nulls=most_nulls, workers=workers or len(os.sched_getaffinity(0)), **said,

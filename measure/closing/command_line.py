@@ -28,7 +28,7 @@ def null_options(*, level: str) -> Callable[[_Command], _Command]:
     options = (
         click.option(
             "--nulls", type=click.IntRange(min=1),
-            help="Number of null recordings to simulate: 160 (the default) or more.",
+            help="Number of null recordings to simulate, 160 or more; on films kinds of numerics, 40 by default.",
         ),
         click.option(
             "--bank", type=LocalPath(exists=True),

@@ -30,7 +30,7 @@ from models.storage import CARD, WEIGHTS
 
 FILMED = (Kind.RECORDING, Kind.CLIP, Kind.CAMERA)
 """Kinds of artifacts that have frames."""
-_LEAST_PREFIX = 6
+LEAST_PREFIX = 6
 CALIBRATED = "anemometer"
 """Key of the recipes of reading models (`measure.anemometer`)."""
 
@@ -162,7 +162,7 @@ def _named(lake: Lake, source: str, at: str | None) -> Artifact:
     meant = [row for row in rows if row["name"] == source and row["kind"] != Kind.CLIP]
     aligned = {parent for row in meant for parent in row["parents"] or ()}
     meant = [row for row in meant if row["artifact"] not in aligned]
-    if not meant and len(source) >= _LEAST_PREFIX:
+    if not meant and len(source) >= LEAST_PREFIX:
         meant = [row for row in rows if row["artifact"].startswith(source)]
     if not meant:
         raise UnknownNameError.of("file or film of the lake", source, {row["name"] for row in rows})
@@ -243,7 +243,7 @@ def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
         return _loaded(estimator.SHIPPED / chosen, None)
     rows = [] if lake is None else _models(lake, at)
     meant = [row for row in rows if row["name"] == chosen]
-    meant = meant or [row for row in rows if len(chosen) >= _LEAST_PREFIX and row["artifact"].startswith(chosen)]
+    meant = meant or [row for row in rows if len(chosen) >= LEAST_PREFIX and row["artifact"].startswith(chosen)]
     if not meant or lake is None:
         raise UnknownNameError.of("model", chosen, shipped | {str(row["name"]) for row in rows}, where="--model")
     if len(meant) > 1:

@@ -8,6 +8,7 @@ priors, each kind of numerics a batch.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from flagdata.rng import child_seed, stream
 from measure.calibrate.design import Design
-from measure.calibrate.discretisation import Discretisation
+from measure.calibrate.discretisation import LITTLE, Discretisation
 from measure.calibrate.prior import CLOTH, NUISANCES, Floats, draws
 from measure.calibrate.simulation import Batch
 from measure.films.library import Weighable
@@ -30,6 +31,7 @@ LONGEST_PAIRS = 120.0
 """s of all recordings together in which flags with an effect are simulated, a minute of each at most."""
 MINUTE = 60.0
 FEWEST_WINDOWS = 8
+_DAMPING = next(one for one in CLOTH if one.name == "damping")
 
 
 def lasting(designs: Sequence[Design]) -> float:
@@ -88,14 +90,18 @@ def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
     return Pairs(effect=effect, places=places, strengths=strengths, batches=tuple(batches))
 
 
-def nulls(designs: Sequence[Design], *, kinds: int, seed: int) -> list[list[Batch]]:
+def nulls(designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed: int) -> list[list[Batch]]:
     """Null experiments: for each recording a batch a kind of numerics, of `TOGETHER` cloths each. A cloth is the same
-    in all recordings, its place and anemometer are not."""
+    in all recordings, its place and anemometer are not.
+
+    Args:
+        places: for each recording the first one of its place.
+    """
     count = kinds * TOGETHER
     fabric = (*CLOTH, *(one for one in NUISANCES if one.name == "stretching"))
     cloths = draws(fabric, count, seed=seed, name="null cloths")
     found = []
-    for number, design in enumerate(designs):
+    for number, design in zip(places, designs, strict=True):
         own = dict(draws(design.quantities(), count, seed=child_seed(seed, "films", number), name="null places"))
         own |= cloths
         if design.log.distance is not None:
@@ -104,13 +110,28 @@ def nulls(designs: Sequence[Design], *, kinds: int, seed: int) -> list[list[Batc
         first = design.batches()[0]
         batches = []
         for kind in range(kinds):
-            part = np.arange(kind, count, kinds)
+            part = np.arange(kind * TOGETHER, (kind + 1) * TOGETHER)
+            numerics = Discretisation.drawn(stream(seed, "films", "kind", kind), explicit=_little())
+            values = {name: own[name][part] for name in first.values}
+            values["damping"] = _damping(values["damping"], explicit=numerics.step is None)
             batches.append(
                 replace(
-                    first, values={name: own[name][part] for name in first.values}, places=seen[part][:, None],
+                    first, values=values, places=seen[part][:, None], discretisation=numerics,
                     seeds=tuple(child_seed(seed, "films", "null", int(place)) for place in part),
-                    discretisation=Discretisation.drawn(stream(seed, "films", "kind", kind)),
                 )
             )  # fmt: skip
         found.append(batches)
     return found
+
+
+def _little() -> float:
+    """Share of the cloths that damp less than what leapfrog is for."""
+    low, high = _DAMPING.at(np.array([0.0, 1.0])).tolist()
+    return math.log(max(LITTLE / low, 1.0)) / math.log(high / low)
+
+
+def _damping(drawn: Floats, *, explicit: bool) -> Floats:
+    """Dampings of the prior as those of the part below `LITTLE`, or of the part above it [s]."""
+    low, high = _DAMPING.at(np.array([0.0, 1.0])).tolist()
+    shares, edge = np.log(drawn / low) / math.log(high / low), _little()
+    return _DAMPING.at(shares * edge if explicit else edge + shares * (1 - edge))

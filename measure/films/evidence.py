@@ -39,11 +39,13 @@ class Sight:
     Attributes:
         model: of its summaries.
         azimuth, elevation: their priors.
+        place: what recordings from one place with one anemometer share; None for a place of its own.
     """
 
     model: Model
     azimuth: Uncertain
     elevation: Uncertain
+    place: str | None = None
 
     @property
     def quantities(self) -> tuple[Uncertain, ...]:
@@ -85,13 +87,24 @@ class Hypothesis:
     @property
     def dimension(self) -> int:
         """Of the scores: cloth, then each recording's place, then the strength."""
-        return len(self.cloth) + sum(len(one.quantities) for one in self.sights) + (self.effect is not None)
+        own = sum(len(self.sights[first].quantities) for first in set(self._owners))
+        return len(self.cloth) + own + (self.effect is not None)
+
+    @property
+    def _owners(self) -> list[int]:
+        """For each sight the first one of its place."""
+        return first_of([one.place for one in self.sights])
 
     def values(self, scores: Floats) -> tuple[dict[str, Floats], list[dict[str, Floats]], Floats | None]:
         """Cloths, places of each recording, and strengths beyond null, at normal scores (n, dimension)."""
         shares = iter(ndtr(scores).T)
         cloth = {one.name: one.at(next(shares)) for one in self.cloth}
-        places = [{one.name: one.at(next(shares)) for one in sight.quantities} for sight in self.sights]
+        owners = self._owners
+        own = {
+            first: {one.name: one.at(next(shares)) for one in self.sights[first].quantities}
+            for first in sorted(set(owners))
+        }
+        places = [own[first] for first in owners]
         return cloth, places, None if self.effect is None else self.effect.at(next(shares))
 
     def predicted(self, scores: Floats) -> list[tuple[Floats, Floats]]:
@@ -193,3 +206,8 @@ def quantiles(values: Floats, weights: Floats, shares: Sequence[float]) -> list[
     order = np.argsort(values)
     total: NDArray[np.float64] = np.cumsum(weights[order])
     return [float(values[order][min(int(np.searchsorted(total, share)), len(order) - 1)]) for share in shares]
+
+
+def first_of(places: Sequence[str | None]) -> list[int]:
+    """For each recording the first one of its place; None is a place of its own."""
+    return [number if name is None else list(places).index(name) for number, name in enumerate(places)]

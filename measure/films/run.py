@@ -19,17 +19,19 @@ import numpy as np
 from scipy.special import ndtr
 
 from flagdata.errors import InputError, UsageError
+from flagdata.findings import Finding
 from flagdata.provenance import code_version
 from measure.calibrate.calibrate import Options as Calibrating
-from measure.calibrate.observed import Observed
+from measure.calibrate.observed import Observed, constant_wind
 from measure.calibrate.prior import CLOTH, Floats, Normal, Uncertain
 from measure.films.evidence import Fit, Sight, quantiles
 from measure.films.judge import Judged, judge
 from measure.films.library import Weighable, weighable
-from measure.films.simulations import Simulations, Stage, experiments, gathered, sight
+from measure.films.simulations import Simulations, experiments, gathered, sight
 from measure.films.statement import stated
 from measure.films.unseen import compared
 from measure.films.weigh import Weighing, fitted, hypothesis, weigh
+from measure.forecasting.setting import Stage
 from measure.nulls.conformal import GroupedConformal
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Candidate, Conclusion, Estimate, NullTest, Parameter, Verdict
@@ -111,6 +113,12 @@ class Outcome:
     base: Fit
     best: tuple[Weighable, Fit] | None
 
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """On the recordings."""
+        own = (finding for one in self.recordings for finding in one.findings)
+        return (*constant_wind(self.recordings), *own)
+
 
 def close_loop(
     recordings: Sequence[Observed],
@@ -132,7 +140,9 @@ def close_loop(
         InputError: recordings that too few simulations resemble.
         CorruptError: a kept batch that cannot be read.
     """
-    return verdict_of(solve(recordings, options, folder=folder, workers=workers, stage=stage))[0]
+    begun = time.monotonic()
+    verdict = verdict_of(solve(recordings, options, folder=folder, workers=workers, stage=stage))
+    return replace(verdict, seconds=time.monotonic() - begun)
 
 
 def solve(
@@ -177,9 +187,8 @@ def solve(
     )  # fmt: skip
 
 
-def verdict_of(outcome: Outcome) -> tuple[Verdict, Outcome]:
-    """The verdict in numbers and sentences, and what it was made from."""
-    begun = time.monotonic()
+def verdict_of(outcome: Outcome) -> Verdict:
+    """The verdict in numbers and sentences."""
     judged, options = outcome.judged, outcome.options
     effects = outcome.weighing.effects
     named = tuple(dict.fromkeys(effects[place].column.effect for place in judged.named))
@@ -194,10 +203,9 @@ def verdict_of(outcome: Outcome) -> tuple[Verdict, Outcome]:
         conclusion=judged.conclusion, named=named, words="", test=_test(outcome), parameters=_parameters(outcome),
         ranking=_ranking(outcome), comparisons=comparisons, residuals=(),
         provenance={"seed": options.calibration.seed, "code": code_version(), "options": options.recipe()},
-        findings=tuple((f.kind, f.what) for one in outcome.recordings for f in one.noticed()),
+        findings=tuple((f.kind, f.what) for f in outcome.findings),
     )  # fmt: skip
-    verdict = stated(verdict, outcome.recordings, judged, effects, weighed=options.area_weight is not None)
-    return replace(verdict, seconds=time.monotonic() - begun), outcome
+    return stated(verdict, outcome.recordings, weighed=options.area_weight is not None)
 
 
 def _test(outcome: Outcome) -> NullTest:

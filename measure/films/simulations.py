@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,12 +17,10 @@ from measure.calibrate.observed import Observed
 from measure.calibrate.prior import Floats
 from measure.calibrate.summary import Projection, shown
 from measure.films.design import TOGETHER, Pairs, lasting, nulls, pairs
-from measure.films.evidence import Sight
+from measure.films.evidence import Sight, first_of
 from measure.films.library import Weighable
 from measure.films.model import fit, responded
-
-Stage = Callable[[str, int, int], None]
-"""Called with what is simulated, how many flags of how many are done."""
+from measure.forecasting.setting import Stage
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,7 +73,7 @@ def gathered(
     designs = [design_of(one, options) for one in recordings]
     until = lasting(designs)
     made = [[pairs(design, effect, until=until) for effect in effects] for design in designs]
-    null = nulls(designs, kinds=kinds, seed=options.seed)
+    null = nulls(designs, first_of([one.place for one in recordings]), kinds=kinds, seed=options.seed)
 
     def all_of(what: str, batches: list) -> Floats:
         total, done = sum(len(batch.seeds) for batch in batches), 0
@@ -131,14 +129,16 @@ def sight(
         response = responded(model, made.effect, made.strengths, paired, with_it, without)
         if response is not None:
             found[made.effect.name] = response
-    return Sight(model=replace(model, responses=found), azimuth=design.azimuth, elevation=design.elevation)
+    return Sight(
+        model=replace(model, responses=found), azimuth=design.azimuth, elevation=design.elevation, place=observed.place
+    )
 
 
 def part_of(observed: Observed, windows: slice) -> Observed:
     """Some windows of a recording, of which means alone are taken."""
     return _Part(
         name=observed.name, source=observed.source, readings=observed.readings[windows], log=observed.log,
-        first=observed.first, sigma=observed.sigma, speeds=observed.speed[windows],
+        first=observed.first, place=observed.place, sigma=observed.sigma, speeds=observed.speed[windows],
     )  # fmt: skip
 
 

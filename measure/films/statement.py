@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from measure.calibrate.observed import Observed
-from measure.films.judge import CONFIDENCE, Judged
-from measure.films.library import Weighable
+from measure.calibrate.observed import Observed, constant_wind
+from measure.films.judge import CONFIDENCE
 from measure.nulls.conformal import kinds_needed
 from measure.report.sentences import listed, readable, titles
 from measure.verdict.quantity import number, probability, with_level
 from measure.verdict.record import Conclusion, Verdict
 
 
-def stated(
-    verdict: Verdict, recordings: Sequence[Observed], judged: Judged, effects: Sequence[Weighable], *, weighed: bool
-) -> Verdict:
+def stated(verdict: Verdict, recordings: Sequence[Observed], *, weighed: bool) -> Verdict:
     """The verdict with all that it says in sentences.
 
     Args:
@@ -63,7 +60,7 @@ def separating(verdict: Verdict) -> str:
 
 def assumptions(recordings: Sequence[Observed], *, weighed: bool) -> tuple[str, ...]:
     """What was taken as given."""
-    steady = all(one.steady for one in recordings) and len(recordings) == 1
+    steady = bool(constant_wind(recordings))
     made = [
         "the flag has the stated size and is held as stated, and the camera is where it is stated to be",
         "area weight, bending and damping are calibrated, so that what only changes them is not an effect",

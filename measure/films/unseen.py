@@ -89,8 +89,9 @@ def compared(
 
 
 def _halves(recordings: Sequence[Observed], simulations: Simulations) -> list[_Task]:
-    """One half of each recording fitted and the other predicted, both ways; none of recordings that are too short."""
-    if min(len(one.readings) for one in recordings) < 2 * LEAST_WINDOWS:
+    """One half of each recording fitted and the other predicted, both ways; none of recordings that are too short, or
+    that are rows of a table against wind, whose windows are the same."""
+    if min(len(one.readings) for one in recordings) < 2 * LEAST_WINDOWS or any(one.place for one in recordings):
         return []
     sides: list[list[tuple[Sight, Observed]]] = [[], []]
     for one, design, base, own in zip(
@@ -177,12 +178,12 @@ def _comparison(
     after, wrong = errors(with_effect) if with_effect else None, errors(with_control) if with_control else None
     floor = float(np.sqrt(np.square(scatter).mean()))
     reduction = None if after is None else (before[0] - after[0], before[1] - after[1])
-    room = before[0] - floor
+    stated = _estimate(before, unit)
     return Comparison(
-        what=words, frames=sum(one.windows for one in own), before=_estimate(before, unit),
+        what=words, frames=sum(one.windows for one in own), before=stated,
         after=_estimate(after, unit), reduction=_estimate(reduction, unit),
         floor=Estimate(value=floor, low=floor, high=floor, unit=unit, level=CRITERIA.interval),
-        share=None if reduction is None or room <= CRITERIA.room * before[0] else reduction[0] / room,
+        share=None if reduction is None or stated.low <= floor else reduction[0] / (before[0] - floor),
         control=None if wrong is None else _estimate(wrong, unit),
         control_name="" if wrong is None or control is None else control.column.effect,
     )  # fmt: skip

@@ -17,7 +17,7 @@ from measure.report.sentences import readable
 from measure.verdict import quantity
 from measure.verdict.record import Conclusion, Estimate, Residual, Verdict
 
-_TONES = {
+TONES = {
     Conclusion.UNTESTED: "open",
     Conclusion.SUFFICIENT: "settled",
     Conclusion.EFFECT: "settled",
@@ -46,7 +46,7 @@ def page(verdict: Verdict) -> str:
     motions = [m for m in map(motion.motion, verdict.residuals) if m is not None]
     values = {
         "verdict": verdict,
-        "tone": _TONES[verdict.conclusion],
+        "tone": TONES[verdict.conclusion],
         "heading": sentences.heading(verdict),
         "test_sentence": sentences.test_sentence(verdict.test),
         "remark": sentences.test_remark(verdict.test),
@@ -74,7 +74,7 @@ def page(verdict: Verdict) -> str:
         **_motions(motions, sentences.after_label(verdict)),
         "provenance": list(_flattened(verdict.provenance)),
     }
-    return render("measure.report", "page.html.j2", values, filters=_FILTERS)
+    return render("measure.report", "page.html.j2", values, filters=FILTERS)
 
 
 def _lengths(verdict: Verdict) -> quantity.Display:
@@ -176,7 +176,7 @@ def _with_error(value: float, error: float) -> Markup:
     return _data(value, quantity.with_error(value, error))
 
 
-_FILTERS = {
+FILTERS = {
     "estimate": _estimate,
     "full": _full,
     "parameter": _parameter,

@@ -1,0 +1,59 @@
+"""Which sources of `flagdata close-loop` are films with logs, or tables of observables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flagdata.addresses import local_path
+from flagdata.errors import UsageError
+from flagdata.lake import Lake
+from measure.calibrate.columns import names
+from measure.calibrate.filmed import is_table
+from measure.estimate.source import FILMED, LEAST_PREFIX
+from measure.observables import OBSERVABLES
+
+_DESCRIPTIONS = (".toml", ".json")
+
+
+def all_films(sources: Sequence[str], *, lake: Lake | None, at: str, sized: bool = False) -> bool:
+    """Whether they are films or tables of observables, not markers and meshes.
+
+    Args:
+        sized: whether a flag's size is given, which films need: then what cannot be found was meant as one.
+
+    Raises:
+        UsageError: some are and some are not.
+        FlagdataError: a table that cannot be read.
+    """
+    found = {source: is_film(source, lake=lake, at=at, otherwise=sized) for source in sources}
+    if len(set(found.values())) > 1:
+        films = ", ".join(source for source, own in found.items() if own)
+        raise UsageError(
+            f"{films} beside recordings of markers", where="SOURCE", fix="judge films and markers each by themselves"
+        )
+    return any(found.values())
+
+
+def is_film(source: str, *, lake: Lake | None, at: str, otherwise: bool = False) -> bool:
+    """Whether a source is a film, a recording or clip of a lake, or a table of observables.
+
+    Args:
+        otherwise: the answer for what is neither a file nor an artifact.
+    """
+    path = local_path(source)
+    if path.is_dir():
+        return False
+    if path.is_file():
+        if not is_table(source):
+            return path.suffix.lower() not in _DESCRIPTIONS
+        columns = names(path)
+        return "marker" not in columns and bool(columns & set(OBSERVABLES))
+    if lake is None:
+        return otherwise
+    rows = lake.rows({}, at=at, columns=["artifact", "kind", "name"]).to_pylist()
+    kinds = {
+        row["kind"]
+        for row in rows
+        if row["name"] == source or (len(source) >= LEAST_PREFIX and row["artifact"].startswith(source))
+    }
+    return bool(kinds & set(FILMED)) if kinds else otherwise

@@ -1,0 +1,136 @@
+"""`flagdata close-loop` on tables of observables: dispatch, refusals, what is written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from flagdata.errors import UsageError
+from flagdata.lake import Lake
+from measure.calibrate.simulation import OBSERVED
+from measure.closing.command import close_loop
+from measure.films import library
+from measure.films.sources import all_films
+from measure.observables.observable import WINDOW
+from sim.run.reading import load
+from tests.measure.films.conftest import EFFECTS, recording
+
+
+def table(path: Path, *, mean: float, effects: Mapping[str, float] | None = None) -> Path:
+    """A table as `flagdata observe` writes it."""
+    one = recording(mean=mean, seed=5, effects=effects)
+    rows = [
+        ",".join(str(v) for v in (WINDOW * (number + 0.5), speed, *own))
+        for number, (speed, own) in enumerate(zip(one.speed.tolist(), one.readings.tolist(), strict=True))
+    ]
+    path.write_text("\n".join([f"time,wind,{','.join(OBSERVED)}", *rows]) + "\n")
+    return path
+
+
+def run(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(close_loop, [str(one) for one in arguments])
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three effects are weighed."""
+    kept = {name: own for name, own in library._RANGES.items() if name in EFFECTS}
+    monkeypatch.setattr(library, "_RANGES", kept)
+
+
+def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], few: None) -> None:
+    lake, out = tmp_path / "lake", tmp_path / "out"
+    Lake.create(lake)
+    effects = {"tangential-linear-drag.coefficient": 0.9}
+    tables = [
+        table(tmp_path / f"{name}.csv", mean=mean, effects=effects) for name, mean in (("calm", 4.0), ("brisk", 6.5))
+    ]
+    given = (*tables, "--flag-size", "1.5x1.0", "--azimuth", "70±7", "--simulations", "64", "--lake", lake)
+    done = run(*given, "--out", out, "--json")
+    assert done.exit_code == 0, done.output
+    verdict = json.loads(done.stdout)
+    assert verdict["schema"] == "flagdata.verdict/1"
+    assert verdict["named"] == ["tangential-linear-drag"]
+    assert {path.name for path in out.iterdir()} == {"report.html", "verdict.json", "base.toml", "model.toml"}
+    text = (out / "report.html").read_text()
+    assert "The base model lacked tangential-linear-drag" in text
+    assert "droop, recordings left out" in text
+    model = load(str(out / "model.toml"))
+    assert list(model.effects) == ["tangential-linear-drag"]
+    assert not load(str(out / "base.toml")).effects
+    opened = Lake.open(lake)
+    assert opened.artifact(verdict["artifacts"]["measurement"]).name == "calm"
+    assert len(opened.rows({"kind": "model"})) == 2
+    again = json.loads(run(*given, "--out", tmp_path / "other", "--json").stdout)
+    assert again["artifacts"]["existing"]
+    assert again["artifacts"]["measurement"] == verdict["artifacts"]["measurement"]
+    words = run(*given, "--out", tmp_path / "third").stdout
+    assert "It lacks tangential-linear-drag, coefficient" in " ".join(words.split())
+    assert max(map(len, words.splitlines())) <= 100
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((), "the flag's size is missing"),
+        (("--flag-size", "1.5x1.0", "--wind", "5"), "films and tables of observables"),
+        (("--flag-size", "1.5x1.0", "--pins", "hoist"), "--pins"),
+        (("--flag-size", "1.5x1.0", "--azimuth", "190"), "give degrees from 1 to 179"),
+        (("--flag-size", "1.5x1.0", "--area-weight", "0"), "give one above 0"),
+        (("--flag-size", "1.5x1.0", "--crop", "0,0,9,9"), "a table of observables has no pictures"),
+        (("--flag-size", "1.5x1.0", "--nulls", "2"), "kinds"),
+        (("--flag-size", "1.5x1.0", "--start", "40s"), "s of film with a log beside them"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_and_nothing_is_written(
+    tmp_path: Path, cheap: list[int], arguments: tuple[str, ...], said: str
+) -> None:
+    done = run(table(tmp_path / "t.csv", mean=5.0), *arguments, "--out", tmp_path / "out")
+    assert done.exit_code != 0
+    error = done.exception
+    assert said in f"{error} {getattr(error, 'where', '')} {getattr(error, 'fix', '')} {done.output}"
+    assert not (tmp_path / "out").exists()
+
+
+def test_options_of_films_are_refused_beside_markers(tmp_path: Path) -> None:
+    path = tmp_path / "tracks.csv"
+    path.write_text("frame,marker,u,v,x,y,z\n0,a,0,0,0,0,0\n")
+    done = run(path, "--wind", "5", "--flag-size", "1.5x1.0", "--out", tmp_path / "out")
+    assert isinstance(done.exception, UsageError)
+    assert done.exception.where == "--flag-size"
+
+
+def test_films_and_markers_are_not_judged_together(tmp_path: Path) -> None:
+    markers = tmp_path / "tracks.csv"
+    markers.write_text("frame,marker,u,v,x,y,z\n0,a,0,0,0,0,0\n")
+    with pytest.raises(UsageError, match="beside recordings of markers"):
+        all_films([str(markers), str(table(tmp_path / "t.csv", mean=5.0))], lake=None, at="main")
+
+
+def test_a_video_counts_as_a_film_and_a_recipe_does_not(tmp_path: Path) -> None:
+    for name in ("flag.mp4", "flag.toml"):
+        (tmp_path / name).write_bytes(b"no film")
+    assert all_films([str(tmp_path / "flag.mp4")], lake=None, at="main")
+    assert not all_films([str(tmp_path / "flag.toml")], lake=None, at="main")
+
+
+def test_a_recording_that_is_not_there_is_named(tmp_path: Path) -> None:
+    lake = tmp_path / "lake"
+    Lake.create(lake)
+    done = run("calm", "--lake", lake, "--flag-size", "1.5x1.0", "--out", tmp_path / "out")
+    assert "unknown file or film of the lake 'calm'" in f"{done.exception}"
+
+
+def test_rows_against_wind_are_recordings_from_one_place(tmp_path: Path, cheap: list[int], few: None) -> None:
+    path = tmp_path / "paper.csv"
+    path.write_text("wind,duration,droop,extension\n4,60,0.38,0.9\n5,60,0.24,0.9\n6.5,60,0.09,0.9\n")
+    done = run(path, "--flag-size", "1.5x1.0", "--simulations", "64", "--out", tmp_path / "out", "--json")
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    assert {one["what"] for one in found["comparisons"]} == {
+        "droop, recordings left out", "extension, recordings left out"
+    }  # fmt: skip
