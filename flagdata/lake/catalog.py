@@ -20,6 +20,7 @@ import errno
 import hashlib
 import json
 import random
+import re
 import threading
 import time
 import uuid
@@ -380,12 +381,14 @@ class Catalog:
             yield
         except (DeltaError, OSError) as error:
             if isinstance(self._log, RemotePath):
-                raise self._unreachable(error) from None
-            if _SYSTEM_ERROR in str(error):
+                if _NO_ANSWER.search(str(error)):
+                    raise self._unreachable(error) from None
+            elif _SYSTEM_ERROR in str(error):
                 with disk_errors("reading the catalog", self._log):
                     raise OSError(str(error).splitlines()[0]) from error
             self._entries.files()  # raises, where an entry is to blame
             first = str(error).splitlines()[0]  # without the Delta library's stack
+            first = plain(first) if isinstance(self._log, RemotePath) else first
             restore = "restore the folder from a copy"
             raise CorruptError(
                 f"the catalog's log cannot be read: {first}",
@@ -468,6 +471,8 @@ class Catalog:
 _CHECKPOINT = ".checkpoint.parquet"
 _HINT = "_last_checkpoint"
 _SYSTEM_ERROR = "(os error "  # as the Delta library writes it
+_NO_ANSWER = re.compile(r"Generic S3 error|Error performing [A-Z]+ ")
+"""What it writes where a store refused a request or did not answer; all else is said of what the store gave."""
 _WRITER = 2
 """Version of Delta's protocol that tables of this package ask of writers; a later one has duties unknown here."""
 

@@ -5,12 +5,13 @@ was sent or after it was answered, n in turn over all requests that a commit mak
 acknowledged is looked for, and the lake examined.
 
 Faults: three processes commit through a proxy that answers a share of the requests by an error, closes the connection
-before or after the store has acted, or waits. rclone's server, which ignores conditions, is refused where
-FLAGDATA_RCLONE names the program.
+before or after the store has acted, or waits. rclone's server, which ignores conditions, is refused: FLAGDATA_RCLONE
+names the program, or `make rclone` installs it.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import random
@@ -20,7 +21,8 @@ import subprocess
 import time
 import traceback
 import uuid
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterable
 from datetime import timedelta
 from functools import partial
 from http.client import HTTPConnection
@@ -36,13 +38,16 @@ from flagdata.lake.health import doctor, object_names, verify
 from flagdata.provenance import code_version
 from flagdata.schema import Kind
 from flagdata.storage.path import RemotePath
+from flagdata.storage.ranges import ObjectRanges
 from tests.s3 import BUCKET, SECRETS, moto, serving
 
 KILLS = 208
-_CHECKED_EVERY = 26
+_GROUP = 26
 _CALLS = 26  # requests of this package in a transaction of one record, at least
 _FAULTY = 0.05
 _COMMITS = 8  # of each process beside faults
+_RANGES = 60  # read beside faults
+_RCLONE = Path(__file__).resolve().parents[2] / ".venv-rclone" / "bin" / "rclone"
 Say = Callable[[object], None]
 
 
@@ -120,11 +125,13 @@ def examine(address: str, say: Say) -> None:
     })  # fmt: skip
 
 
-def killed(address: str) -> dict[str, Any]:
-    """Trials of the kills."""
+def killed(group: int) -> dict[str, int]:
+    """Trials of the kills with a lake of their own, of which there are `KILLS // _GROUP`."""
+    address = f"s3://{BUCKET}/kills-{group}"
+    Child(lambda say: Lake.create(address) and None).said()
     acknowledged: set[str] = set()
-    lost, errors, died, survivors = 0, 0, 0, 0
-    for trial in range(KILLS):
+    died = survivors = 0
+    for trial in range(group * _GROUP, (group + 1) * _GROUP):
         call, answered = 1 + trial // 2 % _CALLS, trial % 2 == 1
 
         def victim(say: Say, trial: int = trial, call: int = call, answered: bool = answered) -> None:
@@ -140,16 +147,23 @@ def killed(address: str) -> dict[str, Any]:
         died += not ended
         survivors += len(beside)
         acknowledged.update(ended, beside)
-        if (trial + 1) % _CHECKED_EVERY == 0:
-            (found,) = Child(lambda say: examine(address, say)).said()
-            lost += len(acknowledged - set(found["rows"]))
-            errors += len(found["errors"])
-            assert len(set(found["rows"])) == len(found["rows"])
-            print(f"{trial + 1} trials, {len(acknowledged)} acknowledged, {lost} lost, {errors} findings", flush=True)  # noqa: T201
-    return {
-        "trials": KILLS, "killed": died, "beside, ended": survivors, "acknowledged": len(acknowledged),
-        "acknowledged and lost": lost, "findings of doctor and verify": errors,
+    (found,) = Child(lambda say: examine(address, say)).said()
+    assert len(set(found["rows"])) == len(found["rows"])
+    result = {
+        "trials": _GROUP, "killed": died, "beside, ended": survivors, "acknowledged": len(acknowledged),
+        "acknowledged and lost": len(acknowledged - set(found["rows"])),
+        "findings of doctor and verify": len(found["errors"]),
     }  # fmt: skip
+    print(group, result, found["errors"], flush=True)  # noqa: T201 — it takes long
+    return result
+
+
+def total(groups: Iterable[dict[str, int]]) -> dict[str, int]:
+    """The sums of what `killed` counted."""
+    found: Counter[str] = Counter()
+    for group in groups:
+        found.update(group)
+    return dict(found)
 
 
 class Faulty(BaseHTTPRequestHandler):
@@ -208,6 +222,7 @@ def beside_faults(store: str, prefix: str) -> dict[str, Any]:
         Child(lambda say: Lake.create(prefix) and None).said()
         writers = [Child(lambda say, w=w: _commits(prefix, w, say)) for w in range(3)]
         said = [line for writer in writers for line in writer.said()]
+        (ranges,) = Child(lambda say: _ranges(prefix, say)).said()
         (found,) = Child(lambda say: examine(prefix, say)).said()
         wrong = [line for line in said if line["text"] != line["read"]]
         os.environ["AWS_ENDPOINT_URL"] = store
@@ -215,8 +230,22 @@ def beside_faults(store: str, prefix: str) -> dict[str, Any]:
     return {
         "share of requests": _FAULTY, "faults": dict(Faulty.faults), "acknowledged": len(acknowledged),
         "acknowledged and lost": len(acknowledged - set(found["rows"])), "rows": len(found["rows"]),
-        "objects read wrongly": len(wrong), "findings of doctor and verify": found["errors"],
+        "objects read wrongly": len(wrong), "ranges read": _RANGES, "ranges read wrongly": ranges, "findings of doctor and verify": found["errors"],
     }  # fmt: skip
+
+
+def _ranges(address: str, say: Say) -> None:
+    """Says how many ranges of a large object are not what was put."""
+    draws = random.Random(2)
+    data = draws.randbytes(6 << 20)
+    place = RemotePath.parse(f"{address}/mcap/{hashlib.sha256(data).hexdigest()}.mcap")
+    place.write_bytes(data)
+    wrong = 0
+    for _ in range(_RANGES):
+        first, length = draws.randrange(len(data)), draws.randrange(1, 1 << 20)
+        wrong += ObjectRanges(place).read(length, first) != data[first : first + length]
+    place.unlink()
+    say(wrong)
 
 
 def _commits(address: str, writer: int, say: Say) -> None:
@@ -264,10 +293,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     with moto() as address:
         os.environ["AWS_ENDPOINT_URL"] = address
         results["faults"] = beside_faults(address, f"s3://{BUCKET}/faults")
-        print(results, flush=True)  # noqa: T201 — the kills take long
-        Child(lambda say: Lake.create(f"s3://{BUCKET}/kills") and None).said()
-        results["kills"] = killed(f"s3://{BUCKET}/kills")
-    rclone = os.environ.get("FLAGDATA_RCLONE")
-    results["rclone refused"] = refused(rclone) if rclone else "left out: FLAGDATA_RCLONE names no program"
+        results["kills"] = total(killed(group) for group in range(KILLS // _GROUP))
+    rclone = os.environ.get("FLAGDATA_RCLONE", str(_RCLONE))
+    results["rclone refused"] = refused(rclone) if Path(rclone).is_file() else "left out: there is no rclone"
     shutil.rmtree(cache, ignore_errors=True)
     return results

@@ -25,6 +25,7 @@ from flagdata.lake import Artifact, Lake
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor
 from flagdata.schema import Kind
+from tests.flagdata.lake.conftest import LINKS
 
 NOW = timedelta(0)
 Put = Callable[..., Artifact]
@@ -46,6 +47,7 @@ except FlagdataError as error:
 """
 
 
+@pytest.mark.disk("a bucket has no limit of the size of files")
 @pytest.mark.parametrize(("limit", "doing"), [(50_000, "storing an object"), (1_000, "committing")])
 def test_a_write_that_the_kernel_refuses_is_a_clear_error_and_publishes_nothing(
     lake: Lake, put_text: Put, tmp_path: Path, limit: int, doing: str
@@ -82,6 +84,7 @@ def test_a_disk_that_refuses_the_folder_of_the_catalog_is_a_clear_error_and_leav
     assert list((tmp_path / "new").iterdir()) == []
 
 
+@pytest.mark.disk("it is about a full disk")
 def test_a_disk_that_fills_at_any_step_leaves_a_whole_lake_and_ingesting_again_succeeds(
     lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -116,6 +119,7 @@ def test_a_disk_that_fills_at_any_step_leaves_a_whole_lake_and_ingesting_again_s
     assert lake.rows()["name"].to_pylist() == ["before", *(f"step {i}" for i in range(step + 1))]
 
 
+@pytest.mark.disk(LINKS)
 def test_a_folder_that_may_not_be_written_is_a_clear_error(lake: Lake, put_text: Put) -> None:
     store = lake.path / "mcap"
     store.chmod(0o555)
@@ -196,6 +200,7 @@ def test_a_file_from_elsewhere_is_copied_and_stays(lake: Lake, tmp_path: Path) -
     assert lake.object_path(name).read_text() == "mine"
 
 
+@pytest.mark.disk(LINKS)
 def test_a_read_only_folder_is_copied_to_one_that_can_be_moved_and_collected(lake: Lake, tmp_path: Path) -> None:
     source = tmp_path / "mine.zarr"
     (source / "inner").mkdir(parents=True)
@@ -302,7 +307,7 @@ def test_a_process_that_died_between_a_checkpoint_and_its_hint_stops_no_commit(l
         put_text(lake, str(count))
         count += 1
     log = lake.path / "catalog" / "_delta_log"
-    DeltaTable(lake.catalog.path).create_checkpoint()
+    DeltaTable(lake.catalog.path.as_uri(), storage_options=lake.catalog._options()).create_checkpoint()
     (log / "_last_checkpoint").unlink()
     (left,) = log.glob("*.checkpoint.parquet")
     later = Lake.open(lake.path)
@@ -310,7 +315,7 @@ def test_a_process_that_died_between_a_checkpoint_and_its_hint_stops_no_commit(l
         put_text(later, str(i))
     newest = max(log.glob("*.checkpoint.parquet"))
     assert newest > left
-    assert json.loads((log / "_last_checkpoint").read_text())["version"] == int(newest.name.split(".")[0])
+    assert json.loads((log / "_last_checkpoint").read_bytes())["version"] == int(newest.name.split(".")[0])
     assert Lake.open(lake.path).rows().num_rows == 2 * count + 1
     assert doctor(later, grace=NOW) == ()
 

@@ -159,6 +159,7 @@ def test_threads_that_share_a_lake_lose_no_row_and_repeat_none(lake: Lake, put_t
     assert sorted(lake.rows()["artifact"].to_pylist()) == sorted(ids)
 
 
+@pytest.mark.disk("a folder of a bucket is put file by file, and is whole with its `.sums`")
 def test_a_folder_that_another_writer_publishes_in_the_same_moment_is_kept_once(
     lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:

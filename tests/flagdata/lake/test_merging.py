@@ -119,7 +119,7 @@ def test_a_row_whose_parent_the_other_side_withdrew_is_a_conflict_that_names_bot
 
 def test_a_merge_whose_object_is_missing_is_refused(lake: Lake, put_text: Put) -> None:
     lake.branch("b")
-    lake.object_path(str(put_text(lake, "a", branch="b").object)).unlink()
+    lake.objects.remove(lake.objects.path(str(put_text(lake, "a", branch="b").object)))
     with pytest.raises(NotFoundError, match="missing"):
         lake.merge("b", "no")
     assert names(lake) == []
@@ -226,7 +226,7 @@ def test_versions_whose_data_gc_deleted_are_named_by_doctor_and_by_what_needs_th
             use(str(gone.object))
         assert "from 3 on" in caught.value.fix
         assert "doctor" not in caught.value.fix
-    lake.object_path(str(kept.object)).unlink()  # nobody withdrew this one
+    lake.objects.remove(lake.objects.path(str(kept.object)))  # nobody withdrew this one
     with pytest.raises(NotFoundError, match="run flagdata doctor"):
         lake.object_path(str(kept.object))
     assert {f.kind for f in doctor(lake, grace=DAY)} == {"withdrawn-collected", "dangling-row"}
@@ -238,7 +238,7 @@ def test_a_file_that_only_older_versions_need_does_not_end_doctor(lake: Lake, pu
     artifact = put_text(lake, "a")
     (old,) = (lake.path / "catalog").glob("*.parquet")
     lake.withdraw([artifact.id], "no")
-    old.write_text("damaged")
+    old.write_bytes(b"damaged")
     assert "catalog-file-unreadable" in {finding.kind for finding in doctor(Lake.open(lake.path), grace=NOW)}
 
 

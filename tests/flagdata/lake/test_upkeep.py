@@ -252,6 +252,7 @@ def test_collection_spares_an_old_orphan_that_a_running_transaction_has_found_ag
     assert lake.object_path(name).read_text() == "again"
 
 
+@pytest.mark.disk("a lease in a bucket is one object, which nobody finds half gone")
 def test_a_transaction_ends_only_when_no_collector_can_see_it_half_gone(lake: Lake) -> None:
     begun, go_on = threading.Event(), threading.Event()
 
