@@ -50,7 +50,7 @@ IN_TWO := -n 2 --dist loadfile --no-loadscope-reorder
 # Tests start the program many times: without its bytecode each start would compile the package anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-oldest blender mujoco vtk lerobot datasets system lint docs bench validate clean
+.PHONY: demo test test-oldest blender mujoco vtk lerobot datasets rclone system lint docs bench validate clean
 
 demo: $(STAMP)
 	$(BIN)/flagdata demo --out $(OUT)/demo

@@ -230,7 +230,8 @@ def beside_faults(store: str, prefix: str) -> dict[str, Any]:
     return {
         "share of requests": _FAULTY, "faults": dict(Faulty.faults), "acknowledged": len(acknowledged),
         "acknowledged and lost": len(acknowledged - set(found["rows"])), "rows": len(found["rows"]),
-        "objects read wrongly": len(wrong), "ranges read": _RANGES, "ranges read wrongly": ranges, "findings of doctor and verify": found["errors"],
+        "objects read wrongly": len(wrong), "ranges read": _RANGES, "ranges read wrongly": ranges,
+        "findings of doctor and verify": found["errors"],
     }  # fmt: skip
 
 
