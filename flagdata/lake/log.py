@@ -73,10 +73,13 @@ class Log:
         missing = [v for v in range(max(newest, acknowledged) + 1) if v not in present and not self.path(v).exists()]
         if missing:
             raise self._gap(missing, newest=newest)
-        if isinstance(self.folder, Path):  # a store shows an entry whole or not at all
-            for version in sorted(present - self._filled):
+        for version in sorted(present.keys() - self._filled):
+            entry = present[version]
+            if isinstance(entry, Path):
                 self._text(version)
-        self._filled = present
+            elif entry.stat().st_size == 0:  # as the listing says; a store shows an entry whole or not at all
+                raise self.damaged(version)
+        self._filled = set(present)
         return max(newest, acknowledged)
 
     def files(self) -> dict[str, str | None]:
@@ -108,7 +111,7 @@ class Log:
             previous = self._content(version)[1].get(PREVIOUS_HASH)
             if previous is not None:
                 noted[version - 1] = previous
-        return [self.path(v) for v in sorted(present & noted.keys()) if file_hash(self.path(v)) != noted[v]]
+        return [self.path(v) for v in sorted(present.keys() & noted.keys()) if file_hash(self.path(v)) != noted[v]]
 
     def put(self, version: int, actions: Sequence[Mapping[str, Any]]) -> bool:
         """Publish the entry of `version`, one action a line; False when another writer has published it.
@@ -187,11 +190,11 @@ class Log:
         """The newest version that was acknowledged; -1 in a lake that has had no commit since marks are made."""
         return max(self._marks(), default=-1)
 
-    def _present(self) -> set[int]:
-        return {int(match[1]) for name in _names_in(self.folder) if (match := _ENTRY.fullmatch(name))}
+    def _present(self) -> dict[int, Place]:
+        return {int(match[1]): path for path in _paths_in(self.folder) if (match := _ENTRY.fullmatch(path.name))}
 
     def _marks(self) -> list[int]:
-        return [int(name) for name in _names_in(self.marks) if _MARK.fullmatch(name)]
+        return [int(path.name) for path in _paths_in(self.marks) if _MARK.fullmatch(path.name)]
 
     def _gap(self, missing: list[int], *, newest: int) -> LogGapError:
         names = ", ".join(self.path(version).name for version in missing[:3])
@@ -204,10 +207,10 @@ class Log:
         )
 
 
-def _names_in(folder: Place) -> list[str]:
-    """Names in a folder, none if it is not there."""
+def _paths_in(folder: Place) -> list[Place]:
+    """What is in a folder, nothing if it is not there."""
     try:
-        return [path.name for path in folder.iterdir()]
+        return list(folder.iterdir())
     except FileNotFoundError:
         return []
     except OSError as error:
