@@ -18,6 +18,7 @@ VALIDATIONS = {
     "gate-films": "tests.validation.gate_films",
     "hanging-cloth": "tests.validation.hanging_cloth",
     "hostile": "tests.validation.hostile",
+    "lake-in-a-bucket": "tests.validation.lake_in_a_bucket",
     "measure-windows": "tests.validation.measure_windows",
     "object-storage": "tests.validation.object_storage",
     "observables": "tests.validation.observables",

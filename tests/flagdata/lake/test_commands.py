@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.addresses import lake_place
 from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter
+from tests.flagdata.lake.conftest import overwrite
 from tests.program import Run, invoke
 
 Put = Callable[..., Artifact]
@@ -56,7 +58,7 @@ def test_ls_and_show_find_an_artifact_by_the_beginning_of_its_id(run: Run, lake:
     shown = run("show", child.id[:8], "--json").document
     assert shown["artifact"]["artifact"] == child.id
     assert [relative["name"] for relative in shown["parents"]] == ["parent"]
-    assert Path(shown["path"]).read_text() == "child"
+    assert lake_place(shown["path"]).read_bytes() == b"child"
     assert f"made into       {child.id[:12]} wind child" in run("show", parent.id).out.splitlines()
     assert "object_bytes    5 B" in run("show", child.id).out.splitlines()
     assert run("show", "nothing").code == 1
@@ -185,7 +187,7 @@ def test_verify_counts_only_what_it_could_read(run: Run, lake: Lake, put_text: P
         put_text(lake, text)
     artifact = put_text(lake, "d")
     assert artifact.object is not None
-    lake.object_path(artifact.object).unlink()
+    lake.objects.path(artifact.object).unlink()
     assert "3 of 4 objects re-hashed" in run("verify").err
 
 
@@ -194,9 +196,8 @@ def test_verify_and_doctor_exit_with_3_when_the_lake_is_damaged(run: Run, lake: 
     assert [run(verb).code for verb in ("verify", "doctor")] == [0, 0]
     assert run("verify", "--sample", 1, "--json").document["healthy"] is True
     assert artifact.object is not None
-    path = lake.object_path(artifact.object)
-    path.chmod(0o644)
-    path.write_text("b")
+    path = lake.objects.path(artifact.object)
+    overwrite(path, b"b")
     assert [run(*verb).code for verb in (("verify",), ("doctor",), ("doctor", "--deep"))] == [3, 0, 3]
     document = run("verify", "--json").document
     assert (document["schema"], document["healthy"]) == ("flagdata.verify/1", False)

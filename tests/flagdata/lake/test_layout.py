@@ -19,8 +19,10 @@ from flagdata.lake.collect import collect, garbage
 from flagdata.lake.health import doctor, object_names, verify, verify_catalog
 from flagdata.lake.layout import FOLDERS, LinkError
 from flagdata.schema import Kind
+from tests.flagdata.lake.conftest import LINKS
 from tests.program import invoke
 
+pytestmark = pytest.mark.disk(LINKS)
 NOW = timedelta(0)
 Put = Callable[..., Artifact]
 

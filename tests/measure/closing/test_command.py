@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -199,3 +200,14 @@ def test_the_uncertainty_of_the_weight_on_the_command_line_is_that_of_the_setup(
     setup = setup_of(unweighed, None, 0.02, None, None)
     assert (setup.mass_known, setup.density_uncertainty) == (True, 0.02)
     assert setup_of(unweighed, None, None, None, None) == unweighed
+
+
+def test_recordings_of_a_bucket_are_those_of_their_table(table: Path, bucket_folder: str, tmp_path: Path) -> None:
+    lake = Lake.create(bucket_folder)
+    taken = ingest_markers(lake, table, MarkerOptions(rate=RATE))
+    shutil.rmtree(tmp_path / "cache")
+    found = read([result.artifact.id for result in taken], ["4"], Reading(), Lake.open(bucket_folder))
+    expected = read([str(table)], ["4"], Reading(rate=RATE), None)
+    assert [one.source for one in found] == [result.artifact.id for result in taken]
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(one.positions, other.positions)

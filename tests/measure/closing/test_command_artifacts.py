@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -105,6 +106,16 @@ def test_what_was_kept_comes_back_as_it_was(lake: Lake, specimen: Specimen) -> N
     assert found.test == given.verdict.test
     assert "<html" in report
     lake.objects.check(stored)
+
+
+def test_a_loop_that_was_closed_is_kept_in_a_bucket(tmp_path: Path, specimen: Specimen, bucket_folder: str) -> None:
+    kept = keep(Lake.create(bucket_folder), closed(experiment(specimen)))
+    shutil.rmtree(tmp_path / "cache")
+    again = Lake.open(bucket_folder)
+    found, report = read(again.object_path(str(again.artifact(kept.measurement).object)))
+    assert found.words == concluded(Conclusion.EFFECT).words
+    assert "<html" in report
+    assert {again.artifact(model).name for model in kept.models} == {"tracks-base", "tracks-lift"}
 
 
 def test_a_folder_that_is_no_measurement_is_an_error(tmp_path: Path) -> None:

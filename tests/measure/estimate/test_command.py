@@ -7,6 +7,7 @@ import errno
 import io
 import json
 import re
+import shutil
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
@@ -19,9 +20,11 @@ from PIL import Image
 
 import flagdata
 from flagdata.cli import main
+from flagdata.console import progress
 from flagdata.dataset.clips import clip_rows
 from flagdata.errors import RefusedError, UnknownNameError, UsageError
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, remote_objects
+from flagdata.lake.transfer import clone
 from flagdata.record import Record, RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
@@ -245,6 +248,22 @@ def test_a_recording_is_measured_once_with_its_parents(lake: Path, model_folder:
     np.testing.assert_allclose(arrays["anemometer"], 4.0)
     assert answer("made-1", *options, "--level", "0.8")["artifact"] != first["artifact"]
     assert len(measurements(lake)) == 2
+
+
+def test_a_recording_in_a_bucket_is_measured_by_its_parts_as_in_a_folder(
+    lake: Path, model_folder: Path, bucket_folder: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    options = (*SIZED, "--model", model_folder, "--anyway", "--seed", "5")
+    expected = answer("made-1", "--lake", lake, "--read-only", *options)
+    remote, _ = clone(Lake.open(lake), bucket_folder, bars=progress)
+    monkeypatch.setattr(remote_objects, "WHOLE", 0)
+    shutil.rmtree(tmp_path / "cache", ignore_errors=True)
+    found = answer("made-1", "--lake", bucket_folder, *options)
+    assert found["quantities"] == expected["quantities"]
+    assert [row["artifact"] for row in remote.rows("kind = 'measurement'").to_pylist()] == [found["artifact"]]
+    assert list((tmp_path / "cache" / "objects").glob("*.blocks/*"))  # no whole record was fetched
+    stored, _ = read(remote.object_path(str(remote.artifact(str(found["artifact"])).object)))
+    assert stored["quantities"] == expected["quantities"]
 
 
 def test_a_network_of_the_lake_is_a_parent_of_what_it_measured(lake: Path, model_folder: Path) -> None:

@@ -122,7 +122,7 @@ class Builds:
     def finish(self, process: subprocess.Popen[bytes]) -> None:
         assert process.wait(timeout=300) == 0
 
-    def build(self, recipe: Path, lake: Path) -> Result:
+    def build(self, recipe: Path, lake: Path | str) -> Result:
         """`flagdata build`, to its end."""
         command = ["build", str(recipe), "--lake", str(lake), "--scheduler", self._cluster.address]
         return CliRunner().invoke(root, command)
@@ -145,7 +145,7 @@ class Builds:
         process.send_signal(signal.SIGKILL)
         process.wait()
 
-    def rows(self, lake: Path) -> Rows:
+    def rows(self, lake: Path | str) -> Rows:
         """Artifact → all of its row that does not say when it was committed, and by which code."""
         columns = ["artifact", "kind", "name", "object", "recipe_hash", "seed", "start", "parameters", "wind"]
         rows = Lake.open(lake).rows(columns=columns).to_pylist()

@@ -79,6 +79,16 @@ def test_a_films_anemometer_is_a_log_of_its_wind_at_1_hz(built: Path) -> None:
         assert parameters["material"] == "camel-ponte-roma"
 
 
+def test_a_build_into_a_bucket_makes_the_rows_and_objects_of_one_in_a_folder(
+    recipe_file: Path, builds: Any, built: Path, bucket_folder: str
+) -> None:
+    done = builds.build(recipe_file, bucket_folder)
+    assert done.exit_code == 0, done
+    assert builds.rows(bucket_folder) == builds.rows(built)
+    lake = Lake.open(bucket_folder)
+    assert verify(lake, object_names(lake)) == ()
+
+
 def test_a_build_that_is_killed_twice_ends_as_an_unbroken_one(
     recipe_file: Path, builds: Any, built: Path, tmp_path: Path
 ) -> None:
