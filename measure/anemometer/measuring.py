@@ -13,7 +13,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.rng import stream
 from measure.anemometer.features import Features, features_of
 from measure.anemometer.intervals import half_width, mean_errors
-from measure.anemometer.novelty import framing, likeness, reasons
+from measure.anemometer.novelty import Compared
 from measure.anemometer.reading import ReadingModel
 from measure.ends import Span, limits_of
 from measure.estimate.answer import Quantity, information
@@ -137,15 +137,9 @@ def _verdict(
     findings: Sequence[Finding],
 ) -> Familiarity:  # fmt: skip
     shown = np.isfinite(winds)
-    away, alike = framing(features.place, model.places), likeness(features.place, model.places)
-    shift = model.familiar.shift(used[shown], winds[shown])
-    figures = [f"its windows are shifted by {shift:.2f} standard deviations"]
-    if np.isfinite(away):
-        figures.append(f"the hoist by {away:.2f} of its height")
-    if np.isfinite(alike):
-        figures.append(f"the backgrounds correlate by {alike:.2f}")
+    compared = Compared.of(model.familiar.shift(used[shown], winds[shown]), features.place, model.places)
     faults = [one for one in findings if one.kind in REASONS]
-    faults += [*_size_reason(options.size, model), *reasons(shift=shift, framing=away, likeness=alike)]
+    faults += [*_size_reason(options.size, model), *compared.reasons()]
     p = model.familiar.p_value(used[shown], winds[shown])
     return Familiarity(
         false_alarm=options.false_alarm, level=0.0, refusing=len(p), sizes=(0,), size=0, p=float(np.median(p)),
@@ -153,7 +147,7 @@ def _verdict(
         window_reasons=(
             Reason(kind="familiar", what=f"the median p of its windows is {np.median(p):.2f}", p=float(np.median(p))),
         ),
-        figures=", ".join(figures),
+        figures=compared.figures,
     )  # fmt: skip
 
 

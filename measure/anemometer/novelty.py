@@ -27,6 +27,8 @@ from models.outliers import shrunk_covariance
 
 Floats = NDArray[np.float64]
 
+SHIFT, FRAMING, BACKGROUND = 1.0, 0.2, 0.4
+"""Levels, fixed on simulated flags of other seeds than those that judge (decision 047)."""
 _BLUR = 3.0
 """Width of what counts as light, not as detail, in a place's picture [px]."""
 _DETAIL = 1.0
@@ -98,27 +100,85 @@ class Familiar:
         return float(np.sqrt(np.square(self._white(values, winds).mean(axis=0)).mean()))
 
 
-def framing(here: Place, places: Sequence[Place]) -> float:
-    """How far the hoist's ends are from where the nearest calibration has them, in heights of its hoist; NaN where a
-    hoist was not found, infinite where the flag flies to the other side."""
-    found = []
-    for one in places:
-        height = float(np.hypot(*(one.hoist[1] - one.hoist[0])))
-        away = float(np.hypot(*(here.hoist - one.hoist).T).max()) / height
-        found.append(math.inf if here.side * one.side < 0 else away)
-    return min(found)
+@dataclass(frozen=True, kw_only=True)
+class Compared:
+    """A film beside the calibration.
+
+    Attributes:
+        shift: see `Familiar.shift`.
+        framing: how far the hoist's ends are from where the nearest recording has them, in heights of its hoist; NaN
+            where a hoist was not found, infinite where the flag flies to the other side.
+        likeness: largest correlation of the backgrounds' details with those of a recording; NaN where there are none.
+        same_shape: whether the picture is as wide for its height as that of a recording.
+    """
+
+    shift: float
+    framing: float
+    likeness: float
+    same_shape: bool
+
+    @classmethod
+    def of(cls, shift: float, here: Place, places: Sequence[Place]) -> Compared:
+        """A film from a place, beside the recordings' places."""
+        alike = [one for one in places if one.background.shape == here.background.shape]
+        known = [value for one in alike if not math.isnan(value := _correlation(here, one))]
+        return cls(
+            shift=shift, framing=min(_away(here, one) for one in places),
+            likeness=max(known) if known else math.nan, same_shape=bool(alike),
+        )  # fmt: skip
+
+    @property
+    def figures(self) -> str:
+        """In words, what is known."""
+        found = [f"its windows are shifted by {self.shift:.2f} standard deviations"]
+        found.append(
+            "the hoist was not found" if math.isnan(self.framing) else f"the hoist by {self.framing:.2f} of its height"
+        )
+        found.append(
+            "no background shows the place" if math.isnan(self.likeness)
+            else f"the backgrounds correlate by {self.likeness:.2f}"
+        )  # fmt: skip
+        return ", ".join(found)
+
+    def reasons(self) -> list[Finding]:
+        """Why the film is refused, the plainest reason first; empty where it is not."""
+        found = []
+        if not self.same_shape:
+            found.append(_reason("another-picture", "the picture is of another shape than that of the calibration"))
+        if self.likeness < BACKGROUND:
+            what = (
+                "the film is from another place than the calibration: the pictures' backgrounds correlate by "
+                f"{self.likeness:.2f}, at least {BACKGROUND:g} is required"
+            )
+            found.append(_reason("another-place", what, self.likeness))
+        if self.framing > FRAMING:
+            beyond = math.isinf(self.framing)
+            away = "on the other side of the flag" if beyond else f"{self.framing:.2f} of its height away"
+            what = f"the flag's hoist is not where it was in the picture: {away}, at most {FRAMING:g} is accepted"
+            found.append(_reason("another-framing", what, None if beyond else self.framing))
+        if self.shift > SHIFT:
+            what = (
+                "the film does not show the flag of the calibration, or not from the same side of the wind: what its "
+                f"windows show beside the wind is off by {self.shift:.2f} standard deviations, at most {SHIFT:g} is "
+                "accepted"
+            )
+            found.append(_reason("another-flag", what, self.shift))
+        return found
 
 
-def likeness(here: Place, places: Sequence[Place]) -> float:
-    """Largest correlation of the backgrounds' details with those of a calibration; NaN where there are none."""
-    found = [_correlation(here, one) for one in places]
-    known = [value for value in found if not math.isnan(value)]
-    return max(known) if known else math.nan
+def _reason(kind: str, what: str, value: float | None = None) -> Finding:
+    fix = "calibrate this flag from this place (flagdata calibrate), or leave --model out"
+    return Finding(kind=kind, severity=Severity.WARNING, what=what, value=value, fix=fix)
+
+
+def _away(here: Place, one: Place) -> float:
+    height = float(np.hypot(*(one.hoist[1] - one.hoist[0])))
+    away = float(np.hypot(*(here.hoist - one.hoist).T).max()) / height
+    return math.inf if here.side * one.side < 0 else away
 
 
 def _correlation(one: Place, other: Place) -> float:
-    if one.background.shape != other.background.shape:
-        return -1.0
+    """Of the details of two pictures of one shape; NaN where they share too few."""
     shared = one.bare & other.bare
     if shared.sum() < _LEAST_PIXELS:
         return math.nan
@@ -134,48 +194,3 @@ def _details(place: Place, shared: NDArray[np.bool_]) -> Floats:
     light = cv2.GaussianBlur(place.background * weight, (0, 0), _BLUR)
     total = cv2.GaussianBlur(weight, (0, 0), _BLUR)
     return np.asarray(place.background - light / np.maximum(total, 1e-3), np.float64)
-
-
-SHIFT, FRAMING, BACKGROUND = 1.0, 0.2, 0.4
-"""Levels, fixed on simulated flags of other seeds than those that judge (decision 047)."""
-
-
-def reasons(*, shift: float, framing: float, likeness: float) -> list[Finding]:
-    """Why a film is refused, the plainest reason first; empty where it is not.
-
-    Args:
-        shift, framing, likeness: as `Familiar.shift`, `framing` and `likeness`; NaN where one is not known.
-    """
-    found = []
-    if likeness < BACKGROUND:
-        found.append(
-            Finding(
-                kind="another-place", severity=Severity.WARNING, value=likeness,
-                what="the film is from another place than the calibration: the pictures' backgrounds correlate by "
-                f"{likeness:.2f}, at least {BACKGROUND:g} is required",
-                fix=_AGAIN,
-            )
-        )  # fmt: skip
-    if framing > FRAMING:
-        away = "on the other side" if math.isinf(framing) else f"{framing:.2f} of its height away"
-        found.append(
-            Finding(
-                kind="another-framing", severity=Severity.WARNING, value=None if math.isinf(framing) else framing,
-                what=f"the flag's hoist is not where it was in the picture: {away}, at most {FRAMING:g} is accepted",
-                fix=_AGAIN,
-            )
-        )  # fmt: skip
-    if shift > SHIFT:
-        found.append(
-            Finding(
-                kind="another-flag", severity=Severity.WARNING, value=shift,
-                what="the film does not show the flag of the calibration, or not from the same side of the wind: what "
-                f"its windows show beside the wind is off by {shift:.2f} standard deviations, at most {SHIFT:g} is "
-                "accepted",
-                fix=_AGAIN,
-            )
-        )  # fmt: skip
-    return found
-
-
-_AGAIN = "calibrate this flag from this place (flagdata calibrate), or leave --model out"

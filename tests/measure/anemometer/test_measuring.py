@@ -92,6 +92,23 @@ def test_a_flag_to_the_other_side_is_refused(measure: Measure) -> None:
     assert "on the other side" in measure(own).verdict.sentence
 
 
+def test_a_picture_of_another_shape_is_refused_and_one_without_details_is_judged_by_the_rest(measure: Measure) -> None:
+    own = place()
+    wide = replace(own, background=own.background[:36], bare=own.bare[:36])
+    found = measure(features(gusts(120.0, seed=21), seed=21, where=wide))
+    assert [reason.kind for reason in found.verdict.faults] == ["another-picture"]
+    plain = replace(own, background=np.full((64, 64), 90.0, np.float32))
+    judged = measure(features(gusts(120.0, seed=21), seed=21, where=plain)).verdict
+    assert not judged.refused
+    assert "no background shows the place" in judged.sentence
+
+
+def test_a_brighter_day_is_the_same_place(measure: Measure) -> None:
+    own = place()
+    light = np.linspace(0.5, 1.5, 64, dtype=np.float32) * own.background + 20.0
+    assert not measure(features(gusts(120.0, seed=21), seed=21, where=replace(own, background=light))).verdict.refused
+
+
 def test_winds_beyond_the_calibration_are_reported(measure: Measure, found: Calibrated) -> None:
     times, speed = gusts(120.0, seed=21)
     own = measure(features((times, speed + 3.0), seed=21))
