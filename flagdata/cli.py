@@ -34,6 +34,7 @@ VERBS: dict[str, tuple[str, str]] = {
     "ls": ("flagdata.commands.lake:ls", "List artifacts."),
     "show": ("flagdata.commands.lake:show", "Show one artifact, its parents and its report."),
     "lineage": ("flagdata.commands.looking:lineage", "Show what an artifact was made from, and what from it."),
+    "view": ("flagdata.commands.looking:view", "Look at a lake in the browser: artifacts, films beside winds, SQL."),
     "log": ("flagdata.commands.lake:log", "List commits."),
     "tag": ("flagdata.commands.lake:tag", "Name a version for good, list or delete tags."),
     "branch": ("flagdata.commands.lake:branch", "Begin, list or delete branches."),

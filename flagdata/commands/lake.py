@@ -111,7 +111,7 @@ def show(artifact: str, at: str | None, as_json: bool, lake_path: str) -> None:
         return
     for column, value in row.items():
         if value is not None and value != [] and column not in ("parents", "report"):
-            click.echo(f"{column:<15} {_said(column, value)}")
+            click.echo(f"{column:<15} {said(column, value)}")
     for name, value in labels.items():
         click.echo(f"{PREFIX + name:<15} {value}")
     if path is not None:
@@ -411,7 +411,7 @@ def _line(row: Mapping[str, Any], *, lost: bool) -> list[object]:
     ]
 
 
-def _said(column: str, value: object) -> str:
+def said(column: str, value: object) -> str:
     """A value for people: instants as times, numbers with their unit, mappings and lists as JSON."""
     from flagdata.schema import CATALOG
     from flagdata.timebase import iso

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import sys
+import webbrowser
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import asdict
 from datetime import timedelta
 from pathlib import Path
@@ -120,3 +123,32 @@ def du(grace: timedelta, at: str | None, as_json: bool, lake_path: str) -> None:
         ],
     )  # fmt: skip
     say(f"{size_text(found.total)} in all; gc would free {size_text(found.freed)} (flagdata gc --dry-run lists it)")
+
+
+@click.command()
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="On loopback; a free one where none is given.")
+@click.option("--open", "opens", is_flag=True, help="Open the page in the browser.")
+@json_option
+@lake_option
+def view(port: int, opens: bool, as_json: bool, lake_path: str) -> None:
+    """Look at a lake in the browser: artifacts, films beside their winds, alignments, lineages, SQL.
+
+    Prints the address of a page that only this machine can open, and only by the whole address; Ctrl-C ends it. The
+    page changes nothing, loads nothing from elsewhere, and shows what other processes commit when it is reloaded.
+    """
+    from flagdata.lake import Lake
+    from flagdata.view.server import Server
+
+    lake = Lake.open(lake_path)
+    lake.catalog.head()
+    with Server(lake, port=port) as server:
+        if as_json:
+            document("view", {"address": server.address})
+        else:
+            click.echo(server.address)
+            say("only this machine can open it; Ctrl-C ends it")
+        sys.stdout.flush()
+        if opens:
+            webbrowser.open(server.address)
+        with suppress(KeyboardInterrupt):
+            server.serve_forever()

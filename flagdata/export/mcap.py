@@ -53,12 +53,13 @@ class Mcap:
             original: _Original | None = None
             for entry in source.entries():
                 target = folder / f"{entry.key}.mcap"
+                path = source.lake.object_path(entry.row["object"])
                 if not entry.is_slice:
-                    shutil.copyfile(entry.path, target)
+                    shutil.copyfile(path, target)
                 else:
-                    if original is None or original.path != entry.path:
+                    if original is None or original.path != path:
                         stack.close()
-                        original = stack.enter_context(_Original(entry.path))
+                        original = stack.enter_context(_Original(path))
                     _cut(entry, original, target)
                 frames += entry.count
                 advance(1)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -40,7 +39,6 @@ class Entry:
 
     Attributes:
         row: the catalog row, column → value.
-        path: of the record.
         record: the record.
         first: index of the first frame in the record.
         count: number of frames; 0 for a record without any.
@@ -48,7 +46,6 @@ class Entry:
     """
 
     row: Mapping[str, Any]
-    path: Path
     record: Record
     first: int
     count: int
@@ -175,19 +172,23 @@ class Source:
                     checked.add(name)
                 if opened is None or opened[0] != name:
                     opened = (name, Record.open(self.lake.object_path(name)))
-                yield self._entry(row, opened[1])
+                yield entry_of(row, opened[1], labels=self.labels.get(row["artifact"], {}))
 
-    def _entry(self, row: Mapping[str, Any], record: Record) -> Entry:
-        present = record.frame_count
-        whole = row["frame_first"] is None
-        first = 0 if whole else row["frame_first"]
-        count = present if whole or row["frame_count"] is None else row["frame_count"]
-        if first + count > present:
-            raise CorruptError(
-                f"frames {first} to {first + count - 1} of a record that has {present}",
-                where=row["artifact"],
-                fix="run flagdata verify",
-            )
-        path = self.lake.object_path(row["object"])
-        labels = self.labels.get(row["artifact"], {})
-        return Entry(row=row, path=path, record=record, first=first, count=count, labels=labels)
+
+def entry_of(row: Mapping[str, Any], record: Record, *, labels: Mapping[str, Any] | None = None) -> Entry:
+    """A row of the catalog with the part of its record that it describes.
+
+    Raises:
+        CorruptError: it reaches beyond its record.
+    """
+    present = record.frame_count
+    whole = row["frame_first"] is None
+    first = 0 if whole else row["frame_first"]
+    count = present if whole or row["frame_count"] is None else row["frame_count"]
+    if first + count > present:
+        raise CorruptError(
+            f"frames {first} to {first + count - 1} of a record that has {present}",
+            where=row["artifact"],
+            fix="run flagdata verify",
+        )
+    return Entry(row=row, record=record, first=first, count=count, labels=labels or {})

@@ -27,10 +27,11 @@ def render(
         loader=ChoiceLoader([PackageLoader(package, "."), PackageLoader("flagdata.pages", ".")]),
     )
     environment.filters.update(filters or {})
-    environment.globals["base_style"] = Markup(_text("flagdata.pages", "base.css"))
-    environment.globals["asset"] = lambda name: Markup(_text(package, name))
+    environment.globals["base_style"] = Markup(text_of("flagdata.pages", "base.css"))
+    environment.globals["asset"] = lambda name: Markup(text_of(package, name))
     return environment.get_template(template).render(**values)
 
 
-def _text(package: str, name: str) -> str:
+def text_of(package: str, name: str) -> str:
+    """A style, script or other text that a package brings along."""
     return files(package).joinpath(name).read_text(encoding="utf-8")

@@ -48,7 +48,7 @@ def test_older_films_pairs_and_labels_name_the_row() -> None:
     readers = [
         lambda: with_data_sets(pa.Table.from_pylist([film], schema=catalog_schema())),
         lambda: PairTable.of(pa.Table.from_pylist([clip], schema=catalog_schema()).select(COLUMNS)),
-        lambda: Entry(row=clip, path=Path(), record=cast("Record", None), first=0, count=1).parameters,
+        lambda: Entry(row=clip, record=cast("Record", None), first=0, count=1).parameters,
     ]
     for read, where in zip(readers, (film, clip, clip), strict=True):
         with pytest.raises(CorruptError, match="deep") as caught:

@@ -1,0 +1,294 @@
+"""The HTML of the page: the artifacts of a version, one artifact, and SQL over the catalog."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import urlencode
+
+import pyarrow as pa
+import pyarrow.compute as pc
+from markupsafe import Markup
+
+from flagdata.commands.lake import said, size_text
+from flagdata.commands.query import plain
+from flagdata.documents import column_json
+from flagdata.errors import FlagdataError, NotFoundError, UnknownNameError, UsageError
+from flagdata.lake import Lake
+from flagdata.lake.ancestry import ancestry
+from flagdata.lake.labels import PREFIX
+from flagdata.lake.refs import MAIN
+from flagdata.lake.tabled import labels_of
+from flagdata.pages.graph import COLOURS
+from flagdata.pages.lineage import SHORT, picture
+from flagdata.pages.render import render, text_of
+from flagdata.printable import printable
+from flagdata.query import COLUMNS, Request, Selection
+from flagdata.schema import Kind
+from flagdata.timebase import iso
+from flagdata.view.films import DRAWN
+from flagdata.view.media import Media
+
+CARDS = 60
+"""Artifacts on one page."""
+CLIPS = 24
+"""Clips of a recording that its page shows, spread over it."""
+ROWS, SECONDS, CHARACTERS = 200, 5.0, 10_000
+"""Most that a query of the page may show, take and have."""
+EXAMPLES = (
+    "select kind, count(*) n, sum(object_bytes) bytes from catalog group by kind order by n desc",
+    "select artifact, name, start_time, wind, wind_sigma from catalog where kind = 'clip' order by wind desc",
+    "select session, day, count(*) clips, round(avg(wind), 2) wind from catalog where kind = 'clip' group by all",
+)
+ICON = (
+    b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 16 16">'
+    b'<path d="M3 1v14" stroke="#56646b" stroke-width="1.6"/>'
+    b'<path d="M4 2c4-2 6 2 10 0v7c-4 2-6-2-10 0z" fill="#3b7d6b"/></svg>'
+)
+_FILMED = frozenset({Kind.CAMERA, Kind.RECORDING, Kind.CLIP, *DRAWN})
+_ASIDE = frozenset({"artifact", "name", "kind", "parents", "report", "recipe", "parameters", "clock_model", "quality"})
+_EVIDENCE = (
+    ("offset", "offset", "s"), ("sigma", "σ of the offset", "s"), ("interval", "interval of the offset", "s"),
+    ("confidence", "confidence", ""), ("chance", "probability by chance", ""), ("correlation", "correlation", ""),
+    ("drift", "drift", "s/s"), ("drift_sigma", "σ of the drift", "s/s"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Site:
+    """A lake at a version, and the addresses of its pages.
+
+    Attributes:
+        lake: that is shown.
+        media: its pictures.
+        base: path before all addresses, with a slash at both ends.
+        at: the version asked for, `None` for the head of main.
+    """
+
+    lake: Lake
+    media: Media
+    base: str
+    at: str | None = None
+
+    def link(self, path: str = "", **values: Any) -> str:
+        """The address of a page of this version."""
+        given = {name: value for name, value in {"at": self.at, **values}.items() if value not in (None, "")}
+        return f"{self.base}{path}" + (f"?{urlencode(given)}" if given else "")
+
+    def rows(self) -> pa.Table:
+        """All rows that the version shows.
+
+        Raises:
+            NotFoundError: no such version.
+        """
+        return self.lake.table(self.lake.view(self.at))
+
+    def row(self, artifact: str) -> dict[str, Any]:
+        """One row, by its full id.
+
+        Raises:
+            NotFoundError: the version does not show it.
+        """
+        found = self.rows().filter(pc.field("artifact") == artifact).to_pylist()
+        if not found:
+            raise NotFoundError(
+                f"no artifact {artifact[:SHORT]} at this version", fix="choose another version, or go to the overview"
+            )
+        return found[0]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """Rows of a query's answer, ready to be shown.
+
+    Attributes:
+        header: names of the columns.
+        rows: texts of the cells, and the address that a cell leads to.
+        total: how many rows there are without the limit.
+    """
+
+    header: Sequence[str] = ()
+    rows: Sequence[Sequence[tuple[str, str | None]]] = ()
+    total: int = 0
+
+
+def overview(site: Site, *, kind: str | None, name: str | None, page: int) -> str:
+    """The artifacts of a version, newest first; clips are listed where that kind is asked for.
+
+    Raises:
+        NotFoundError: no such version.
+        UnknownNameError: no such kind.
+    """
+    if kind is not None and kind not in list(Kind):
+        raise UnknownNameError.of("kind", kind, [one.value for one in Kind])
+    rows = site.rows()
+    counts = {entry["values"]: entry["counts"] for entry in pc.value_counts(rows["kind"]).to_pylist()}  # type: ignore[attr-defined]
+    chosen = pc.field("kind") != Kind.CLIP.value if kind is None else pc.field("kind") == kind
+    if name:
+        chosen &= pc.match_substring(pc.field("name"), name, ignore_case=True)  # type: ignore[attr-defined]
+    found = rows.filter(chosen).sort_by([("created", "descending"), ("start", "ascending"), ("artifact", "ascending")])
+    last = max(0, (found.num_rows - 1) // CARDS)
+    page = min(page, last)
+    cards = [_card(site, row) for row in found.slice(page * CARDS, CARDS).to_pylist()]
+    return _page(
+        site, "overview.html.j2", cards=cards, counts=counts, kind=kind, name=name or "", page=page, last=last,
+        total=found.num_rows, everything=rows.num_rows - counts.get(Kind.CLIP.value, 0),
+    )  # fmt: skip
+
+
+def artifact(site: Site, identity: str) -> str:
+    """One artifact: its film beside its wind, what was found, how it was aligned, where it comes from.
+
+    Raises:
+        NotFoundError: no such version, or it does not show the artifact.
+    """
+    shown, row = site.rows(), site.row(identity)
+    report = _stated(row, "report") or {}
+    lost = site.media.is_lost(row)
+    clips, count = _clips(site, shown, row)
+    labels = labels_of(shown).get(identity, {})
+    facts = [(name, printable(said(name, value))) for name, value in row.items() if _is_fact(name, value)]
+    facts += [(PREFIX + name, printable(str(value))) for name, value in labels.items()]
+    drawn = picture(ancestry(shown, identity), link=lambda one: site.link(f"artifact/{one}"))
+    stated = {name: _stated(row, name) for name in ("recipe", "parameters", "clock_model")}
+    return _page(
+        site, "artifact.html.j2", card=_card(site, row), row=row, facts=facts, lost=lost,
+        findings=_findings(report), words=report.get("words"), evidence=_evidence(row, report),
+        stated={name: json.dumps(value, indent=2, ensure_ascii=False) for name, value in stated.items() if value},
+        films=row["kind"] in _FILMED and row["object"] is not None, blows=row["kind"] == Kind.WIND,
+        lineage=Markup(drawn),  # its texts are escaped
+        clips=clips, clip_count=count,
+    )  # fmt: skip
+
+
+def sql(site: Site, text: str | None) -> tuple[str, FlagdataError | None]:
+    """The page of a query, and what is wrong with it.
+
+    Raises:
+        NotFoundError: no such version.
+    """
+    found, error = Table(), None
+    if text:
+        try:
+            found = _answer(site, text)
+        except FlagdataError as refused:
+            error = refused
+    columns = [(name, str(column.type), column.unit, column.about) for name, column in COLUMNS.items()]
+    return _page(site, "query.html.j2", sql=text or "", found=found, error=error, columns=columns, rows=ROWS), error
+
+
+def problem(site: Site, error: FlagdataError, status: int) -> str:
+    """The page of an error; it reads nothing of the lake."""
+    return _filled(site, "problem.html.j2", error=error, status=status, refs=[], version=None)
+
+
+def style() -> bytes:
+    """The sheet of all pages."""
+    kinds = "".join(f".k-{kind} {{ --kind: {colour}; }}\n" for kind, colour in COLOURS.items())
+    return (text_of("flagdata.pages", "base.css") + text_of("flagdata.view", "view.css") + kinds).encode()
+
+
+def script() -> bytes:
+    """What moves on the pages."""
+    return text_of("flagdata.view", "view.js").encode()
+
+
+def _page(site: Site, template: str, **values: Any) -> str:
+    branches, tags = site.lake.refs.branches(), site.lake.refs.tags()
+    refs = [*((name, "branch") for name in (MAIN, *branches)), *((name, "tag") for name in tags)]
+    return _filled(site, template, refs=refs, version=site.lake.resolve(site.at), **values)
+
+
+def _filled(site: Site, template: str, **values: Any) -> str:
+    known = {"site": site, "link": site.link, "lake": str(site.lake.path), "examples": EXAMPLES, "short": SHORT}
+    return render("flagdata.view", template, {**known, **values}, filters={"printable": printable})
+
+
+def _card(site: Site, row: Mapping[str, Any]) -> dict[str, Any]:
+    """What a tile shows of a row."""
+    seconds = None if row["start"] is None or row["end"] is None else (row["end"] - row["start"]) / 1e9
+    length = None if seconds is None else f"{seconds:.3g} s" if seconds < 120 else f"{seconds / 60:.3g} min"
+    size = None if row["kind"] == Kind.CLIP else size_text(row["object_bytes"])
+    wind = row["wind"]
+    if row["kind"] == Kind.WIND:
+        wind = (_stated(row, "report") or {}).get("mean_speed")
+    sigma = "" if row["wind_sigma"] is None else f" ± {row['wind_sigma']:.2f}"
+    return {
+        "artifact": row["artifact"], "kind": row["kind"], "name": printable(row["name"]), "quality": row["quality"],
+        "start": None if row["start"] is None else iso(row["start"] // 10**9 * 10**9).replace("T", " "),
+        "length": _together(length), "size": _together(size), "drawn": row["kind"] in DRAWN,
+        "wind": None if wind is None else f"{wind:.2f}{sigma} m/s",
+        "lost": site.media.is_lost(row), "pictured": row["kind"] in _FILMED and row["object"] is not None,
+    }  # fmt: skip
+
+
+def _together(text: str | None) -> str | None:
+    """A number and its unit in one line."""
+    return text and text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
+def _clips(site: Site, shown: pa.Table, row: Mapping[str, Any]) -> tuple[list[dict[str, Any]], int]:
+    """Some of the clips of a recording, in order, and how many there are."""
+    if row["kind"] != Kind.RECORDING:
+        return [], 0
+    wanted = (pc.field("kind") == Kind.CLIP.value) & (pc.field("recording") == row["artifact"])
+    clips = shown.filter(wanted).sort_by("start")
+    step = max(1, -(-clips.num_rows // CLIPS))
+    return [_card(site, clip) for clip in clips.take(list(range(0, clips.num_rows, step))).to_pylist()], clips.num_rows
+
+
+def _evidence(row: Mapping[str, Any], report: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """How the clocks of a recording were brought together, in numbers."""
+    if row["clock_method"] is None:
+        return []
+    found = [("method", str(row["clock_method"]))]
+    for name, words, unit in _EVIDENCE:
+        value = report.get(name)
+        if isinstance(value, int | float):
+            found.append((words, f"{value:.4g} {unit}".strip()))
+        elif isinstance(value, list) and len(value) == 2:
+            found.append((f"{words}, {report.get('level', 0.9):.0%}", f"{value[0]:.4g} to {value[1]:.4g} {unit}"))
+    return found
+
+
+def _findings(report: Mapping[str, Any]) -> list[dict[str, str]]:
+    """What a report found; one of another program may lack parts of it."""
+    return [
+        {name: printable(str(finding.get(name) or "")) for name in ("severity", "kind", "what", "fix")}
+        for finding in report.get("findings", [])
+    ]
+
+
+def _stated(row: Mapping[str, Any], column: str) -> Any:
+    return column_json(row[column], column, artifact=row["artifact"]) if row[column] else None
+
+
+def _is_fact(name: str, value: object) -> bool:
+    return name not in _ASIDE and value is not None and value != []
+
+
+def _answer(site: Site, text: str) -> Table:
+    if len(text) > CHARACTERS:
+        raise UsageError(f"SQL of {len(text):,} characters", fix=f"write at most {CHARACTERS:,}")
+    rows = site.rows()
+    selection = Selection(rows, Request(sql=text, limit=ROWS, time_limit=SECONDS))
+    answer = selection.table()
+    known = set(rows["artifact"].to_pylist()) if answer.num_rows else set()
+    columns = [[_cell(site, value, known) for value in column.to_pylist()] for column in answer.columns]
+    return Table(
+        header=[printable(name) for name in answer.column_names], rows=list(zip(*columns, strict=True)),
+        total=selection.total(),
+    )  # fmt: skip
+
+
+def _cell(site: Site, value: Any, known: set[str]) -> tuple[str, str | None]:
+    shown = plain(value)
+    if shown is None:
+        return "", None
+    if isinstance(shown, str) and shown in known:
+        return shown[:SHORT], site.link(f"artifact/{shown}")
+    if isinstance(shown, float):
+        return f"{shown:.6g}", None
+    return printable(", ".join(map(str, shown)) if isinstance(shown, list) else str(shown)), None
