@@ -21,15 +21,21 @@ from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Floats
 from measure.calibrate.simulation import OBSERVED, Flag
 from measure.calibrate.summary import shown
 
-ANSWER = 1
+ANSWER = 2
 """Raised when the same recordings and options get another answer."""
 DETERMINED = 0.8
 """Share of the prior's spread, in ranks, below which a posterior is an answer: above it, it is the prior."""
 _FOLDS = 8
 _CHECKED = 48
 """Simulations left out that are weighed to check the intervals."""
-_UNUSUAL = 1e-3
-"""Tail probability of a recording's summary among simulated ones from which on a warning is given."""
+_UNLIKE = 0.01
+"""Tail probability of a recording's summary among those that the answer predicts below which the weight is withheld: of
+recordings that are as the model has them one in a hundred."""
+_APART = 2.0
+"""σ from which on a summary is named as what is unlike."""
+_NEAR, _LEANS = 0.05, 0.25
+"""Share of a prior next to either end of it, and of the posterior there from which on it leans on that end: five times
+as much as the prior."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,6 +123,7 @@ class Fitted:
         low, middle, high: (window, observable) of simulated flags of the posterior at the level, by the emulator.
         used: (observable,) those whose mean or slope the answer rests on.
         misfit: tail probability of its summary among those that the answer predicts.
+        apart: (2·observable,) summaries less those that the answer predicts, in their standard deviations.
         failed: simulations that diverged or hardly show the flag.
     """
 
@@ -126,7 +133,20 @@ class Fitted:
     high: Floats
     used: NDArray[np.bool_]
     misfit: float
+    apart: Floats
     failed: int
+
+    @property
+    def unlike(self) -> str | None:
+        """What no simulated flag shows, in words; None where some look like it."""
+        if self.misfit >= _UNLIKE:
+            return None
+        names = [*OBSERVED, *(f"the change of {name} with the wind" for name in OBSERVED)]
+        order = np.argsort(-np.abs(np.nan_to_num(self.apart)))
+        far = [(names[place], float(self.apart[place])) for place in order.tolist() if abs(self.apart[place]) > _APART]
+        if not far:
+            return "its observables together"
+        return ", ".join(f"{name} {abs(z):.1f} σ too {'large' if z > 0 else 'small'}" for name, z in far[:4])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -157,6 +177,11 @@ class Calibration:
         return self.cloth[0]
 
     @property
+    def withheld(self) -> str | None:
+        """Why no value is given, where no simulated flag looks like a recording."""
+        return next((f"{one.observed.name}: {one.unlike}" for one in self.recordings if one.unlike is not None), None)
+
+    @property
     def stated(self) -> str | None:
         """The area weight as `flagdata measure --area-weight` takes it; None where it is not determined."""
         weight = self.weight
@@ -168,6 +193,8 @@ class Calibration:
         weight = self.weight
         level = f"{self.options.level * 100:.3g} %"
         windows = sum(len(one.observed.readings) for one in self.recordings)
+        if self.withheld is not None:
+            return f"area weight: withheld, since no simulated flag looks like {self.withheld}"
         if weight.value is None:
             low, high = weight.assumed
             return f"area weight: not determined by {windows} windows (assumed: {low:.3f} to {high:.3f} kg/m²)"
@@ -188,7 +215,7 @@ class Calibration:
                 }
                 for one, place in zip(self.recordings, self.places, strict=True)
             ],
-            "area_weight_stated": self.stated,
+            "area_weight_stated": self.stated, "withheld": self.withheld,
             "close_loop": None if weight.value is None else {
                 "density": weight.value, "density-uncertainty": weight.sigma / weight.value
             },
@@ -216,18 +243,31 @@ def calibrate(
     Raises:
         InputError: see `Observed` and `Emulator.fit`.
     """
-    made: list[tuple[Observed, Mapping[str, Floats], Floats, NDArray[np.bool_]]] = []
-    sights: list[Sight] = []
+    made: list[tuple[Observed, Mapping[str, Floats], Floats]] = []
     for one in recordings:
         design = Design(
             flag=options.flag, log=one.log, duration=one.duration, azimuth=options.azimuth,
             elevation=options.elevation, count=options.simulations, seed=options.seed, distance=options.distance,
         )  # fmt: skip
         readings = simulated(design, folder=folder, workers=workers, advance=advance)
+        made.append((one, design.values(), readings))
+    return answered(made, options)
+
+
+def answered(simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats]], options: Options) -> Calibration:
+    """The answer from recordings, each with its simulations' values, name → (simulation,), and their readings
+    (simulation, window, observable).
+
+    Raises:
+        InputError: see `Emulator.fit`.
+    """
+    made: list[tuple[Observed, Mapping[str, Floats], Floats, NDArray[np.bool_]]] = []
+    sights: list[Sight] = []
+    for one, values, readings in simulations:
         summaries = with_errors(one, readings, seed=options.seed)
         used = np.tile(shown(one.readings), 2 if one.projection.changes else 1)
-        emulator = Emulator.fit(design.values(), summaries, used)
-        made.append((one, design.values(), summaries, used))
+        emulator = Emulator.fit(values, summaries, used)
+        made.append((one, values, summaries, used))
         sights.append(
             Sight(
                 emulator=emulator,
@@ -249,7 +289,10 @@ def calibrate(
             tuple(quantity(q, place[q.name], options.level) for q in _placed(options)) for place in found.places
         ),
     )  # fmt: skip
-    return replace(calibration, findings=_findings(calibration))
+    findings = _findings(calibration)
+    if calibration.withheld is not None:
+        calibration = replace(calibration, cloth=tuple(replace(q, value=None) for q in calibration.cloth))
+    return replace(calibration, findings=findings)
 
 
 def with_errors(observed: Observed, readings: Floats, *, seed: int) -> Floats:
@@ -332,9 +375,13 @@ def _fitted(
     offsets = np.concatenate([whole[:, looked], one.summary[None, looked]]) - centre
     *distances, own = ((offsets @ inverse) * offsets).sum(axis=1).tolist()
     distance = np.array(distances)
+    spread = whole.std(axis=0)
+    apart = np.where(
+        looked & (spread > 0), (one.summary - whole.mean(axis=0)) / np.where(spread > 0, spread, 1.0), np.nan
+    )
     return Fitted(
         observed=one, low=low, middle=middle, high=high, used=np.asarray(used.reshape(-1, count).any(axis=0)),
-        misfit=float((1 + (distance >= own).sum()) / (1 + len(distance))),
+        misfit=float((1 + (distance >= own).sum()) / (1 + len(distance))), apart=apart,
         failed=int((~np.isfinite(summaries[:, used]).all(axis=1)).sum()),
     )  # fmt: skip
 
@@ -343,12 +390,16 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
     found = list(constant_wind([one.observed for one in calibration.recordings]))
     for one in calibration.recordings:
         found.extend(one.observed.findings)
-        if one.misfit < _UNUSUAL:
+        if one.unlike is not None:
             what = (
-                f"no simulated flag looks like {one.observed.name} (p = {one.misfit:.1g}): something acts on it that "
-                "the model lacks, or its size, attachment or place is another than stated; do not rely on the weight"
+                f"no simulated flag looks like {one.observed.name} (p = {one.misfit:.1g}): {one.unlike}. The cloth is "
+                "not separated from what is behind it, or its size, attachment or place is another than stated, or "
+                "something acts on it that the model lacks. The weight is withheld"
             )
-            fix = "check --flag-size, --attachment and --azimuth; flagdata close-loop looks for what is missing"
+            fix = (
+                "look at the readings with flagdata observe --picture, check --flag-size, --attachment, --azimuth, "
+                "--elevation and --distance; flagdata close-loop looks for what is missing"
+            )
             found.append(Finding(kind="unlike-simulations", severity=Severity.WARNING, what=what, fix=fix))
         if one.failed > 0.1 * calibration.options.simulations:
             what = f"{one.failed} of {calibration.options.simulations} simulations of {one.observed.name} were left out"
@@ -361,8 +412,29 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
         )
         fix = "give more simulations with --simulations"
         found.append(Finding(kind="narrow-intervals", severity=Severity.WARNING, what=what, fix=fix))
+    found.extend(_leaning(calibration))
     undetermined = [q.name.replace("_", " ") for q in calibration.cloth if q.value is None]
     if undetermined:
         what = f"{', '.join(undetermined)}: the posterior is the prior's, so that no value is given"
         found.append(Finding(kind="not-determined", severity=Severity.NOTE, what=what))
     return tuple(found)
+
+
+def _leaning(calibration: Calibration) -> list[Finding]:
+    """Quantities with a value whose posterior leans on an end of the prior."""
+    found = []
+    for about, own in zip(CLOTH, calibration.cloth, strict=True):
+        if own.value is None:
+            continue
+        draws = calibration.draws.cloth[about.name]
+        ends = about.at(np.array([0.0, _NEAR, 1 - _NEAR, 1.0])).tolist()
+        for end, share, side in (
+            (ends[0], float((draws < ends[1]).mean()), "less"), (ends[3], float((draws > ends[2]).mean()), "more"),
+        ):  # fmt: skip
+            if share > _LEANS:
+                what = (
+                    f"{about.name.replace('_', ' ')}: the posterior leans on the end of what is assumed, {end:.3g} "
+                    f"{about.unit}; the flag may have {side}"
+                )
+                found.append(Finding(kind="leans-on-prior", severity=Severity.WARNING, what=what))
+    return found

@@ -108,7 +108,8 @@ def calibrate(
     `wind`, the logged mean over the row [m/s], or with a --log of the lake; or rows against `wind` alone, each with
     its `duration` [s]. Its other columns are observables by their names (droop, extension, middle-speed, frequency,
     bandwidth, amplitude-up, amplitude-across, area), each perhaps with a unit, as in `droop [deg]`, and with
-    NAME-sigma, what it is off by. Several recordings are of one flag.
+    NAME-sigma, what it is off by. Several recordings are of one flag. Where no simulated flag looks like it, no weight
+    is given, and the exit code is 3.
 
     \b
       flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --azimuth 70±7 --report page.html
@@ -193,6 +194,8 @@ def calibrate(
         document("calibrate", {**found.as_dict(), "artifact": wanted, "anemometer": own})
     else:
         _print(found)
+    if found.withheld is not None:
+        raise click.exceptions.Exit(RefusedError.exit_code)
 
 
 _OF_WEIGHT = (

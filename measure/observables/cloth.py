@@ -58,7 +58,7 @@ class ClothWindow:
     Attributes:
         times: (n,) ascending [s].
         points: (n, vertex, 2) in metres at the hoist's distance, as someone measures who knows the flag's height: x to
-            the right, z up, from any origin.
+            the right, z up, from any origin; `seen_from` takes the middle of the hoist.
         faces: (face, 3) vertex indices.
         hoist: (k,) vertices along the hoist, from its upper end to its lower one; 2 or more.
         free: (m,) vertices along the free edge, likewise.
@@ -161,6 +161,7 @@ def seen_from(
     # The hoist looks shorter from above or below and by its distance, and its known height is what gives the scale.
     upright = (positions[:, upper, 2] - positions[:, lower, 2]).mean()
     places = places * (upright / (places[:, upper, 1] - places[:, lower, 1]).mean())
+    places = places - places[:, [upper, lower]].mean(axis=(0, 1))
     return ClothWindow(
         times=times, points=places, faces=np.asarray(faces, np.int64), hoist=np.asarray(hoist, np.int64),
         free=np.asarray(free, np.int64), length=length, height=height,

@@ -42,6 +42,9 @@ _TEXTURE_NEAR = 12.0
 """Pixels over which the background's texture is averaged."""
 _JOINED = 0.5
 """Share of its bare instants in which a place has to be joined to the outside to be background."""
+_BAY, _SPUR = 0.12, 0.04
+"""Radius of the widest bay of the core that is filled and of the widest spur that is taken off, over the square root of
+the area in which cloth is sought."""
 _HELD = 0.12
 """Width of the strip at the hoist through which nothing is joined, in sizes of the region."""
 _CLEAR = 10.0
@@ -111,7 +114,7 @@ class Outliner:
         always = joined.sum(axis=0) < _JOINED * np.maximum(bare.sum(axis=0), 1)
         core = cv2.morphologyEx((always & (within > 0)).astype(np.uint8), cv2.MORPH_OPEN, _disc(2))
         core = cv2.erode(core, _disc(1), borderType=cv2.BORDER_REPLICATE) > 0  # a gradient is as wide on either side
-        core |= always & (within > 0) & _strip(within, hoist, 2)
+        core = _hanging(core, within, hoist) | (always & (within > 0) & _strip(within, hoist, 2))
         around = np.clip(np.rint(still), 0, 255).astype(np.uint8)
         behind = cv2.inpaint(around, cv2.dilate(core.astype(np.uint8), _disc(2)), 3, cv2.INPAINT_TELEA)
         return cls(
@@ -250,6 +253,20 @@ def _joined(passable: Masks, entrances: Masks) -> Masks:
     """Passable places that are joined to an entrance."""
     _, labels = cv2.connectedComponents(passable.astype(np.uint8), connectivity=4)
     return np.isin(labels, np.unique(labels[entrances & passable])) & passable
+
+
+def _hanging(core: Masks, within: NDArray[np.uint8], hoist: Side) -> Masks:
+    """The part of a core that reaches the hoist, without spurs, and with its bays, which are left by cloth that looks
+    like what is beside it. The rest are details of the background whose edges enclose them, as a window's, so that
+    nothing joins them to the outside."""
+    size = float(np.sqrt(within.sum()))
+    bay, spur = max(1, round(_BAY * size)), _disc(max(1, round(_SPUR * size)))
+    wide = np.pad(core.astype(np.uint8), bay, mode="edge")
+    opened = cv2.morphologyEx(wide, cv2.MORPH_OPEN, spur)[bay:-bay, bay:-bay]
+    _, labels = cv2.connectedComponents(opened, connectivity=8)
+    own = np.isin(labels, np.unique(labels[(opened > 0) & _strip(within, hoist)])) & (opened > 0)
+    closed = cv2.morphologyEx(np.pad(own.astype(np.uint8), bay), cv2.MORPH_CLOSE, _disc(bay))[bay:-bay, bay:-bay]
+    return (closed > 0) & (within > 0)
 
 
 def _entrances(within: NDArray[np.uint8], hoist: Side) -> Masks:

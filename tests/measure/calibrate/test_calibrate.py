@@ -79,13 +79,27 @@ def test_simulations_left_out_lie_in_their_intervals(plain: Calibration) -> None
 
 
 @pytest.mark.usefixtures("cheap")
-def test_a_flag_that_no_simulation_looks_like_is_warned_of(plain: Calibration) -> None:
+def test_the_weight_of_a_flag_that_no_simulation_looks_like_is_withheld(plain: Calibration) -> None:
     own = _observed(0.17)
     strange = np.array(own.readings)
     strange[:, 3] += 1.0
     other = Observed(name="strange", source="x", readings=strange, log=own.log)
-    assert "unlike-simulations" in {finding.kind for finding in _found(other).findings}
+    found = _found(other)
+    (finding,) = [one for one in found.findings if one.kind == "unlike-simulations"]
+    assert "frequency" in finding.what.partition("too large")[0]
+    assert [one.value for one in found.cloth] == [None, None, None]
+    assert found.stated is None
+    assert (found.as_dict()["close_loop"], found.as_dict()["area_weight_stated"]) == (None, None)
+    assert found.sentence.startswith("area weight: withheld, since no simulated flag looks like strange: frequency")
     assert "unlike-simulations" not in {finding.kind for finding in plain.findings}
+
+
+@pytest.mark.usefixtures("cheap")
+def test_a_posterior_at_an_end_of_the_prior_is_warned_of(plain: Calibration) -> None:
+    leaning = [one.what for one in _found(_observed(0.052)).findings if one.kind == "leans-on-prior"]
+    assert leaning
+    assert leaning[0].startswith("area weight: the posterior leans on the end of what is assumed, 0.05 kg/m²")
+    assert "leans-on-prior" not in {finding.kind for finding in plain.findings}
 
 
 @pytest.mark.usefixtures("cheap")

@@ -69,6 +69,17 @@ def test_a_table_is_weighed_kept_and_shown(tmp_path: Path) -> None:
     assert len(Lake.open(lake).rows({"kind": "measurement"})) == 1
 
 
+@pytest.mark.usefixtures("cheap")
+def test_a_weight_that_is_withheld_is_exit_code_3_and_no_option(tmp_path: Path) -> None:
+    rows = [line.split(",") for line in _table(tmp_path / "t.csv").read_text().splitlines()]
+    strange = [",".join([*rows[0], "area"]), *(",".join([*row, "3.0"]) for row in rows[1:])]
+    (tmp_path / "t.csv").write_text("\n".join(strange) + "\n")
+    done = _run(tmp_path / "t.csv", "--flag-size", "1.5x1.0", "--azimuth", "70±7")
+    assert done.exit_code == 3
+    assert done.stdout.startswith("area weight: withheld, since no simulated flag looks like t: area")
+    assert "--area-weight" not in done.output
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
