@@ -54,6 +54,35 @@ class Sight:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Experiments:
+    """What is fitted, each by itself.
+
+    Attributes:
+        summaries: for each recording (n, used summary).
+        stated: (n,) area weights that a scale showed [kg/m²]; None where none was.
+        sigma: standard uncertainty of these, as a share.
+    """
+
+    summaries: tuple[Floats, ...]
+    stated: Floats | None = None
+    sigma: float = 0.0
+
+    def __len__(self) -> int:
+        return len(self.summaries[0])
+
+    def repeated(self, times: int) -> Experiments:
+        """Each so many times, one after the other."""
+        return Experiments(
+            summaries=tuple(np.repeat(own, times, axis=0) for own in self.summaries), sigma=self.sigma,
+            stated=None if self.stated is None else np.repeat(self.stated, times),
+        )  # fmt: skip
+
+    def off(self, weight: Floats) -> Floats:
+        """(n,) by how many standard deviations stated weights are off from (n,) [kg/m²]; 0 where none was stated."""
+        return np.zeros(len(weight)) if self.stated is None else np.log(self.stated / weight) / self.sigma
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Fit:
     """A model fitted to experiments.
 
@@ -76,19 +105,17 @@ class Hypothesis:
 
     Attributes:
         sights: of the recordings.
-        cloth: priors of area weight, bending and damping.
         effect: the strength's prior; None for the base model.
     """
 
     sights: tuple[Sight, ...]
-    cloth: tuple[Uncertain, ...] = CLOTH
     effect: Uncertain | None = None
 
     @property
     def dimension(self) -> int:
         """Of the scores: cloth, then each recording's place, then the strength."""
         own = sum(len(self.sights[first].quantities) for first in set(self._owners))
-        return len(self.cloth) + own + (self.effect is not None)
+        return len(CLOTH) + own + (self.effect is not None)
 
     @property
     def _owners(self) -> list[int]:
@@ -98,7 +125,7 @@ class Hypothesis:
     def values(self, scores: Floats) -> tuple[dict[str, Floats], list[dict[str, Floats]], Floats | None]:
         """Cloths, places of each recording, and strengths beyond null, at normal scores (n, dimension)."""
         shares = iter(ndtr(scores).T)
-        cloth = {one.name: one.at(next(shares)) for one in self.cloth}
+        cloth = {one.name: one.at(next(shares)) for one in CLOTH}
         owners = self._owners
         own = {
             first: {one.name: one.at(next(shares)) for one in self.sights[first].quantities}
@@ -107,29 +134,27 @@ class Hypothesis:
         places = [own[first] for first in owners]
         return cloth, places, None if self.effect is None else self.effect.at(next(shares))
 
-    def predicted(self, scores: Floats) -> list[tuple[Floats, Floats]]:
-        """For each recording means (n, k) and factors of the scale (n,)."""
+    def predicted(self, scores: Floats) -> tuple[list[tuple[Floats, Floats]], Floats]:
+        """For each recording means (n, k) and factors of the scale (n,); and the area weights (n,) [kg/m²]."""
         cloth, places, strength = self.values(scores)
         name = None if self.effect is None else self.effect.name
-        return [
+        found = [
             sight.model.predict({**cloth, **place}, name, strength)
             for sight, place in zip(self.sights, places, strict=True)
         ]
+        return found, cloth["area_weight"]
 
-    def log_posterior(self, scores: Floats, observed: Sequence[Floats]) -> Floats:
-        """(n,) logarithm of likelihood times prior, of summaries (n, k) of each recording."""
+    def log_posterior(self, scores: Floats, observed: Experiments) -> Floats:
+        """(n,) logarithm of likelihood times prior, but for a constant of stated weights."""
+        found, weight = self.predicted(scores)
         total = -0.5 * np.square(scores).sum(axis=1) - 0.5 * scores.shape[1] * np.log(2 * np.pi)
-        for sight, y, (mean, stretch) in zip(self.sights, observed, self.predicted(scores), strict=True):
+        for sight, y, (mean, stretch) in zip(self.sights, observed.summaries, found, strict=True):
             total += log_t(y - mean, sight.model.factor, stretch, sight.model.base.freedom)
-        return total
+        return total - 0.5 * np.square(observed.off(weight))
 
-    def fit(self, observed: Sequence[Floats], rng: np.random.Generator) -> Fit:
-        """Fit it to experiments, each by itself.
-
-        Args:
-            observed: for each recording (n, used summary).
-        """
-        n, d = len(observed[0]), self.dimension
+    def fit(self, observed: Experiments, rng: np.random.Generator) -> Fit:
+        """Fit it to experiments, each by itself."""
+        n, d = len(observed), self.dimension
         modes = []
         for begin in _STARTS if self.effect is not None else (0.0,):
             at = np.zeros((n, d))
@@ -147,15 +172,14 @@ class Hypothesis:
             density.append(_log_t(scores - at[:, None], curvature / _WIDER**2))
         proposal = logsumexp(density, axis=0) - np.log(len(modes))
         flat = scores.reshape(-1, d)
-        repeated = [np.repeat(y, scores.shape[1], axis=0) for y in observed]
-        ratio = self.log_posterior(flat, repeated).reshape(n, -1) - proposal
+        ratio = self.log_posterior(flat, observed.repeated(scores.shape[1])).reshape(n, -1) - proposal
         evidence = logsumexp(ratio, axis=1) - np.log(scores.shape[1])
         return Fit(
             evidence=evidence, misfit=np.min([misfit for _, _, misfit in modes], axis=0), scores=scores,
             weights=np.exp(ratio - logsumexp(ratio, axis=1, keepdims=True)),
         )  # fmt: skip
 
-    def _climbed(self, at: Floats, observed: Sequence[Floats]) -> tuple[Floats, Floats, Floats]:
+    def _climbed(self, at: Floats, observed: Experiments) -> tuple[Floats, Floats, Floats]:
         """A mode (n, d) from a start, the curvature there (n, d, d), and the misfit (n,)."""
         value, damping = self.log_posterior(at, observed), np.full(len(at), 1.0)
         for _ in range(_STEPS):
@@ -167,19 +191,24 @@ class Hypothesis:
             at, value = np.where(better[:, None], tried, at), np.where(better, found, value)
             damping = np.where(better, damping / 5, damping * 4).clip(1e-6, 1e6)
         _, curvature = self._slope(at, observed)
-        misfit = np.square(at).sum(axis=1)
-        for sight, y, (mean, stretch) in zip(self.sights, observed, self.predicted(at), strict=True):
+        found, weight = self.predicted(at)
+        misfit = np.square(at).sum(axis=1) + np.square(observed.off(weight))
+        for sight, y, (mean, stretch) in zip(self.sights, observed.summaries, found, strict=True):
             misfit += np.square(np.linalg.solve(sight.model.factor, (y - mean).T)).sum(axis=0) / stretch
         return at, curvature, misfit
 
-    def _slope(self, at: Floats, observed: Sequence[Floats]) -> tuple[Floats, Floats]:
+    def _slope(self, at: Floats, observed: Experiments) -> tuple[Floats, Floats]:
         """Gradient (n, d) and Gauss–Newton's curvature (n, d, d) of minus the logarithm, at scores (n, d)."""
         n, d = at.shape
         moved = at[:, None] + _DIFFERENCE * np.concatenate([np.zeros((1, d)), np.eye(d)])
         gradient, curvature = -at.copy(), np.broadcast_to(np.eye(d), (n, d, d)).copy()
-        for sight, y, (mean, stretch) in zip(
-            self.sights, observed, self.predicted(moved.reshape(-1, d)), strict=True
-        ):  # fmt: skip
+        found, weight = self.predicted(moved.reshape(-1, d))
+        if observed.stated is not None:
+            off = observed.repeated(d + 1).off(weight).reshape(n, d + 1)
+            slopes_of = (off[:, :1] - off[:, 1:]) / _DIFFERENCE
+            gradient += slopes_of * off[:, :1]
+            curvature += slopes_of[:, :, None] * slopes_of[:, None]
+        for sight, y, (mean, stretch) in zip(self.sights, observed.summaries, found, strict=True):
             factor, freedom = sight.model.factor, sight.model.base.freedom
             mean, stretch = mean.reshape(n, d + 1, -1), stretch.reshape(n, d + 1)[:, 0]
             slopes = (mean[:, 1:] - mean[:, :1]) / _DIFFERENCE  # (n, d, k)

@@ -24,6 +24,8 @@ from measure.verdict.record import Conclusion
 
 CONFIDENCE = 0.95
 """Of the set of effects that may be what is missing."""
+PART = 0.25
+"""Share of the misfit beyond that of null experiments which an effect that is called a part takes away."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,8 +98,10 @@ def judge(own: Weighing, nulls: Weighing, kinds: NDArray[np.int64], *, level: fl
     passing = tuple(place for place in confident if leftover[place] > level)
     if passing:
         return judged(Conclusion.EFFECT if len(confident) == 1 else Conclusion.ONE_OF, passing)
-    # An effect that helps more than any does in null experiments is a part of what is missing.
+    excess = float(own.misfit[0] - np.median(nulls.misfit))
+    explained = float(own.misfit[0] - own.left[0, confident[0]])
     helpful = GroupedConformal(null=null[:, 1], kinds=kinds).p(float(statistics[1])) <= level
+    helpful = helpful and explained >= PART * excess
     return judged(Conclusion.PARTLY, confident[:1]) if helpful else judged(Conclusion.OUTSIDE)
 
 

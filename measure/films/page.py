@@ -87,7 +87,7 @@ def _against_wind(outcome: Outcome, place: int, *, named: bool) -> str:
         both.append((*outcome.best, _AFTER))
     drawn = []
     for effect, fit, colour in both:
-        cloth, places, strength = hypothesis(outcome.sights, effect, outcome.options.cloth).values(fit.scores[0])
+        cloth, places, strength = hypothesis(outcome.sights, effect).values(fit.scores[0])
         found = bands(
             sight, one, {**cloth, **places[place]}, fit.weights[0], effect, strength,
             seed=outcome.options.calibration.seed,

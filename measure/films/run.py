@@ -23,12 +23,14 @@ from flagdata.findings import Finding
 from flagdata.provenance import code_version
 from measure.calibrate.calibrate import Options as Calibrating
 from measure.calibrate.observed import Observed, constant_wind
-from measure.calibrate.prior import CLOTH, Floats, Normal, Uncertain
+from measure.calibrate.prior import CLOTH, Floats
+from measure.calibrate.simulation import OBSERVED
 from measure.films.evidence import Fit, Sight, quantiles
 from measure.films.judge import Judged, judge
 from measure.films.library import Weighable, weighable
-from measure.films.simulations import Simulations, experiments, gathered, sight
-from measure.films.statement import stated
+from measure.films.sensitivity import SEEN, sensitivity
+from measure.films.simulations import Simulations, gathered, of_nulls, of_recordings, sight
+from measure.films.statement import Departure, stated
 from measure.films.unseen import compared
 from measure.films.weigh import Weighing, fitted, hypothesis, weigh
 from measure.forecasting.setting import Stage
@@ -73,15 +75,6 @@ class Options:
         """That are weighed."""
         return tuple(one for one in weighable(self.calibration.flag) if not self.only or one.name in self.only)
 
-    @property
-    def cloth(self) -> tuple[Uncertain, ...]:
-        """Priors of area weight, bending and damping."""
-        if self.area_weight is None:
-            return CLOTH
-        mean, sigma = self.area_weight
-        first, *rest = CLOTH
-        return (replace(first, prior=Normal(mean=mean, sigma=sigma), source="stated"), *rest)
-
     def recipe(self) -> dict[str, Any]:
         """JSON values."""
         return {
@@ -101,6 +94,7 @@ class Outcome:
         judged: what was decided.
         base: the base model fitted to the recordings.
         best: the most probable effect's model fitted to them; None where nothing was weighed.
+        sensitivity: (effect,) standard errors by which each moves the recordings where it is strong.
     """
 
     options: Options
@@ -112,6 +106,7 @@ class Outcome:
     judged: Judged
     base: Fit
     best: tuple[Weighable, Fit] | None
+    sensitivity: Floats
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -167,23 +162,19 @@ def solve(
         )
     )
     effects = tuple(one for one in effects if all(one.name in own.model.responses for own in sights))
-    null = experiments(sights, recordings, simulations.nulls, seed=seed)
-    whole = np.all([np.isfinite(own).all(axis=1) for own in null], axis=0)
-    kinds = simulations.kinds[whole]
-    seen: list[Floats] = [own.summary[None, one.model.used] for one, own in zip(sights, recordings, strict=True)]
-    stacked = [np.concatenate([own, rest[whole]]) for own, rest in zip(seen, null, strict=True)]
-    both = weigh(sights, stacked, effects, cloth=CLOTH, seed=seed)
-    own, nulls = both.rows(slice(0, 1)), both.rows(slice(1, None))
-    if options.area_weight is not None:  # null experiments were not weighed
-        own = weigh(sights, seen, effects, cloth=options.cloth, seed=seed)
+    null, kinds = of_nulls(sights, recordings, simulations, options.area_weight, seed=seed)
+    seen = of_recordings(sights, recordings, options.area_weight)
+    own, nulls = weigh(sights, seen, effects, seed=seed), weigh(sights, null, effects, seed=seed)
     judged = judge(own, nulls, kinds, level=options.level)
     best = None
     if effects:
         first = effects[judged.confident[0]]
-        best = first, fitted(sights, seen, first, cloth=options.cloth, seed=seed)
+        best = first, fitted(sights, seen, first, seed=seed)
+    base = fitted(sights, seen, None, seed=seed)
     return Outcome(
         options=options, recordings=tuple(recordings), simulations=simulations, sights=sights, weighing=own,
-        nulls=nulls, judged=judged, base=fitted(sights, seen, None, cloth=options.cloth, seed=seed), best=best,
+        nulls=nulls, judged=judged, base=base, best=best,
+        sensitivity=sensitivity(sights, effects, base, seen),
     )  # fmt: skip
 
 
@@ -196,7 +187,7 @@ def verdict_of(outcome: Outcome) -> Verdict:
     others = [place for place in np.argsort(-judged.probability) if place not in judged.confident]
     comparisons = compared(
         outcome.recordings, outcome.simulations, outcome.sights, effect=None if acting is None else acting[0],
-        control=effects[others[0]] if others and acting is not None else None, cloth=options.cloth,
+        control=effects[others[0]] if others and acting is not None else None, weighed=options.area_weight,
         seed=options.calibration.seed,
     )  # fmt: skip
     verdict = Verdict(
@@ -205,7 +196,32 @@ def verdict_of(outcome: Outcome) -> Verdict:
         provenance={"seed": options.calibration.seed, "code": code_version(), "options": options.recipe()},
         findings=tuple((f.kind, f.what) for f in outcome.findings),
     )  # fmt: skip
-    return stated(verdict, outcome.recordings, weighed=options.area_weight is not None)
+    unseen = [
+        one.column.effect for one, errors in zip(effects, outcome.sensitivity.tolist(), strict=True) if errors < SEEN
+    ]
+    return stated(
+        verdict, outcome.recordings, weighed=options.area_weight is not None, unseen=tuple(dict.fromkeys(unseen)),
+        departing=departing(outcome),
+    )  # fmt: skip
+
+
+def departing(outcome: Outcome) -> tuple[Departure, ...]:
+    """Of each recording the observables' means that depart from those of the base model fitted to it, by two standard
+    deviations of replicates or more, the farthest first."""
+    found = []
+    cloth, places, _ = hypothesis(outcome.sights, None).values(outcome.base.scores[0])
+    for one, own, place in zip(outcome.recordings, outcome.sights, places, strict=True):
+        mean, _ = own.model.predict({**cloth, **place})
+        off = one.summary[own.model.used] - outcome.base.weights[0] @ mean
+        scatter = np.sqrt(np.diag(own.model.factor @ own.model.factor.T))
+        for column, size, sigma in zip(np.flatnonzero(own.model.used).tolist(), off, scatter, strict=True):
+            if column < len(OBSERVED) and abs(size) >= SEEN * sigma:
+                found.append(
+                    Departure(
+                        recording=one.name, observable=OBSERVED[column], off=float(size), deviations=float(size / sigma)
+                    )
+                )  # fmt: skip
+    return tuple(sorted(found, key=lambda one: -abs(one.deviations)))
 
 
 def _test(outcome: Outcome) -> NullTest:
@@ -224,13 +240,12 @@ def _test(outcome: Outcome) -> NullTest:
 
 def _parameters(outcome: Outcome) -> tuple[Parameter, ...]:
     """Area weight, bending and damping, of the base model and with the effect."""
-    options = outcome.options
     before = _cloths(outcome, None, outcome.base)
     after = None
     if outcome.judged.named and outcome.best is not None:
         after = _cloths(outcome, *outcome.best)
     made = []
-    for place, one in enumerate(options.cloth):
+    for place, one in enumerate(CLOTH):
         later = None if after is None else after[place]
         made.append(
             Parameter(
@@ -242,8 +257,8 @@ def _parameters(outcome: Outcome) -> tuple[Parameter, ...]:
 
 
 def _cloths(outcome: Outcome, effect: Weighable | None, fit: Fit) -> list[tuple[Estimate, float]]:
-    own, _, _ = hypothesis(outcome.sights, effect, outcome.options.cloth).values(fit.scores[0])
-    return [_marginal(own[one.name], fit.weights[0], one.unit) for one in outcome.options.cloth]
+    own, _, _ = hypothesis(outcome.sights, effect).values(fit.scores[0])
+    return [_marginal(own[one.name], fit.weights[0], one.unit) for one in CLOTH]
 
 
 def _marginal(values: Floats, weights: Floats, unit: str) -> tuple[Estimate, float]:
@@ -270,14 +285,14 @@ def strength_of(outcome: Outcome, effect: Weighable, fit: Fit) -> Estimate:
 
 def _ranking(outcome: Outcome) -> tuple[Candidate, ...]:
     judged, own, nulls = outcome.judged, outcome.weighing, outcome.nulls
-    seen = [o.summary[None, one.model.used] for one, o in zip(outcome.sights, outcome.recordings, strict=True)]
+    seen = of_recordings(outcome.sights, outcome.recordings, outcome.options.area_weight)
     if not own.effects:
         return ()
     largest = GroupedConformal(null=nulls.factors.max(axis=1), kinds=judged.conformal.kinds)
     made = []
     for place in np.argsort(-judged.probability).tolist():
         effect = own.effects[place]
-        fit = fitted(outcome.sights, seen, effect, cloth=outcome.options.cloth, seed=outcome.options.calibration.seed)
+        fit = fitted(outcome.sights, seen, effect, seed=outcome.options.calibration.seed)
         factor = float(own.factors[0, place])
         alone = GroupedConformal(null=nulls.factors[:, place], kinds=judged.conformal.kinds)
         made.append(

@@ -17,7 +17,7 @@ from measure.calibrate.observed import Observed
 from measure.calibrate.prior import Floats
 from measure.calibrate.summary import Projection, shown
 from measure.films.design import TOGETHER, Pairs, lasting, nulls, pairs
-from measure.films.evidence import Sight, first_of
+from measure.films.evidence import Experiments, Sight, first_of
 from measure.films.library import Weighable
 from measure.films.model import fit, responded
 from measure.forecasting.setting import Stage
@@ -33,6 +33,7 @@ class Simulations:
         pairs: for each recording, of each effect: what was simulated, and (pair, window, observable) of it.
         nulls: for each recording (null, window, observable).
         kinds: (null,) of numerics.
+        weights: (null,) their area weights [kg/m²].
     """
 
     designs: tuple[Design, ...]
@@ -40,6 +41,7 @@ class Simulations:
     pairs: tuple[tuple[tuple[Pairs, Floats], ...], ...]
     nulls: tuple[Floats, ...]
     kinds: NDArray[np.int64]
+    weights: Floats
 
 
 def design_of(observed: Observed, options: Calibrating) -> Design:
@@ -98,6 +100,7 @@ def gathered(
     return Simulations(
         designs=tuple(designs), base=tuple(base), pairs=tuple(beside), nulls=tuple(read_nulls),
         kinds=np.repeat(np.arange(kinds), TOGETHER),
+        weights=np.concatenate([batch.values["area_weight"] for batch in null[0]]),
     )  # fmt: skip
 
 
@@ -157,14 +160,40 @@ class _Part(Observed):
         return Projection(speed=self.speeds, changes=False)
 
 
-def experiments(
-    sights: Sequence[Sight], recordings: Sequence[Observed], readings: Sequence[Floats], *, seed: int
-) -> list[Floats]:
-    """For each recording (n, used summary) of simulated experiments (n, window, observable), with pixels' errors; NaN
-    where one does not show all."""
+def of_recordings(
+    sights: Sequence[Sight], recordings: Sequence[Observed], weighed: tuple[float, float] | None
+) -> Experiments:
+    """The recordings as the one experiment that they are.
+
+    Args:
+        weighed: mean and standard deviation of a stated area weight [kg/m²].
+    """
+    summaries = tuple(own.summary[None, one.model.used] for one, own in zip(sights, recordings, strict=True))
+    if weighed is None:
+        return Experiments(summaries=summaries)
+    mean, sigma = weighed
+    return Experiments(summaries=summaries, stated=np.array([mean]), sigma=sigma / mean)
+
+
+def of_nulls(
+    sights: Sequence[Sight],
+    recordings: Sequence[Observed],
+    simulations: Simulations,
+    weighed: tuple[float, float] | None,
+    *,
+    seed: int,
+) -> tuple[Experiments, NDArray[np.int64]]:
+    """Null experiments with errors of pixels and of the scale, those that show all, and their kinds of numerics."""
     found = []
-    for number, (one, own, seen) in enumerate(zip(sights, recordings, readings, strict=True)):
+    for number, (one, own, seen) in enumerate(zip(sights, recordings, simulations.nulls, strict=True)):
         summaries = own.projection.of(seen)
         summaries[:, 0] += own.sigma * stream(seed, "films", "pixels", number).standard_normal(summaries[:, 0].shape)
         found.append(summaries.reshape(len(seen), -1)[:, one.model.used])
-    return found
+    whole = np.all([np.isfinite(own).all(axis=1) for own in found], axis=0)
+    made = Experiments(summaries=tuple(own[whole] for own in found))
+    if weighed is not None:
+        mean, sigma = weighed
+        share = sigma / mean
+        drawn = stream(seed, "films", "scale").standard_normal(len(whole))
+        made = replace(made, stated=(simulations.weights * np.exp(share * drawn))[whole], sigma=share)
+    return made, simulations.kinds[whole]

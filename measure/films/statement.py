@@ -3,24 +3,51 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from measure.calibrate.observed import Observed, constant_wind
 from measure.films.judge import CONFIDENCE
 from measure.nulls.conformal import kinds_needed
+from measure.observables import OBSERVABLES
 from measure.report.sentences import listed, readable, titles
 from measure.verdict.quantity import number, probability, with_level
 from measure.verdict.record import Conclusion, Verdict
 
+_NOTHING_MISSING = (Conclusion.SUFFICIENT, Conclusion.UNTESTED)
+_MOST = 4
+"""Observables that are named."""
 
-def stated(verdict: Verdict, recordings: Sequence[Observed], *, weighed: bool) -> Verdict:
+
+@dataclass(frozen=True, kw_only=True)
+class Departure:
+    """An observable's mean beside that of the base model as calibrated.
+
+    Attributes:
+        recording, observable: which.
+        off: observed less predicted, in the observable's unit.
+        deviations: the same in standard deviations of replicates.
+    """
+
+    recording: str
+    observable: str
+    off: float
+    deviations: float
+
+
+def stated(
+    verdict: Verdict, recordings: Sequence[Observed], *, weighed: bool, unseen: tuple[str, ...],
+    departing: tuple[Departure, ...],
+) -> Verdict:  # fmt: skip
     """The verdict with all that it says in sentences.
 
     Args:
         weighed: whether the cloth's area weight was stated.
+        unseen: effects that these recordings would not show.
+        departing: what departs from the base model.
     """
     return replace(
-        verdict, words=sentence(verdict), assumptions=assumptions(recordings, weighed=weighed),
+        verdict, words=sentence(verdict), assumptions=assumptions(recordings, weighed=weighed, unseen=unseen),
+        proposal=missing(departing) if verdict.conclusion not in _NOTHING_MISSING else "",
         separating=separating(verdict),
     )  # fmt: skip
 
@@ -58,7 +85,22 @@ def separating(verdict: Verdict) -> str:
     return "a recording in another wind, or the cloth weighed (--area-weight)"
 
 
-def assumptions(recordings: Sequence[Observed], *, weighed: bool) -> tuple[str, ...]:
+def missing(departing: Sequence[Departure]) -> str:
+    """The size of what the base model lacks."""
+    if not departing:
+        return ""
+    parts = []
+    for one in departing[:_MOST]:
+        unit = OBSERVABLES[one.observable].unit
+        sign = "+" if one.off > 0 else ""
+        parts.append(
+            f"{one.observable} {sign}{number(one.off, digits=2)}{'' if unit == '1' else f' {unit}'} "
+            f"({one.recording}; {number(abs(one.deviations), digits=2)} standard deviations of replicates)"
+        )
+    return f"What the base model as calibrated does not show, observed less predicted: {', '.join(parts)}."
+
+
+def assumptions(recordings: Sequence[Observed], *, weighed: bool, unseen: tuple[str, ...]) -> tuple[str, ...]:
     """What was taken as given."""
     steady = bool(constant_wind(recordings))
     made = [
@@ -74,6 +116,11 @@ def assumptions(recordings: Sequence[Observed], *, weighed: bool) -> tuple[str, 
         made.append(
             "the wind hardly changes: a film in one steady wind shows only the ratio of the air's pressure to the "
             "cloth's weight"
+        )
+    if unseen:
+        made.append(
+            f"even where they are strong, {listed(unseen)} would move what these recordings show by less than two "
+            "standard errors beyond what another cloth or view does: they are not excluded"
         )
     made.append("a wind that is turned from its log looks like another place of the camera, and is not weighed")
     return tuple(made)

@@ -15,12 +15,12 @@ import numpy as np
 
 from flagdata.rng import stream
 from measure.calibrate.observed import Observed
-from measure.calibrate.prior import CLOTH, Floats, Uncertain
+from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.summary import LEAST_WINDOWS
 from measure.films.evidence import Sight
 from measure.films.library import Weighable
-from measure.films.simulations import Simulations, part_of, sight
+from measure.films.simulations import Simulations, of_recordings, part_of, sight
 from measure.films.weigh import fitted, hypothesis
 from measure.observables import OBSERVABLES
 from measure.verdict.criteria import CRITERIA
@@ -63,7 +63,7 @@ def compared(
     *,
     effect: Weighable | None,
     control: Weighable | None,
-    cloth: tuple[Uncertain, ...] = CLOTH,
+    weighed: tuple[float, float] | None = None,
     seed: int,
 ) -> tuple[Comparison, ...]:
     """Comparisons for each observable: on other halves, and on recordings left out.
@@ -72,6 +72,7 @@ def compared(
         sights: of whole recordings.
         effect: that is named; None for none.
         control: the best wrong effect; None for none.
+        weighed: mean and standard deviation of a stated area weight [kg/m²].
     """
     found: list[Comparison] = []
     for words, tasks in (
@@ -79,7 +80,9 @@ def compared(
         ("recordings left out", _left_out(recordings, sights)),
     ):
         predictions = [
-            one for task in tasks for one in _predicted(task, effect=effect, control=control, cloth=cloth, seed=seed)
+            one
+            for task in tasks
+            for one in _predicted(task, effect=effect, control=control, weighed=weighed, seed=seed)
         ]
         for place, name in enumerate(OBSERVED):
             own = [one for one in predictions if math.isfinite(one.observed[place] + one.before[place])]
@@ -118,16 +121,16 @@ def _left_out(recordings: Sequence[Observed], sights: Sequence[Sight]) -> list[_
 
 
 def _predicted(
-    task: _Task, *, effect: Weighable | None, control: Weighable | None, cloth: tuple[Uncertain, ...], seed: int
+    task: _Task, *, effect: Weighable | None, control: Weighable | None, weighed: tuple[float, float] | None, seed: int
 ) -> list[Prediction]:
     sights = [one for one, _ in task.fitted]
-    seen = [own.summary[None, one.model.used] for one, own in task.fitted]
+    seen = of_recordings(sights, [own for _, own in task.fitted], weighed)
     rng = stream(seed, "films", "places")
 
     def means(which: Weighable | None) -> list[Floats]:
         """(observable,) of each predicted sight."""
-        found = fitted(sights, seen, which, cloth=cloth, seed=seed)
-        own, places, strength = hypothesis(sights, which, cloth).values(found.scores[0])
+        found = fitted(sights, seen, which, seed=seed)
+        own, places, strength = hypothesis(sights, which).values(found.scores[0])
         made = []
         for place, one, _ in task.predicted:
             values = places[place] if place is not None else {

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from flagdata.rng import stream
-from measure.calibrate.prior import CLOTH, Floats, Uncertain
-from measure.films.evidence import Fit, Hypothesis, Sight
+from measure.calibrate.prior import Floats
+from measure.films.evidence import Experiments, Fit, Hypothesis, Sight
 from measure.films.library import Weighable
 
 
@@ -40,30 +40,25 @@ class Weighing:
         )  # fmt: skip
 
 
-def hypothesis(
-    sights: Sequence[Sight], effect: Weighable | None, cloth: tuple[Uncertain, ...] = CLOTH
-) -> Hypothesis:  # fmt: skip
+def hypothesis(sights: Sequence[Sight], effect: Weighable | None) -> Hypothesis:
     """The base model, or it with an effect."""
-    return Hypothesis(sights=tuple(sights), cloth=cloth, effect=None if effect is None else effect.prior)
+    return Hypothesis(sights=tuple(sights), effect=None if effect is None else effect.prior)
 
 
 def weigh(
     sights: Sequence[Sight],
-    observed: Sequence[Floats],
+    observed: Experiments,
     effects: Sequence[Weighable],
     *,
-    cloth: tuple[Uncertain, ...] = CLOTH,
     seed: int,
 ) -> Weighing:
     """Weigh effects on experiments, each by itself.
 
     Args:
-        observed: for each recording (n, used summary).
         effects: those that all sights' models know a response of.
-        cloth: priors of area weight, bending and damping.
     """
-    base = fitted(sights, observed, None, cloth=cloth, seed=seed)
-    fits = [fitted(sights, observed, effect, cloth=cloth, seed=seed) for effect in effects]
+    base = fitted(sights, observed, None, seed=seed)
+    fits = [fitted(sights, observed, effect, seed=seed) for effect in effects]
     empty = np.zeros((len(base.evidence), 0))
     return Weighing(
         effects=tuple(effects), base=base.evidence, misfit=base.misfit,
@@ -74,12 +69,11 @@ def weigh(
 
 def fitted(
     sights: Sequence[Sight],
-    observed: Sequence[Floats],
+    observed: Experiments,
     effect: Weighable | None,
     *,
-    cloth: tuple[Uncertain, ...] = CLOTH,
     seed: int,
 ) -> Fit:
     """One model fitted to experiments; as `weigh`."""
     rng = stream(seed, "films", "weigh", "base" if effect is None else effect.name)
-    return hypothesis(sights, effect, cloth).fit(observed, rng)
+    return hypothesis(sights, effect).fit(observed, rng)

@@ -52,7 +52,7 @@ def readings(batch: Batch, *, foreign: float = 0.0) -> Floats:
     out[..., 3] += 0.1 * np.log(values["bending"] / 1e-4)[:, None]
     patterns = {
         "lift.coefficient": (4, 0.2), "shear.exponent": (5, 0.3), "tangential-linear-drag.coefficient": (6, 0.2),
-        "air-density.change": (7, 0.4), "power-law-drag.exponent": (7, 0.4),
+        "hem-mass.line_density": (3, 0.0), "air-density.change": (7, 0.4), "power-law-drag.exponent": (7, 0.4),
     }  # fmt: skip
     most = {"lift.coefficient": 8.0, "tangential-linear-drag.coefficient": 1.5}
     for column, strength in batch.effects:

@@ -68,7 +68,7 @@ def test_what_no_effect_explains_is_none_of_the_library(cheap: list[int], tmp_pa
 
 
 def test_an_effect_beside_something_else_is_a_part(cheap: list[int], tmp_path: Path) -> None:
-    recordings = both(DRAG, foreign=0.3)
+    recordings = both(DRAG, foreign=0.1)
     found = close_loop(recordings, options(only=("tangential-linear-drag.coefficient",)), folder=tmp_path)
     assert found.conclusion is Conclusion.PARTLY
     assert found.named == ("tangential-linear-drag",)
@@ -82,3 +82,23 @@ def test_too_few_kinds_of_numerics_cannot_test(cheap: list[int], tmp_path: Path)
 def test_an_effect_that_is_not_weighed_is_refused() -> None:
     with pytest.raises(UsageError, match="direction-change"):
         options(only=("direction-change.angle",))
+
+
+def test_a_cloth_that_is_heavier_than_it_was_weighed_is_not_the_base_model(cheap: list[int], tmp_path: Path) -> None:
+    recordings = both()
+    own = close_loop(recordings, options(), folder=tmp_path).parameters[0].before.value
+    right = close_loop(recordings, options(area_weight=(own, 0.02 * own)), folder=tmp_path)
+    wrong = close_loop(recordings, options(area_weight=(0.5 * own, 0.01 * own)), folder=tmp_path)
+    assert right.conclusion is Conclusion.SUFFICIENT
+    assert wrong.test.p_value.value <= 0.05
+
+
+def test_what_is_missing_is_stated_with_its_size_and_unit(cheap: list[int], tmp_path: Path) -> None:
+    verdict = close_loop(both(DRAG), options(), folder=tmp_path)
+    assert "amplitude-across +0.12 (" in verdict.proposal  # 0.2 · 0.9/1.5
+
+
+def test_effects_that_the_recordings_would_not_show_are_listed(cheap: list[int], tmp_path: Path) -> None:
+    tiny = "hem-mass.line_density"
+    verdict = close_loop(both(), options(only=(*EFFECTS, tiny)), folder=tmp_path)
+    assert any("even where they are strong, hem-mass would move" in text for text in verdict.assumptions)
