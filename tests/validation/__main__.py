@@ -19,6 +19,7 @@ VALIDATIONS = {
     "hanging-cloth": "tests.validation.hanging_cloth",
     "hostile": "tests.validation.hostile",
     "lake-in-a-bucket": "tests.validation.lake_in_a_bucket",
+    "loop-on-films": "tests.validation.loop_on_films",
     "measure-windows": "tests.validation.measure_windows",
     "object-storage": "tests.validation.object_storage",
     "observables": "tests.validation.observables",

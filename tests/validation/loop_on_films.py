@@ -7,33 +7,44 @@ with one are eight cloths for each effect, its strength from the stronger half o
 is the azimuth, ± 7°. Reported: how many are rejected at the level, and for those that are, whether the effect is named
 alone, among several, as a part, or wrongly.
 
-`python -m tests.validation loop_on_films`; the simulations are kept in FLAGDATA_LOOP_ON_FILMS, by default a new folder.
+`python -m tests.validation loop-on-films`; the simulations are kept in FLAGDATA_LOOP_ON_FILMS, by default a new folder.
+FLAGDATA_LOOP_ON_FILMS_EFFECTS names the effects that are weighed and that act, _KINDS is how many kinds of numerics
+null experiments have, and _RECORDINGS which of the two recordings are used, as in "1": all by default.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any
 
 import numpy as np
 import torch
 
 from flagdata.rng import child_seed, stream
-from measure.calibrate.design import Design
+from measure.calibrate.design import Design, read
 from measure.calibrate.discretisation import Discretisation
+from measure.calibrate.observed import Observed
 from measure.calibrate.prior import Floats, Normal, Uncertain
 from measure.calibrate.simulation import Batch, Flag
 from measure.calibrate.wind import Log
-from measure.films.design import TOGETHER, nulls
+from measure.films.design import TOGETHER, lasting, nulls, pairs
+from measure.films.judge import Judged, judge
 from measure.films.library import Weighable, weighable
+from measure.films.simulations import Simulations, of_nulls, sight
+from measure.films.weigh import weigh
 from sim.effects.anemometer_lag import AnemometerLag
 from sim.wind.spectral import VonKarman
 
 SEED = 20261127
 MEANS = (4.0, 6.5)  # m/s
 DURATION = 30.0  # s
-KINDS = 40
+KINDS = int(os.environ.get("FLAGDATA_LOOP_ON_FILMS_KINDS", "40"))
+LEVEL = 0.05
 _BEFORE = 64.0  # s
 _INTENSITY, _LENGTH, _RATE = 0.18, 50.0, 10.0  # 1, m, Hz
 FLAG = Flag(length=1.5, height=1.0)
@@ -53,6 +64,17 @@ def log(mean: float) -> Log:
     at = np.arange(-60.0, DURATION + 1.0)
     read = np.interp(at, times, lagged) + 0.05 * rng.standard_normal(len(at))
     return Log(times=at, speed=np.round(read, 1), distance=3.0)
+
+
+def chosen() -> tuple[int, ...]:
+    """Places of the recordings that are used."""
+    return tuple(int(place) for place in os.environ.get("FLAGDATA_LOOP_ON_FILMS_RECORDINGS", "0 1").split())
+
+
+def effects() -> tuple[Weighable, ...]:
+    """That are weighed, and that act."""
+    wanted = os.environ.get("FLAGDATA_LOOP_ON_FILMS_EFFECTS", "").split()
+    return tuple(one for one in weighable(FLAG) if not wanted or one.name in wanted)
 
 
 def designs() -> list[Design]:
@@ -84,6 +106,80 @@ def stronger(effect: Weighable, seed: int) -> Floats:
     return effect.prior.at(shares)
 
 
-def all_truths() -> Sequence[tuple[str, list[list[Batch]]]]:
-    """Name of the effect, and its flags."""
-    return [(one.name, truths(one, number)) for number, one in enumerate(weighable(FLAG), start=1)]
+def simulations(folder: Path) -> Simulations:
+    """Of the recordings that are used: the base model, the effects' pairs and null experiments."""
+    own, workers = designs(), len(os.sched_getaffinity(0))
+    null = nulls(own, (0, 1), kinds=KINDS, seed=SEED)
+
+    def seen(batches: Sequence[Batch]) -> Floats:
+        return read(batches, folder=folder, workers=workers)[:, 0]
+
+    made = [[pairs(design, effect, until=lasting(own)) for effect in effects()] for design in own]
+    return Simulations(
+        designs=tuple(own[place] for place in chosen()), base=tuple(seen(own[place].batches()) for place in chosen()),
+        pairs=tuple(tuple((pair, seen(pair.batches)) for pair in made[place]) for place in chosen()),
+        nulls=tuple(seen(null[place]) for place in chosen()), kinds=np.repeat(np.arange(KINDS), TOGETHER),
+        weights=np.concatenate([batch.values["area_weight"] for batch in null[0]]),
+    )  # fmt: skip
+
+
+def run(*, seed: int, out: Path) -> dict[str, Any]:
+    """Judge all truths. The design has its own seed."""
+    del seed, out
+    folder = Path(os.environ.get("FLAGDATA_LOOP_ON_FILMS") or mkdtemp(prefix="loop-on-films-"))
+    made = simulations(folder)
+    recordings = [
+        Observed(name=f"{MEANS[place]:g} m/s", source="", readings=np.nanmean(base, axis=0), log=design.log)
+        for place, base, design in zip(chosen(), made.base, made.designs, strict=True)
+    ]
+    sights = [
+        sight(one, design, base, own)
+        for one, design, base, own in zip(recordings, made.designs, made.base, made.pairs, strict=True)
+    ]
+    null, kinds = of_nulls(sights, recordings, made, None, seed=SEED)
+    weighed = weigh(sights, null, effects(), seed=SEED)
+    rows: list[dict[str, Any]] = []
+    for number, kind in enumerate(kinds.tolist()):
+        others = np.flatnonzero(kinds != kind).tolist()
+        found = judge(weighed.rows([number]), weighed.rows(others), kinds[others], level=LEVEL)
+        rows.append(_row(None, 0.0, found))
+    for number, effect in enumerate(weighable(FLAG), start=1):
+        if effect in effects():
+            batches = truths(effect, number)
+            shown = tuple(read(batches[place], folder=folder)[:, 0] for place in chosen())
+            true, whole = of_nulls(
+                sights, recordings, replace(made, nulls=shown, kinds=np.arange(TOGETHER)), None, seed=SEED + number
+            )
+            own = weigh(sights, true, effects(), seed=SEED)
+            strengths = stronger(effect, child_seed(SEED, "truths", number))[whole]
+            for place, strength in enumerate(strengths.tolist()):
+                rows.append(_row(effect, strength, judge(own.rows([place]), weighed, kinds, level=LEVEL)))
+    return {"recordings": list(chosen()), "kinds": KINDS, "effects": [one.name for one in effects()],
+            **_summary(rows), "rows": rows}  # fmt: skip
+
+
+def _row(effect: Weighable | None, strength: float, found: Judged) -> dict[str, Any]:
+    names = [one.name for one in effects()]
+    return {
+        "effect": None if effect is None else effect.name, "strength": strength, "p": found.p_value,
+        "conclusion": found.conclusion.value, "named": [names[place] for place in found.named],
+        "parts": list(found.parts), "probability": None if effect is None else float(
+            found.probability[names.index(effect.name)]
+        ),
+    }  # fmt: skip
+
+
+def _summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """How often which became of truths without and with an effect."""
+    without, true = [one for one in rows if one["effect"] is None], [one for one in rows if one["effect"] is not None]
+    rejected = [one for one in true if one["p"] <= LEVEL]
+    return {
+        "without": {"count": len(without), "rejected": sum(one["p"] <= LEVEL for one in without)},
+        "with": {
+            "count": len(true), "rejected": len(rejected),
+            "named alone": sum(one["named"] == [one["effect"]] for one in rejected),
+            "one of": sum(one["effect"] in one["named"] and len(one["named"]) > 1 for one in rejected),
+            "another alone": sum(len(one["named"]) == 1 and one["named"] != [one["effect"]] for one in rejected),
+            "none": sum(not one["named"] for one in rejected),
+        },
+    }  # fmt: skip

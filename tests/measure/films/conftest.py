@@ -76,10 +76,16 @@ def cheap(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return asked
 
 
-def recording(*, mean: float, seed: int, foreign: float = 0.0, effects: Mapping[str, float] | None = None) -> Observed:
-    """One recording of a cloth that no simulation has, with effects of strengths beyond null."""
+def recording(
+    *, mean: float, seed: int, foreign: float = 0.0, effects: Mapping[str, float] | None = None, swing: float = 0.15
+) -> Observed:
+    """One recording of a cloth that no simulation has, with effects of strengths beyond null.
+
+    Args:
+        swing: of the wind, as a share of its mean.
+    """
     times = np.arange(-30.0, WINDOWS * WINDOW + 1)
-    log = Log(times=times, speed=mean * (1 + 0.15 * np.sin(times / 6.0)), distance=3.0)
+    log = Log(times=times, speed=mean * (1 + swing * np.sin(times / 6.0)), distance=3.0)
     design = Design(flag=options().calibration.flag, log=log, duration=WINDOWS * WINDOW, azimuth=AZIMUTH, seed=seed)
     first = design.batches()[3]
     known = {one.name: one.column for one in weighable(design.flag)}

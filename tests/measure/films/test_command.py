@@ -10,7 +10,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from flagdata.errors import UsageError
-from flagdata.lake import Lake
+from flagdata.lake import Artifact, Lake
+from flagdata.schema import Kind
 from measure.calibrate.simulation import OBSERVED
 from measure.closing.command import close_loop
 from measure.films import library
@@ -116,6 +117,17 @@ def test_a_video_counts_as_a_film_and_a_recipe_does_not(tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(b"no film")
     assert all_films([str(tmp_path / "flag.mp4")], lake=None, at="main")
     assert not all_films([str(tmp_path / "flag.toml")], lake=None, at="main")
+
+
+def test_recordings_of_a_lake_are_films_and_its_markers_are_not(tmp_path: Path) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    with lake.transaction("three") as transaction:
+        for name, kind in (("calm", Kind.RECORDING), ("tracked", Kind.MARKERS)):
+            transaction.add(Artifact(kind=kind, name=name, parents=(), recipe={"name": name}, seed=0))
+    assert all_films(["calm"], lake=lake, at="main")
+    assert not all_films(["tracked"], lake=lake, at="main", sized=True)
+    with pytest.raises(UsageError, match="calm beside recordings of markers"):
+        all_films(["calm", "tracked"], lake=lake, at="main")
 
 
 def test_a_recording_that_is_not_there_is_named(tmp_path: Path) -> None:
