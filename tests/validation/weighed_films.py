@@ -60,9 +60,9 @@ def pictures(truth: Mapping[str, Any], positions: Floats, mesh: Mesh) -> NDArray
     assets = Assets()
     zeta = placed(prior.named("flags").draw(truth["seed"], assets), truth, positions, mesh)
     count, vertices = positions.shape[:2]
-    faces = torch.as_tensor(mesh.faces, dtype=torch.int64)
+    faces = torch.tensor(mesh.faces, dtype=torch.int64)
     size = mesh.rest.max(axis=0)
-    uv = torch.as_tensor(mesh.rest / size, dtype=torch.float32)
+    uv = torch.tensor(mesh.rest / size, dtype=torch.float32)
     meshes = Meshes(
         positions=torch.as_tensor(positions.reshape(-1, 3), dtype=torch.float32), faces=faces.repeat(count, 1),
         uv=uv.repeat(count, 1), vertex_offset=tuple(vertices * k for k in range(count + 1)),
