@@ -165,7 +165,7 @@ def by_kernel(*, explicit: bool) -> dict[int, Floats]:
 
 
 def by_mujoco(truth: Mapping[str, Any]) -> Floats:
-    """(frame, vertex, 3) of one of MuJoCo's, likewise: bending and stretching are the nominal cloth's by its factors."""
+    """(frame, vertex, 3) of one of MuJoCo's: bending and stretching are the nominal ones by its factors."""
     own = mesh("mujoco")
     sheet = Sheet(
         mesh=own, held=handles.corners(own.rest), density=truth["area_weight"],
