@@ -5,8 +5,9 @@ Three figures, each with a level above which a film is refused:
 *shift*      What windows show beside the wind: each feature less its mean at the wind that is read (a quadratic, fitted
              on the calibration). The mean of these over a film, by Mahalanobis's distance with the scatter of the
              calibration's windows (Ledoit and Wolf 2004), over the root of the number of features: how far a usual
-             window of the film lies from those of the calibration, in standard deviations of a feature. Another cloth,
-             another angle of view or another direction of the wind shifts it.
+             window of the film lies from those of the calibration, in standard deviations of a feature, less what
+             means of as few windows scatter by in blocks of the calibration that were left out. Another cloth, another
+             angle of view or another direction of the wind shifts it.
 *framing*    How far the hoist's ends are in the picture from where they were, in heights of the hoist.
 *background* Correlation of the pictures' details beside the flag, where there are any.
 """
@@ -47,6 +48,8 @@ class Familiar:
         coefficients: (3, column) of their means at a wind, in standardised features: 1, wind, its square.
         whitening: (column, column) W with WᵀW the inverse of the residuals' covariance.
         distances: (n,) of windows that were left out with their block, ascending.
+        noise: mean square of a component of the mean over a block's windows, times their number, of blocks left out:
+            what the mean over one window would be off by if it were as slow as theirs.
     """
 
     centre: Floats
@@ -54,18 +57,21 @@ class Familiar:
     coefficients: Floats
     whitening: Floats
     distances: Floats
+    noise: float
 
     @classmethod
     def of(cls, values: Floats, winds: Floats, blocks: NDArray[np.int_]) -> Familiar:
         """Of windows (n, column), the winds that were read of them and their blocks of time (n,)."""
         whole = cls._fitted(values, winds)
-        distances = np.empty(len(winds))
+        distances, noises = np.empty(len(winds)), []
         for block in np.unique(blocks):
             inside = blocks == block
-            distances[inside] = cls._fitted(values[~inside], winds[~inside]).distance(values[inside], winds[inside])
+            white = cls._fitted(values[~inside], winds[~inside])._white(values[inside], winds[inside])
+            distances[inside] = np.sqrt(np.square(white).mean(axis=1))
+            noises.append(len(white) * float(np.square(white.mean(axis=0)).mean()))
         return cls(
             centre=whole.centre, spread=whole.spread, coefficients=whole.coefficients, whitening=whole.whitening,
-            distances=np.sort(distances),
+            distances=np.sort(distances), noise=float(np.mean(noises)),
         )  # fmt: skip
 
     @classmethod
@@ -78,7 +84,7 @@ class Familiar:
         covariance, _ = shrunk_covariance(standard - powers @ coefficients)
         own, vectors = np.linalg.eigh(covariance)
         return cls(
-            centre=centre, spread=spread, coefficients=coefficients, distances=np.zeros(0),
+            centre=centre, spread=spread, coefficients=coefficients, distances=np.zeros(0), noise=0.0,
             whitening=(vectors / np.sqrt(np.maximum(own, 1e-12))).T,
         )  # fmt: skip
 
@@ -96,8 +102,9 @@ class Familiar:
         return (1 + len(self.distances) - nearer) / (len(self.distances) + 1)
 
     def shift(self, values: Floats, winds: Floats) -> float:
-        """Distance of the mean of windows (n, column); see the module."""
-        return float(np.sqrt(np.square(self._white(values, winds).mean(axis=0)).mean()))
+        """Distance of the mean of windows (n, column), less what the means of as few windows scatter by."""
+        square = float(np.square(self._white(values, winds).mean(axis=0)).mean())
+        return math.sqrt(max(square - self.noise / len(winds), 0.0))
 
 
 @dataclass(frozen=True, kw_only=True)

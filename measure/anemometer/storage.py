@@ -38,7 +38,7 @@ def write(path: Path, model: ReadingModel, about: Mapping[str, Any]) -> None:
     group.update_attributes({
         HEAD: {"format": FORMAT}, "network": model.network, "identity": model.identity,
         "flag_size": [model.size.length, model.size.height], "step": model.step, "features": list(model.names),
-        "offset": ridge.offset, "penalty": ridge.penalty, "block": model.block,
+        "offset": ridge.offset, "penalty": ridge.penalty, "block": model.block, "noise": familiar.noise,
         "sides": [place.side for place in model.places], "answer": dict(about),
     })  # fmt: skip
     for name in ("centre", "spread", "coefficients"):
@@ -79,7 +79,7 @@ def read(path: Path) -> ReadingModel:
                 offset=about["offset"], penalty=about["penalty"],
             ),
             winds=array("winds"), errors=array("errors"), block=about["block"],
-            familiar=Familiar(**{name: array(f"familiar_{name}") for name in _FAMILIAR}),
+            familiar=Familiar(noise=about["noise"], **{name: array(f"familiar_{name}") for name in _FAMILIAR}),
             places=tuple(
                 Place(
                     hoist=array(f"hoist_{number}"), side=side, background=array(f"background_{number}"),

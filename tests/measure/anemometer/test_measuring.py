@@ -78,6 +78,20 @@ def test_another_flag_or_place_is_refused_with_its_figure(measure: Measure, chan
     assert f"{own.verdict.reasons[0].value:.2f}" in own.verdict.sentence
 
 
+def test_a_film_of_few_windows_is_no_more_another_flag_than_a_long_one(found: Calibrated) -> None:
+    """The mean of three windows scatters by 1/√3 of a window's scatter or more, which is no shift; a shift of one
+    feature of six by four deviations is √(16/6) in each."""
+    shifts = []
+    for seed in range(30, 42):
+        own = features(gusts(4.0, seed=seed), seed=seed)
+        used = found.model.used(own)
+        shifts.append(found.model.familiar.shift(used, found.model.read(used)))
+    assert np.sqrt(np.mean(np.square(shifts))) < 0.5
+    far = features(gusts(120.0, seed=21), seed=21, other=4.0)
+    used = found.model.used(far)
+    assert found.model.familiar.shift(used, found.model.read(used)) == pytest.approx(np.sqrt(16 / 6), rel=0.15)
+
+
 def test_another_size_and_a_fault_of_the_film_refuse_it(measure: Measure) -> None:
     own = features(gusts(120.0, seed=21), seed=21)
     fault = Finding(kind="cut-off", severity=Severity.WARNING, what="the edge cuts the cloth off", value=0.5)
