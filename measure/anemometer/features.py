@@ -60,7 +60,7 @@ class Features:
         layout: of the windows.
         values: (w, feature), NaN where a window does not show one; a row of NaN where frames are missing.
         names: of the features.
-        summaries: (w, dimension) of the network, for whoever compares films; NaN likewise.
+        summaries: (w, dimension) of the network's first learner, for whoever compares films; NaN likewise.
         winds: (w,) that the network reads by itself [m/s]; NaN likewise.
         clip: (frames, height, width) of the first whole window.
         place: of the camera.
@@ -104,6 +104,7 @@ def features_of(
         duration=film.duration, step=None, first=first, last=last,
     )  # fmt: skip
     summaries: NDArray[np.float32] | None = None
+    rows: dict[int, NDArray[np.float32]] = {}
     winds = np.full(layout.count, np.nan)
     clip: NDArray[np.uint8] | None = None
     observed = _Observed(count=layout.count)
@@ -122,6 +123,7 @@ def features_of(
         if summaries is None:
             summaries, clip = np.full((layout.count, len(summary)), np.nan, np.float32), window.clips[0]
         summaries[window.index] = summary
+        rows[window.index] = np.concatenate([one[0].cpu().numpy() for one in embeddings])
         values = model.learners[0].scaling.values(model.posterior(embeddings).mean().float())
         winds[window.index] = float(values[0, 0]) * scale ** POWERS[WIND]
         if advance is not None:
@@ -131,10 +133,12 @@ def features_of(
             "no window of the film has all its frames", where=film.name, fix="choose another part by --start and --end"
         )
     watcher.finish()
+    every = np.full((layout.count, len(next(iter(rows.values())))), np.nan)
+    every[list(rows)] = list(rows.values())
     return Features(
         film=film.name, starts=layout.first + layout.step * np.arange(layout.count, dtype=np.float64), layout=layout,
-        values=np.concatenate([summaries, winds[:, None], observed.values], axis=1, dtype=np.float64),
-        names=(*(f"summary-{k}" for k in range(summaries.shape[1])), "network-wind", *OBSERVED),
+        values=np.concatenate([every, winds[:, None], observed.values], axis=1),
+        names=(*(f"summary-{k}" for k in range(every.shape[1])), "network-wind", *OBSERVED),
         summaries=summaries, winds=winds, clip=clip, place=_place(film, *observed.hoist()),
     )  # fmt: skip
 
