@@ -6,8 +6,9 @@ Three figures, each with a level above which a film is refused:
              on the calibration). The mean of these over a film, by Mahalanobis's distance with the scatter of the
              calibration's windows (Ledoit and Wolf 2004), over the root of the number of features: how far a usual
              window of the film lies from those of the calibration, in standard deviations of a feature, less what
-             means of as few windows scatter by in blocks of the calibration that were left out. Another cloth, another
-             angle of view or another direction of the wind shifts it.
+             means of as few windows scatter by in blocks of the calibration that were left out. Only windows that read
+             a wind of the calibration count: beyond it, the quadratic is wrong of the same flag as well. Another angle
+             of view, another direction of the wind or a quite different cloth shifts it.
 *framing*    How far the hoist's ends are in the picture from where they were, in heights of the hoist.
 *background* Correlation of the pictures' details beside the flag, where there are any.
 """
@@ -28,8 +29,10 @@ from models.outliers import shrunk_covariance
 
 Floats = NDArray[np.float64]
 
-SHIFT, FRAMING, BACKGROUND = 1.0, 0.2, 0.4
+SHIFT, FRAMING, BACKGROUND = 0.7, 0.2, 0.4
 """Levels, fixed on simulated flags of other seeds than those that judge (decision 047)."""
+LEAST_WINDOWS, LEAST_SHARE = 3, 0.1
+"""Windows, and share of the windows, that must read a wind of the calibration."""
 _BLUR = 3.0
 """Width of what counts as light, not as detail, in a place's picture [px]."""
 _DETAIL = 1.0
@@ -48,6 +51,7 @@ class Familiar:
         coefficients: (3, column) of their means at a wind, in standardised features: 1, wind, its square.
         whitening: (column, column) W with WᵀW the inverse of the residuals' covariance.
         distances: (n,) of windows that were left out with their block, ascending.
+        low, high: winds between which films are compared: the middle 96 % of those that were read [m/s].
         noise: mean square of a component of the mean over a block's windows, times their number, of blocks left out:
             what the mean over one window would be off by if it were as slow as theirs.
     """
@@ -57,6 +61,8 @@ class Familiar:
     coefficients: Floats
     whitening: Floats
     distances: Floats
+    low: float
+    high: float
     noise: float
 
     @classmethod
@@ -71,7 +77,7 @@ class Familiar:
             noises.append(len(white) * float(np.square(white.mean(axis=0)).mean()))
         return cls(
             centre=whole.centre, spread=whole.spread, coefficients=whole.coefficients, whitening=whole.whitening,
-            distances=np.sort(distances), noise=float(np.mean(noises)),
+            distances=np.sort(distances), low=whole.low, high=whole.high, noise=float(np.mean(noises)),
         )  # fmt: skip
 
     @classmethod
@@ -83,8 +89,10 @@ class Familiar:
         coefficients = np.linalg.lstsq(powers, standard, rcond=None)[0]
         covariance, _ = shrunk_covariance(standard - powers @ coefficients)
         own, vectors = np.linalg.eigh(covariance)
+        low, high = np.quantile(winds, [0.02, 0.98])
         return cls(
-            centre=centre, spread=spread, coefficients=coefficients, distances=np.zeros(0), noise=0.0,
+            centre=centre, spread=spread, coefficients=coefficients, distances=np.zeros(0), low=float(low),
+            high=float(high), noise=0.0,
             whitening=(vectors / np.sqrt(np.maximum(own, 1e-12))).T,
         )  # fmt: skip
 
@@ -101,10 +109,18 @@ class Familiar:
         nearer = np.searchsorted(self.distances, self.distance(values, winds), side="left")
         return (1 + len(self.distances) - nearer) / (len(self.distances) + 1)
 
+    def within(self, winds: Floats) -> NDArray[np.bool_]:
+        """(n,) whether films are compared at these winds."""
+        return (winds >= self.low) & (winds <= self.high)
+
     def shift(self, values: Floats, winds: Floats) -> float:
-        """Distance of the mean of windows (n, column), less what the means of as few windows scatter by."""
-        square = float(np.square(self._white(values, winds).mean(axis=0)).mean())
-        return math.sqrt(max(square - self.noise / len(winds), 0.0))
+        """Distance of the mean of windows (n, column), less what the means of as few windows scatter by; NaN where too
+        few are `within`."""
+        shared = self.within(winds)
+        if shared.sum() < max(LEAST_WINDOWS, LEAST_SHARE * len(winds)):
+            return math.nan
+        square = float(np.square(self._white(values[shared], winds[shared]).mean(axis=0)).mean())
+        return math.sqrt(max(square - self.noise / int(shared.sum()), 0.0))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,7 +128,7 @@ class Compared:
     """A film beside the calibration.
 
     Attributes:
-        shift: see `Familiar.shift`.
+        shift: see `Familiar.shift`; NaN where too few windows read a wind of the calibration.
         framing: how far the hoist's ends are from where the nearest recording has them, in heights of its hoist; NaN
             where a hoist was not found, infinite where the flag flies to the other side.
         likeness: largest correlation of the backgrounds' details with those of a recording; NaN where there are none.
@@ -163,6 +179,8 @@ class Compared:
             away = "on the other side of the flag" if beyond else f"{self.framing:.2f} of its height away"
             what = f"the flag's hoist is not where it was in the picture: {away}, at most {FRAMING:g} is accepted"
             found.append(_reason("another-framing", what, None if beyond else self.framing))
+        if math.isnan(self.shift):
+            found.append(_reason("another-wind", "hardly any window reads a wind in which the flag was calibrated"))
         if self.shift > SHIFT:
             what = (
                 "the film does not show the flag of the calibration, or not from the same side of the wind: what its "
@@ -174,7 +192,7 @@ class Compared:
 
 
 def _reason(kind: str, what: str, value: float | None = None) -> Finding:
-    fix = "calibrate this flag from this place (flagdata calibrate), or leave --model out"
+    fix = "calibrate this flag from this place and in such winds (flagdata calibrate), or leave --model out"
     return Finding(kind=kind, severity=Severity.WARNING, what=what, value=value, fix=fix)
 
 

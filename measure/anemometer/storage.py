@@ -39,6 +39,7 @@ def write(path: Path, model: ReadingModel, about: Mapping[str, Any]) -> None:
         HEAD: {"format": FORMAT}, "network": model.network, "identity": model.identity,
         "flag_size": [model.size.length, model.size.height], "step": model.step, "features": list(model.names),
         "offset": ridge.offset, "penalty": ridge.penalty, "block": model.block, "noise": familiar.noise,
+        "compared": [familiar.low, familiar.high],
         "sides": [place.side for place in model.places], "answer": dict(about),
     })  # fmt: skip
     for name in ("centre", "spread", "coefficients"):
@@ -79,7 +80,10 @@ def read(path: Path) -> ReadingModel:
                 offset=about["offset"], penalty=about["penalty"],
             ),
             winds=array("winds"), errors=array("errors"), block=about["block"],
-            familiar=Familiar(noise=about["noise"], **{name: array(f"familiar_{name}") for name in _FAMILIAR}),
+            familiar=Familiar(
+                noise=about["noise"], low=about["compared"][0], high=about["compared"][1],
+                **{name: array(f"familiar_{name}") for name in _FAMILIAR},
+            ),
             places=tuple(
                 Place(
                     hoist=array(f"hoist_{number}"), side=side, background=array(f"background_{number}"),
