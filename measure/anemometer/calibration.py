@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ from flagdata.signals import Sensor
 from measure.anemometer.features import Features, features_of
 from measure.anemometer.intervals import half_width
 from measure.anemometer.novelty import Familiar
-from measure.anemometer.reading import ReadingModel, filled
+from measure.anemometer.reading import ReadingModel, filled, filling_of
 from measure.anemometer.regression import BLOCK, Ridge, blocks_of, validated, with_neighbours
 from measure.calibrate.wind import STEADY, Log
 from measure.estimate.similarity import FlagSize
@@ -183,7 +183,10 @@ def calibrated(
         )  # fmt: skip
     _check_wind(recordings, usable)
     names = _names(recordings, usable)
-    rows, plain = _rows(recordings, usable, names)
+    columns = [recordings[0].features.names.index(name) for name in names]
+    shown = np.concatenate([one.features.values[own][:, columns] for one, own in zip(recordings, usable, strict=True)])
+    filling = filling_of(shown, names)
+    rows, plain = _rows(recordings, usable, names, filling)
     numbers = np.repeat(np.arange(len(recordings)), [int(one.sum()) for one in usable])
     times = np.concatenate([one.features.starts[own] for one, own in zip(recordings, usable, strict=True)])
     blocks = blocks_of(times, numbers)
@@ -204,6 +207,7 @@ def calibrated(
         )  # fmt: skip
     model = ReadingModel(
         network=network.estimator.name, identity=network.identity, size=size, step=step, names=names,
+        filling=filling,
         ridge=Ridge.fitted(rows, logged, checked.penalty), winds=logged, errors=logged - checked.predicted,
         block=round(BLOCK / step), familiar=Familiar.of(plain, checked.predicted, blocks),
         places=tuple(one.features.place for one in recordings),
@@ -236,13 +240,14 @@ def _names(recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]])
 
 
 def _rows(
-    recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]], names: tuple[str, ...]
-) -> tuple[Floats, Floats]:
+    recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]], names: tuple[str, ...],
+    filling: Mapping[str, Ridge],
+) -> tuple[Floats, Floats]:  # fmt: skip
     """(n, 3 · column) features with the neighbours', and (n, column) without, of all whole windows."""
     rows, plain = [], []
     for one, own in zip(recordings, usable, strict=True):
         columns = [one.features.names.index(name) for name in names]
-        values = filled(one.features.values[:, columns], own, names, where=one.name)
+        values = filled(one.features.values[:, columns], own, names, filling)
         rows.append(with_neighbours(values)[own])
         plain.append(values[own])
     return np.concatenate(rows), np.concatenate(plain)

@@ -186,6 +186,15 @@ def _about(winds: Floats, features: Features, model: ReadingModel) -> list[Findi
                 fix="calibrate in stronger and weaker winds as well",
             )
         )  # fmt: skip
+    if unseen := model.unseen(features):
+        share = max(unseen.values())
+        found.append(
+            Finding(
+                kind="observables-inferred", severity=Severity.NOTE, value=share,
+                what=f"up to {share:.0%} of the windows do not show {', '.join(unseen)}, which were inferred from the "
+                "network's summary",
+            )
+        )  # fmt: skip
     missing = len(features.starts) - len(winds)
     if missing:
         found.append(

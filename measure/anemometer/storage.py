@@ -18,6 +18,7 @@ from measure.estimate.similarity import FlagSize
 
 FORMAT = 1
 HEAD = "flagdata_anemometer"
+_RIDGE = ("centre", "spread", "coefficients")
 _FAMILIAR: Mapping[str, tuple[str, ...]] = {
     "centre": ("feature",), "spread": ("feature",), "coefficients": ("power", "feature"),
     "whitening": ("white", "feature"), "distances": ("rank",),
@@ -38,12 +39,15 @@ def write(path: Path, model: ReadingModel, about: Mapping[str, Any]) -> None:
     group.update_attributes({
         HEAD: {"format": FORMAT}, "network": model.network, "identity": model.identity,
         "flag_size": [model.size.length, model.size.height], "step": model.step, "features": list(model.names),
-        "offset": ridge.offset, "penalty": ridge.penalty, "block": model.block, "noise": familiar.noise,
+        "ridge": _numbers(ridge), "filling": {name: _numbers(own) for name, own in model.filling.items()},
+        "block": model.block, "noise": familiar.noise,
         "compared": [familiar.low, familiar.high],
         "sides": [place.side for place in model.places], "answer": dict(about),
     })  # fmt: skip
-    for name in ("centre", "spread", "coefficients"):
+    for name in _RIDGE:
         write_plain(group, f"ridge_{name}", getattr(ridge, name), ("column",))
+        for observable, own in model.filling.items():
+            write_plain(group, f"filling_{observable}_{name}", getattr(own, name), ("summary",))
     write_plain(group, "winds", model.winds, ("window",))
     write_plain(group, "errors", model.errors, ("window",))
     for name, dims in _FAMILIAR.items():
@@ -52,6 +56,10 @@ def write(path: Path, model: ReadingModel, about: Mapping[str, Any]) -> None:
         write_plain(group, f"hoist_{number}", place.hoist, ("end", "coordinate"))
         write_plain(group, f"background_{number}", place.background, (f"row_{number}", f"col_{number}"))
         write_plain(group, f"bare_{number}", place.bare, (f"row_{number}", f"col_{number}"))
+
+
+def _numbers(ridge: Ridge) -> dict[str, float]:
+    return {"offset": ridge.offset, "penalty": ridge.penalty}
 
 
 def read(path: Path) -> ReadingModel:
@@ -75,10 +83,11 @@ def read(path: Path) -> ReadingModel:
             network=about["network"], identity=about["identity"],
             size=FlagSize(length=about["flag_size"][0], height=about["flag_size"][1]), step=about["step"],
             names=tuple(about["features"]),
-            ridge=Ridge(
-                centre=array("ridge_centre"), spread=array("ridge_spread"), coefficients=array("ridge_coefficients"),
-                offset=about["offset"], penalty=about["penalty"],
-            ),
+            filling={
+                name: Ridge(**{part: array(f"filling_{name}_{part}") for part in _RIDGE}, **numbers)
+                for name, numbers in about["filling"].items()
+            },
+            ridge=Ridge(**{part: array(f"ridge_{part}") for part in _RIDGE}, **about["ridge"]),
             winds=array("winds"), errors=array("errors"), block=about["block"],
             familiar=Familiar(
                 noise=about["noise"], low=about["compared"][0], high=about["compared"][1],

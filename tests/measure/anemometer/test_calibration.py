@@ -11,7 +11,7 @@ from flagdata.errors import InputError, RefusedError
 from measure.anemometer.intervals import half_width, mean_errors
 from measure.anemometer.regression import Ridge, blocks_of, validated, with_neighbours
 from measure.calibrate.wind import Log
-from tests.measure.anemometer.made import STEP, features, gusts, model, recording, slow
+from tests.measure.anemometer.made import NAMES, STEP, features, gusts, model, recording, slow
 
 _RNG = np.random.default_rng(3)
 
@@ -81,14 +81,29 @@ def test_two_recordings_are_taken_together_and_share_no_neighbours() -> None:
     assert {one.kind for one in both.findings} == {"short-calibration", "anemometer-accuracy"}
 
 
-def test_a_feature_that_films_often_do_not_show_is_left_out_and_a_gap_is_filled() -> None:
+def test_an_observable_that_films_often_do_not_show_is_left_out() -> None:
     own = recording()
     values = own.features.values.copy()
     values[::3, 0] = np.nan
-    values[5, 1] = np.nan
+    assert model(replace(own, features=replace(own.features, values=values))).model.names == NAMES[1:]
+    values[::3, 0], values[::9, 0] = own.features.values[::3, 0], np.nan
     found = model(replace(own, features=replace(own.features, values=values)))
-    assert found.model.names == ("b", "c", "d", "e", "f")
+    assert found.model.names == NAMES
     assert np.isfinite(found.model.errors).all()
+
+
+def test_a_film_that_does_not_show_an_observable_is_read_by_the_rest() -> None:
+    """What is missing is inferred from the others, so that the reading is nearly as good."""
+    found = model().model
+    later = features(gusts(240.0, seed=11), seed=11)
+    values = later.values.copy()
+    values[:, 0] = np.nan
+    without = replace(later, values=values)
+    assert found.unseen(without) == {"droop": 1.0}
+    assert found.unseen(later) == {}
+    logged = recording(seed=11).winds(0.0)
+    errors = [float(np.std(found.read(found.used(one)) - logged)) for one in (later, without)]
+    assert errors[1] < 1.2 * errors[0]
 
 
 def test_a_steady_wind_a_short_film_and_a_film_of_something_else_are_refused() -> None:
