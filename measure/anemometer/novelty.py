@@ -29,7 +29,7 @@ from models.outliers import shrunk_covariance
 
 Floats = NDArray[np.float64]
 
-SHIFT, FRAMING, BACKGROUND = 0.7, 0.2, 0.4
+SHIFT, FRAMING, BACKGROUND = 0.45, 0.2, 0.4
 """Levels, fixed on simulated flags of other seeds than those that judge (decision 047)."""
 LEAST_WINDOWS, LEAST_SHARE = 3, 0.1
 """Windows, and share of the windows, that must read a wind of the calibration."""

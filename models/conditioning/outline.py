@@ -88,19 +88,19 @@ class Outliner:
     @classmethod
     def of(cls, pictures: Sequence[NDArray[np.uint8]] | NDArray[np.uint8], found: Conditioning) -> Outliner | None:
         """From pictures as `Conditioning.show` gives them, spread over the film or a part of it in one light; None
-        where nothing moves or a cloth that hangs from above does.
+        where nothing moves, or a cloth that moves least at its top and has no pole at either side.
 
         Args:
             pictures: (size, size) each; `SAMPLE` of them are taken.
             found: of the film.
         """
         region = found.region
-        if region is None or region.hoist == "top" or len(pictures) < 10:
+        if region is None or len(pictures) < 10:
             return None
         small = np.stack([halved(picture) for picture in pictures[:: -(-len(pictures) // SAMPLE)]])
         still, width = _still(small)
         within, hoist = _within(found, still, region)
-        if not within.any():
+        if hoist is None or not within.any():
             return None
         outside = within == 0
         texture = _blurred(np.where(outside, np.abs(still - cv2.GaussianBlur(still, (0, 0), 2)), 0.0), _TEXTURE_NEAR)
@@ -178,9 +178,10 @@ def halved(picture: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 def _within(
     found: Conditioning, still: NDArray[np.float32], region: Region
-) -> tuple[NDArray[np.uint8], Literal["left", "right"]]:
+) -> tuple[NDArray[np.uint8], Literal["left", "right"] | None]:
     """The hull of the weighted part of the pictures, as far as the hoist, and the hoist's side: where motion is least,
-    unless an upright edge at the other side is much stronger, as a pole's."""
+    unless an upright edge at the other side is much stronger, as a pole's. A flag in strong wind may move least at its
+    top: then the stronger upright edge decides, and None is the side of a cloth without any."""
     shown = (found.weight >= 1).astype(np.uint8)
     shown = np.asarray(cv2.resize(shown, still.shape[::-1], interpolation=cv2.INTER_NEAREST), np.uint8)
     contours, _ = cv2.findContours(shown, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
@@ -196,6 +197,8 @@ def _within(
     ends, at_right = _upright(still, hull, place=right - x, size=size, away=-1)
     at_left, at_right = (s * (_LEAST_MOVED if region.hoist == side else 1) for s, side in
                          ((at_left, "left"), (at_right, "right")))  # fmt: skip
+    if region.hoist == "top" and max(at_left, at_right) < _FAINT:
+        return hull, None
     if at_left >= at_right:
         hull[:, :begins] = 0
         return hull, "left"

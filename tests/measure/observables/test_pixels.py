@@ -119,6 +119,21 @@ def test_a_houses_windows_are_not_cloth() -> None:
     assert (masks & ~true)[:, :, 90:].mean() < 0.02  # beyond 180 px, where the windows are
 
 
+def test_a_flag_that_moves_least_at_its_top_hangs_at_its_pole(seen: Seen) -> None:
+    """As in strong wind; a cloth without a pole at either side hangs from above, and has no outline."""
+    film = seen.painted
+    found = conditioned(film.frames, film.cloth.times, size=SIDE)
+    assert found.found.region is not None
+    above = replace(found.found, regions=(replace(found.found.region, hoist="top"),))
+    outliner = Outliner.of(found.frames, above)
+    assert outliner is not None
+    assert outliner.hoist == "left"
+    bare = found.frames.copy()
+    pole = slice(int(HOIST[0]) - POLE - 2, int(HOIST[0]) + 2)
+    bare[:, :, pole] = np.linspace(200, 170, SIDE)[:, None].astype(np.uint8)
+    assert Outliner.of(bare, above) is None
+
+
 def test_the_hoist_is_where_the_pole_ends(seen: Seen) -> None:
     """To a pixel of the halved picture along the wind, and to 4 % of the height, which gives the scale."""
     ends = (HOIST + np.array([[0.0, -HEIGHT / 2], [0.0, HEIGHT / 2]]) * SCALE) / HALVED
