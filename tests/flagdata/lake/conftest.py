@@ -62,7 +62,7 @@ class Worker:
         return self.said.read_text().split("\n")[:-1] if self.said.exists() else []
 
     def await_line(self, line: str) -> None:
-        deadline = time.monotonic() + 120
+        deadline = time.monotonic() + 500
         while line not in self.lines():
             assert "failed" not in self.lines()
             assert time.monotonic() < deadline

@@ -13,7 +13,6 @@ import signal
 import sys
 import traceback
 from hashlib import sha256
-from pathlib import Path
 
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.transaction import Transaction
@@ -49,7 +48,7 @@ def ingest(lake: Lake, prefix: str, count: int, shared: int, said: int) -> None:
         os.write(said, f"{artifact.id}\n".encode())
 
 
-def serve(lake: Lake) -> None:
+def serve(address: str) -> None:
     code_version()  # asks git, once for all
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # the kernel buries the dead
     for line in sys.stdin:
@@ -59,7 +58,7 @@ def serve(lake: Lake) -> None:
             status = 1
             try:
                 signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-                ingest(lake, prefix, int(count), int(shared), said)
+                ingest(Lake.open(address), prefix, int(count), int(shared), said)
                 status = 0
             except BaseException:  # noqa: BLE001 — the worker ends here whatever happened
                 traceback.print_exc()  # os._exit says nothing of what ended the worker
@@ -69,4 +68,4 @@ def serve(lake: Lake) -> None:
 
 
 if __name__ == "__main__":
-    serve(Lake.open(Path(sys.argv[1])))
+    serve(sys.argv[1])
