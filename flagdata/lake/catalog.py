@@ -301,15 +301,22 @@ class Catalog:
             CorruptError: an entry of the log that cannot be read, or that no writer of a catalog writes.
         """
         head = self.head()
-        if self._history is None or self._history[0] != head:
-            table = self._open(head)
-            with self._log_errors():
-                found = table.history()
-            # The Delta library lists the log as it is by now, and counts its versions down from the table's.
-            later = max(0, len(found) - (head + 1))
-            entries = [self._stated({**entry, "version": entry["version"] + later}) for entry in found[later:]]
-            self._history = (head, entries)
+        known = self._history
+        if known is None or known[0] > head:
+            known = (head, self._whole_history(head))
+        # Entries never change, so that a process reads each once: in a bucket each is a request.
+        unread = range(head, known[0], -1)
+        later = [self._stated({**self._entries.info(version), "version": version}) for version in unread]
+        self._history = (head, [*later, *known[1]])
         return self._history[1][:limit]
+
+    def _whole_history(self, head: int) -> list[dict[str, Any]]:
+        table = self._open(head)
+        with self._log_errors():
+            found = table.history()
+        # The Delta library lists the log as it is by now, and counts its versions down from the table's.
+        later = max(0, len(found) - (head + 1))
+        return [self._stated({**entry, "version": entry["version"] + later}) for entry in found[later:]]
 
     def _stated(self, entry: Mapping[str, Any]) -> dict[str, Any]:
         """What the log says of a version."""

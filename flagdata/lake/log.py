@@ -139,6 +139,14 @@ class Log:
         """
         return self._text(version).encode(), self._content(version)[0]
 
+    def info(self, version: int) -> dict[str, Any]:
+        """What the writer of an entry said of its commit.
+
+        Raises:
+            CorruptError: it cannot be read.
+        """
+        return self._content(version)[1]
+
     def adopt(self, version: int, entry: bytes) -> bool:
         """Put an entry of another lake of the same history; False where there is another one of that version."""
         path = self.path(version)

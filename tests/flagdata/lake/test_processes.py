@@ -53,6 +53,25 @@ def test_the_history_at_a_head_is_the_same_while_others_commit(
     assert reader.history() == expected
 
 
+def test_a_process_reads_what_others_committed_once_and_finds_the_history_that_a_fresh_one_does(
+    lake: Lake, put_text: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reader = Lake.open(lake.path).catalog
+    put_text(lake, "one")
+    assert reader.history()[0]["message"] == "ingest one"
+    read: list[int] = []
+    content = reader._entries._content
+    monkeypatch.setattr(reader, "_whole_history", None)  # is read no more
+    monkeypatch.setattr(reader._entries, "_content", lambda version: read.append(version) or content(version))
+    put_text(lake, "two")
+    lake.branch("side")
+    put_text(lake, "three", branch="side")
+    assert reader.history() == Lake.open(lake.path).catalog.history()
+    assert read == [3, 2]
+    assert reader.history(1)[0]["message"] == "ingest three"
+    assert read == [3, 2]
+
+
 def test_collection_beside_ingests_deletes_nothing_that_they_publish(
     lake: Lake, start_worker: Callable[..., Any]
 ) -> None:
