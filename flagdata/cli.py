@@ -54,6 +54,7 @@ VERBS: dict[str, tuple[str, str]] = {
     "doctor": ("flagdata.commands.upkeep:doctor", "Find and explain what is wrong with a lake, or a data set."),
     "du": ("flagdata.commands.looking:du", "Show what takes space, by kind and by version."),
     "gc": ("flagdata.commands.upkeep:gc", "Delete unreferenced files."),
+    "expire": ("flagdata.commands.upkeep:expire", "Let old versions expire, with a trace."),
     "recover": ("flagdata.commands.upkeep:recover", "Salvage a record that was cut off."),
     "challenge": ("measure.challenge.command:challenge", "Benchmark close-loop on blind data sets."),
     "blender-setup": ("sim.blender.command:blender_setup", "Make the environment that Blender renders in."),

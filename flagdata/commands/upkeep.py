@@ -1,4 +1,4 @@
-"""`flagdata verify|doctor|gc|recover`: is the lake whole, and putting it right."""
+"""`flagdata verify|doctor|gc|expire|recover`: is the lake whole, and putting it right."""
 
 from __future__ import annotations
 
@@ -156,6 +156,44 @@ def gc(grace: timedelta, dry_run: bool, as_json: bool, lake_path: str) -> None:
     verb = "would be deleted" if dry_run else "deleted"
     what = f"{counted(len(found.objects), 'object')} and {counted(len(found.leftovers), 'leftover')}"
     say(f"{what}, {size_text(found.size)}, {verb}")
+
+
+@click.command()
+@click.option("--older-than", type=Duration(), metavar="AGE", help="Versions that another replaced so long ago: 30d.")
+@click.option("--keep", type=click.IntRange(min=1), metavar="N", help="All but the newest N versions.")
+@click.option("--message", "-m", help="Why.")
+@click.option("--dry-run", is_flag=True, help="Say what would go, delete nothing.")
+@json_option
+@lake_option
+def expire(
+    older_than: timedelta | None, keep: int | None, message: str | None, dry_run: bool, as_json: bool, lake_path: str
+) -> None:
+    """Let old versions expire: delete the data that no other version, branch or tag shows, at once.
+
+    The log keeps which versions expired, why, and what went; ls, export and doctor say so. With both options the
+    versions expire that both name. Catalog rows stay readable.
+    """
+    from dataclasses import asdict
+
+    from flagdata.lake import Lake
+    from flagdata.lake.expiry import expire as expiring
+    from flagdata.lake.expiry import last_version
+
+    if older_than is None and keep is None:
+        raise UsageError("which versions expire is not given", fix="give --older-than AGE, --keep N, or both")
+    lake = Lake.open(lake_path)
+    found = expiring(lake, last_version(lake, older_than=older_than, keep=keep), message, dry_run=dry_run)
+    if as_json:
+        document("expire", {**asdict(found), "deleted": not dry_run})
+        return
+    for name in found.objects:
+        click.echo(name)
+    if found.up_to < 0:
+        say("no version is that old")
+        return
+    by = "would expire" if found.version is None else f"expired by version {found.version}"
+    gone = f"{counted(len(found.objects), 'object')}, {size_text(found.size)}"
+    say(f"versions up to {found.up_to} {by}: {gone}, {'would go' if dry_run else 'deleted'}")
 
 
 @click.command()

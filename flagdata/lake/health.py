@@ -18,7 +18,7 @@ from flagdata.lake.leases import LeaseState, collecting, last_written, leases, u
 from flagdata.lake.log import LogGapError
 from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import StoredObject
-from flagdata.lake.removals import erased, removals
+from flagdata.lake.removals import erased, expirations, removals
 from flagdata.schema import FORMAT_VERSION
 from flagdata.storage import Place
 
@@ -51,6 +51,7 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
     if not marked.findings:
         held = {name for state in states if state.alive for name in state.objects}
         findings += _erased(lake, marked)
+        findings += _expired(lake, marked, {found.name for found in stored})
         findings += _collected(lake, marked, {found.name for found in stored})
         needed = marked.objects | held
         findings += [_orphan(found, grace) for found in stored if found.name not in needed]
@@ -214,11 +215,25 @@ def _erased(lake: Lake, marked: Marked) -> list[Finding]:
     return findings
 
 
+def _expired(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
+    """A note for each commit that let versions expire, of which data went."""
+    return [
+        Finding(
+            kind="expired", severity=Severity.NOTE, count=len(gone), where=f"versions up to {one.up_to}",
+            what=f"{len(gone)} of the objects that these versions show went when they expired, by version "
+            f"{one.version} ({one.message})",
+            fix=f"none needed; all branches and tags, and versions from {one.version} on, are whole without them",
+        )
+        for one in expirations(lake)
+        if (gone := one.objects - _needed(marked) - frozenset(stored))
+    ]  # fmt: skip
+
+
 def _collected(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
     """A note where gc has deleted what was withdrawn, so that older versions show rows without data."""
-    needed = {name for table in marked.refs.values() for name in table["object"].drop_null().to_pylist()}
     try:
-        gone = lake.catalog.objects() - needed - frozenset(stored)
+        gone = lake.catalog.objects() - _needed(marked) - frozenset(stored)
+        gone -= {name for one in expirations(lake) for name in one.objects}
         last = next((r for r in removals(lake) if not gone.isdisjoint(r.objects.values())), None) if gone else None
     except FlagdataError as error:  # a file of which older versions are made
         kind = "catalog-file-unreadable"
@@ -236,6 +251,11 @@ def _collected(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Find
             fix=f"none needed; all tags, and versions from {last.version} on, are whole without them",
         )
     ]
+
+
+def _needed(marked: Marked) -> frozenset[str]:
+    """Names of the objects that a branch or tag shows."""
+    return frozenset(name for table in marked.refs.values() for name in table["object"].drop_null().to_pylist())
 
 
 def _orphan(stored: StoredObject, grace: timedelta) -> Finding:

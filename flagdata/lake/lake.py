@@ -20,6 +20,7 @@ from flagdata.lake.catalog import newer
 from flagdata.lake.deletion import check_reuse, delete
 from flagdata.lake.durable import disk_errors, put_if_absent
 from flagdata.lake.erasure import Erasure, erase
+from flagdata.lake.expiry import check_whole
 from flagdata.lake.labels import Value, put
 from flagdata.lake.layout import FOLDERS, STORES, scratch_files
 from flagdata.lake.leases import collecting
@@ -218,11 +219,13 @@ class Lake(Store):
 
         Raises:
             UsageError: a name that cannot be one.
-            ConflictError: the name is taken, or was that of a tag that showed other artifacts.
+            ConflictError: the name is taken, or was that of a tag that showed other artifacts; or data of an expired
+                version went.
         """
         self.check_writable()
         with collecting(self.staging):  # one ref at a time, so that no name is both a tag and a branch
             view = self.view(at)
+            check_whole(self, view)
             check_reuse(self, name, view)
             return self.refs.put("tags", name, view)
 
@@ -231,11 +234,13 @@ class Lake(Store):
 
         Raises:
             UsageError: a name that cannot be one.
-            ConflictError: the name is taken.
+            ConflictError: the name is taken; data of an expired version went.
         """
         self.check_writable()
         with collecting(self.staging):  # one ref at a time, so that no name is both a tag and a branch
-            return self.refs.put("branches", name, self.view(at))
+            view = self.view(at)
+            check_whole(self, view)
+            return self.refs.put("branches", name, view)
 
     def delete_tag(self, name: str, message: str | None = None, *, discard: bool = False) -> int:
         """Delete a tag; the version that notes it. Its name never shows another version.

@@ -41,6 +41,21 @@ def noted_erased(entry: Entry) -> Mapping[str, str | None]:
         return dict(from_json(entry.get("erased", "{}")).items())
 
 
+EXPIRED = "expired"
+"""Note of a commit that let versions expire."""
+
+
+def noted_expired(entry: Entry) -> tuple[int, frozenset[str]]:
+    """The newest version that a commit let expire, with all before it, and the names of the objects that went.
+
+    Raises:
+        CorruptError: the note cannot be read.
+    """
+    with _reading(entry):
+        noted = from_json(entry[EXPIRED])
+        return int(noted["up_to"]), frozenset(str(name) for name in noted["objects"])
+
+
 def noted_view(entry: Entry) -> View:
     """What the tag showed that a commit deleted, or what the branch began from.
 

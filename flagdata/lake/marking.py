@@ -36,8 +36,12 @@ class Marked:
     findings: tuple[Finding, ...]
 
 
-def mark(lake: Store, *, grace: timedelta) -> Marked:
-    """Read every ref, and what was shown before each withdrawal and deletion younger than `grace`."""
+def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
+    """Read every ref, and what was shown before each withdrawal and deletion younger than `grace`.
+
+    Args:
+        first: and what any version from this one on shows.
+    """
     refs: dict[str, pa.Table] = {}
     recent: list[pa.Table] = []
     findings: list[Finding] = []
@@ -61,7 +65,7 @@ def mark(lake: Store, *, grace: timedelta) -> Marked:
             findings.append(_unreadable(error, f"ref {name}"))
     try:
         findings += _lost(lake.catalog.rows(lake.catalog.head()), names)
-        recent = list(_withdrawn(lake, since=datetime.now(UTC) - grace))
+        recent = list(_withdrawn(lake, since=datetime.now(UTC) - grace, first=first))
     except FlagdataError as error:
         findings.append(_unreadable(error, "recent versions"))
     objects = {name for table in (*kept, *recent) for name in table["object"].drop_null().to_pylist()}
@@ -126,18 +130,19 @@ def _lost(head: pa.Table, known: list[str]) -> list[Finding]:
     ]
 
 
-def _withdrawn(lake: Store, *, since: datetime) -> Iterator[pa.Table]:
+def _withdrawn(lake: Store, *, since: datetime, first: int | None) -> Iterator[pa.Table]:
     limit = since.timestamp() * 1000
     for entry in lake.catalog.history():
-        if entry["timestamp"] < limit:
-            continue
         before = entry["version"] - 1
+        recent = entry["timestamp"] >= limit
+        if not recent and (first is None or before < first):
+            continue
         if "withdrawn" in entry:
             yield _unerased(lake, lake.catalog.rows(before), (Slice(branch=MAIN, version=before),))
         if noted_hidden(entry):  # rows of a base, which may have left the table long ago
             view = lake.lineage().view(Slice(branch=entry["branch"], version=before))
             yield _unerased(lake, lake.table(view), view)
-        if "deleted" in entry:
+        if recent and "deleted" in entry:
             yield _unerased(lake, lake.table(noted_view(entry)), noted_view(entry))
 
 

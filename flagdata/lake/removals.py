@@ -1,4 +1,4 @@
-"""Commits that took rows off: withdrawals, merges that carry them over, deletions of branches."""
+"""Commits that took rows or data off: withdrawals, merges that carry them over, deletions of branches, expirations."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from datetime import timedelta
 import pyarrow as pa
 
 from flagdata.errors import FlagdataError, NotFoundError
-from flagdata.lake.lineage import noted_erased, noted_hidden
+from flagdata.lake.lineage import EXPIRED, noted_erased, noted_expired, noted_hidden
 from flagdata.lake.marking import mark
 from flagdata.lake.refs import MAIN
 from flagdata.lake.store import Store
@@ -59,9 +59,30 @@ def erased(lake: Store) -> dict[str, tuple[int, str]]:
     }
 
 
+@dataclass(frozen=True, kw_only=True)
+class Expiration:
+    """A commit that let the versions up to one expire: which, why, and the objects that went."""
+
+    version: int
+    up_to: int
+    message: str
+    objects: frozenset[str]
+
+
+def expirations(lake: Store) -> list[Expiration]:
+    """The commits that let versions expire, newest first."""
+    found = []
+    for entry in lake.catalog.history():
+        if EXPIRED in entry:
+            up_to, objects = noted_expired(entry)
+            message = entry.get("message", "")
+            found.append(Expiration(version=entry["version"], up_to=up_to, message=message, objects=objects))
+    return found
+
+
 def explained(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
-    """Why an object is missing: it was erased, or collected after a version withdrew what it held; `missing` where no
-    version did, or where the catalog cannot be asked."""
+    """Why an object is missing: it was erased, it went with versions that expired, or it was collected after a version
+    withdrew what it held; `missing` where no version did, or where the catalog cannot be asked."""
     try:
         if name in mark(lake, grace=timedelta(0)).objects:
             return missing
@@ -71,6 +92,13 @@ def explained(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
                 f"{name} was erased from all versions by version {version} ({message})", where=missing.where,
                 fix="leave its artifact out by --where; no version has its data any more",
             )  # fmt: skip
+        for one in expirations(lake):
+            if name in one.objects:
+                return NotFoundError(
+                    f"{name} went when versions up to {one.up_to} expired, by version {one.version} ({one.message})",
+                    where=missing.where,
+                    fix=f"use a tag, or a version from {one.version} on; ingesting the source again restores it",
+                )
         for removal in removals(lake):
             if name in removal.objects.values():
                 return NotFoundError(

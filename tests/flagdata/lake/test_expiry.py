@@ -1,0 +1,125 @@
+"""Expiring versions: what only they show goes at once, with a trace; branches, tags and newer versions lose nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+
+from flagdata.errors import ConflictError, NotFoundError
+from flagdata.export import Export, export
+from flagdata.lake import Artifact, Lake
+from flagdata.lake.collect import collect
+from flagdata.lake.expiry import expire, last_version
+from flagdata.lake.health import doctor, is_healthy, verify_catalog
+from flagdata.lake.removals import lost
+from tests.program import invoke
+
+Put = Callable[..., Artifact]
+
+
+def stored(lake: Lake) -> set[str]:
+    return {one.name for one in lake.objects}
+
+
+def test_what_only_expired_versions_show_goes_and_ls_export_and_doctor_say_alike_by_which_version(
+    lake: Lake, put_text: Put, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    blurred, film = put_text(lake, "blurred"), put_text(lake, "film")  # versions 1 and 2
+    lake.withdraw([blurred.id], "out of focus")
+    done = expire(lake, 2, "the first season")
+    assert (done.version, done.objects, done.size) == (4, (blurred.object,), len("blurred"))
+    assert stored(lake) == {film.object}
+    (why,) = lost(lake, lake.rows(at="2")).values()
+    assert "went when versions up to 2 expired, by version 4 (the first season)" in why.what
+    listed = invoke(capsys, "ls", "--at", "2", "--lake", lake.path)
+    assert f"without data: blurred: {why.what}" in listed.err
+    with pytest.raises(NotFoundError) as refused:
+        export(lake, Export(format="csv", at="2", where="name = 'blurred'"), tmp_path / "out")
+    assert refused.value.what == why.what
+    (note,) = doctor(lake)
+    assert (note.kind, note.where, note.count) == ("expired", "versions up to 2", 1)
+    assert "by version 4 (the first season)" in note.what
+    assert not verify_catalog(lake)
+    newest = invoke(capsys, "log", "--limit", "1", "--json", "--lake", lake.path).document["commits"][0]
+    assert (newest["version"], newest["message"]) == (4, "the first season")
+
+
+def test_branches_tags_and_versions_that_have_not_expired_keep_their_data(lake: Lake, put_text: Put) -> None:
+    tagged, branched, later, gone = (put_text(lake, name) for name in ("tagged", "branched", "later", "gone"))
+    lake.tag("v1", at="1")
+    lake.branch("b", at="2")
+    lake.withdraw([gone.id], "version 5")
+    lake.withdraw([tagged.id, branched.id, later.id], "version 6")
+    assert set(expire(lake, 4).objects) == {gone.object}  # version 5 still shows the others
+    assert stored(lake) == {tagged.object, branched.object, later.object}
+    assert set(expire(lake, 5).objects) == {later.object}
+    assert stored(lake) == {tagged.object, branched.object}
+    for ref in ("v1", "b"):
+        assert not lost(lake, lake.rows(at=ref))
+    assert is_healthy(doctor(lake))
+    assert collect(lake, grace=timedelta(0)).objects == ()
+
+
+def test_no_new_tag_or_branch_shows_what_went_and_ingesting_again_restores_it(lake: Lake, put_text: Put) -> None:
+    film = put_text(lake, "film")
+    lake.withdraw([film.id], "blurred")
+    expire(lake, 1)
+    for name in (lake.tag, lake.branch):
+        with pytest.raises(ConflictError, match="went when versions up to 1 expired"):
+            name("old", at="1")
+    assert put_text(lake, "film").id == film.id
+    assert not lost(lake, lake.rows(at="1"))
+    assert doctor(lake) == ()
+    lake.tag("old", at="1")
+
+
+def test_what_a_running_transaction_holds_stays(lake: Lake, put_text: Put) -> None:
+    film = put_text(lake, "film")
+    lake.withdraw([film.id], "blurred")
+    with lake.transaction("again") as tx:
+        tx.add(Artifact(kind="measurement", name="of it", object=film.object))
+        assert expire(lake, 1).objects == ()
+    assert stored(lake) == {film.object}
+
+
+def test_versions_are_chosen_by_age_and_by_how_many_are_newer(
+    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("a", "b", "c"):
+        put_text(lake, name)  # versions 1 to 3
+    assert [last_version(lake, older_than=None, keep=keep) for keep in (1, 2, 4, 9)] == [2, 1, -1, -1]
+    now = lake.catalog.history()[0]["timestamp"]
+    days = {0: 40, 1: 30, 2: 20, 3: 0}
+    dated = [{"version": v, "timestamp": now - days[v] * 86_400_000} for v in (3, 2, 1, 0)]
+    monkeypatch.setattr(lake.catalog, "history", lambda: dated)
+    # Version 0 was replaced 30 days ago, version 1 20 days ago, version 2 just now.
+    ages = {day: last_version(lake, older_than=timedelta(days=day), keep=None) for day in (35, 25, 15, 0)}
+    assert ages == {35: -1, 25: 0, 15: 1, 0: 2}
+    assert last_version(lake, older_than=timedelta(days=15), keep=4) == -1
+
+
+def test_the_command_says_what_would_go_and_deletes_nothing_then(
+    lake: Lake, put_text: Put, capsys: pytest.CaptureFixture[str]
+) -> None:
+    film = put_text(lake, "film")
+    lake.withdraw([film.id], "blurred")
+    where = ("--lake", lake.path)
+    tried = invoke(capsys, "expire", "--keep", "1", "--dry-run", *where)
+    assert (tried.code, tried.out) == (0, f"{film.object}\n")
+    assert "versions up to 1 would expire: 1 object, 4 B, would go" in tried.err
+    assert stored(lake) == {film.object}
+    assert lake.catalog.head() == 2
+    done = invoke(capsys, "expire", "--keep", "1", "--json", *where).document
+    assert (done["up_to"], done["objects"], done["version"]) == (1, [film.object], 3)
+    assert invoke(capsys, "expire", *where).code == 2
+    assert "no version is that old" in invoke(capsys, "expire", "--older-than", "9d", *where).err
+
+
+def test_a_lake_in_a_bucket_expires_alike(remote_lake: Lake, put_text: Put) -> None:
+    film = put_text(remote_lake, "film")
+    remote_lake.withdraw([film.id], "blurred")
+    assert expire(remote_lake, 1).objects == (film.object,)
+    assert stored(remote_lake) == set()
