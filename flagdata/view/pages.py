@@ -49,10 +49,10 @@ ICON = (
 )
 _FILMED = frozenset({Kind.CAMERA, Kind.RECORDING, Kind.CLIP, *DRAWN})
 _ASIDE = frozenset({"artifact", "name", "kind", "parents", "report", "recipe", "parameters", "clock_model", "quality"})
+_CLOCK = (("clock_offset", "offset", "s"), ("clock_sigma", "σ of the offset", "s"), ("clock_drift", "drift", "s/s"))
 _EVIDENCE = (
-    ("offset", "offset", "s"), ("sigma", "σ of the offset", "s"), ("interval", "interval of the offset", "s"),
+    ("interval", "interval of the offset", "s"), ("drift_sigma", "σ of the drift", "s/s"),
     ("confidence", "confidence", ""), ("chance", "probability by chance", ""), ("correlation", "correlation", ""),
-    ("drift", "drift", "s/s"), ("drift_sigma", "σ of the drift", "s/s"),
 )  # fmt: skip
 
 
@@ -244,6 +244,7 @@ def _evidence(row: Mapping[str, Any], report: Mapping[str, Any]) -> list[tuple[s
     if row["clock_method"] is None:
         return []
     found = [("method", str(row["clock_method"]))]
+    found += [(words, f"{row[name]:.4g} {unit}") for name, words, unit in _CLOCK if row[name] is not None]
     for name, words, unit in _EVIDENCE:
         value = report.get(name)
         if isinstance(value, int | float):

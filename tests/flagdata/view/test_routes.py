@@ -69,6 +69,7 @@ def test_the_page_of_an_artifact_shows_film_clips_alignment_findings_and_lineage
     of_network = text(shown, f"artifact/{shown.network}")
     assert "data-series" not in of_network
     shown.lake.tag("v1")
+    assert "<dt>σ of the offset</dt><dd>0.2 s</dd>" in page
     at_tag = text(shown, f"artifact/{shown.clip}?at=v1")
     assert f"/key/artifact/{shown.recording}?at=v1" in at_tag
     assert f"/key/artifact/{shown.recording}&#34;" not in at_tag
