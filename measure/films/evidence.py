@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,8 @@ from scipy.special import gammaln, logsumexp, ndtr
 
 from measure.calibrate.emulator import BESIDE
 from measure.calibrate.prior import CLOTH, NUISANCES, Floats, Uncertain
-from measure.films.model import Model, log_t
+from measure.films.model import Model
+from measure.films.scatter import Scatter, scatter
 
 _STEPS = 14
 _DIFFERENCE = 1e-3
@@ -70,6 +72,11 @@ class Experiments:
     def __len__(self) -> int:
         return len(self.summaries[0])
 
+    @cached_property
+    def whole(self) -> Floats:
+        """(n, k) of all recordings side by side."""
+        return np.concatenate(self.summaries, axis=1)
+
     def repeated(self, times: int) -> Experiments:
         """Each so many times, one after the other."""
         return Experiments(
@@ -89,12 +96,14 @@ class Fit:
     Attributes:
         evidence: (n,) logarithms of p(y | e).
         misfit: (n,) squared standardised distance at the mode, that of the scores from their prior included.
+        mode: (n, dimension) normal scores there.
         scores: (n, draw, dimension) of importance samples.
         weights: (n, draw) of them, of sum 1.
     """
 
     evidence: Floats
     misfit: Floats
+    mode: Floats
     scores: Floats
     weights: Floats
 
@@ -110,6 +119,11 @@ class Hypothesis:
 
     sights: tuple[Sight, ...]
     effect: Uncertain | None = None
+
+    @cached_property
+    def scatter(self) -> Scatter:
+        """Of all recordings' summaries about their prediction."""
+        return scatter([one.model for one in self.sights], None if self.effect is None else self.effect.name)
 
     @property
     def dimension(self) -> int:
@@ -134,22 +148,24 @@ class Hypothesis:
         places = [own[first] for first in owners]
         return cloth, places, None if self.effect is None else self.effect.at(next(shares))
 
-    def predicted(self, scores: Floats) -> tuple[list[tuple[Floats, Floats]], Floats]:
-        """For each recording means (n, k) and factors of the scale (n,); and the area weights (n,) [kg/m²]."""
+    def predicted(self, scores: Floats) -> tuple[Floats, Floats, Floats]:
+        """Means (n, k) of all recordings' summaries, their variances (n, k) in the scatter's coordinates, and the area
+        weights (n,) [kg/m²]."""
         cloth, places, strength = self.values(scores)
         name = None if self.effect is None else self.effect.name
         found = [
             sight.model.predict({**cloth, **place}, name, strength)
             for sight, place in zip(self.sights, places, strict=True)
         ]
-        return found, cloth["area_weight"]
+        mean = np.concatenate([own for own, _, _ in found], axis=1)
+        stretch, leverage = (np.mean([own[place] for own in found], axis=0) for place in (1, 2))
+        return mean, self.scatter.variances(stretch, leverage), cloth["area_weight"]
 
     def log_posterior(self, scores: Floats, observed: Experiments) -> Floats:
         """(n,) logarithm of likelihood times prior, but for a constant of stated weights."""
-        found, weight = self.predicted(scores)
+        mean, variances, weight = self.predicted(scores)
         total = -0.5 * np.square(scores).sum(axis=1) - 0.5 * scores.shape[1] * np.log(2 * np.pi)
-        for sight, y, (mean, stretch) in zip(self.sights, observed.summaries, found, strict=True):
-            total += log_t(y - mean, sight.model.factor, stretch, sight.model.base.freedom)
+        total += self.scatter.log_density(observed.whole - mean, variances)
         return total - 0.5 * np.square(observed.off(weight))
 
     def fit(self, observed: Experiments, rng: np.random.Generator) -> Fit:
@@ -174,8 +190,11 @@ class Hypothesis:
         flat = scores.reshape(-1, d)
         ratio = self.log_posterior(flat, observed.repeated(scores.shape[1])).reshape(n, -1) - proposal
         evidence = logsumexp(ratio, axis=1) - np.log(scores.shape[1])
+        misfits = np.array([misfit for _, _, misfit in modes])
+        best = np.argmin(misfits, axis=0)
         return Fit(
-            evidence=evidence, misfit=np.min([misfit for _, _, misfit in modes], axis=0), scores=scores,
+            evidence=evidence, misfit=misfits.min(axis=0), scores=scores,
+            mode=np.array([at for at, _, _ in modes])[best, np.arange(n)],
             weights=np.exp(ratio - logsumexp(ratio, axis=1, keepdims=True)),
         )  # fmt: skip
 
@@ -191,33 +210,28 @@ class Hypothesis:
             at, value = np.where(better[:, None], tried, at), np.where(better, found, value)
             damping = np.where(better, damping / 5, damping * 4).clip(1e-6, 1e6)
         _, curvature = self._slope(at, observed)
-        found, weight = self.predicted(at)
+        mean, variances, weight = self.predicted(at)
         misfit = np.square(at).sum(axis=1) + np.square(observed.off(weight))
-        for sight, y, (mean, stretch) in zip(self.sights, observed.summaries, found, strict=True):
-            misfit += np.square(np.linalg.solve(sight.model.factor, (y - mean).T)).sum(axis=0) / stretch
-        return at, curvature, misfit
+        return at, curvature, misfit + self.scatter.distance(observed.whole - mean, variances)
 
     def _slope(self, at: Floats, observed: Experiments) -> tuple[Floats, Floats]:
         """Gradient (n, d) and Gauss–Newton's curvature (n, d, d) of minus the logarithm, at scores (n, d)."""
         n, d = at.shape
         moved = at[:, None] + _DIFFERENCE * np.concatenate([np.zeros((1, d)), np.eye(d)])
         gradient, curvature = -at.copy(), np.broadcast_to(np.eye(d), (n, d, d)).copy()
-        found, weight = self.predicted(moved.reshape(-1, d))
+        mean, variances, weight = self.predicted(moved.reshape(-1, d))
         if observed.stated is not None:
             off = observed.repeated(d + 1).off(weight).reshape(n, d + 1)
             slopes_of = (off[:, :1] - off[:, 1:]) / _DIFFERENCE
             gradient += slopes_of * off[:, :1]
             curvature += slopes_of[:, :, None] * slopes_of[:, None]
-        for sight, y, (mean, stretch) in zip(self.sights, observed.summaries, found, strict=True):
-            factor, freedom = sight.model.factor, sight.model.base.freedom
-            mean, stretch = mean.reshape(n, d + 1, -1), stretch.reshape(n, d + 1)[:, 0]
-            slopes = (mean[:, 1:] - mean[:, :1]) / _DIFFERENCE  # (n, d, k)
-            inverse = np.linalg.inv(factor)
-            white = (y - mean[:, 0]) @ inverse.T
-            slopes = slopes @ inverse.T
-            weight = (freedom + y.shape[1]) / (freedom * stretch + np.square(white).sum(axis=1))
-            gradient += weight[:, None] * np.einsum("ndk,nk->nd", slopes, white)
-            curvature += weight[:, None, None] * np.einsum("ndk,nek->nde", slopes, slopes)
+        mean, scale = mean.reshape(n, d + 1, -1), np.sqrt(variances.reshape(n, d + 1, -1)[:, 0])
+        white = ((observed.whole - mean[:, 0]) @ self.scatter.white.T) / scale
+        slopes = ((mean[:, 1:] - mean[:, :1]) / _DIFFERENCE) @ self.scatter.white.T / scale[:, None]
+        freedom = self.scatter.freedom
+        heavy = (freedom + white.shape[1]) / (freedom + np.square(white).sum(axis=1))
+        gradient += heavy[:, None] * np.einsum("ndk,nk->nd", slopes, white)
+        curvature += heavy[:, None, None] * np.einsum("ndk,nek->nde", slopes, slopes)
         return gradient, curvature
 
 

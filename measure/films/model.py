@@ -5,20 +5,18 @@ that the recording shows. An effect adds what it changed in pairs of simulations
 
     Δ = Dᵀz(s, θ),   z = (u, u², u ln w),
 
-u the strength or its logarithm, whichever predicts pairs that are left out better, and w the area weight. The
-predictive density stays a multivariate t. Its scale grows by what so few pairs leave open of D, and by how much farther
-simulations with the effect are from their prediction than those without.
+u the strength or its logarithm, whichever predicts pairs that are left out better, and w the area weight. How far what
+is shown lies from its prediction is in `measure.films.scatter`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
 
 from flagdata.errors import InputError
 from measure.calibrate.emulator import regressors
@@ -44,19 +42,14 @@ class Response:
         logarithmic: whether u is the strength's logarithm.
         coefficients: D (3, k).
         inverse: (ZᵀZ)⁻¹ (3, 3).
-        open: κ, the pairs' residual variance over that of the base model's regression.
-        wider: the mean square of simulations with the effect about their prediction over that of those without; 1 at
-            least.
-        pairs: that it was fitted to.
+        residuals: (pair, k) of the pairs; NaN of those that do not show all.
     """
 
     effect: Weighable
     logarithmic: bool
     coefficients: Floats
     inverse: Floats
-    open: float
-    wider: float
-    pairs: int
+    residuals: Floats
 
     def features(self, strength: Floats, weight: Floats) -> Floats:
         """z (n, 3) at strengths beyond null (n,) and area weights (n,) [kg/m²]."""
@@ -70,11 +63,15 @@ class Model:
     Attributes:
         base: of the summaries that are used.
         used: (2·observable,) which.
+        residuals: (simulation, k) of the base model's simulations; NaN of those that do not show all.
+        weights: (simulation,) their area weights [kg/m²], by which recordings of the same cloths are known.
         responses: name of an effect → what it changes.
     """
 
     base: Metamodel
     used: NDArray[np.bool_]
+    residuals: Floats
+    weights: Floats
     responses: Mapping[str, Response]
 
     @property
@@ -84,17 +81,16 @@ class Model:
 
     def predict(
         self, values: Mapping[str, Floats], effect: str | None = None, strength: Floats | None = None
-    ) -> tuple[Floats, Floats]:
-        """Means (n, k) of the used summaries, and factors (n,) of the scale matrix."""
+    ) -> tuple[Floats, Floats, Floats]:
+        """Means (n, k) of the used summaries, factors (n,) of the scatter, and of the pairs' residuals' covariance."""
         x = (regressors(values) - self.base.centre) / self.base.spread
         x = np.concatenate([np.ones((len(x), 1)), x], axis=1)
         mean, stretch = x @ self.base.coefficients, 1 + ((x @ self.base.inverse) * x).sum(axis=1)
         if effect is None or strength is None:
-            return mean, stretch
+            return mean, stretch, np.zeros(len(x))
         own = self.responses[effect]
         z = own.features(strength, values["area_weight"])
-        beyond = own.wider - 1 + own.open * ((z @ own.inverse) * z).sum(axis=1)
-        return mean + z @ own.coefficients, stretch + beyond
+        return mean + z @ own.coefficients, stretch, ((z @ own.inverse) * z).sum(axis=1)
 
 
 def fit(values: Mapping[str, Floats], summaries: Floats, shown: NDArray[np.bool_], *, name: str) -> Model:
@@ -111,7 +107,7 @@ def fit(values: Mapping[str, Floats], summaries: Floats, shown: NDArray[np.bool_
     """
     there = np.isfinite(summaries)
     used = shown & (there.mean(axis=0) > SHOWN_BY)
-    complete = there[:, used].all(axis=1) if used.any() else np.zeros(len(summaries), dtype=bool)
+    complete = np.asarray(there[:, used].all(axis=1) & used.any(), dtype=np.bool_)
     x, y = regressors(values)[complete], summaries[complete][:, used]
     needed = least(x.shape[1] + 1, int(used.sum())) + 8
     if len(x) < needed:
@@ -119,7 +115,11 @@ def fit(values: Mapping[str, Floats], summaries: Floats, shown: NDArray[np.bool_
             f"{len(x)} of {len(summaries)} simulations show what the film shows, and {needed} are needed", where=name,
             fix="check --flag-size, --attachment and --azimuth: flags that were simulated so look otherwise",
         )  # fmt: skip
-    return Model(base=Metamodel.fit(x, y, np.arange(len(x))), used=used, responses={})
+    base = Metamodel.fit(x, y, np.arange(len(x)))
+    model = Model(base=base, used=used, residuals=np.zeros(0), weights=values["area_weight"], responses={})
+    mean, _, _ = model.predict(values)
+    residuals = np.where(complete[:, None], summaries[:, used] - mean, np.nan)
+    return replace(model, residuals=residuals)
 
 
 def responded(
@@ -133,7 +133,7 @@ def responded(
         with_it, without: summaries (pair, k), without errors of numerics and pixels.
     """
     change = (with_it - without)[:, model.used]
-    there = np.isfinite(change).all(axis=1)
+    there = np.asarray(np.isfinite(change).all(axis=1), dtype=np.bool_)
     if there.sum() < FEWEST_PAIRS:
         return None
     change, strengths = change[there], strengths[there]
@@ -146,29 +146,14 @@ def responded(
         hat = z @ inverse @ z.T
         residual = white - hat @ white
         error = float(np.square(residual / (1 - np.diag(hat))[:, None]).mean())
-        tried.append((error, logarithmic, z, inverse, residual))
-    _, logarithmic, z, inverse, residual = min(tried, key=lambda one: one[0])
+        tried.append((error, logarithmic, z, inverse))
+    _, logarithmic, z, inverse = min(tried, key=lambda one: one[0])
     coefficients = inverse @ z.T @ change
-    own = float(np.square(residual).sum() / ((len(z) - z.shape[1]) * white.shape[1]))
-    mean, _ = model.predict(values)
-    about = np.linalg.solve(model.factor, (with_it[there][:, model.used] - mean - z @ coefficients).T).T
-    plain = np.linalg.solve(model.factor, (without[there][:, model.used] - mean).T).T
-    ratio = float(np.square(about).mean() / np.square(plain).mean())
+    residuals = np.full((len(there), change.shape[1]), np.nan)
+    residuals[there] = change - z @ coefficients
     return Response(
-        effect=effect, logarithmic=logarithmic, coefficients=coefficients, inverse=inverse, open=own,
-        wider=max(1.0, ratio), pairs=len(z),
-    )  # fmt: skip
-
-
-def log_t(offset: Floats, factor: Floats, stretch: Floats, freedom: float) -> Floats:
-    """(n,) logarithm of multivariate t at offsets (n, k) from its mean, of scale (factor factorᵀ) · stretch (n,)."""
-    k = offset.shape[1]
-    distance = np.square(np.linalg.solve(factor, offset.T)).sum(axis=0) / stretch
-    constant = gammaln((freedom + k) / 2) - gammaln(freedom / 2) - 0.5 * k * math.log(freedom * math.pi)
-    return (
-        constant - np.log(np.diag(factor)).sum() - 0.5 * k * np.log(stretch)
-        - 0.5 * (freedom + k) * np.log1p(distance / freedom)
-    )  # fmt: skip
+        effect=effect, logarithmic=logarithmic, coefficients=coefficients, inverse=inverse, residuals=residuals
+    )
 
 
 def _features(effect: Weighable, logarithmic: bool, strength: Floats, weight: Floats) -> Floats:

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from flagdata.errors import InputError, UsageError
-from flagdata.findings import Finding
+from flagdata.findings import Finding, Severity
 from flagdata.provenance import code_version
 from measure.calibrate.calibrate import Options as Calibrating
 from measure.calibrate.observed import Observed, constant_wind
@@ -37,6 +37,13 @@ from measure.forecasting.setting import Stage
 from measure.nulls.conformal import GroupedConformal
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Candidate, Conclusion, Estimate, NullTest, Parameter, Verdict
+
+_APART = Finding(
+    kind="recordings-taken-apart", severity=Severity.WARNING,
+    what="the recordings are too many for the simulations, or their logs are described differently: what is unknown of "
+    "the cloth was taken as another one in each, so that probabilities of effects are too sure",
+    fix="give fewer recordings, or more simulations with --simulations",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,11 +97,11 @@ class Outcome:
     Attributes:
         options, recordings, simulations, sights: what went in.
         weighing: of the recordings.
-        nulls: of null experiments.
         judged: what was decided.
         base: the base model fitted to the recordings.
         best: the most probable effect's model fitted to them; None where nothing was weighed.
         sensitivity: (effect,) standard errors by which each moves the recordings where it is strong.
+        together: whether what is unknown of the cloth was taken as the same in all recordings.
     """
 
     options: Options
@@ -102,17 +109,17 @@ class Outcome:
     simulations: Simulations
     sights: tuple[Sight, ...]
     weighing: Weighing
-    nulls: Weighing
     judged: Judged
     base: Fit
     best: tuple[Weighable, Fit] | None
     sensitivity: Floats
+    together: bool
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """On the recordings."""
         own = (finding for one in self.recordings for finding in one.findings)
-        return (*constant_wind(self.recordings), *own)
+        return (*constant_wind(self.recordings), *own, *([] if self.together else [_APART]))
 
 
 def close_loop(
@@ -173,8 +180,9 @@ def solve(
     base = fitted(sights, seen, None, seed=seed)
     return Outcome(
         options=options, recordings=tuple(recordings), simulations=simulations, sights=sights, weighing=own,
-        nulls=nulls, judged=judged, base=base, best=best,
+        judged=judged, base=base, best=best,
         sensitivity=sensitivity(sights, effects, base, seen),
+        together=hypothesis(sights, None).scatter.together,
     )  # fmt: skip
 
 
@@ -211,7 +219,7 @@ def departing(outcome: Outcome) -> tuple[Departure, ...]:
     found = []
     cloth, places, _ = hypothesis(outcome.sights, None).values(outcome.base.scores[0])
     for one, own, place in zip(outcome.recordings, outcome.sights, places, strict=True):
-        mean, _ = own.model.predict({**cloth, **place})
+        mean, _, _ = own.model.predict({**cloth, **place})
         off = one.summary[own.model.used] - outcome.base.weights[0] @ mean
         scatter = np.sqrt(np.diag(own.model.factor @ own.model.factor.T))
         for column, size, sigma in zip(np.flatnonzero(own.model.used).tolist(), off, scatter, strict=True):
@@ -284,7 +292,7 @@ def strength_of(outcome: Outcome, effect: Weighable, fit: Fit) -> Estimate:
 
 
 def _ranking(outcome: Outcome) -> tuple[Candidate, ...]:
-    judged, own, nulls = outcome.judged, outcome.weighing, outcome.nulls
+    judged, own, nulls = outcome.judged, outcome.weighing, outcome.judged.nulls
     seen = of_recordings(outcome.sights, outcome.recordings, outcome.options.area_weight)
     if not own.effects:
         return ()

@@ -31,11 +31,9 @@ def sensitivity(
     own = hypothesis(sights, None)
     at = base.weights[:1] @ base.scores[0]
     moved = np.concatenate([at, at + _DIFFERENCE * np.eye(at.shape[1])])
-    predicted, weight = own.predicted(moved)
-    rows = [np.linalg.solve(sight.model.factor, ((mean[1:] - mean[0]) / _DIFFERENCE).T)
-            for sight, (mean, _) in zip(sights, predicted, strict=True)]  # fmt: skip
+    mean, _, weight = own.predicted(moved)
     off = observed.repeated(len(moved)).off(weight)
-    slopes = np.concatenate([*rows, (off[1:] - off[0])[None] / _DIFFERENCE])
+    slopes = np.concatenate([own.scatter.white @ (mean[1:] - mean[0]).T, (off[1:] - off[0])[None]]) / _DIFFERENCE
     # What the prior lets them make up for: ridge regression on slopes, the scores' prior being standard normal.
     left = np.eye(len(slopes)) - slopes @ np.linalg.solve(slopes.T @ slopes + np.eye(slopes.shape[1]), slopes.T)
     cloth, places, _ = own.values(at)
@@ -44,9 +42,9 @@ def sensitivity(
         strength = effect.prior.at(np.array([STRONG]))
         parts = []
         for sight, place in zip(sights, places, strict=True):
-            with_it, _ = sight.model.predict({**cloth, **place}, effect.name, strength)
-            without, _ = sight.model.predict({**cloth, **place})
-            parts.append(np.linalg.solve(sight.model.factor, (with_it - without)[0]))
-        column = np.concatenate([*parts, [0.0]])
+            with_it, _, _ = sight.model.predict({**cloth, **place}, effect.name, strength)
+            without, _, _ = sight.model.predict({**cloth, **place})
+            parts.append((with_it - without)[0])
+        column = np.concatenate([own.scatter.white @ np.concatenate(parts), [0.0]])
         found.append(float(np.sqrt(column @ left @ column)))
     return np.array(found)

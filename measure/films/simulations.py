@@ -121,8 +121,9 @@ def sight(
     seen = observed if windows is None else part_of(observed, windows)
     summaries = with_errors(seen, base if windows is None else base[:, windows], seed=design.seed)
     changes = seen.projection.changes
-    model = fit(design.values(), summaries, np.tile(shown(seen.readings), 1 + changes), name=observed.name)
-    values, found = design.values(), {}
+    values = design.values()
+    model = fit(values, summaries, np.tile(shown(seen.readings), 1 + changes), name=observed.name)
+    found = {}
     for made, readings in own:
         count = readings.shape[1]
         projection = Projection(speed=observed.speed[:count], changes=changes)

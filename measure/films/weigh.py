@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flagdata.rng import stream
-from measure.calibrate.prior import Floats
+from measure.calibrate.prior import CLOTH, Floats
 from measure.films.evidence import Experiments, Fit, Hypothesis, Sight
 from measure.films.library import Weighable
 
@@ -21,6 +21,7 @@ class Weighing:
         effects: that were weighed.
         base: (n,) logarithm of the base model's evidence.
         misfit: (n,) of the base model at its mode.
+        cloth: (n, 3) normal scores of area weight, bending and damping there.
         factors: (n, effect) logarithms of the Bayes factors against the base model [nat].
         left: (n, effect) misfit of the model with each.
     """
@@ -28,6 +29,7 @@ class Weighing:
     effects: tuple[Weighable, ...]
     base: Floats
     misfit: Floats
+    cloth: Floats
     factors: Floats
     left: Floats
 
@@ -35,7 +37,8 @@ class Weighing:
         """Of some experiments."""
         own = which if isinstance(which, slice) else np.asarray(which, dtype=np.int64)
         return Weighing(
-            effects=self.effects, base=self.base[own], misfit=self.misfit[own], factors=self.factors[own],
+            effects=self.effects, base=self.base[own], misfit=self.misfit[own], cloth=self.cloth[own],
+            factors=self.factors[own],
             left=self.left[own],
         )  # fmt: skip
 
@@ -61,7 +64,7 @@ def weigh(
     fits = [fitted(sights, observed, effect, seed=seed) for effect in effects]
     empty = np.zeros((len(base.evidence), 0))
     return Weighing(
-        effects=tuple(effects), base=base.evidence, misfit=base.misfit,
+        effects=tuple(effects), base=base.evidence, misfit=base.misfit, cloth=base.mode[:, : len(CLOTH)],
         factors=np.stack([one.evidence - base.evidence for one in fits], axis=1) if fits else empty,
         left=np.stack([one.misfit for one in fits], axis=1) if fits else empty,
     )  # fmt: skip
