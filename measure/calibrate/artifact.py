@@ -63,8 +63,8 @@ def keep(lake: Lake, found: Calibration, reading: Reading, parents: tuple[str, .
 
 
 def write(path: Path, found: Calibration) -> None:
-    """A new Zarr folder: `cloth` (draw, quantity), and for each recording `readings-N` (window, observable) and
-    `wind-N` (window)."""
+    """A new Zarr folder: `cloth` (draw, quantity) where the weight is not withheld, and for each recording `readings-N`
+    (window, observable) and `wind-N` (window)."""
     import zarr
 
     group = zarr.open_group(path, mode="w-", zarr_format=3)
@@ -72,8 +72,9 @@ def write(path: Path, found: Calibration) -> None:
     group.update_attributes(
         {_HEAD: {"format": _FORMAT}, "quantities": names, "observables": list(OBSERVED), "answer": found.as_dict()}
     )
-    cloth = np.stack([found.draws.cloth[name] for name in names], axis=1)
-    write_plain(group, "cloth", cloth.astype(np.float32), ("draw", "quantity"))
+    if found.withheld is None:
+        cloth = np.stack([found.draws.cloth[name] for name in names], axis=1)
+        write_plain(group, "cloth", cloth.astype(np.float32), ("draw", "quantity"))
     for number, one in enumerate(found.recordings):
         write_plain(
             group, f"readings-{number}", one.observed.readings.astype(np.float32), (f"window-{number}", "observable")

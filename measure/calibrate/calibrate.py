@@ -291,7 +291,7 @@ def answered(simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats]
     )  # fmt: skip
     findings = _findings(calibration)
     if calibration.withheld is not None:
-        calibration = replace(calibration, cloth=tuple(replace(q, value=None) for q in calibration.cloth))
+        calibration = replace(calibration, cloth=tuple(_assumed(q, options.level) for q in CLOTH))
     return replace(calibration, findings=findings)
 
 
@@ -323,6 +323,11 @@ def quantity(about: Uncertain, draws: Floats, level: float) -> Quantity:
         name=about.name, unit=about.unit, value=float(np.median(draws)) if determined else None,
         sigma=float(draws.std()), interval=(low, high), assumed=(assumed[0], assumed[1]),
     )  # fmt: skip
+
+
+def _assumed(about: Uncertain, level: float) -> Quantity:
+    """What is assumed of a quantity, where nothing is found."""
+    return quantity(about, about.at(np.linspace(0.0, 1.0, 1001)), level)
 
 
 def left_out(

@@ -33,7 +33,7 @@ def page(found: Calibration, provenance: Mapping[str, str], *, sections: Sequenc
         "name": ", ".join(one.observed.name for one in found.recordings), "sentence": found.sentence,
         "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in found.findings],
         "level": f"{found.options.level * 100:.3g} %", "cloth": [shown(q) for q in found.cloth],
-        "stated": found.stated, "posterior": _posterior(found),
+        "stated": found.stated, "posterior": None if found.withheld else _posterior(found),
         "recordings": [
             {
                 "name": one.observed.name, "windows": len(one.observed.readings),

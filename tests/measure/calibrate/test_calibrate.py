@@ -88,6 +88,7 @@ def test_the_weight_of_a_flag_that_no_simulation_looks_like_is_withheld(plain: C
     (finding,) = [one for one in found.findings if one.kind == "unlike-simulations"]
     assert "frequency" in finding.what.partition("too large")[0]
     assert [one.value for one in found.cloth] == [None, None, None]
+    np.testing.assert_allclose(found.weight.interval, found.weight.assumed, rtol=1e-3)  # what was assumed, no number
     assert found.stated is None
     assert (found.as_dict()["close_loop"], found.as_dict()["area_weight_stated"]) == (None, None)
     assert found.sentence.startswith("area weight: withheld, since no simulated flag looks like strange: frequency")
