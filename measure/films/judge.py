@@ -7,8 +7,8 @@ of other kinds, and the larger one is counted by the grouped conformal p.
 
 Given that something is missing, effects have posterior probabilities with equal priors. The confidence set is the
 smallest that has 95 % of it; a name is given alone only where one effect has as much. The best of them has to help more
-than the best one does in null experiments, and a model with an effect to pass the test of its own misfit, against that
-of null experiments with the same effect fitted to them.
+than the best one does in null experiments, and a model with one of them to pass the test of its own misfit, against
+that of null experiments with the same effect fitted to them.
 """
 
 from __future__ import annotations
@@ -112,9 +112,8 @@ def judge(own: Weighing, nulls: Weighing, kinds: NDArray[np.int64], *, level: fl
     # Where no effect helps more than the best one does in null experiments, none is named.
     if GroupedConformal(null=null[:, 1], kinds=kinds).p(float(statistics[1])) > level:
         return judged(Conclusion.OUTSIDE)
-    passing = tuple(place for place in confident if leftover[place] > level)
-    if passing:
-        return judged(Conclusion.EFFECT if len(confident) == 1 else Conclusion.ONE_OF, passing)
+    if any(leftover[place] > level for place in confident):
+        return judged(Conclusion.EFFECT if len(confident) == 1 else Conclusion.ONE_OF, confident)
     excess = float(own.misfit[0] - np.median(nulls.misfit))
     explained = float(own.misfit[0] - own.left[0, confident[0]])
     part = explained >= PART * excess
