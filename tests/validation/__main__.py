@@ -32,6 +32,7 @@ VALIDATIONS = {
     "stressors": "tests.validation.stressors",
     "transfer": "tests.validation.transfer",
     "weighed": "tests.validation.weighed",
+    "weighed-briefly": "tests.validation.weighed_briefly",
     "verification": "tests.validation.verification",
 }
 

@@ -280,15 +280,19 @@ def options() -> Options:
     )
 
 
-def weigh(name: str, found: Floats, base: Floats, *, sigma: Floats, truth: Mapping[str, Any]) -> Row:
+def weigh(
+    name: str, found: Floats, base: Floats, *, sigma: Floats, truth: Mapping[str, Any], of: tuple[Design, Options]
+) -> Row:  # fmt: skip
     """What `measure.calibrate` answers to a truth's readings (window, observable).
 
     Args:
         base: readings of the design's simulations.
         sigma: of the truth's.
+        of: the design, and what is stated.
     """
-    one = Observed(name=name, source="", readings=found, log=design().log, sigma=sigma)
-    answer = answered([(one, design().values(), base)], options())
+    own, stated = of
+    one = Observed(name=name, source="", readings=found, log=own.log, sigma=sigma)
+    answer = answered([(one, own.values(), base)], stated)
     (fitted,), weight = answer.recordings, answer.weight
     low, high = weight.interval
     return {
@@ -302,13 +306,13 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     """Weigh all truths. The design has its own seed."""
     del seed
     at = folder()
-    base = simulations(at)
+    base, of = simulations(at), (design(), options())
     rows, films = [], []
     for truth in truths():
         name = f"truth-{truth['number']}"
-        rows.append(weigh(name, geometry(truth, at), base, sigma=np.zeros(len(OBSERVED)), truth=truth))
+        rows.append(weigh(name, geometry(truth, at), base, sigma=np.zeros(len(OBSERVED)), truth=truth, of=of))
         if truth["number"] in FILMED:
-            films.append(weigh(f"{name}, filmed", film(truth, at), base, sigma=SIGMA, truth=truth))
+            films.append(weigh(f"{name}, filmed", film(truth, at), base, sigma=SIGMA, truth=truth, of=of))
     fine, places = finer(design())
     blank = Observed(name="", source="", readings=fine[0], log=design().log)
     change = blank.projection.of(fine) - blank.projection.of(base[places])
@@ -334,7 +338,7 @@ def score(rows: Sequence[Row]) -> dict[str, Any]:
 
 def page(sheet: Mapping[str, Any]) -> str:
     """The sheet in Markdown."""
-    lines = ["# Twenty simulated flags weighed", ""]
+    lines = ["# Simulated flags weighed", "", f"{sheet['seconds']:g} s each.", ""]
     lines += ["| seen as | flags | weight withheld | median error | in the 90 % interval |", "|---|---|---|---|---|"]
     for name in ("geometry", "films"):
         own = sheet[name]
