@@ -12,6 +12,7 @@ import fnmatch
 import posixpath
 import re
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 SCHEME = "s3://"
 BLOCK = 8 << 20
 """Bytes that one request reads or writes of a larger object."""
+_UPLOADS = 3
+"""How often a file is put whose parts the store does not find."""
 _ADDRESS = re.compile(r"s3://([a-z0-9][a-z0-9.-]{1,61}[a-z0-9])(?:/(.*))?", re.DOTALL)
 _SECRET = re.compile(r"(?<!^[sS]3):|[@?]")
 """What stands beside credentials in an address: a user's name and password, or the query of a signed one."""
@@ -211,8 +214,19 @@ class RemotePath:
         self._ask(lambda obstore, store: obstore.put(store, self.key, data))
 
     def upload(self, file: Path) -> None:
-        """Put a file's bytes; of a large file in parts, which show together."""
-        self._ask(lambda obstore, store: obstore.put(store, self.key, file, chunk_size=BLOCK, max_concurrency=4))
+        """Put a file's bytes; of a large file in parts, which show together.
+
+        Raises:
+            StoreError: the store did not take it.
+        """
+        for _ in range(_UPLOADS):
+            # A store that is asked again to join the parts, since its first answer was lost, knows of no parts.
+            with suppress(FileNotFoundError):
+                self._ask(
+                    lambda obstore, store: obstore.put(store, self.key, file, chunk_size=BLOCK, max_concurrency=4)
+                )
+                return
+        raise StoreError(errno.EREMOTEIO, "the store lost the parts of an upload", str(self))
 
     def create(self, data: bytes) -> bool:
         """Put an object if its key is free; False where it was taken.

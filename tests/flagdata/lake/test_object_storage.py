@@ -27,7 +27,7 @@ from flagdata.lake.leases import collecting, last_written, leases, open_lease
 from flagdata.lake.transaction import Transaction
 from flagdata.query import select
 from flagdata.schema import Kind
-from flagdata.storage import RemotePath
+from flagdata.storage import RemotePath, StoreError
 from flagdata.storage import cache as object_cache
 from flagdata.storage.connection import plain
 from tests.program import invoke
@@ -214,6 +214,26 @@ def test_a_put_whose_bytes_are_there_has_succeeded_however_often_it_was_sent(buc
     assert place.create(b"mine")  # as when the answer to the first was lost
     assert not place.create(b"another")
     assert place.read_bytes() == b"mine"
+
+
+def test_an_upload_whose_parts_the_store_has_joined_without_an_answer_is_made_again(
+    bucket_folder: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "film.mcap").write_bytes(b"film")
+    place, asked, lost = RemotePath.parse(bucket_folder) / "film.mcap", RemotePath._ask, [True]
+
+    def unanswered(path: RemotePath, request: Callable[..., object]) -> object:
+        answer = asked(path, request)
+        if lost and lost.pop():
+            raise FileNotFoundError  # NoSuchUpload, as the store says to whom asks again
+        return answer
+
+    monkeypatch.setattr(RemotePath, "_ask", unanswered)
+    place.upload(tmp_path / "film.mcap")
+    assert place.read_bytes() == b"film"
+    lost[:] = [True] * 9
+    with pytest.raises(StoreError, match="lost the parts"):
+        place.upload(tmp_path / "film.mcap")
 
 
 def dead_owner() -> dict[str, object]:
