@@ -6,7 +6,7 @@ All of them are simulated by the recipe of the data set `gusty`, a cup anemomete
 |---|---|---|---|---|
 | gusty-test-00000 | drawn | drawn | drawn | ten minutes; those of `flagdata build gusty` for the recipe's own seed |
 | day | the same | the same | another | others, of a mean within 25 % |
-| light | the same | the same | the same | the first minute of the day's |
+| light | the same | the same | the same | the first part of the day's |
 | place | the same | another | another | the day's |
 | flag | another | the same | another | others |
 
@@ -41,7 +41,7 @@ from sim.run.recipe import Recipe as Simulation
 FIRST = "gusty-test-00000"
 """Name that `flagdata build gusty` gives its film."""
 DAY, LIGHT, PLACE, FLAG = "day", "light", "place", "flag"
-SECONDS = {DAY: 120.0, LIGHT: 60.0, PLACE: 60.0, FLAG: 60.0}
+SECONDS = {DAY: 60.0, LIGHT: 36.0, PLACE: 36.0, FLAG: 48.0}
 """Length of the films beside the first [s]."""
 _SETTLED = 10.0
 """s before another day's film that are simulated and not kept."""
