@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from flagdata.errors import InputError, RefusedError
 from flagdata.findings import Finding, Severity
 from flagdata.signals import Sensor
-from measure.anemometer.features import Features, features_of
+from measure.anemometer.features import SUMMARY, Features, features_of
 from measure.anemometer.intervals import half_width
 from measure.anemometer.novelty import Familiar
-from measure.anemometer.reading import ReadingModel, filled, filling_of
+from measure.anemometer.reading import ReadingModel
 from measure.anemometer.regression import BLOCK, Ridge, blocks_of, validated, with_neighbours
 from measure.calibrate.wind import STEADY, Log
 from measure.estimate.similarity import FlagSize
@@ -31,8 +31,6 @@ LEAST = 60.0
 """s of film beside a log: three blocks of time."""
 ENOUGH = 240.0
 """s of film from which on intervals rest on enough blocks of time."""
-SHOWN = 0.8
-"""Share of the windows that must show a feature for it to be used."""
 _OFFSETS = np.linspace(-2.0, 2.0, 9)
 """Errors of the clock that are tried, in its standard uncertainties."""
 _CLOCK = 0.05
@@ -182,11 +180,8 @@ def calibrated(
             fix=f"give {LEAST:.0f} s or more that the log covers; {ENOUGH / 60:.0f} minutes are better",
         )  # fmt: skip
     _check_wind(recordings, usable)
-    names = _names(recordings, usable)
-    columns = [recordings[0].features.names.index(name) for name in names]
-    shown = np.concatenate([one.features.values[own][:, columns] for one, own in zip(recordings, usable, strict=True)])
-    filling = filling_of(shown, names)
-    rows, plain = _rows(recordings, usable, names, filling)
+    names = recordings[0].features.names
+    rows, plain = _rows(recordings, usable)
     numbers = np.repeat(np.arange(len(recordings)), [int(one.sum()) for one in usable])
     times = np.concatenate([one.features.starts[own] for one, own in zip(recordings, usable, strict=True)])
     blocks = blocks_of(times, numbers)
@@ -195,9 +190,10 @@ def calibrated(
         return np.concatenate([one.winds(offset)[own] for one, own in zip(recordings, usable, strict=True)])
 
     clock = max(one.log.clock for one in recordings)
-    offset = _best_offset(plain, winds, blocks, clock)
+    named = np.array([not name.startswith(SUMMARY) for name in names])
+    offset = _best_offset(plain, winds, blocks, clock, named)
     logged = winds(offset)
-    checked = validated(rows, logged, blocks)
+    checked = validated(rows, logged, blocks, np.tile(named, rows.shape[1] // len(names)))
     spread = float(logged.std())
     if checked.rmse >= spread:
         raise RefusedError(
@@ -207,9 +203,9 @@ def calibrated(
         )  # fmt: skip
     model = ReadingModel(
         network=network.estimator.name, identity=network.identity, size=size, step=step, names=names,
-        filling=filling,
-        ridge=Ridge.fitted(rows, logged, checked.penalty), winds=logged, errors=logged - checked.predicted,
-        block=round(BLOCK / step), familiar=Familiar.of(plain, checked.predicted, blocks),
+        ridge=Ridge.fitted(rows, logged, checked.penalty, checked.weights), winds=logged,
+        errors=logged - checked.predicted, block=round(BLOCK / step),
+        familiar=Familiar.of(plain, checked.predicted, blocks),
         places=tuple(one.features.place for one in recordings),
     )  # fmt: skip
     return Calibrated(
@@ -229,35 +225,20 @@ def _check_wind(recordings: Sequence[Recording], usable: Sequence[NDArray[np.boo
         )  # fmt: skip
 
 
-def _names(recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]]) -> tuple[str, ...]:
-    """The features that enough windows of every recording show."""
-    shares = np.min(
-        [np.isfinite(one.features.values[own]).mean(axis=0) for one, own in zip(recordings, usable, strict=True)],
-        axis=0,
-    )
-    names = recordings[0].features.names
-    return tuple(name for name, share in zip(names, shares, strict=True) if share >= SHOWN)
+def _rows(recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]]) -> tuple[Floats, Floats]:
+    """(n, 3 · column) features with the neighbours', and (n, column) without, of all usable windows."""
+    both = list(zip(recordings, usable, strict=True))
+    rows = np.concatenate([with_neighbours(one.features.values)[own] for one, own in both])
+    return rows, np.concatenate([one.features.values[own] for one, own in both])
 
 
-def _rows(
-    recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]], names: tuple[str, ...],
-    filling: Mapping[str, Ridge],
-) -> tuple[Floats, Floats]:  # fmt: skip
-    """(n, 3 · column) features with the neighbours', and (n, column) without, of all whole windows."""
-    rows, plain = [], []
-    for one, own in zip(recordings, usable, strict=True):
-        columns = [one.features.names.index(name) for name in names]
-        values = filled(one.features.values[:, columns], own, names, filling)
-        rows.append(with_neighbours(values)[own])
-        plain.append(values[own])
-    return np.concatenate(rows), np.concatenate(plain)
-
-
-def _best_offset(plain: Floats, winds: Callable[[float], Floats], blocks: NDArray[np.int_], clock: float) -> float:
+def _best_offset(
+    plain: Floats, winds: Callable[[float], Floats], blocks: NDArray[np.int_], clock: float, named: NDArray[np.bool_]
+) -> float:
     """The most probable error of the clock [s], of windows without their neighbours, which could make up for it."""
     if clock <= _CLOCK:
         return 0.0
-    errors = [validated(plain, winds(share * clock), blocks).rmse for share in _OFFSETS.tolist()]
+    errors = [validated(plain, winds(share * clock), blocks, named).rmse for share in _OFFSETS.tolist()]
     misfit = len(plain) * np.log(errors) + np.square(_OFFSETS) / 2
     return float(_OFFSETS[misfit.argmin()]) * clock
 

@@ -15,17 +15,13 @@ from measure.estimate.conditioned import ConditionedFilm
 from measure.estimate.joint import WIND
 from measure.estimate.similarity import POWERS, FlagSize, spacing, trained_on
 from measure.estimate.windows import Layout, cut, lay_out
-from measure.observables import OBSERVABLES
 from measure.observables.film import FilmWindow
-from measure.observables.observable import Observable
 from measure.observables.watching import Watcher
 from models.conditioning.repeats import Distinct, TimedFrame
 from models.estimator import Estimator
 
-OBSERVED = (
-    "droop", "extension", "middle-speed", "outline-speed", "amplitude-up", "amplitude-across", "area", "asymmetry",
-)  # fmt: skip
-"""Observables of a window: those that one of 1.2 s shows. Spectra and waves take longer ones."""
+SUMMARY = "summary-"
+"""What the names of a summary's numbers begin with."""
 VERSION = 1
 """Raised when the same film gives other features."""
 THUMBNAIL = 64
@@ -58,7 +54,7 @@ class Features:
         film: its name.
         starts: (w,) of the windows [s from the film's first frame], `layout.step` apart.
         layout: of the windows.
-        values: (w, feature), NaN where a window does not show one; a row of NaN where frames are missing.
+        values: (w, feature), a row of NaN where frames are missing.
         names: of the features.
         summaries: (w, dimension) of the network's first learner, for whoever compares films; NaN likewise.
         winds: (w,) that the network reads by itself [m/s]; NaN likewise.
@@ -107,8 +103,8 @@ def features_of(
     rows: dict[int, NDArray[np.float32]] = {}
     winds = np.full(layout.count, np.nan)
     clip: NDArray[np.uint8] | None = None
-    observed = _Observed(count=layout.count)
-    watcher = Watcher(film, size, begin=layout.first, count=layout.count, seconds=layout.step, found=observed.take)
+    hoist = _Hoist()
+    watcher = Watcher(film, size, begin=layout.first, count=layout.count, seconds=layout.step, found=hoist.take)
     margin = 2 * layout.period
 
     def watched() -> Iterator[TimedFrame]:
@@ -137,37 +133,31 @@ def features_of(
     every[list(rows)] = list(rows.values())
     return Features(
         film=film.name, starts=layout.first + layout.step * np.arange(layout.count, dtype=np.float64), layout=layout,
-        values=np.concatenate([every, winds[:, None], observed.values], axis=1),
-        names=(*(f"summary-{k}" for k in range(every.shape[1])), "network-wind", *OBSERVED),
-        summaries=summaries, winds=winds, clip=clip, place=_place(film, *observed.hoist()),
+        values=np.concatenate([every, winds[:, None]], axis=1),
+        names=(*(f"{SUMMARY}{k}" for k in range(every.shape[1])), "network-wind"),
+        summaries=summaries, winds=winds, clip=clip, place=_place(film, *hoist.found()),
     )  # fmt: skip
 
 
-class _Observed:
-    """The observables of windows, and where the hoist is in them."""
+class _Hoist:
+    """Where the hoist is in the conditioned picture."""
 
-    def __init__(self, *, count: int) -> None:
-        self.values = np.full((count, len(OBSERVED)), np.nan)
-        self._done = 0
-        self._hoists: list[NDArray[np.float64]] = []
+    def __init__(self) -> None:
+        self._ends: list[NDArray[np.float64]] = []
         self._side = 0.0
 
     def take(self, windows: Sequence[FilmWindow | None]) -> None:
         """The next windows."""
         for window in windows:
             if window is not None:
-                observables: list[Observable] = [OBSERVABLES[name] for name in OBSERVED]
-                self.values[self._done] = [one.of_film(window).value for one in observables]
-                self._hoists.append(window.hoist / window.masks.shape[2])
+                self._ends.append(window.hoist / window.masks.shape[2])
                 self._side += window.side
-            self._done += 1
 
-    def hoist(self) -> tuple[NDArray[np.float64], float]:
-        """Its ends (2, 2) in the conditioned picture's sides, NaN where no window shows them, and the side the flag
-        flies to."""
-        if not self._hoists:
+    def found(self) -> tuple[NDArray[np.float64], float]:
+        """Its ends (2, 2) in the picture's sides, NaN where no window shows them, and the side the flag flies to."""
+        if not self._ends:
             return np.full((2, 2), np.nan), 0.0
-        return np.median(self._hoists, axis=0), float(np.sign(self._side))
+        return np.median(self._ends, axis=0), float(np.sign(self._side))
 
 
 def _place(film: ConditionedFilm, hoist: NDArray[np.float64], side: float) -> Place:

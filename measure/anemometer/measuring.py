@@ -67,7 +67,6 @@ def measure_by(
     Raises:
         UsageError: an option that belongs to networks.
         RefusedError: nothing moves like cloth, or no window is whole.
-        InputError: a film that does not show what the model uses.
     """
     _check(options, model)
     features = features_of(film, estimator, model.size, first=options.first, last=options.last, advance=advance)
@@ -184,15 +183,6 @@ def _about(winds: Floats, features: Features, model: ReadingModel) -> list[Findi
                 what=f"{beyond} of {len(winds)} windows read winds beyond those of the calibration ({low:.1f} to "
                 f"{high:.1f} m/s), where nothing checked the intervals",
                 fix="calibrate in stronger and weaker winds as well",
-            )
-        )  # fmt: skip
-    if unseen := model.unseen(features):
-        share = max(unseen.values())
-        found.append(
-            Finding(
-                kind="observables-inferred", severity=Severity.NOTE, value=share,
-                what=f"up to {share:.0%} of the windows do not show {', '.join(unseen)}, which were inferred from the "
-                "network's summary",
             )
         )  # fmt: skip
     missing = len(features.starts) - len(winds)

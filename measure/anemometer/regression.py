@@ -9,6 +9,9 @@ predicts (Fuller, Measurement Error Models, 1987, section 1.6.3); correcting it 
 clock between film and log has one error for the whole recording, which is fitted before the rest, without neighbours,
 since these would make up for it: an offset is as probable as its prior and the errors of the blocks left out make it.
 
+*Two penalties.* A summary has many numbers that say little each, beside a few features with names and units that say
+more. Under one penalty either the first are fitted to noise or the second are lost, so that both have their own.
+
 *Blocks.* Windows of one gust are alike, so that whole blocks of time are left out, and the windows next to a block are
 not fitted either when it is.
 """
@@ -27,6 +30,8 @@ BLOCK = 20.0
 """Length of a block [s]: gusts last some seconds."""
 PENALTIES = tuple(float(v) for v in np.geomspace(1.0, 1e5, 21))
 """Penalties that are tried, in squares of standardised features."""
+WEIGHTS = (1.0, 3.0, 10.0, 30.0)
+"""Weights of the named features that are tried: their penalty is over the square."""
 _BESIDE = 2
 """Windows beside a block that are left out with it: they share its neighbours."""
 
@@ -49,10 +54,9 @@ class Ridge:
     penalty: float
 
     @classmethod
-    def fitted(cls, rows: Floats, winds: Floats, penalty: float) -> Ridge:
-        """To rows (n, column) and winds (n,) [m/s], all finite."""
-        centre, spread = rows.mean(axis=0), rows.std(axis=0)
-        spread = np.where(spread > 0, spread, 1.0)
+    def fitted(cls, rows: Floats, winds: Floats, penalty: float, weights: Floats | float = 1.0) -> Ridge:
+        """To rows (n, column) and winds (n,) [m/s], all finite; the penalty of a column is over its squared weight."""
+        centre, spread = _standard(rows, weights)
         offset = float(winds.mean())
         coefficients = _solved((rows - centre) / spread, winds - offset, [penalty])[0]
         return cls(centre=centre, spread=spread, coefficients=coefficients, offset=offset, penalty=penalty)
@@ -60,6 +64,12 @@ class Ridge:
     def __call__(self, rows: Floats) -> Floats:
         """(n,) winds [m/s] of rows (n, column)."""
         return self.offset + (rows - self.centre) / self.spread @ self.coefficients
+
+
+def _standard(rows: Floats, weights: Floats | float) -> tuple[Floats, Floats]:
+    """Mean and standard deviation of columns, the latter over the weights."""
+    spread = rows.std(axis=0)
+    return rows.mean(axis=0), np.where(spread > 0, spread, 1.0) / weights
 
 
 def _solved(rows: Floats, winds: Floats, penalties: Sequence[float]) -> Floats:
@@ -94,33 +104,40 @@ class Validated:
 
     Attributes:
         penalty: with the least error.
+        weights: of the columns, likewise.
         predicted: (n,) of each window by the fit without its block [m/s].
         rmse: root mean square of their errors [m/s].
     """
 
     penalty: float
+    weights: Floats
     predicted: Floats
     rmse: float
 
 
-def validated(rows: Floats, winds: Floats, blocks: NDArray[np.int_]) -> Validated:
-    """Leave each block out in turn, with the windows beside it.
+def validated(rows: Floats, winds: Floats, blocks: NDArray[np.int_], named: NDArray[np.bool_]) -> Validated:
+    """Leave each block out in turn, with the windows beside it, for each penalty and weight of the named features.
 
     Args:
         rows: (n, column).
         winds: (n,) [m/s].
         blocks: (n,) of each window; two or more.
+        named: (column,) which are numbers with a unit, each of which says more than one of a summary.
     """
+    tried = [_validated(rows, winds, blocks, np.where(named, weight, 1.0)) for weight in WEIGHTS]
+    return min(tried, key=lambda one: one.rmse)
+
+
+def _validated(rows: Floats, winds: Floats, blocks: NDArray[np.int_], weights: Floats) -> Validated:
     predicted = np.empty((len(PENALTIES), len(winds)))
     for block in np.unique(blocks):
         inside = np.flatnonzero(blocks == block)
         fitted = np.ones(len(winds), bool)
         fitted[max(0, inside[0] - _BESIDE) : inside[-1] + _BESIDE + 1] = False
-        centre, spread = rows[fitted].mean(axis=0), rows[fitted].std(axis=0)
-        spread = np.where(spread > 0, spread, 1.0)
+        centre, spread = _standard(rows[fitted], weights)
         offset = winds[fitted].mean()
         coefficients = _solved((rows[fitted] - centre) / spread, winds[fitted] - offset, PENALTIES)
         predicted[:, inside] = offset + coefficients @ ((rows[inside] - centre) / spread).T
     errors = np.sqrt(np.square(predicted - winds).mean(axis=1))
     best = int(errors.argmin())
-    return Validated(penalty=PENALTIES[best], predicted=predicted[best], rmse=float(errors[best]))
+    return Validated(penalty=PENALTIES[best], weights=weights, predicted=predicted[best], rmse=float(errors[best]))

@@ -39,15 +39,11 @@ def write(path: Path, model: ReadingModel, about: Mapping[str, Any]) -> None:
     group.update_attributes({
         HEAD: {"format": FORMAT}, "network": model.network, "identity": model.identity,
         "flag_size": [model.size.length, model.size.height], "step": model.step, "features": list(model.names),
-        "ridge": _numbers(ridge), "filling": {name: _numbers(own) for name, own in model.filling.items()},
-        "block": model.block, "noise": familiar.noise,
-        "compared": [familiar.low, familiar.high],
-        "sides": [place.side for place in model.places], "answer": dict(about),
+        "ridge": {"offset": ridge.offset, "penalty": ridge.penalty}, "block": model.block, "noise": familiar.noise,
+        "compared": [familiar.low, familiar.high], "sides": [place.side for place in model.places], "answer": dict(about),
     })  # fmt: skip
     for name in _RIDGE:
         write_plain(group, f"ridge_{name}", getattr(ridge, name), ("column",))
-        for observable, own in model.filling.items():
-            write_plain(group, f"filling_{observable}_{name}", getattr(own, name), ("summary",))
     write_plain(group, "winds", model.winds, ("window",))
     write_plain(group, "errors", model.errors, ("window",))
     for name, dims in _FAMILIAR.items():
@@ -56,10 +52,6 @@ def write(path: Path, model: ReadingModel, about: Mapping[str, Any]) -> None:
         write_plain(group, f"hoist_{number}", place.hoist, ("end", "coordinate"))
         write_plain(group, f"background_{number}", place.background, (f"row_{number}", f"col_{number}"))
         write_plain(group, f"bare_{number}", place.bare, (f"row_{number}", f"col_{number}"))
-
-
-def _numbers(ridge: Ridge) -> dict[str, float]:
-    return {"offset": ridge.offset, "penalty": ridge.penalty}
 
 
 def read(path: Path) -> ReadingModel:
@@ -83,10 +75,6 @@ def read(path: Path) -> ReadingModel:
             network=about["network"], identity=about["identity"],
             size=FlagSize(length=about["flag_size"][0], height=about["flag_size"][1]), step=about["step"],
             names=tuple(about["features"]),
-            filling={
-                name: Ridge(**{part: array(f"filling_{name}_{part}") for part in _RIDGE}, **numbers)
-                for name, numbers in about["filling"].items()
-            },
             ridge=Ridge(**{part: array(f"ridge_{part}") for part in _RIDGE}, **about["ridge"]),
             winds=array("winds"), errors=array("errors"), block=about["block"],
             familiar=Familiar(

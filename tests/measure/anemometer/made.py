@@ -19,8 +19,6 @@ from measure.estimate.windows import Layout
 
 SIZE = FlagSize(length=1.5, height=1.0)
 STEP = 1.2
-NAMES = ("droop", "b", "c", "d", "e", "f")
-"""Of the features; the first is one that not every window shows."""
 NOISE = 0.3
 """Scatter of each feature, in its spread by the wind."""
 _RATE = 10.0
@@ -70,7 +68,7 @@ def features(
     values[:, 5] += other
     layout = Layout(frames=30, spacings=(0.04,), step=STEP, period=0.04, first=0.0, last=count * STEP)
     return Features(
-        film="made", starts=starts, layout=layout, values=values, names=NAMES,
+        film="made", starts=starts, layout=layout, values=values, names=tuple("abcdef"),
         summaries=values.astype(np.float32), winds=means * 1.1 + 0.3, clip=np.zeros((30, 8, 8), np.uint8),
         place=where if where is not None else place(),
     )  # fmt: skip
