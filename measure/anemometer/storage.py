@@ -40,7 +40,8 @@ def write(path: Path, model: ReadingModel, about: Mapping[str, Any]) -> None:
         HEAD: {"format": FORMAT}, "network": model.network, "identity": model.identity,
         "flag_size": [model.size.length, model.size.height], "step": model.step, "features": list(model.names),
         "ridge": {"offset": ridge.offset, "penalty": ridge.penalty}, "block": model.block, "noise": familiar.noise,
-        "compared": [familiar.low, familiar.high], "sides": [place.side for place in model.places], "answer": dict(about),
+        "compared": [familiar.low, familiar.high], "sides": [place.side for place in model.places],
+        "answer": dict(about),
     })  # fmt: skip
     for name in _RIDGE:
         write_plain(group, f"ridge_{name}", getattr(ridge, name), ("column",))
