@@ -9,8 +9,9 @@ Three figures, each with a level above which a film is refused:
              means of as few windows scatter by in blocks of the calibration that were left out. Only windows that read
              a wind of the calibration count: beyond it, the quadratic is wrong of the same flag as well. Another angle
              of view, another direction of the wind or a quite different cloth shifts it.
-*framing*    How far the hoist's ends are in the picture from where they were, in heights of the hoist.
 *background* Correlation of the pictures' details beside the flag, where there are any.
+*framing*    How far the hoist's ends are in the picture from where they were, in heights of the hoist. It counts only
+             where no background shows the place, since a hoist is found less surely.
 """
 
 from __future__ import annotations
@@ -174,7 +175,7 @@ class Compared:
                 f"{self.likeness:.2f}, at least {BACKGROUND:g} is required"
             )
             found.append(_reason("another-place", what, self.likeness))
-        if self.framing > FRAMING:
+        if math.isnan(self.likeness) and self.framing > FRAMING:
             beyond = math.isinf(self.framing)
             away = "on the other side of the flag" if beyond else f"{self.framing:.2f} of its height away"
             what = f"the flag's hoist is not where it was in the picture: {away}, at most {FRAMING:g} is accepted"

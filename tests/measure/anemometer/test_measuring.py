@@ -16,7 +16,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.stated import Stated
 from measure.anemometer import measuring
 from measure.anemometer.calibration import Calibrated
-from measure.anemometer.features import Features
+from measure.anemometer.features import Features, Place
 from measure.anemometer.storage import read, write
 from measure.estimate.measuring import Measurement
 from measure.estimate.options import Options
@@ -26,6 +26,11 @@ from models.targets import TARGETS
 from tests.measure.anemometer.made import SIZE, STEP, features, gusts, model, place
 
 Measure = Callable[..., Measurement]
+
+
+def bare(where: Place) -> Place:
+    """The same before a cloudless sky."""
+    return replace(where, background=np.full((64, 64), 90.0, np.float32))
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +73,7 @@ def test_the_same_flag_on_another_day_is_read_window_by_window(measure: Measure,
     [
         ({"other": 4.0}, "another-flag"),
         ({"where": place(seed=5)}, "another-place"),
-        ({"where": place(shifted=1.0)}, "another-framing"),
+        ({"where": bare(place(shifted=1.0))}, "another-framing"),
     ],
 )
 def test_another_flag_or_place_is_refused_with_its_figure(measure: Measure, changed: dict[str, Any], kind: str) -> None:
@@ -102,9 +107,11 @@ def test_another_size_and_a_fault_of_the_film_refuse_it(measure: Measure) -> Non
     assert not measure(own, options=Options(size=SIZE)).verdict.refused
 
 
-def test_a_flag_to_the_other_side_is_refused(measure: Measure) -> None:
-    own = features(gusts(120.0, seed=21), seed=21, where=replace(place(), side=-1.0))
-    assert "on the other side" in measure(own).verdict.sentence
+def test_the_hoist_counts_where_no_background_shows_the_place(measure: Measure) -> None:
+    moved = place(shifted=1.0)
+    assert not measure(features(gusts(120.0, seed=21), seed=21, where=moved)).verdict.refused
+    other = bare(replace(place(), side=-1.0))
+    assert "on the other side" in measure(features(gusts(120.0, seed=21), seed=21, where=other)).verdict.sentence
 
 
 def test_a_picture_of_another_shape_is_refused_and_one_without_details_is_judged_by_the_rest(measure: Measure) -> None:
@@ -112,8 +119,7 @@ def test_a_picture_of_another_shape_is_refused_and_one_without_details_is_judged
     wide = replace(own, background=own.background[:36], bare=own.bare[:36])
     found = measure(features(gusts(120.0, seed=21), seed=21, where=wide))
     assert [reason.kind for reason in found.verdict.faults] == ["another-picture"]
-    plain = replace(own, background=np.full((64, 64), 90.0, np.float32))
-    judged = measure(features(gusts(120.0, seed=21), seed=21, where=plain)).verdict
+    judged = measure(features(gusts(120.0, seed=21), seed=21, where=bare(own))).verdict
     assert not judged.refused
     assert "no background shows the place" in judged.sentence
 
