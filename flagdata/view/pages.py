@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import urlencode
 
@@ -19,7 +20,7 @@ from flagdata.errors import FlagdataError, NotFoundError, UnknownNameError, Usag
 from flagdata.lake import Lake
 from flagdata.lake.ancestry import ancestry
 from flagdata.lake.labels import PREFIX
-from flagdata.lake.refs import MAIN
+from flagdata.lake.refs import MAIN, View
 from flagdata.lake.tabled import labels_of
 from flagdata.pages.graph import COLOURS
 from flagdata.pages.lineage import SHORT, picture
@@ -31,6 +32,7 @@ from flagdata.timebase import iso
 from flagdata.view.films import DRAWN
 from flagdata.view.media import Media
 
+_VIEWS = 3
 CARDS = 60
 """Artifacts on one page."""
 CLIPS = 24
@@ -47,6 +49,7 @@ ICON = (
     b'<path d="M3 1v14" stroke="#56646b" stroke-width="1.6"/>'
     b'<path d="M4 2c4-2 6 2 10 0v7c-4 2-6-2-10 0z" fill="#3b7d6b"/></svg>'
 )
+_ID = 32  # characters of an artifact's id
 _FILMED = frozenset({Kind.CAMERA, Kind.RECORDING, Kind.CLIP, *DRAWN})
 _ASIDE = frozenset({"artifact", "name", "kind", "parents", "report", "recipe", "parameters", "clock_model", "quality"})
 _CLOCK = (("clock_offset", "offset", "s"), ("clock_sigma", "σ of the offset", "s"), ("clock_drift", "drift", "s/s"))
@@ -54,6 +57,21 @@ _EVIDENCE = (
     ("interval", "interval of the offset", "s"), ("drift_sigma", "σ of the drift", "s/s"),
     ("confidence", "confidence", ""), ("chance", "probability by chance", ""), ("correlation", "correlation", ""),
 )  # fmt: skip
+
+
+class Tables:
+    """The rows of the views that were asked for last: what a view shows never changes, and a page asks many times."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._known: dict[View, pa.Table] = {}
+
+    def of(self, lake: Lake, view: View) -> pa.Table:
+        """All rows of a view."""
+        with self._lock:
+            if view not in self._known:
+                self._known = {view: lake.table(view), **dict(list(self._known.items())[: _VIEWS - 1])}
+            return self._known[view]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,12 +83,14 @@ class Site:
         media: its pictures.
         base: path before all addresses, with a slash at both ends.
         at: the version asked for, `None` for the head of main.
+        tables: the rows of versions.
     """
 
     lake: Lake
     media: Media
     base: str
     at: str | None = None
+    tables: Tables = field(default_factory=Tables)
 
     def link(self, path: str = "", **values: Any) -> str:
         """The address of a page of this version."""
@@ -83,7 +103,7 @@ class Site:
         Raises:
             NotFoundError: no such version.
         """
-        return self.lake.table(self.lake.view(self.at))
+        return self.tables.of(self.lake, self.lake.view(self.at))
 
     def row(self, artifact: str) -> dict[str, Any]:
         """One row, by its full id.
@@ -276,8 +296,11 @@ def _answer(site: Site, text: str) -> Table:
     rows = site.rows()
     selection = Selection(rows, Request(sql=text, limit=ROWS, time_limit=SECONDS))
     answer = selection.table()
-    known = set(rows["artifact"].to_pylist()) if answer.num_rows else set()
-    columns = [[_cell(site, value, known) for value in column.to_pylist()] for column in answer.columns]
+    values = [column.to_pylist() for column in answer.columns]
+    named = {value for column in values for value in column if isinstance(value, str) and len(value) == _ID}
+    ids = rows["artifact"]
+    known = set(ids.filter(pc.is_in(ids, value_set=pa.array(sorted(named), pa.string()))).to_pylist())  # type: ignore[attr-defined]
+    columns = [[_cell(site, value, known) for value in column] for column in values]
     return Table(
         header=[printable(name) for name in answer.column_names], rows=list(zip(*columns, strict=True)),
         total=selection.total(),
