@@ -16,7 +16,7 @@ from measure.calibrate.observed import Observed
 from measure.calibrate.prior import Floats, Normal, Uncertain
 from measure.calibrate.simulation import OBSERVED, Batch, Flag
 from measure.calibrate.wind import Log
-from measure.films import simulations
+from measure.films import design, simulations
 from measure.films.library import weighable
 from measure.films.run import Options
 from measure.observables.observable import WINDOW
@@ -65,7 +65,7 @@ def readings(batch: Batch, *, foreign: float = 0.0) -> Floats:
 
 @pytest.fixture
 def cheap(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Batches simulated as `readings`; how many flags were asked for, each time."""
+    """Batches of two, simulated as `readings`; how many flags were asked for, each time."""
     asked: list[int] = []
 
     def read(batches: Sequence[Batch], *, folder: Path, workers: int, advance: object) -> Floats:
@@ -73,6 +73,8 @@ def cheap(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         return np.concatenate([readings(batch) for batch in batches])[:, None]
 
     monkeypatch.setattr(simulations, "read", read)
+    for module in (design, simulations):
+        monkeypatch.setattr(module, "TOGETHER", 2)
     return asked
 
 
@@ -86,11 +88,11 @@ def recording(
     """
     times = np.arange(-30.0, WINDOWS * WINDOW + 1)
     log = Log(times=times, speed=mean * (1 + swing * np.sin(times / 6.0)), distance=3.0)
-    design = Design(flag=options().calibration.flag, log=log, duration=WINDOWS * WINDOW, azimuth=AZIMUTH, seed=seed)
-    first = design.batches()[3]
-    known = {one.name: one.column for one in weighable(design.flag)}
+    made = Design(flag=options().calibration.flag, log=log, duration=WINDOWS * WINDOW, azimuth=AZIMUTH, seed=seed)
+    first = made.batches()[3]
+    known = {one.name: one.column for one in weighable(made.flag)}
     one = Batch(
-        flag=design.flag, log=log, duration=design.duration, values={k: v[:1] for k, v in first.values.items()},
+        flag=made.flag, log=log, duration=made.duration, values={k: v[:1] for k, v in first.values.items()},
         places=first.places[:1], seeds=(seed,),
         effects=tuple((known[name], np.array([strength])) for name, strength in (effects or {}).items()),
     )  # fmt: skip
