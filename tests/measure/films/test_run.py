@@ -104,7 +104,7 @@ def test_effects_that_the_recordings_would_not_show_are_listed(cheap: list[int],
     assert any("even where they are strong, hem-mass would move" in text for text in verdict.assumptions)
 
 
-def test_a_constant_wind_is_said_to_hide_what_acts_as_another_weight_does(cheap: list[int], tmp_path: Path) -> None:
+def test_a_constant_wind_is_reported_to_hide_what_acts_as_another_weight_does(cheap: list[int], tmp_path: Path) -> None:
     verdict = close_loop([recording(mean=5.0, seed=5, swing=0.0)], options(), folder=tmp_path)
     assert [kind for kind, _ in verdict.findings] == ["constant-wind"]
     assert any("one steady wind" in text for text in verdict.assumptions)
