@@ -479,7 +479,7 @@ _CHECKPOINT = ".checkpoint.parquet"
 _HINT = "_last_checkpoint"
 _SYSTEM_ERROR = "(os error "  # as the Delta library writes it
 _NO_ANSWER = re.compile(r"Generic S3 error|Error performing [A-Z]+ ")
-"""What it writes where a store refused a request or did not answer; all else is said of what the store gave."""
+"""What it writes where a store refused a request or did not answer; all else concerns what the store gave."""
 _WRITER = 2
 """Version of Delta's protocol that tables of this package ask of writers; a later one has duties unknown here."""
 

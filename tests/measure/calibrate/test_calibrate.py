@@ -153,7 +153,7 @@ def test_draws_fill_the_priors_range_evenly() -> None:
 
 @pytest.mark.usefixtures("cheap")
 def test_rows_of_one_place_share_the_anemometers_gain() -> None:
-    """Three winds of one place tell the weight no better than the gain allows: to 6 %; of three places, to 6 %/√3."""
+    """Three winds of one place show the weight no better than the gain allows: to 6 %; of three places, to 6 %/√3."""
     winds = (4.0, 6.0, 9.0)
     apart = [_observed(0.17, speed=np.full(190, wind), seed=number) for number, wind in enumerate(winds)]
     together = [replace(one, place="tunnel") for one in apart]
