@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import zip_longest
@@ -70,6 +71,7 @@ def close_films(
             "the flag's size is missing: what is simulated is a flag of its size", where="--flag-size",
             fix="give length x height in metres, as in 1.5x1.0",
         )  # fmt: skip
+    begun = time.monotonic()
     check_files(out, *FILES, command="close-loop")
     size = parse_size(given.flag_size)
     options = Options(
@@ -104,7 +106,7 @@ def close_films(
         recordings, options, folder=given.cache or user_cache() / "calibrate",
         workers=workers or len(os.sched_getaffinity(0)), stage=stage_bars(),
     )  # fmt: skip
-    verdict = verdict_of(outcome)
+    verdict = replace(verdict_of(outcome), seconds=time.monotonic() - begun)
     called = name or recordings[0].name
     closed = ClosedOnFilms(
         name=called, outcome=outcome, verdict=verdict, models=models(verdict, outcome, name=called),

@@ -56,6 +56,7 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
     verdict = json.loads(done.stdout)
     assert verdict["schema"] == "flagdata.verdict/1"
     assert verdict["named"] == ["tangential-linear-drag"]
+    assert 0 < verdict["seconds"] < 300
     assert {path.name for path in out.iterdir()} == {"report.html", "verdict.json", "base.toml", "model.toml"}
     text = (out / "report.html").read_text()
     assert "The base model lacked tangential-linear-drag" in text
