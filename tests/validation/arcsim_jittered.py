@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -41,6 +42,8 @@ DRAWS = tuple(range(1, 1 + int(os.environ.get("FLAGDATA_DRAWS", "3"))))
 KNOWN = tuple(float(known) for known in os.environ.get("FLAGDATA_KNOWN", f"{DENSITY_UNCERTAINTY:g},0.02").split(","))
 """Relative standard uncertainties of the density that is declared: where it is not given, and of a cloth that was
 weighed; FLAGDATA_KNOWN says which are tried."""
+WORKERS = int(os.environ.get("FLAGDATA_WORKERS", "0")) or len(os.sched_getaffinity(0))
+"""Processes that simulate the nulls; FLAGDATA_WORKERS says how many."""
 _UNIT = 1e-4  # m, of the stored positions
 _SHOWN = 7
 """Candidates that the page reports."""
@@ -78,17 +81,21 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         return dict(ABSENT)
     experiments = {known: {name: _experiment(runs / "jittered", name, known) for name in CASES} for known in KNOWN}
     results: dict[str, Any] = {"criteria": CRITERIA.as_dict()}
+    setting = Setting.of(experiments[KNOWN[0]]["null"])
     for draw in DRAWS:
         place = out / f"arcsim-jittered-{seed}-{draw}"
-        setting = Setting.of(next(iter(experiments.values()))["null"])
         wanted = batches(setting, kinds=CRITERIA.simulated_kinds, seed=100 * seed + draw)
-        banks.build(place / "nulls", wanted, workers=len(os.sched_getaffinity(0)))
-    for known, group in experiments.items():
-        for draw in DRAWS:
-            place = out / f"arcsim-jittered-{seed}-{draw}"
-            results[_heading(draw, known)] = {name: _once(place, name, own, seed) for name, own in group.items()}
+        banks.build(place / "nulls", wanted, workers=WORKERS, progress=lambda done: _report(f"nulls + {done}"))
+        for known, group in experiments.items():
+            heading = _heading(draw, known)
+            results[heading] = {name: _once(place, name, own, seed) for name, own in group.items()}
+            _report(f"{heading}: {sum(own['right'] for own in results[heading].values())} of {len(group)} right")
     (out / "validate-arcsim-jittered.md").write_text(_page(results), encoding="utf-8")
     return results
+
+
+def _report(what: str) -> None:
+    sys.stderr.write(f"arcsim-jittered: {what}\n")
 
 
 def _heading(draw: int, known: float) -> str:
