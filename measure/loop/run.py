@@ -139,8 +139,8 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
     report("sensitivities", 1, 1)
     nominal = setting
 
-    def tested() -> tuple[Setting, Fits, NullBank, Reference]:
-        bank = plan.bank_for(nominal, options, stage=report)
+    def tested(nulls: int) -> tuple[Setting, Fits, NullBank, Reference]:
+        bank = plan.bank_for(nominal, options, nulls=nulls, stage=report)
         reference = bank.reference(
             len(nominal.segments), noise=nominal.design.noise, seed=options.seed, prior=nominal.prior
         )
@@ -150,11 +150,11 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
         report("base model", 1, 1)
         return fitted, fits, bank, reference.at(fitted.calibration)
 
-    setting, fits, bank, reference = tested()
+    nulls = plan.first_round(options)
+    setting, fits, bank, reference = tested(nulls)
     evidence = fits.whitened.evidence(fits.whitened.found)
-    while (more := _more(options, reference, evidence)) is not None:
-        options = replace(options, nulls=more)
-        setting, fits, bank, reference = tested()
+    while (more := _more(options, nulls, reference, evidence)) is not None:
+        setting, fits, bank, reference = tested(nulls := more)
         evidence = fits.whitened.evidence(fits.whitened.found)
     set_up = SetUp(tolerance=setting.tolerance, attached=hoist_stands_still(setting.experiment))
     judgement, refits = judge(evidence, reference, level=options.level, set_up=set_up), dict[int, Refit | None]()
@@ -171,12 +171,14 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
     return _outcome(solved, bank, trial, options, began, late)
 
 
-def _more(options: Options, reference: Reference, evidence: Evidence) -> int | None:
-    """How many nulls to go on with; None where those that there are decide, or are given as a bank."""
+def _more(options: Options, nulls: int, reference: Reference, evidence: Evidence) -> int | None:
+    """How many nulls to go on with after so many; None where those decide, or are given as a bank."""
     if options.bank is not None:
         return None
     statistic = reference.farthest(evidence, names())
-    return plan.more_nulls(options.nulls, options.most_nulls, reference.conformal, statistic, level=options.level)
+    return plan.more_nulls(
+        nulls, options.nulls, options.most_nulls, reference.conformal, statistic, level=options.level
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

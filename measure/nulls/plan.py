@@ -13,7 +13,7 @@ from flagdata.rng import child_seed
 from measure.forecasting.setting import Setting, Stage
 from measure.nulls import bank as banks
 from measure.nulls import winds
-from measure.nulls.conformal import GroupedConformal
+from measure.nulls.conformal import GroupedConformal, kinds_needed
 from measure.nulls.reference import NullBank
 from measure.nulls.simulation import NullBatch
 from measure.observe.trajectory import described
@@ -30,7 +30,8 @@ class NullOptions:
     Attributes:
         seed: of the nulls.
         level: of the test.
-        nulls: null recordings simulated where no bank is given, in whole batches; at least `FEWEST_NULLS`.
+        nulls: null recordings simulated where no bank is given, in whole batches; at least `FEWEST_NULLS`. A verdict
+            simulates half as many, or fewer, where these show that the base model is not rejected (see `first_round`).
         bank: a folder of nulls over priors that hold for this design; None simulates nulls of this cloth, its markers
             and winds, over the same priors.
         workers: processes for the nulls, then threads for what is fitted.
@@ -55,21 +56,43 @@ class NullOptions:
             )  # fmt: skip
 
 
-def bank_for(setting: Setting, options: NullOptions, *, stage: Stage) -> NullBank:
+def bank_for(setting: Setting, options: NullOptions, *, nulls: int | None = None, stage: Stage) -> NullBank:
     """The bank of a folder where one is named; else nulls that are simulated for an experiment.
+
+    Args:
+        nulls: how many are simulated; None for as many as the options have.
 
     Raises:
         FlagdataError: as `load_bank`.
     """
     if options.bank is not None:
         return load_bank(options.bank, setting)
-    return simulated(setting, nulls=options.nulls, seed=options.seed, workers=options.workers, stage=stage)
+    return simulated(
+        setting,
+        nulls=options.nulls if nulls is None else nulls,
+        seed=options.seed,
+        workers=options.workers,
+        stage=stage,
+    )
 
 
-def more_nulls(nulls: int, most: int, conformal: GroupedConformal, statistic: float, *, level: float) -> int | None:
-    """Twice as many nulls, up to `most`, where so many leave open what the test decides: p within `Criteria.near` of
-    the level, and a level that its interval includes. None where they decide it, or no more may be simulated."""
+def first_round(options: NullOptions) -> int:
+    """Nulls with which a verdict begins: they can test the level."""
+    return min(max(CRITERIA.first_kinds, kinds_needed(options.level)) * banks.WINDS, options.nulls)
+
+
+def more_nulls(
+    nulls: int, wanted: int, most: int, conformal: GroupedConformal, statistic: float, *, level: float
+) -> int | None:
+    """Twice as many nulls where so many leave open what the test decides; None where they decide it.
+
+    Below `wanted` that is where the interval of p is not wholly above the level: the base model is only ever rejected
+    by that many or more, and p of so many is valid whether fewer would have ended the test or not. Beyond, up to
+    `most`, it is where p is within `Criteria.near` of the level and its interval includes the level.
+    """
     p, (low, high) = conformal.p(statistic), conformal.interval(statistic, level=CRITERIA.interval)
+    if nulls < wanted:
+        return min(2 * nulls, wanted) if low <= level else None
     near = level / CRITERIA.near <= p <= CRITERIA.near * level and low <= level <= high
     return min(2 * nulls, most) if near and nulls < most else None
 

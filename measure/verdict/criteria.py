@@ -23,8 +23,11 @@ class Criteria:
         level: of the global test, and of the same test of what a model with effects leaves: rejected at p ≤ level.
         interval: level of all intervals.
         fewest_kinds: kinds of numerics below which their spread cannot be estimated.
-        simulated_kinds: kinds of numerics that are simulated at least where no bank is given. A level of 0.05 can be
-            tested by 19; of 40, one kind whose groups are all as far does not save the base model.
+        simulated_kinds: kinds of numerics that are simulated at least where no bank is given, before the base model is
+            rejected. A level of 0.05 can be tested by 19; of 40, one kind whose groups are all as far does not save the
+            base model.
+        first_kinds: kinds after which no more are simulated where the interval of p lies above the level: what twenty
+            leave open is decided by twice as many. Rejecting needs all of `simulated_kinds`, so that the level holds.
         alike_noise: difference of the markers' noise up to which nulls stand for the data [m]: it moves statistics
             little beside the 20 mm that meshes do.
         refitted: candidates that are refitted at least, of each of two orders (held-out gain, statistic); all that are
@@ -56,6 +59,7 @@ class Criteria:
     interval: float = 0.9
     fewest_kinds: int = 4
     simulated_kinds: int = 40
+    first_kinds: int = 20
     alike_noise: float = 1.5e-3
     refitted: int = 2
     lead: float = 2.0

@@ -26,8 +26,11 @@ class Backend(StrEnum):
     """The Warp kernel, for graphics processors; never taken unless it is asked for."""
 
 
-def kernel_for(system: System, state: State, backend: Backend) -> Kernel | None:
+def kernel_for(system: System, state: State, backend: Backend, *, kind: str | None = None) -> Kernel | None:
     """The compiled kernel where the backend allows it and it can run; None where torch is to do the work.
+
+    Args:
+        kind: of its functions, see `Kernel.of`.
 
     Raises:
         UsageError: the kernel was asked for and cannot run this system, or gradients are wanted from it; the Warp
@@ -41,7 +44,7 @@ def kernel_for(system: System, state: State, backend: Backend) -> Kernel | None:
     differentiated = _differentiated(system, state)
     if backend is Backend.TORCH or (backend is Backend.AUTO and differentiated):
         return None
-    kernel = Kernel.of(system)
+    kernel = Kernel.of(system, kind=kind)
     if backend is Backend.KERNEL and (kernel is None or differentiated):
         raise UsageError(
             "the compiled kernel cannot run this batch",

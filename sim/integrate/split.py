@@ -12,6 +12,7 @@ the compiled kernel's, so that an effect costs one evaluation a step, not one an
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import accumulate
 
@@ -21,8 +22,9 @@ from torch import Tensor
 from flagdata.errors import UsageError
 from sim.inertia import effective, mean_normals
 from sim.integrate.backend import extra_force, kernel_for
-from sim.integrate.implicit import BackwardEuler
+from sim.integrate.implicit import AirShape, BackwardEuler
 from sim.integrate.joint_batch import JointBatch
+from sim.kernel.fused import Kernel
 from sim.state import State
 from sim.system import Drive, System
 
@@ -47,6 +49,8 @@ class SplitEuler:
         if not (system.extra or system.loads or system.ties):
             return self.base.advance(plain, state, duration)
         steps, h = self._steps(duration)
+        if (kernels := self._kernels(plain, [system], state)) is not None:
+            return self._at_once(plain, *kernels, state, h, steps)
         for drive in system.drives(_times(state.time, h, steps)):
             begun = replace(state, velocity=self._pushed(system, state, drive, h), memory=())
             state = _carried(system, state, self.base.stepped(plain, begun, drive, h), h)
@@ -60,6 +64,8 @@ class SplitEuler:
         """
         plain = batches.plain
         steps, h = self._steps(duration)
+        if (kernels := self._kernels(plain, batches.systems, state)) is not None:
+            return self._at_once(plain, *kernels, state, h, steps)
         for drive in plain.drives(_times(state.time, h, steps)):
             parts = list(batches.parts(state))
             velocity = state.velocity.clone()
@@ -76,6 +82,35 @@ class SplitEuler:
                     memory += carried.memory
             state = replace(after, memory=tuple(memory))
         return state
+
+    def _kernels(
+        self, plain: System, systems: Sequence[System], state: State
+    ) -> tuple[Kernel, tuple[Kernel, ...]] | None:
+        """Those of the base model of all and of the batches; None where one of them cannot take the steps."""
+        kernel = kernel_for(plain, state, self.base.backend)
+        if kernel is None or plain.contact is not None or plain.limits is not None:
+            return None
+        if self.base.air_shape is not AirShape.CURRENT or any(_loosened(system) for system in systems):
+            return None
+        parts: list[Kernel] = []
+        for system in systems:
+            own = kernel_for(system, state, self.base.backend, kind=kernel.kind)
+            if own is None or own.beside is None:
+                return None
+            parts.append(own)
+        return kernel, tuple(parts)
+
+    def _at_once(
+        self, plain: System, kernel: Kernel, parts: Sequence[Kernel], state: State, h: float, steps: int
+    ) -> State:
+        """Steps of `h` [s] in one call of the kernel."""
+        times = _times(state.time, h, steps)
+        x, v, memory = kernel.split(
+            parts, [plain.wind.velocity(time) for time in times[:-1]], [plain.targets(time) for time in times[1:]],
+            state.position, state.velocity, h, tolerance=self.base.tolerance, iterations=self.base.iterations,
+            offsets=[plain.offset(time) for time in times[:-1]], memory=state.memory,
+        )  # fmt: skip
+        return State(position=x, velocity=v, time=times[-1], memory=memory)
 
     def _steps(self, duration: float) -> tuple[int, float]:
         """How many, and how long each is [s]."""
@@ -109,6 +144,11 @@ def _carried(system: System, before: State, after: State, h: float) -> State:
         change = effective(change, mass=system.cloth.mass, added=system.added_mass, normals=normals) / mass
         after = replace(after, position=x + h * (v + change), velocity=v + change)
     return replace(after, memory=system.remembered(before.memory, after.position))
+
+
+def _loosened(system: System) -> bool:
+    """Whether ties pull less than the handles do."""
+    return any(float(tie.springs(system.cloth).share) < 1 for tie in system.ties)
 
 
 def _pulling(stiffness: Tensor) -> Tensor:

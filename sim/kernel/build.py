@@ -29,7 +29,8 @@ _FLAGS = (
 _EFFECT = ("effect.hpp", "vector.hpp")
 """What the C++ of an effect is written with."""
 _SOURCES = (
-    "kernel.cpp", "block.hpp", "acting.hpp", "problem.hpp", "contact.hpp", "on_mesh.hpp", "implicit.hpp", *_EFFECT,
+    "kernel.cpp", "block.hpp", "acting.hpp", "problem.hpp", "contact.hpp", "on_mesh.hpp", "implicit.hpp", "split.hpp",
+    *_EFFECT,
 )  # fmt: skip
 
 

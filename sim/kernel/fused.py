@@ -71,6 +71,15 @@ class _Problem(ctypes.Structure):
     ]
 
 
+class _Part(ctypes.Structure):
+    """Mirrors `Part` of split.hpp field by field."""
+
+    _fields_ = [
+        ("problem", ctypes.POINTER(_Problem)),
+        *((name, ctypes.c_int64) for name in ("blocks", "first", "count")),
+    ]
+
+
 class _Lists:
     """What the kernel's contact remembers from call to call of what is near: it saves time and changes no result.
 
@@ -112,23 +121,28 @@ class Kernel:
     beside: Acting | None
 
     @classmethod
-    def of(cls, system: System) -> Kernel | None:
+    def of(cls, system: System, *, kind: str | None = None) -> Kernel | None:
         """The kernel for a system, or for its base where effects have no C++ (see `beside`); None where there is none:
-        not a CPU, not float32 or 64, or it cannot be built."""
+        not a CPU, not float32 or 64, or it cannot be built.
+
+        Args:
+            kind: of the functions, as that of another kernel which it is run beside; None for what its batch needs.
+        """
         cloth = system.cloth
         if cloth.device.type != "cpu" or cloth.dtype not in (torch.float32, torch.float64):
             return None
-        if system not in _KERNELS:
+        kind = kind or _kind(system)
+        made = _KERNELS.setdefault(system, {})
+        if kind not in made:
             code = library()
             if code is None:
                 return None
-            _KERNELS[system] = cls._build(system, code)
-        return _KERNELS[system]
+            made[kind] = cls._build(system, code, kind)
+        return made[kind]
 
     @classmethod
-    def _build(cls, system: System, code: ctypes.CDLL) -> Kernel:
+    def _build(cls, system: System, code: ctypes.CDLL, kind: str) -> Kernel:
         cloth = system.cloth
-        kind = _kind(system)
         lanes = int(_function(code, "lanes", kind)())
         blocks = math.ceil(cloth.batch / lanes)
         inverse_mass = 1 / cloth.mass
@@ -303,12 +317,66 @@ class Kernel:
         numbers = (ctypes.c_double(h), ctypes.c_double(lag), ctypes.c_double(tolerance), *counts)
         self._call("implicit", problem, xb, vb, failed, *numbers)
         del alive, past
-        after, lost = (self.unpack(xb), self.unpack(vb)), self.unpack(failed) != 0
+        return self._solved(xb, vb, failed)
+
+    def split(
+        self,
+        parts: Sequence[Kernel],
+        winds: Sequence[Tensor],
+        targets: Sequence[Tensor],
+        x: Tensor,
+        v: Tensor,
+        h: float,
+        *,
+        tolerance: float,
+        iterations: int,
+        offsets: Sequence[Tensor],
+        memory: Sequence[Tensor] = (),
+    ) -> tuple[Tensor, Tensor, tuple[Tensor, ...]]:
+        """Steps of `h` [s] of the splitting (see `sim.integrate.split`): positions, velocities (vertex, 3, batch), and
+        the memory of frictions.
+
+        Args:
+            parts: of the batches, of this one's kind, whose members side by side are this one's; `beside` is none of
+                theirs None.
+            winds, targets, offsets, tolerance, iterations: as of `implicit`.
+            memory: of the frictions of all parts, in order.
+        """
+        problem, alive = self._given(wind=self._each(winds), targets=self._each(targets))
+        problems: list[_Problem] = []
+        remembered: list[tuple[Kernel, Tensor]] = []
+        own, left = (_Part * len(parts))(), list(memory)
+        first = 0
+        for place, part in enumerate(parts):
+            given = {} if part.tied is None else {"tie_targets": part._each([part.tied + o[:, None] for o in offsets])}
+            mine, kept = part._given(**given)
+            count = 0 if part.beside is None else part.beside.frictions
+            past = part._remember(mine, left[:count])
+            own[place] = _Part(ctypes.pointer(mine), part.blocks, first, part.batch)
+            remembered += [(part, tensor) for tensor in past]
+            problems.append(mine)
+            alive += kept
+            first, left = first + part.batch, left[count:]
+        xb, vb = self.pack(x), self.pack(v)
+        failed = torch.zeros((self.blocks, self.lanes), dtype=torch.int32)
+        counts = (ctypes.c_int64(iterations), ctypes.c_int64(len(winds)))
+        self._call(
+            "split", problem, xb, vb, failed, ctypes.c_double(h), ctypes.c_double(tolerance), *counts, own,
+            ctypes.c_int64(len(parts)),
+        )  # fmt: skip
+        del alive, problems
+        return *self._solved(xb, vb, failed), tuple(part.unpack(tensor) for part, tensor in remembered)
+
+    def _solved(self, x: Tensor, v: Tensor, failed: Tensor) -> tuple[Tensor, Tensor]:
+        """Positions and velocities (vertex, 3, batch) of blocks, NaN for members whose solve did not converge."""
+        after, lost = (self.unpack(x), self.unpack(v)), self.unpack(failed) != 0
         if bool(lost.any()):
             after = (after[0].masked_fill(lost, torch.nan), after[1].masked_fill(lost, torch.nan))
         return after
 
-    def _call(self, name: str, problem: _Problem, *arguments: Tensor | ctypes._SimpleCData[Any]) -> None:
+    def _call(
+        self, name: str, problem: _Problem, *arguments: Tensor | ctypes._SimpleCData[Any] | ctypes.Array[_Part]
+    ) -> None:
         function = _function(self.code, name, self.kind)
         function.restype = None
         passed = [ctypes.c_void_p(a.data_ptr()) if isinstance(a, Tensor) else a for a in arguments]
@@ -351,7 +419,7 @@ def _groups(points: NDArray[np.float64], width: int) -> NDArray[np.int64]:
     return np.stack(halved(np.arange(len(points))))
 
 
-_KERNELS: weakref.WeakKeyDictionary[System, Kernel] = weakref.WeakKeyDictionary()
+_KERNELS: weakref.WeakKeyDictionary[System, dict[str, Kernel]] = weakref.WeakKeyDictionary()
 
 
 def _function(code: ctypes.CDLL, name: str, kind: str) -> Any:

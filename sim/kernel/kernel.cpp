@@ -2,7 +2,7 @@
 
 #include "block.hpp"
 #include "on_mesh.hpp"
-#include "implicit.hpp"
+#include "split.hpp"
 
 namespace {
 
@@ -88,6 +88,10 @@ void implicit(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, 
   void implicit_##name(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, double h, double lag,       \
                        double tolerance, int64_t iterations, int64_t steps) {                                        \
     implicit<T, L>(p, blocks, x, v, failed, h, lag, tolerance, iterations, steps);                                   \
+  }                                                                                                                  \
+  void split_##name(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, double h, double tolerance,    \
+                    int64_t iterations, int64_t steps, const Part<T>* part, int64_t parts) {                         \
+    split<T, L>(p, blocks, x, v, failed, h, tolerance, iterations, steps, part, parts);                              \
   }
 
 extern "C" {

@@ -22,6 +22,8 @@ from sim.effects.field import FieldEffect, Seen
 from sim.effects.files import load
 from sim.integrate.backend import Backend
 from sim.integrate.implicit import BackwardEuler
+from sim.integrate.joint_batch import JointBatch
+from sim.integrate.split import SplitEuler
 from sim.integrate.symplectic import advance
 from sim.kernel.fused import Kernel
 from sim.material import named
@@ -165,6 +167,40 @@ def test_both_integrators_with_an_effect_agree_with_torch(name: str, run: Callab
     else:
         expected = BackwardEuler(step=5e-3, tolerance=1e-10, backend=Backend.TORCH).advance(system, state, 0.01)
     torch.testing.assert_close(final.velocity, expected.velocity, rtol=0, atol=1e-9)
+
+
+def splitting(backend: Backend) -> SplitEuler:
+    return SplitEuler(base=BackwardEuler(step=5e-3, tolerance=1e-11, backend=backend))
+
+
+@pytest.mark.parametrize("dtype", [torch.float64, torch.float32])
+def test_batches_of_all_effects_split_jointly_in_one_call_as_torch_splits_each(
+    dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Blocks hold members of several batches; the memory of frictions is carried from frame to frame."""
+    base = flag(dtype=dtype)
+    batches = [with_effect(drawn(name), *base) for name in EFFECTS if name != "slack"]
+    batches = [
+        (system, replace(state, velocity=torch.cos(11 * state.position.roll(1, 0)))) for system, state in batches
+    ]
+    expected = batches
+    for _ in range(2):
+        expected = [(own, splitting(Backend.TORCH).advance(own, state, 0.01)) for own, state in expected]
+    monkeypatch.setattr(Kernel, "extra", lambda *_, **__: pytest.fail("impulses are taken batch by batch"))
+    joint, together = JointBatch.of(batches)
+    for _ in range(2):
+        together = splitting(Backend.AUTO).advance_jointly(joint, together, 0.01)
+    tolerance = 1e-8 if dtype == torch.float64 else 2e-4
+    for field in ("position", "velocity"):
+        whole = torch.cat([getattr(state, field) for _, state in expected], dim=-1)
+        torch.testing.assert_close(getattr(together, field), whole, rtol=0, atol=tolerance)
+    remembered = [past for _, state in expected for past in state.memory]
+    assert remembered
+    for past, defined in zip(together.memory, remembered, strict=True):
+        torch.testing.assert_close(past, defined, rtol=0, atol=tolerance)
+    alone, start = batches[list(EFFECTS).index("added-mass")]
+    once, defined = (splitting(b).advance(alone, start, 0.01) for b in (Backend.AUTO, Backend.TORCH))
+    torch.testing.assert_close(once.velocity, defined.velocity, rtol=0, atol=tolerance)
 
 
 OWN = '''

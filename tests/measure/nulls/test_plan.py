@@ -62,6 +62,16 @@ def test_nulls_are_kept_by_their_design(monkeypatch: pytest.MonkeyPatch, tmp_pat
 def test_more_are_simulated_where_p_is_near_the_level(as_far: int, wanted: int | None) -> None:
     """p = (1 + as far)/41."""
     conformal = GroupedConformal(null=np.where(np.arange(40) < as_far, 9.0, 1.0), kinds=np.arange(40))
-    assert plan.more_nulls(160, 400, conformal, 5.0, level=0.05) == wanted
-    assert plan.more_nulls(160, 200, conformal, 5.0, level=0.05) == (None if wanted is None else 200)
-    assert plan.more_nulls(320, 320, conformal, 5.0, level=0.05) is None
+    assert plan.more_nulls(160, 160, 400, conformal, 5.0, level=0.05) == wanted
+    assert plan.more_nulls(160, 160, 200, conformal, 5.0, level=0.05) == (None if wanted is None else 200)
+    assert plan.more_nulls(320, 320, 320, conformal, 5.0, level=0.05) is None
+
+
+@pytest.mark.parametrize(("as_far", "wanted"), [(0, 160), (3, 160), (4, None), (20, None)])
+def test_twenty_kinds_end_the_simulation_only_where_they_do_not_reject(as_far: int, wanted: int | None) -> None:
+    """Clopper and Pearson bound 3 and 4 of 20 by 0.042 and 0.071 from below; 1/21 is not enough to reject."""
+    conformal = GroupedConformal(null=np.where(np.arange(20) < as_far, 9.0, 1.0), kinds=np.arange(20))
+    assert plan.first_round(plan.NullOptions()) == 80
+    assert plan.first_round(plan.NullOptions(level=0.01, nulls=400)) == 4 * 99
+    assert plan.more_nulls(80, 160, 400, conformal, 5.0, level=0.05) == wanted
+    assert plan.more_nulls(80, 100, 400, conformal, 5.0, level=0.05) == (None if wanted is None else 100)
