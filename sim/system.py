@@ -393,8 +393,16 @@ class System:
 
     @cached_property
     def alone(self) -> System:
-        """The base model without ties and loads."""
-        return replace(self.base, loads=(), ties=())
+        """The base model without loads, of the ties with those alone that loosen its handles."""
+        return replace(self.base, loads=(), ties=tuple(tie for tie in self.ties if self._loosened_by(tie)))
+
+    @cached_property
+    def beside(self) -> System:
+        """All that `alone` lacks, beside the base model."""
+        return replace(self, ties=tuple(tie for tie in self.ties if not self._loosened_by(tie)))
+
+    def _loosened_by(self, tie: Tie) -> bool:
+        return tie.springs(self.cloth).share < 1
 
     def extra_force(
         self,

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import torch
@@ -67,7 +67,10 @@ class Course(Rows):
         whole, fast = (
             (weight * c[:, :-1] * c[:, 1:]).sum(axis=(0, 1)) / weight.sum(axis=(0, 1)) for c in (value, within)
         )
-        return Variation(whole=whole, fast=fast)
+        # The error of a ratio of sums over segments, of which each may be another.
+        each = (weight * (value[:, :-1] * value[:, 1:] - whole)).sum(axis=1)
+        error = np.sqrt((each**2).sum(axis=0)) / weight.sum(axis=(0, 1))
+        return Variation(whole=whole, fast=fast, error=error)
 
     @property
     def _together(self) -> Floats:
@@ -112,10 +115,12 @@ class Variation:
     Attributes:
         whole: (part,) about the mean of the recording.
         fast: (part,) about the mean of the segment.
+        error: (part,) standard errors of `whole`, by how segments differ; none where they are not known.
     """
 
     whole: Floats
     fast: Floats
+    error: Floats = field(default_factory=lambda: np.zeros(3))
 
     @property
     def turbulent(self) -> bool:
@@ -129,8 +134,9 @@ class Variation:
 
     @property
     def alone(self) -> bool:
-        """Whether the wind varies along itself alone, however fast: neither turbulence nor an obstacle does so."""
-        across = max(float(self.whole[LEFT]), 0.0)
+        """Whether the wind varies along itself alone, however fast, and beyond what chance may hide: neither turbulence
+        nor an obstacle does so."""
+        across = max(float(self.whole[LEFT]), 0.0) + CRITERIA.reach * float(self.error[LEFT])
         return bool(self.whole[ALONG] > 0 and across < CRITERIA.least_obstructed**2 * self.whole[ALONG])
 
     @property

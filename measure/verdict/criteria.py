@@ -39,8 +39,8 @@ class Criteria:
             were named rightly (decision 030).
         least_turned: a wind that varies across its mean by less than this share of what it does along it is not
             turbulence (see `course`).
-        least_obstructed: one that varies across its mean by less than this share varies along itself alone, as a fan
-            makes it: passing obstacles turn it by 0.15 to 0.23 (decision 012).
+        least_obstructed: one that certainly varies across its mean by less than this share varies along itself alone,
+            as a fan makes it: passing obstacles turn it by 0.15 to 0.23 (decision 012).
         most_within: nor is one whose variance within two seconds is more than so many times that between stretches.
         density_between: standard deviation of the logarithm of the density by which simulators of other authors differ;
             this and the next two are of twenty nulls of MuJoCo (decision 023).
@@ -65,7 +65,7 @@ class Criteria:
     lead: float = 2.0
     strength_factor: float = 0.5
     least_turned: float = 0.3
-    least_obstructed: float = 0.1
+    least_obstructed: float = 0.15
     most_within: float = 2.0
     density_between: float = 0.07
     bending_between: float = 0.6

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate, pairwise
 
 import torch
 from torch import Tensor
@@ -15,7 +16,7 @@ from torch import Tensor
 from flagdata.errors import UsageError
 from sim.cloth import Cloth
 from sim.state import State
-from sim.system import AnchorMotion, System
+from sim.system import AnchorMotion, Springs, System, Tie
 from sim.wind import Wind
 
 
@@ -42,6 +43,50 @@ class _Motions:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class _Loosening:
+    """A tie of one batch among the members of all.
+
+    Attributes:
+        tie, cloth: of the batch.
+        members: its place.
+        batch: members of all.
+    """
+
+    tie: Tie
+    cloth: Cloth
+    members: slice
+    batch: int
+
+    def springs(self, cloth: Cloth) -> Springs:
+        """Those of the batch, without stiffness for all others."""
+        own = self.tie.springs(self.cloth)
+        anchors = own.anchors[..., :1].repeat(1, 1, self.batch)
+        anchors[..., self.members] = own.anchors
+        return Springs(
+            vertices=own.vertices, anchors=anchors, stiffness=self._widened(own.stiffness),
+            slack=self._widened(own.slack), share=own.share,
+        )  # fmt: skip
+
+    def force(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
+        """(vertex, 3, batch) [N]."""
+        return self._widened(self.tie.force(self.cloth, time, position[..., self.members]))
+
+    def stiffness(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
+        """(vertex, batch) [N/m]."""
+        return self._widened(self.tie.stiffness(self.cloth, time, position[..., self.members]))
+
+    def stiffest(self, cloth: Cloth) -> Tensor:
+        """(vertex, batch) [N/m]."""
+        return self._widened(self.tie.stiffest(self.cloth))
+
+    def _widened(self, own: Tensor) -> Tensor:
+        """(…, members of the batch) → (…, batch), 0 for all others."""
+        whole = own.new_zeros((*own.shape[:-1], self.batch))
+        whole[..., self.members] = own
+        return whole
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class JointBatch:
     """Batches on one mesh, held alike.
 
@@ -64,7 +109,7 @@ class JointBatch:
 
     @cached_property
     def plain(self) -> System:
-        """The base model of all, without ties and loads.
+        """The base model of all, without loads, of the ties with those alone that loosen handles.
 
         Raises:
             UsageError: batches that differ in their mesh, handles, air, contact or strain limits, or in whether their
@@ -80,26 +125,41 @@ class JointBatch:
                     where="joint batch",
                     fix="run them one by one",
                 )
+        loosening = [
+            _Loosening(tie=tie, cloth=part.cloth, members=members, batch=self._members[-1].stop)
+            for part, members in zip(parts, self._members, strict=True)
+            for tie in part.ties
+        ]
         motions = [part.motion for part in parts if part.motion is not None]
         if motions and len(motions) < len(parts):
             raise UsageError(
                 "batches with anchors that move and anchors that do not", where="joint batch", fix="run them one by one"
             )
         return replace(
-            first, cloth=Cloth.joined([part.cloth for part in parts]), wind=_Winds(parts=tuple(p.wind for p in parts)),
+            first, ties=tuple(loosening), cloth=Cloth.joined([part.cloth for part in parts]),
+            wind=_Winds(parts=tuple(p.wind for p in parts)),
             gravity=torch.cat([part.gravity for part in parts], dim=-1),
             anchors=torch.cat([part.anchors for part in parts], dim=-1),
             motion=_Motions(parts=tuple(motions)) if motions else None,
         )  # fmt: skip
 
+    @cached_property
+    def beside(self) -> tuple[System, ...]:
+        """What `plain` lacks of each."""
+        return tuple(system.beside for system in self.systems)
+
+    @cached_property
+    def _members(self) -> list[slice]:
+        """Of each batch among all."""
+        ends = list(accumulate((system.cloth.batch for system in self.systems), initial=0))
+        return [slice(*pair) for pair in pairwise(ends)]
+
     def parts(self, state: State) -> Iterator[tuple[System, slice, State]]:
-        """For every batch its system, its place among the members, and its state."""
-        memory, start = state.memory, 0
-        for system in self.systems:
-            members = slice(start, start + system.cloth.batch)
+        """For every batch what `plain` lacks of its system, its place among the members, and its state."""
+        memory = state.memory
+        for system, members in zip(self.beside, self._members, strict=True):
             own, memory = memory[: len(system.frictions)], memory[len(system.frictions) :]
             yield system, members, replace(state.select(members), memory=own)
-            start = members.stop
 
 
 def _joined(states: Sequence[State]) -> State:

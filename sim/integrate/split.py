@@ -5,8 +5,9 @@ A step of h is
     v ← v + h M⁻¹ F_extra(x, v),   a backward Euler step of the base model,
 
 Lie's splitting, of first order in h as the base step is. Air that moves with the cloth takes its share of the step's
-change of velocity (see `sim.inertia`); springs beside the handles act implicitly, vertex by vertex. The base step is
-the compiled kernel's, so that an effect costs one evaluation a step, not one an iteration of the solver.
+change of velocity (see `sim.inertia`); springs beside the handles act implicitly, vertex by vertex. What loosens the
+handles is part of the base model's solve, since no impulse can take back what they pull. The base step is the compiled
+kernel's, so that an effect costs one evaluation a step, not one an iteration of the solver.
 """
 
 from __future__ import annotations
@@ -19,7 +20,6 @@ from itertools import accumulate
 import torch
 from torch import Tensor
 
-from flagdata.errors import UsageError
 from sim.inertia import effective, mean_normals
 from sim.integrate.backend import extra_force, kernel_for
 from sim.integrate.implicit import AirShape, BackwardEuler
@@ -40,12 +40,8 @@ class SplitEuler:
     base: BackwardEuler = field(default_factory=lambda: BackwardEuler(tolerance=1e-4))
 
     def advance(self, system: System, state: State, duration: float) -> State:
-        """The state `duration` seconds later.
-
-        Raises:
-            UsageError: ties that pull apart (`slack`), which an impulse cannot follow.
-        """
-        plain = system.alone
+        """The state `duration` seconds later."""
+        plain, system = system.alone, system.beside
         if not (system.extra or system.loads or system.ties):
             return self.base.advance(plain, state, duration)
         steps, h = self._steps(duration)
@@ -60,11 +56,11 @@ class SplitEuler:
         """The same of several batches jointly: their members move as they do in batches of their own.
 
         Raises:
-            UsageError: as `advance`, or batches that cannot be joined.
+            UsageError: batches that cannot be joined.
         """
         plain = batches.plain
         steps, h = self._steps(duration)
-        if (kernels := self._kernels(plain, batches.systems, state)) is not None:
+        if (kernels := self._kernels(plain, batches.beside, state)) is not None:
             return self._at_once(plain, *kernels, state, h, steps)
         for drive in plain.drives(_times(state.time, h, steps)):
             parts = list(batches.parts(state))
@@ -90,7 +86,7 @@ class SplitEuler:
         kernel = kernel_for(plain, state, self.base.backend)
         if kernel is None or plain.contact is not None or plain.limits is not None:
             return None
-        if self.base.air_shape is not AirShape.CURRENT or any(_loosened(system) for system in systems):
+        if self.base.air_shape is not AirShape.CURRENT:
             return None
         parts: list[Kernel] = []
         for system in systems:
@@ -127,7 +123,7 @@ class SplitEuler:
         if stiffness is None:
             return v + impulse / mass
         pull = torch.stack([tie.force(system.cloth, time, x) for tie in system.ties]).sum(0)
-        return v + (impulse + h * pull - h * h * stiffness * v) / (mass + h * h * _pulling(stiffness))
+        return v + (impulse + h * pull - h * h * stiffness * v) / (mass + h * h * stiffness)
 
 
 def _times(start: float, h: float, steps: int) -> list[float]:
@@ -144,17 +140,3 @@ def _carried(system: System, before: State, after: State, h: float) -> State:
         change = effective(change, mass=system.cloth.mass, added=system.added_mass, normals=normals) / mass
         after = replace(after, position=x + h * (v + change), velocity=v + change)
     return replace(after, memory=system.remembered(before.memory, after.position))
-
-
-def _loosened(system: System) -> bool:
-    """Whether ties pull less than the handles do."""
-    return any(float(tie.springs(system.cloth).share) < 1 for tie in system.ties)
-
-
-def _pulling(stiffness: Tensor) -> Tensor:
-    if bool((stiffness < 0).any()):
-        raise UsageError(
-            "ties that loosen handles cannot act as impulses",
-            where="integrator split", fix="use the symplectic or the implicit integrator for this effect",
-        )  # fmt: skip
-    return stiffness

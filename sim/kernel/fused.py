@@ -216,6 +216,12 @@ class Kernel:
             given["tie_rate"] = self.pack(drive.drift[:, None].expand(3, self.batch))
         return self._given(**given)
 
+    def _tie_targets(self, offsets: Sequence[Tensor]) -> dict[str, Tensor]:
+        """Where the ties' anchors are at displacements (3,) [m]; nothing where there are no ties."""
+        if self.tied is None:
+            return {}
+        return {"tie_targets": self._each([self.tied + offset[:, None] for offset in offsets])}
+
     def _given(self, **tensors: Tensor) -> tuple[_Problem, list[Tensor]]:
         """The problem with some tensors set, which must outlive the call it is made for."""
         problem = _Problem.from_buffer_copy(self.problem)
@@ -306,10 +312,7 @@ class Kernel:
         Returns:
             NaN for members whose solve did not converge.
         """
-        given = {"wind": self._each(winds), "targets": self._each(targets)}
-        if self.tied is not None:
-            given["tie_targets"] = self._each([self.tied + offset[:, None] for offset in offsets])
-        problem, alive = self._given(**given)
+        problem, alive = self._given(wind=self._each(winds), targets=self._each(targets), **self._tie_targets(offsets))
         past = self._remember(problem, memory)
         xb, vb = self.pack(x), self.pack(v)
         failed = torch.zeros((self.blocks, self.lanes), dtype=torch.int32)
@@ -342,14 +345,13 @@ class Kernel:
             winds, targets, offsets, tolerance, iterations: as of `implicit`.
             memory: of the frictions of all parts, in order.
         """
-        problem, alive = self._given(wind=self._each(winds), targets=self._each(targets))
+        problem, alive = self._given(wind=self._each(winds), targets=self._each(targets), **self._tie_targets(offsets))
         problems: list[_Problem] = []
         remembered: list[tuple[Kernel, Tensor]] = []
         own, left = (_Part * len(parts))(), list(memory)
         first = 0
         for place, part in enumerate(parts):
-            given = {} if part.tied is None else {"tie_targets": part._each([part.tied + o[:, None] for o in offsets])}
-            mine, kept = part._given(**given)
+            mine, kept = part._given(**part._tie_targets(offsets))
             count = 0 if part.beside is None else part.beside.frictions
             past = part._remember(mine, left[:count])
             own[place] = _Part(ctypes.pointer(mine), part.blocks, first, part.batch)

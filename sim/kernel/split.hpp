@@ -166,6 +166,7 @@ void split(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, dou
     for (auto& batch : batches) batch.carry(x, v, T(h));
     now.wind += blocks * 3 * L;
     now.targets += blocks * p->held * 3 * L;
+    now.tie_targets += blocks * p->ties * 3 * L;
   }
 }
 

@@ -179,7 +179,7 @@ def test_batches_of_all_effects_split_jointly_in_one_call_as_torch_splits_each(
 ) -> None:
     """Blocks hold members of several batches; the memory of frictions is carried from frame to frame."""
     base = flag(dtype=dtype)
-    batches = [with_effect(drawn(name), *base) for name in EFFECTS if name != "slack"]
+    batches = [with_effect(drawn(name), *base) for name in EFFECTS]
     batches = [
         (system, replace(state, velocity=torch.cos(11 * state.position.roll(1, 0)))) for system, state in batches
     ]
