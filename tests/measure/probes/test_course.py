@@ -97,8 +97,8 @@ def test_a_pressure_that_varies_alone_is_not_turbulence() -> None:
 def test_a_wind_varies_along_itself_alone_only_where_chance_cannot_hide_that_it_turns(
     size: float, turned: float, least: int, most: int
 ) -> None:
-    """Of an intensity of 0.05, 0.2 or 0.4. Obstacles turn the wind by 0.15 to 0.23 of what they do along it: at the bound
-    of 0.15 two of 40 pass on the average, since its interval is of 95 % on one side, and at 0.2 fewer."""
+    """Of an intensity of 0.05, 0.2 or 0.4. Obstacles turn the wind by 0.15 to 0.23 of what they do along it; at the
+    bound of 0.15 two of 40 pass on the average, since its interval is of 95 % on one side, and at 0.2 fewer."""
     found = [
         seen(size * turbulence(5.0, 60.0, left=turned, up=0.0, seed=seed), noise=1.0, seed=seed).variation(RECORDING)
         for seed in range(40)
