@@ -20,6 +20,7 @@ from sim.datasets.recipe import AnemometerSpec
 from sim.effects import SENSOR_EFFECTS
 from sim.effects.sensor import AnemometerEffect
 from sim.run.members import Crew, Member
+from sim.system import System
 
 _FINE = 10.0  # Hz, at which the air is sampled and the instrument's response computed
 _NAME = "simulated"
@@ -50,12 +51,25 @@ def read(spec: AnemometerSpec, crew: Crew, member: Member, *, instrument: int, s
         seed: of the recording, for the noise and the stamps.
         begin: instant at which the simulation's time is 0 [UTC ns].
     """
+    time, velocity = air(spec, crew, member)
+    return logged(spec, time, velocity, instrument=instrument, seed=seed, begin=begin)
+
+
+def logged(
+    spec: AnemometerSpec,
+    time: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    *,
+    instrument: int,
+    seed: int,
+    begin: int,
+) -> Reading:
+    """What an anemometer logs of the air's velocity (n, 3) [m/s] at times (n,) [s]; `seed`s and `begin` as of `read`."""
     drawn = {
         name: {key: _drawn(value, instrument, "anemometer", name, key) for key, value in parameters.items()}
         for name, parameters in spec.effects.items()
     }
     noise = _drawn(spec.noise, instrument, "anemometer", "noise")
-    time, velocity = air(spec, crew, member)
     speed = torch.from_numpy(np.hypot(velocity[:, 0], velocity[:, 1])[:, None])
     for name, values in drawn.items():
         effect: AnemometerEffect = SENSOR_EFFECTS[name](**values)
@@ -93,9 +107,13 @@ def air(spec: AnemometerSpec, crew: Crew, member: Member) -> tuple[NDArray[np.fl
     if not changing(crew.recipe):
         return times, np.tile(np.array(member.scene.wind, dtype=np.float64), (count, 1))
     system, _ = crew.assemble([member])
+    return times, velocities(system, times)
+
+
+def velocities(system: System, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3) [m/s] of the undisturbed air that the first of a batch stands in, at times (n,) [s]."""
     with torch.no_grad():
-        velocity = [system.wind.velocity(float(t))[:, 0].double().numpy() for t in times]
-    return times, np.stack(velocity)
+        return np.stack([system.wind.velocity(float(t))[:, 0].double().numpy() for t in times])
 
 
 def blowing_from(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@ H.264."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,13 +88,22 @@ def jpegs(frames: NDArray[np.uint8], drawn: dict[str, float], *, slot: int, seed
 
 def _noisy(frames: NDArray[np.uint8], drawn: dict[str, float], *, seed: int) -> Iterator[NDArray[np.uint8]]:
     rng = stream(seed, "camera", "noise")
-    read, shot = drawn["camera.read_noise"], drawn["camera.shot_noise"]
     for frame in frames:
-        gray = np.asarray(Image.fromarray(frame).convert("L"), dtype=np.float32)
-        if read or shot:
-            sigma = np.sqrt(read**2 + shot**2 * gray / 255)
-            gray = np.clip(np.rint(gray + sigma * rng.standard_normal(gray.shape, dtype=np.float32)), 0, 255)
-        yield gray.astype(np.uint8)
+        yield noisy(np.asarray(Image.fromarray(frame).convert("L")), drawn, rng)
+
+
+def noisy(gray: NDArray[np.uint8], drawn: Mapping[str, float], rng: np.random.Generator) -> NDArray[np.uint8]:
+    """A gray picture (height, width) with the camera's noise.
+
+    Args:
+        drawn: of `settings`.
+    """
+    read, shot = drawn["camera.read_noise"], drawn["camera.shot_noise"]
+    if not (read or shot):
+        return gray
+    light = gray.astype(np.float32)
+    sigma = np.sqrt(read**2 + shot**2 * light / 255)
+    return np.clip(np.rint(light + sigma * rng.standard_normal(light.shape, dtype=np.float32)), 0, 255).astype(np.uint8)
 
 
 def filled(jpeg: bytes, length: int) -> bytes:

@@ -45,6 +45,15 @@ class Raster:
             InputError: cloth behind the camera, or assets that cannot be read.
             UnknownNameError: assets that do not exist.
         """
+        return self.part(meshes, parameters, 0, len(meshes))
+
+    def part(self, meshes: Meshes, parameters: RenderParameters, first: int, last: int) -> Tensor:
+        """Frames `first` to `last` (the last not included) of what `render` makes of all: the camera aims at the cloth of
+        the whole sequence.
+
+        Raises:
+            InputError, UnknownNameError: as `render`.
+        """
         zeta, device = parameters, meshes.device
         pyramid = Pyramid.of(self.assets.texture(zeta.texture), device=device)
         behind = torch.from_numpy(plate(self.assets.background(zeta.background), zeta)).to(device)
@@ -54,10 +63,10 @@ class Raster:
         for instant in (samples.time.min(), samples.time.max()):
             check_in_front(meshes.positions if motion is None else motion.at(float(instant)), meshes, placed)
         film = []
-        for first in range(0, len(meshes), _TOGETHER):
-            last = min(first + _TOGETHER, len(meshes))
-            moving = motion and motion.part(meshes.vertex_offset[first], meshes.vertex_offset[last])
-            scene = _exposed(meshes.part(first, last), moving, placed, samples, zeta, pyramid)
+        for begin in range(first, last, _TOGETHER):
+            end = min(begin + _TOGETHER, last)
+            moving = motion and motion.part(meshes.vertex_offset[begin], meshes.vertex_offset[end])
+            scene = _exposed(meshes.part(begin, end), moving, placed, samples, zeta, pyramid)
             film.append(_developed(scene, behind, gain=zeta.gain))
         return torch.cat(film)
 

@@ -1,0 +1,298 @@
+"""A recording as a user would bring it: a camera's film of a flag in gusty wind, and a cup anemometer's log beside it.
+
+The flag is simulated on a mesh and in steps that no fit uses. What acts on it beside the base model, what its cloth
+weighs and by how much the two clocks differ are drawn from the seed and written nowhere but into the returned
+`Recording`, so that results can be compared with them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from flagdata.errors import InputError
+from flagdata.lake.meshes import MeshSequence
+from flagdata.rng import child_seed, stream
+from flagdata.timebase import NANOSECONDS, from_datetime
+from measure.demo.camera import write_film
+from measure.demo.logger import CUP, SENSOR, write_log
+from sim import handles
+from sim.assets import Assets
+from sim.datasets.anemometer import logged, velocities
+from sim.effects import EFFECTS, apply
+from sim.effects.gusts import Gusts
+from sim.handles import Handles
+from sim.integrate.implicit import BackwardEuler
+from sim.material import named
+from sim.mesh import Diagonals, Mesh, grid
+from sim.render import Meshes, RenderParameters, prior
+from sim.render.stage import stage
+from sim.scene import Scene, assemble
+from sim.state import State
+from sim.system import System
+
+BEFORE, AFTER = 120.0, 120.0
+"""s of wind that are logged before the camera starts and after it stops."""
+START = datetime(2026, 5, 14, 9, 30, tzinfo=UTC)
+"""When the camera starts, by its own clock."""
+MATERIAL = "camel-ponte-roma"
+"""Whose measured tables the flag's cloth has, bent more or less easily."""
+WIDTH, HEIGHT = 480, 360
+"""Of the picture [px]."""
+_SETTLE = 5.0  # s that are simulated before the first frame
+_AIR_RATE = 10.0  # Hz, at which the air is sampled for the anemometer
+_LARGEST_OFFSET = 45.0  # s
+_ROUGH = 2e-3  # m, standard deviation of the free vertices' start
+_SURVEYED = {"azimuth": math.radians(3.0), "elevation": math.radians(1.0), "distance": 0.1}
+"""Standard errors with which a person notes down where the camera stood: compass and tape."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Acting:
+    """Something that acts on the flag beside the base model.
+
+    Attributes:
+        effect: a name of `sim.effects.EFFECTS`.
+        parameter, strength: its one strength that is not null.
+    """
+
+    effect: str
+    parameter: str
+    strength: float
+
+    @property
+    def unit(self) -> str:
+        """Of the strength."""
+        return EFFECTS[self.effect].parameters()[self.parameter].unit
+
+
+HIDDEN = (
+    Acting(effect="tangential-linear-drag", parameter="coefficient", strength=0.3),
+)  # fmt: skip
+"""Of which the seed draws one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingRecipe:
+    """What to make.
+
+    Attributes:
+        seed: root of all random streams.
+        duration: of the film [s].
+        rate: frames a second [Hz].
+        columns: of the mesh along the flag.
+        step: of backward Euler [s].
+        length, height: of the flag [m].
+        intensity: of the gusts, their standard deviation over the mean wind.
+        eddies: length of the largest [m].
+        hidden: what may act beside the base model; none where it is empty.
+
+    Raises:
+        InputError: a film too short to be aligned, or no rate.
+    """
+
+    seed: int
+    duration: float = 120.0
+    rate: int = 30
+    columns: int = 20
+    step: float = 2.5e-3
+    length: float = 1.5
+    height: float = 1.0
+    intensity: float = 0.2
+    eddies: float = 60.0
+    hidden: tuple[Acting, ...] = HIDDEN
+
+    def __post_init__(self) -> None:
+        if self.duration < 10 or self.rate < 1:
+            raise InputError(
+                f"a recording of {self.duration} s at {self.rate} Hz", where="demonstration",
+                fix="make it at least 10 s long, at 1 Hz",
+            )  # fmt: skip
+
+    def drawn(self, name: str, low: float, high: float) -> float:
+        """A value between two from the stream of that name."""
+        return float(stream(self.seed, "demo", name).uniform(low, high))
+
+    @property
+    def wind(self) -> float:
+        """Mean wind [m/s]."""
+        return self.drawn("wind", 5.0, 6.0)
+
+    @property
+    def mesh(self) -> Mesh:
+        """Of the flag: another one than any fit's."""
+        rows = max(2, round(self.columns * self.height / self.length))
+        return grid(
+            width=self.length, height=self.height, columns=self.columns, rows=rows, diagonals=Diagonals.FORWARD
+        )
+
+    @property
+    def acting(self) -> Acting | None:
+        """What acts beside the base model."""
+        if not self.hidden:
+            return None
+        return self.hidden[int(stream(self.seed, "demo", "effect").integers(len(self.hidden)))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noted:
+    """Where the camera stood, as a person notes it down.
+
+    Attributes:
+        azimuth: of its axis to the wind, 90° from the side [rad].
+        elevation: of its axis [rad].
+        distance: from the flag [m].
+    """
+
+    azimuth: float
+    elevation: float
+    distance: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recording:
+    """Where the files are, what a person who stood beside would know, and the truth.
+
+    Attributes:
+        video, log, sensor: the files.
+        noted: where the camera stood, by compass and tape.
+        clock_offset: what must be added to the camera's clock to reach the anemometer's [s].
+        wind: true horizontal speed at the flag [m/s] at 10 Hz, from `BEFORE` seconds before the first frame on.
+        area_weight, damping: of the cloth [kg/m²], [s].
+        acting: what acted beside the base model.
+    """
+
+    video: Path
+    log: Path
+    sensor: Path
+    noted: Noted
+    clock_offset: float
+    wind: NDArray[np.float64]
+    area_weight: float
+    damping: float
+    acting: Acting | None
+
+
+def make_recording(
+    recipe: RecordingRecipe, folder: Path, *, workers: int, advance: Callable[[int], object]
+) -> Recording:
+    """Write `flag.mp4`, `anemometer.csv` and `cup-logger.toml` into `folder`.
+
+    Args:
+        workers: processes that render.
+        advance: called with the number of frames that were simulated or filmed: twice each.
+    """
+    video, log, sensor = folder / "flag.mp4", folder / "anemometer.csv", folder / "cup-logger.toml"
+    sensor.write_text(SENSOR, encoding="utf-8")
+    system, state = _flag(recipe)
+    times = np.arange(round((BEFORE + recipe.duration + AFTER) * _AIR_RATE) + 1) / _AIR_RATE
+    velocity = velocities(system, times)
+    offset = _log(recipe, log, times, velocity)
+    sequence = _flown(recipe, system, state, advance)
+    zeta = look(recipe)
+    write_film(
+        video, sequence, zeta, rate=recipe.rate, start=START, seed=child_seed(recipe.seed, "demo", "film"),
+        workers=workers, advance=advance,
+    )  # fmt: skip
+    cloth = _cloth(recipe)
+    return Recording(
+        video=video, log=log, sensor=sensor, noted=_noted(recipe, sequence, zeta), clock_offset=offset,
+        wind=np.hypot(velocity[:, 0], velocity[:, 1]), area_weight=cloth[0], damping=cloth[2], acting=recipe.acting,
+    )  # fmt: skip
+
+
+def look(recipe: RecordingRecipe) -> RenderParameters:
+    """How it is filmed: as in the data set `outdoor`, from 7 to 9 m away, in daylight, by a camera held level."""
+    quantities = {
+        "camera_radius": recipe.drawn("radius", 7.0, 9.0), "camera_height": recipe.drawn("camera", 1.4, 1.8),
+        "camera_angle": math.radians(recipe.drawn("azimuth", 70.0, 110.0)),
+        "view_angle": math.radians(recipe.drawn("view", 20.0, 23.0)),
+        "exposure_bias": recipe.drawn("exposure", -0.5, 0.1), "raster_samples": 4, "width": WIDTH, "height": HEIGHT,
+    }  # fmt: skip
+    outdoor = prior.named("outdoor").with_quantities(quantities, source="the demonstration")
+    return outdoor.draw(child_seed(recipe.seed, "demo", "look"), Assets())
+
+
+def _cloth(recipe: RecordingRecipe) -> tuple[float, float, float]:
+    """Area weight [kg/m²], factor on the bending table, damping [s]."""
+    return (
+        recipe.drawn("area-weight", 0.11, 0.17), math.exp(recipe.drawn("bending", -0.5, 0.5)),
+        recipe.drawn("damping", 3e-3, 8e-3),
+    )  # fmt: skip
+
+
+def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
+    """The flag in its wind, `_SETTLE` before the first frame; the wind's time begins with the log."""
+    flat = recipe.mesh
+    held = Handles(vertices=handles.corners(flat.rest))
+    area_weight, bending, damping = _cloth(recipe)
+    base = named(MATERIAL)
+    material = replace(base.scaled(bending=bending), density=area_weight, damping=max(damping - recipe.step, 0.0))
+    start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
+    rough = stream(recipe.seed, "demo", "start").normal(0.0, _ROUGH, start.shape)
+    rough[list(held.vertices)] = 0.0
+    speed = recipe.wind
+    scene = Scene(mesh=flat, position=start + rough, material=material, handles=held, wind=(speed, 0.0, 0.0))
+    gusts = Gusts(intensity=recipe.intensity).with_series(
+        stream(recipe.seed, "demo", "gusts"), batch=1, speed=speed, length=recipe.eddies,
+        duration=BEFORE + recipe.duration + AFTER, rate=_AIR_RATE,
+    )  # fmt: skip
+    acting = recipe.acting
+    beside = [] if acting is None else [EFFECTS[acting.effect](**{acting.parameter: acting.strength})]
+    system, state = apply([gusts, *beside], *assemble([scene], dtype=torch.float32))
+    return system, replace(state, time=BEFORE - _SETTLE)
+
+
+def _flown(
+    recipe: RecordingRecipe, system: System, state: State, advance: Callable[[int], object]
+) -> MeshSequence:
+    """The flag in each frame of the film."""
+    method = BackwardEuler(step=recipe.step, tolerance=1e-3)
+    settle, count = round(_SETTLE * recipe.rate), round(recipe.duration * recipe.rate)
+    frames: list[NDArray[np.float32]] = []
+    with torch.no_grad():
+        for frame in range(settle + count):
+            state = method.advance(system, state, 1 / recipe.rate)
+            if frame >= settle:
+                frames.append(state.position[..., 0].float().numpy().copy())
+                advance(1)
+    mesh = recipe.mesh
+    return MeshSequence(
+        time=np.round(np.arange(count) / recipe.rate * NANOSECONDS).astype(np.int64), positions=np.stack(frames),
+        faces=mesh.faces.astype(np.int32), rest=mesh.rest.astype(np.float32), attributes={},
+    )  # fmt: skip
+
+
+def _log(
+    recipe: RecordingRecipe, path: Path, times: NDArray[np.float64], velocity: NDArray[np.float64]
+) -> float:
+    """Write the anemometer's log; what must be added to the camera's clock to reach the logger's [s]."""
+    begin = from_datetime(START) - round(BEFORE * NANOSECONDS)
+    seed = child_seed(recipe.seed, "demo", "anemometer")
+    series = logged(CUP, times, velocity, instrument=seed, seed=seed, begin=begin).series
+    offset = recipe.drawn("clock", -_LARGEST_OFFSET, _LARGEST_OFFSET)
+    first = (int(series.time[0]) - begin) / NANOSECONDS - BEFORE  # by the camera's clock, from its start
+    stamp = (START + timedelta(seconds=first + offset)).replace(microsecond=0)  # the logger stamps its whole seconds
+    write_log(
+        path, series.channels["wind_speed"], series.channels["wind_direction"], first=stamp,
+        quiet=round(BEFORE - _LARGEST_OFFSET), seed=recipe.seed,
+    )  # fmt: skip
+    return (stamp - START).total_seconds() - first
+
+
+def _noted(recipe: RecordingRecipe, sequence: MeshSequence, zeta: RenderParameters) -> Noted:
+    camera = stage(Meshes.flag(sequence, heading=0.0), zeta).camera
+    true = {
+        "azimuth": zeta.camera_angle, "elevation": math.asin(camera.forward[2]),
+        "distance": zeta.camera_radius / math.cos(math.asin(camera.forward[2])),
+    }  # fmt: skip
+    return Noted(
+        **{name: value + float(stream(recipe.seed, "demo", name).normal(0.0, _SURVEYED[name])) for name, value in true.items()}
+    )
