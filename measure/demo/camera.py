@@ -25,7 +25,7 @@ NOISE = {"camera.read_noise": 0.8, "camera.shot_noise": 1.5}
 """Of the camera, in 8-bit steps: in the middle of the data set `outdoor`."""
 RATE_FACTOR = 23
 """x264's: what phones and cameras write is no better."""
-_CHUNK = 96
+_CHUNK = 240
 """Frames that a process renders at a time."""
 
 
@@ -87,7 +87,9 @@ def _chunk(sequence: MeshSequence, zeta: RenderParameters, first: int, seed: int
     rng = stream(seed, "demo", "camera", first)
     out = []
     for picture in pictures:
-        planes = VideoFrame.from_ndarray(picture, format="rgb24").reformat(format="yuv420p").to_ndarray()
+        planes = (
+            VideoFrame.from_ndarray(picture, format="rgb24").reformat(format="yuv420p").to_ndarray().astype(np.uint8)
+        )
         planes[: zeta.height] = noisy(planes[: zeta.height], NOISE, rng)
         out.append(planes)
     return np.stack(out)

@@ -1,4 +1,5 @@
-"""The demonstration's page: wind, alignment, clips with their ground truth, findings and the commands, in one file."""
+"""The page of the film and the log on one clock: wind, alignment, clips with their ground truth, findings and the
+commands, in one file."""
 
 from __future__ import annotations
 
@@ -21,8 +22,7 @@ from flagdata.provenance import code_version
 from flagdata.record import Record
 from flagdata.schema import CLIP_FRAMES, FRAME_RATE
 from flagdata.timebase import NANOSECONDS
-from measure.demo import estimates
-from measure.demo.field import BEFORE, WIND_RATE, Field
+from measure.demo.recording import AIR_RATE, BEFORE, Recording
 from models.spectral import SpectralDecomposition
 
 _SHOWN = 6
@@ -48,8 +48,10 @@ class Recovered:
         return self.low <= self.truth <= self.high
 
 
-def write_page(folder: Path, *, made: Field, at: str, transcript: Sequence[tuple[str, str]], seconds: float) -> Path:
-    """Write `index.html` (self-contained) into `folder` from the lake inside it; returns its path."""
+def write_page(
+    folder: Path, *, made: Recording, at: str, transcript: Sequence[tuple[str, str]], seconds: float
+) -> Path:
+    """Write `recording.html` (self-contained) into `folder` from the lake inside it; returns its path."""
     lake = Lake.open(folder / "lake")
     (row,) = lake.rows("kind = 'recording'", at=at).to_pylist()
     record = Record.open(lake.object_path(row["object"]))
@@ -57,16 +59,13 @@ def write_page(folder: Path, *, made: Field, at: str, transcript: Sequence[tuple
     order = np.argsort([pairs[i].wind for i in range(len(pairs))])
     shown = [pairs[int(i)] for i in order[np.linspace(0, len(order) - 1, _SHOWN).round().astype(int)]]
     wind_image, caption = _wind_plot(record, lake, at, made)
-    series = estimates.read(record.path, lake.artifact(row["artifact"], at=at))
-    target = folder / "index.html"
+    target = folder / "recording.html"
     values = {
-        "minutes": f"{len(record.frame_times) / FRAME_RATE / 60:.0f}",
+        "minutes": f"{len(record.frame_times) / FRAME_RATE / 60:.2g}",
         "seconds": seconds,
         "clock": recovered(row, made.clock_offset),
-        "estimates": series.sentence,
         "images": {
             "wind": wind_image,
-            "estimates": estimates.picture(series),
             "alignment": data_url((folder / "alignment.png").read_bytes(), "image/png"),
         },
         "wind_caption": caption,
@@ -118,7 +117,7 @@ def dominant_frequency(clip: torch.Tensor) -> float:
     return float((power * frequency).sum() / power.sum())
 
 
-def _wind_plot(record: Record, lake: Lake, at: str, made: Field) -> tuple[str, str]:
+def _wind_plot(record: Record, lake: Lake, at: str, made: Recording) -> tuple[str, str]:
     from matplotlib.figure import Figure
 
     logged = record.wind_1hz()
@@ -131,7 +130,7 @@ def _wind_plot(record: Record, lake: Lake, at: str, made: Field) -> tuple[str, s
     sigma = np.array([np.nan if clip["wind"] is None else clip["wind_sigma"] for clip in clips])
     figure = Figure(figsize=(9.5, 3.4), layout="constrained")
     axes = figure.subplots()
-    truth = np.arange(len(made.wind)) / WIND_RATE - BEFORE
+    truth = np.arange(len(made.wind)) / AIR_RATE - BEFORE
     axes.plot(truth, made.wind, color="0.82", linewidth=0.6, label="true wind at the flag")
     axes.plot(
         (logged.time - zero) / NANOSECONDS, logged.speed, color="#2b6f8f", linewidth=0.8, label="anemometer, 1 Hz"

@@ -42,12 +42,11 @@ BEFORE, AFTER = 120.0, 120.0
 """s of wind that are logged before the camera starts and after it stops."""
 START = datetime(2026, 5, 14, 9, 30, tzinfo=UTC)
 """When the camera starts, by its own clock."""
+AIR_RATE = 10.0
+"""Hz, at which the air is sampled."""
 MATERIAL = "camel-ponte-roma"
 """Whose measured tables the flag's cloth has, bent more or less easily."""
-WIDTH, HEIGHT = 480, 360
-"""Of the picture [px]."""
 _SETTLE = 5.0  # s that are simulated before the first frame
-_AIR_RATE = 10.0  # Hz, at which the air is sampled for the anemometer
 _LARGEST_OFFSET = 45.0  # s
 _ROUGH = 2e-3  # m, standard deviation of the free vertices' start
 _SURVEYED = {"azimuth": math.radians(3.0), "elevation": math.radians(1.0), "distance": 0.1}
@@ -74,7 +73,7 @@ class Acting:
 
 
 HIDDEN = (
-    Acting(effect="tangential-linear-drag", parameter="coefficient", strength=0.3),
+    Acting(effect="tangential-linear-drag", parameter="coefficient", strength=0.2),
 )  # fmt: skip
 """Of which the seed draws one."""
 
@@ -92,6 +91,8 @@ class RecordingRecipe:
         length, height: of the flag [m].
         intensity: of the gusts, their standard deviation over the mean wind.
         eddies: length of the largest [m].
+        width, rows: of the picture [px].
+        samples: of a pixel.
         hidden: what may act beside the base model; none where it is empty.
 
     Raises:
@@ -99,14 +100,17 @@ class RecordingRecipe:
     """
 
     seed: int
-    duration: float = 120.0
+    duration: float = 150.0
     rate: int = 30
     columns: int = 20
     step: float = 2.5e-3
     length: float = 1.5
     height: float = 1.0
-    intensity: float = 0.2
+    intensity: float = 0.25
     eddies: float = 60.0
+    width: int = 480
+    rows: int = 360
+    samples: int = 4
     hidden: tuple[Acting, ...] = HIDDEN
 
     def __post_init__(self) -> None:
@@ -123,15 +127,13 @@ class RecordingRecipe:
     @property
     def wind(self) -> float:
         """Mean wind [m/s]."""
-        return self.drawn("wind", 5.0, 6.0)
+        return self.drawn("wind", 4.5, 5.5)
 
     @property
     def mesh(self) -> Mesh:
         """Of the flag: another one than any fit's."""
         rows = max(2, round(self.columns * self.height / self.length))
-        return grid(
-            width=self.length, height=self.height, columns=self.columns, rows=rows, diagonals=Diagonals.FORWARD
-        )
+        return grid(width=self.length, height=self.height, columns=self.columns, rows=rows, diagonals=Diagonals.FORWARD)
 
     @property
     def acting(self) -> Acting | None:
@@ -192,7 +194,7 @@ def make_recording(
     video, log, sensor = folder / "flag.mp4", folder / "anemometer.csv", folder / "cup-logger.toml"
     sensor.write_text(SENSOR, encoding="utf-8")
     system, state = _flag(recipe)
-    times = np.arange(round((BEFORE + recipe.duration + AFTER) * _AIR_RATE) + 1) / _AIR_RATE
+    times = np.arange(round((BEFORE + recipe.duration + AFTER) * AIR_RATE) + 1) / AIR_RATE
     velocity = velocities(system, times)
     offset = _log(recipe, log, times, velocity)
     sequence = _flown(recipe, system, state, advance)
@@ -214,7 +216,8 @@ def look(recipe: RecordingRecipe) -> RenderParameters:
         "camera_radius": recipe.drawn("radius", 7.0, 9.0), "camera_height": recipe.drawn("camera", 1.4, 1.8),
         "camera_angle": math.radians(recipe.drawn("azimuth", 70.0, 110.0)),
         "view_angle": math.radians(recipe.drawn("view", 20.0, 23.0)),
-        "exposure_bias": recipe.drawn("exposure", -0.5, 0.1), "raster_samples": 4, "width": WIDTH, "height": HEIGHT,
+        "exposure_bias": recipe.drawn("exposure", -0.5, 0.1), "raster_samples": recipe.samples,
+        "width": recipe.width, "height": recipe.rows,
     }  # fmt: skip
     outdoor = prior.named("outdoor").with_quantities(quantities, source="the demonstration")
     return outdoor.draw(child_seed(recipe.seed, "demo", "look"), Assets())
@@ -223,7 +226,7 @@ def look(recipe: RecordingRecipe) -> RenderParameters:
 def _cloth(recipe: RecordingRecipe) -> tuple[float, float, float]:
     """Area weight [kg/m²], factor on the bending table, damping [s]."""
     return (
-        recipe.drawn("area-weight", 0.11, 0.17), math.exp(recipe.drawn("bending", -0.5, 0.5)),
+        recipe.drawn("area-weight", 0.13, 0.18), math.exp(recipe.drawn("bending", -0.5, 0.5)),
         recipe.drawn("damping", 3e-3, 8e-3),
     )  # fmt: skip
 
@@ -242,7 +245,7 @@ def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
     scene = Scene(mesh=flat, position=start + rough, material=material, handles=held, wind=(speed, 0.0, 0.0))
     gusts = Gusts(intensity=recipe.intensity).with_series(
         stream(recipe.seed, "demo", "gusts"), batch=1, speed=speed, length=recipe.eddies,
-        duration=BEFORE + recipe.duration + AFTER, rate=_AIR_RATE,
+        duration=BEFORE + recipe.duration + AFTER, rate=AIR_RATE,
     )  # fmt: skip
     acting = recipe.acting
     beside = [] if acting is None else [EFFECTS[acting.effect](**{acting.parameter: acting.strength})]
@@ -250,9 +253,7 @@ def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
     return system, replace(state, time=BEFORE - _SETTLE)
 
 
-def _flown(
-    recipe: RecordingRecipe, system: System, state: State, advance: Callable[[int], object]
-) -> MeshSequence:
+def _flown(recipe: RecordingRecipe, system: System, state: State, advance: Callable[[int], object]) -> MeshSequence:
     """The flag in each frame of the film."""
     method = BackwardEuler(step=recipe.step, tolerance=1e-3)
     settle, count = round(_SETTLE * recipe.rate), round(recipe.duration * recipe.rate)
@@ -270,9 +271,7 @@ def _flown(
     )  # fmt: skip
 
 
-def _log(
-    recipe: RecordingRecipe, path: Path, times: NDArray[np.float64], velocity: NDArray[np.float64]
-) -> float:
+def _log(recipe: RecordingRecipe, path: Path, times: NDArray[np.float64], velocity: NDArray[np.float64]) -> float:
     """Write the anemometer's log; what must be added to the camera's clock to reach the logger's [s]."""
     begin = from_datetime(START) - round(BEFORE * NANOSECONDS)
     seed = child_seed(recipe.seed, "demo", "anemometer")
@@ -294,5 +293,8 @@ def _noted(recipe: RecordingRecipe, sequence: MeshSequence, zeta: RenderParamete
         "distance": zeta.camera_radius / math.cos(math.asin(camera.forward[2])),
     }  # fmt: skip
     return Noted(
-        **{name: value + float(stream(recipe.seed, "demo", name).normal(0.0, _SURVEYED[name])) for name, value in true.items()}
+        **{
+            name: value + float(stream(recipe.seed, "demo", name).normal(0.0, _SURVEYED[name]))
+            for name, value in true.items()
+        }
     )

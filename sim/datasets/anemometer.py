@@ -64,7 +64,7 @@ def logged(
     seed: int,
     begin: int,
 ) -> Reading:
-    """What an anemometer logs of the air's velocity (n, 3) [m/s] at times (n,) [s]; `seed`s and `begin` as of `read`."""
+    """What an anemometer logs of the air's velocity (n, 3) [m/s] at times (n,) [s]; the others as of `read`."""
     drawn = {
         name: {key: _drawn(value, instrument, "anemometer", name, key) for key, value in parameters.items()}
         for name, parameters in spec.effects.items()

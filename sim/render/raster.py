@@ -48,8 +48,8 @@ class Raster:
         return self.part(meshes, parameters, 0, len(meshes))
 
     def part(self, meshes: Meshes, parameters: RenderParameters, first: int, last: int) -> Tensor:
-        """Frames `first` to `last` (the last not included) of what `render` makes of all: the camera aims at the cloth of
-        the whole sequence.
+        """Frames `first` to `last` (the last not included) of what `render` makes of all: the camera aims at the
+        cloth of the whole sequence.
 
         Raises:
             InputError, UnknownNameError: as `render`.

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import shlex
 import shutil
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import av
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from flagdata.cli import main
 from flagdata.errors import InputError
@@ -19,10 +16,10 @@ from flagdata.ingest.anemometer import WindOptions
 from flagdata.ingest.anemometer.identify import opened
 from flagdata.ingest.anemometer.sniffing import Head
 from flagdata.lake import Lake
-from flagdata.rng import stream
-from measure.demo.field import SENSOR, START, FieldRecipe, film, write_log
-from measure.demo.flag import DrawnFlag
+from measure.demo.logger import SENSOR
 from tests.docs.pages import DOCS, Shell, blocks, commands, files
+from tests.drawn.field import DrawnRecipe, write_drawn_film, write_drawn_log
+from tests.drawn.flag import DrawnFlag
 from tests.models.conftest import fill
 
 OF_INFERENCE = {"closing-the-loop.md", "proposals.md"}
@@ -32,31 +29,15 @@ AFTER_START = (
     "exchange.md", "looking.md",
 )  # fmt: skip
 ALONE = ("sensors.md", "simulator.md", "models.md", "datasets.md")
-RECIPE = FieldRecipe(seed=2026, duration=150, frame_rate=25)
+RECIPE = DrawnRecipe(seed=2026, duration=150)
+FLAG = DrawnFlag(width=200, height=150, length=95)
 
 
-def write_small_field(folder: Path, recipe: FieldRecipe) -> None:
-    """The demonstration's field recording, its flag drawn at half the size."""
-    wind, at_frames, offset = film(recipe)
-    write_log(folder / "anemometer.csv", recipe, wind, offset)
+def write_small_field(folder: Path, recipe: DrawnRecipe) -> None:
+    """Files as the demonstration's, of a small flag that is drawn."""
+    write_drawn_log(folder / "anemometer.csv", recipe)
     (folder / "cup-logger.toml").write_text(SENSOR, encoding="utf-8")
-    write_flag(folder / "flag.mp4", at_frames, recipe)
-
-
-def write_flag(path: Path, winds: NDArray[np.float64], recipe: FieldRecipe) -> None:
-    """A film of a drawn flag in the winds (n,) of its frames [m/s]."""
-    flag = DrawnFlag(width=200, height=150, length=95)
-    with av.open(str(path), "w") as container:
-        container.metadata["creation_time"] = START.isoformat()
-        video = container.add_stream("libx264", rate=recipe.frame_rate, options={"preset": "ultrafast", "crf": "23"})
-        video.width, video.height, video.pix_fmt = flag.width, flag.height, "yuv420p"
-        video.codec_context.time_base = Fraction(1, recipe.frame_rate)
-        drawn = flag.frames(winds, recipe.frame_rate, stream(recipe.seed, "camera"))
-        for number, image in enumerate(drawn):
-            frame = av.VideoFrame.from_ndarray(image, format="gray").reformat(format="yuv420p")
-            frame.pts = number
-            container.mux(video.encode(frame))
-        container.mux(video.encode(None))
+    write_drawn_film(folder / "flag.mp4", recipe.at_frames(), rate=recipe.rate, seed=recipe.seed, flag=FLAG)
 
 
 def enter(folder: Path, patch: pytest.MonkeyPatch, page: str) -> None:
@@ -128,7 +109,9 @@ def test_every_command_of_a_page_that_stands_alone_runs(
     if page == "datasets.md":
         Lake.create(tmp_path / "lake")
         for number, row in enumerate(files(page)["fabrics.csv"].splitlines()[1:]):
-            write_flag(tmp_path / row.split(",")[0], np.full(35, 3.0 + number), RECIPE)
+            write_drawn_film(
+                tmp_path / row.split(",")[0], np.full(35, 3.0 + number), rate=RECIPE.rate, seed=RECIPE.seed, flag=FLAG
+            )
     assert any(run_page(page, monkeypatch))
 
 

@@ -19,22 +19,23 @@ from flagdata.align.windbins import wind_bins
 from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.rng import stream
 from flagdata.timebase import NANOSECONDS, from_datetime
-from measure.demo.field import SENSOR, START, ZONE, FieldRecipe, film, write_log
-from measure.demo.flag import DrawnFlag
+from measure.demo.logger import SENSOR, ZONE
+from measure.demo.recording import START
 from sim.wind.spectral import VonKarman
+from tests.drawn.field import DrawnRecipe, write_drawn_log
+from tests.drawn.flag import DrawnFlag
 
 _RATE = 25
 _RECORDINGS = 20
 
 
-def _estimate(recipe: FieldRecipe) -> tuple[LagEstimate, float]:
-    wind, at_frames, offset = film(recipe)
+def _estimate(recipe: DrawnRecipe) -> tuple[LagEstimate, float]:
     start = from_datetime(START)
-    pictures = DrawnFlag().frames(at_frames, recipe.frame_rate, stream(recipe.seed, "camera"))
+    pictures = DrawnFlag().frames(recipe.at_frames(), recipe.rate, stream(recipe.seed, "camera"))
     motion = motion_energy((start + i * NANOSECONDS // _RATE, picture) for i, picture in enumerate(pictures))
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "anemometer.csv"
-        write_log(log, recipe, wind, offset)
+        offset = write_drawn_log(log, recipe)
         recipe_file = Path(folder) / "cup-logger.toml"
         recipe_file.write_text(SENSOR)
         series = read_log(log, WindOptions(recipe=str(recipe_file), zone=ZONE)).series
@@ -47,12 +48,12 @@ def _estimate(recipe: FieldRecipe) -> tuple[LagEstimate, float]:
 def run(*, seed: int, out: Path) -> dict[str, Any]:
     gusty, steady = [], []
     for i in range(_RECORDINGS):
-        recipe = FieldRecipe(seed=seed * 1000 + i, frame_rate=_RATE)
+        recipe = DrawnRecipe(seed=seed * 1000 + i)
         estimate, offset = _estimate(recipe)
         gusty.append((estimate, offset))
     for i in range(_RECORDINGS // 4):
         calm = VonKarman(mean=5.0, intensity=0.005, length=60.0)
-        steady.append(_estimate(FieldRecipe(seed=seed * 1000 + 500 + i, frame_rate=_RATE, wind=calm))[0])
+        steady.append(_estimate(DrawnRecipe(seed=seed * 1000 + 500 + i, wind=calm))[0])
     errors = np.array([abs(e.offset - o) for e, o in gusty if e.accepted])
     return {
         "recordings": _RECORDINGS,

@@ -9,13 +9,14 @@ from typing import Any
 import pytest
 
 from flagdata.cli import main
-from measure.demo import command
-from measure.demo.command import SHORTEST, Transcript
+from measure.demo import story
+from measure.demo.command import SHORTEST
+from measure.demo.transcript import Transcript
 
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """A demonstration whose parts only write a file each; the lengths of the films asked for."""
+    """A demonstration whose steps only write a file each; the lengths of the films asked for [s]."""
     lengths: list[float] = []
 
     def init(shell: Transcript, *arguments: str) -> str:
@@ -24,16 +25,16 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> list[float]:
         return ""
 
     def part(name: str) -> Any:
-        def write(shell: Transcript, seed: int, minutes: float = 0.0) -> Path:
-            lengths.append(minutes)
+        def write(shell: Transcript, seed: int, *others: Any) -> None:
+            lengths.extend(length for length in others if isinstance(length, float))
             (shell.folder / name).write_text(f"seed {seed}")
-            return shell.folder / name
 
         return write
 
     monkeypatch.setattr(Transcript, "show", init)
-    monkeypatch.setattr(command, "_field", part("index.html"))
-    monkeypatch.setattr(command, "_loop", part("report.html"))
+    monkeypatch.setattr(story, "field_steps", part("recording.html"))
+    monkeypatch.setattr(story, "weighing_step", lambda *given: None)
+    monkeypatch.setattr(story, "loop_step", part("report.html"))
     return lengths
 
 
@@ -53,11 +54,12 @@ def test_it_replaces_what_it_wrote_and_lists_it(
 ) -> None:
     out = tmp_path / "out" / "demo"
     assert demo(out) == 0
-    assert f"Open {out}/index.html and {out}/report.html" in capsys.readouterr().err
+    assert f"Open {out}/index.html" in capsys.readouterr().err
     assert demo(out, "--part", "field", "--seed", "7") == 0
-    assert names(out) == ["index.html", "lake/lake.json", "manifest.json"]
-    assert (out / "index.html").read_text() == "seed 7"
-    assert [entry["path"] for entry in json.loads((out / "manifest.json").read_text())["files"]] == names(out)[:2]
+    assert names(out) == ["index.html", "lake/lake.json", "manifest.json", "recording.html"]
+    assert (out / "recording.html").read_text() == "seed 7"
+    listed = [entry["path"] for entry in json.loads((out / "manifest.json").read_text())["files"]]
+    assert listed == ["index.html", "lake/lake.json", "recording.html"]
     assert [entry.name for entry in (tmp_path / "out").iterdir()] == ["demo"]
 
 
@@ -98,17 +100,17 @@ def test_one_that_fails_leaves_the_earlier_one(
     out = tmp_path / "demo"
     assert demo(out) == 0
 
-    def interrupted(shell: Transcript, seed: int) -> Path:
+    def interrupted(*given: Any) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(command, "_loop", interrupted)
+    monkeypatch.setattr(story, "loop_step", interrupted)
     assert demo(out) == 1
     assert names(tmp_path) == [
-        f"demo/{name}" for name in ("index.html", "lake/lake.json", "manifest.json", "report.html")
+        f"demo/{name}" for name in ("index.html", "lake/lake.json", "manifest.json", "recording.html", "report.html")
     ]
 
 
 def test_a_film_too_short_to_align_is_a_usage_error(quick: list[float], tmp_path: Path) -> None:
     assert demo(tmp_path / "demo", "--minutes", "2") == 2
     assert demo(tmp_path / "demo", "--part", "field", "--minutes", str(SHORTEST)) == 0
-    assert quick == [SHORTEST]
+    assert quick == [60 * SHORTEST]

@@ -1,6 +1,6 @@
 """A drawn flag whose motion follows a wind series: kinematics, not mechanics.
 
-It stands in for a camera in the demonstration and in tests of clocks and ingest, where only *when* something moves
+It stands in for a camera in tests of clocks and ingest, where only *when* something moves
 matters. Its droop, amplitude and frequency follow the wind by plain formulas; no physics is measured from it.
 """
 

@@ -1,0 +1,226 @@
+"""The steps of the demonstration: each types its commands and leaves a card."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import av
+import numpy as np
+
+from flagdata.console import progress, say
+from flagdata.lake import Lake
+from flagdata.pages.pictures import data_url, figure_url, moving
+from measure.demo.cards import Card, Truth
+from measure.demo.page import recovered, write_page
+from measure.demo.recording import AIR_RATE, BEFORE, Recording, RecordingRecipe, make_recording
+from measure.demo.transcript import Transcript
+from measure.estimate.artifact import read
+
+SIZE = "1.5x1.0"
+"""Of the flag, as its maker states it [m]."""
+SIMULATIONS = 64
+"""Flags that are simulated to weigh the cloth: the fewest that the command takes."""
+WEIGHED = 60.0
+"""s of the film that the cloth is weighed on."""
+_SHOWN = 50  # frames of the film's moving picture
+_CLIPS = 2.4  # s from one window of the wind series to the next
+
+
+def field_steps(shell: Transcript, seed: int, duration: float, truths: list[Truth]) -> Recording:
+    """From nothing to a film and a log on one clock, pairs of them, and the wind that is read off the film."""
+    made = _film(shell, RecordingRecipe(seed=seed, duration=duration))
+    began = time.monotonic()
+    done = "Each file was identified, with the reason; for the log a sensor recipe was drafted."
+    with _Step(shell, "What are these files?", done) as step:
+        step.found = _head(shell.show("ingest", "--sniff", "flag.mp4", "anemometer.csv"), 6)
+    done = "Film and log became artifacts, each on its own clock. Units and zones are settled here; doubts are listed."
+    with _Step(shell, "Into the lake", done) as step:
+        for arguments in (
+            ("flag.mp4", "--session", "demo"),
+            ("anemometer.csv", "--sensor", "cup-logger.toml", "--zone", "+02:00", "--session", "demo"),
+        ):
+            step.found += _head(shell.show("ingest", *arguments, "--lake", "lake"), 6)
+    _aligned(shell)
+    lake = Lake.open(shell.folder / "lake")
+    (row,) = lake.rows("kind = 'recording'", at="demo").to_pylist()
+    clock = recovered(row, made.clock_offset)
+    truths.append(
+        Truth(
+            what="the log's clock minus the camera's", true=f"{clock.truth:+.2f} s",
+            found=f"{clock.offset:+.2f} s [{clock.low:+.2f}, {clock.high:+.2f}] 90 %", right=clock.covered,
+        )
+    )  # fmt: skip
+    page = write_page(
+        shell.folder, made=made, at="demo", transcript=tuple(shell.entries), seconds=time.monotonic() - began
+    )
+    shell.cards[-1] = replace(shell.cards[-1], page=page.name)
+    _measured(shell, made, truths)
+    return made
+
+
+def weighing_step(shell: Transcript, made: Recording, truths: list[Truth]) -> None:
+    """The cloth weighed with the log beside the film."""
+    noted = made.noted
+    done = (
+        f"The flag's motion in {WEIGHED:g} s of the film was compared with that of {SIMULATIONS} simulated flags in "
+        "the logged wind, which are few and a short time: more of both narrow the interval. By compass and tape the "
+        "camera stood "
+        f"{math.degrees(noted.azimuth):.0f}° from the wind's direction and {noted.distance:.1f} m away."
+    )
+    with _Step(shell, "What the cloth weighs", done, page="weighed.html") as step:
+        step.found = shell.show(
+            "calibrate", "flag", "--flag-size", SIZE, "--azimuth", f"{math.degrees(noted.azimuth):.0f}±3",
+            "--elevation", f"{math.degrees(noted.elevation):.0f}±2", "--distance", f"{noted.distance:.1f}",
+            "--end", f"{WEIGHED:g}s", "--simulations", str(SIMULATIONS), "--workers", str(_cores()),
+            "--cache", "simulations", "--report", "weighed.html", "--lake", "lake",
+        )  # fmt: skip
+    truths.append(Truth(what="area weight", true=f"{made.area_weight:.3f} kg/m²", found=_first(step.found), right=None))
+
+
+def loop_step(shell: Transcript, seed: int, truths: list[Truth]) -> None:
+    """What the model of a tracked flag lacks."""
+    from measure.demo.tracked import TrackedRecipe, make_tracks
+
+    recipe = TrackedRecipe(seed=seed)
+    winds = ", ".join(f"{speed:g}" for speed in recipe.speeds)
+    done = (
+        f"Markers of another flag were tracked in winds of {winds} m/s; something acts on it that no file states. The "
+        "model of its cloth was tested against simulations in which nothing undeclared acts."
+    )
+    with _Step(shell, "What the model of a cloth lacks", done, page="loop/report.html") as step:
+        frames = round((recipe.settle + recipe.duration) * recipe.rate)
+        with progress(frames, label="tracking", unit="frame") as advance:
+            made = make_tracks(recipe, shell.folder, advance=advance)
+        step.found = shell.show("close-loop", "--recipe", made.recipe.name, "--lake", "lake", "--out", "loop")
+        models = [row["name"] for row in shell.read("ls", "--kind", "model", "--lake", "lake")["artifacts"]]
+        with_effects = [name for name in models if not name.endswith("-base")]
+        shell.show("simulate", (with_effects or models)[0], "--lake", "lake")
+    unit = "" if made.unit == "1" else f" {made.unit}"
+    true = f"{made.effect}, {made.parameter} {made.strength:g}{unit}"
+    truths.append(Truth(what="what acted on the tracked flag", true=true, found=_first(step.found), right=None))
+
+
+class _Step:
+    """A step as it runs; its card is there when it ends.
+
+    Attributes:
+        found: what the card shows as its result.
+        picture: a data URL.
+    """
+
+    def __init__(self, shell: Transcript, title: str, done: str, *, alt: str = "", page: str = "") -> None:
+        self._shell, self._title, self._done, self._alt, self._page = shell, title, done, alt, page
+        self._began, self._typed = time.monotonic(), len(shell.entries)
+        self.found, self.picture = "", ""
+
+    def __enter__(self) -> _Step:
+        say(f"\n{self._title}")
+        return self
+
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
+        if kind is None:
+            typed = tuple(command for command, _ in self._shell.entries[self._typed :])
+            self._shell.cards.append(
+                Card(
+                    title=self._title, done=self._done, found=self.found.strip(), picture=self.picture, alt=self._alt,
+                    page=self._page, commands=typed, seconds=time.monotonic() - self._began,
+                )
+            )  # fmt: skip
+
+
+def _film(shell: Transcript, recipe: RecordingRecipe) -> Recording:
+    done = (
+        f"A flag of {SIZE.replace('x', ' m × ')} m was simulated for {recipe.duration:g} s in gusts about "
+        f"{recipe.wind:.1f} m/s and filmed at {recipe.rate} frames a second into an H.264 file; a cup anemometer's log "
+        "is a CSV file in km/h."
+    )
+    with _Step(shell, "A film and a log", done, alt="The film") as step:
+        with progress(2 * round(recipe.duration * recipe.rate), label="film", unit="frame") as advance:
+            made = make_recording(recipe, shell.folder, workers=_cores(), advance=advance)
+        step.picture = _moving(made.video, recipe.rate)
+    return made
+
+
+def _aligned(shell: Transcript) -> None:
+    done = (
+        "The flag moves more in a stronger wind, a moment later. So the gusts in the log and the motion in the film "
+        "give the offset of the two clocks; with it, each clip of the film has its wind."
+    )
+    with _Step(shell, "On one clock, in pairs", done, alt="Motion and wind on one clock, and the evidence") as step:
+        artifacts = {row["kind"]: row["artifact"] for row in shell.read("ls", "--lake", "lake")["artifacts"]}
+        step.found = shell.show(
+            "align", artifacts["camera"][:10], artifacts["wind"][:10], "--by", "estimate", "--plot", "alignment.png",
+            "--lake", "lake",
+        )  # fmt: skip
+        shell.show("tag", "demo", "--lake", "lake")
+        shell.show("ls", "--lake", "lake")
+        where = "kind = 'clip' and wind between 4 and 6"
+        shell.show("query", "--where", where, "--limit", "5", "--at", "demo", "--lake", "lake")
+        shell.show("verify", "--lake", "lake")
+        step.picture = data_url((shell.folder / "alignment.png").read_bytes(), "image/png")
+
+
+def _measured(shell: Transcript, made: Recording, truths: list[Truth]) -> None:
+    done = "From the film alone, a network that was trained on simulated flags estimates the wind."
+    alt = "The wind read off the film, beside the log and the true wind"
+    with _Step(shell, "Wind from the film", done, alt=alt, page="measured.html") as step:
+        step.found = shell.show(
+            "measure", "flag", "--flag-size", SIZE, "--windows", f"{_CLIPS:g}s", "--report", "measured.html",
+            "--lake", "lake",
+        )  # fmt: skip
+        step.picture = _series(shell.folder / "lake", made)
+    true = f"{_during(made).mean():.2f} m/s"
+    truths.append(Truth(what="mean wind at the flag", true=true, found=_first(step.found), right=None))
+
+
+def _during(made: Recording) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """The true wind from the first frame to the last [m/s]."""
+    first = round(BEFORE * AIR_RATE)
+    return made.wind[first : len(made.wind) - first]
+
+
+def _series(place: Path, made: Recording) -> str:
+    from matplotlib.figure import Figure
+
+    lake = Lake.open(place)
+    (measured,) = lake.rows("kind = 'measurement'").to_pylist()
+    _, columns = read(lake.object_path(measured["object"]))
+    time_, value, low, high = (columns[name] for name in ("time", "wind", "low", "high"))
+    figure = Figure(figsize=(9.5, 3.2), layout="constrained")
+    axes = figure.subplots()
+    wind = _during(made)
+    axes.plot(np.arange(len(wind)) / AIR_RATE, wind, color="0.75", linewidth=0.8, label="true wind at the flag")
+    axes.errorbar(
+        time_, value, np.abs(np.stack([value - low, high - value])), fmt="o", markersize=3, linewidth=0.8,
+        color="#c4622d", label="read off the film, 90 %",
+    )  # fmt: skip
+    axes.set(xlabel="time since the first frame [s]", ylabel="wind speed [m/s]", ylim=(0, None))
+    axes.legend(loc="lower right", fontsize=8, ncols=2)
+    return figure_url(figure, dpi=110)
+
+
+def _moving(video: Path, rate: int) -> str:
+    """The first seconds of a film, in motion."""
+    with av.open(str(video)) as container:
+        frames = []
+        for frame in container.decode(video=0):
+            frames.append(frame.to_ndarray(format="rgb24"))
+            if len(frames) == 2 * _SHOWN:
+                break
+    return moving(np.stack(frames[::2]), rate=rate / 2, side=320)
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0))
+
+
+def _first(text: str) -> str:
+    return text.splitlines()[0]
+
+
+def _head(text: str, count: int) -> str:
+    return "".join(f"{line}\n" for line in text.splitlines()[:count])
