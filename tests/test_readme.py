@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 import flagdata
-from flagdata.lake import Lake
 from flagdata.outputs import check_folder
 from measure.demo.command import SCHEMA, SHORTEST
 from measure.demo.recording import RecordingRecipe
