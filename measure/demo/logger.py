@@ -30,7 +30,7 @@ decimal = ","
 
 [time]
 columns = ["Date", "Time"]
-format = "%d.%m.%Y %H:%M:%S"
+format = "%d.%m.%Y %H:%M:%S.%f"
 
 [channels.wind_speed]
 column = "Wind speed [km/h]"
@@ -63,7 +63,7 @@ def write_log(
 
     Args:
         speed, direction: (n,) of the readings [m/s], [rad].
-        first: stamp of the first reading by the logger's clock, a whole second.
+        first: stamp of the first reading by the logger's clock.
         quiet: number of the first readings, among which the logger sticks: before the film begins.
         seed: of the gap and the stretch.
     """
@@ -80,4 +80,5 @@ def write_log(
             if not gap <= second < gap + _DROPOUT:
                 stamp = (first.astimezone(UTC) + timedelta(seconds=second)).astimezone(zone)
                 decimal = f"{kilometres:.2f}".replace(".", ",")
-                writer.writerow([f"{stamp:%d.%m.%Y}", f"{stamp:%H:%M:%S}", decimal, f"{degrees:.0f}"])
+                clock = f"{stamp:%H:%M:%S}.{stamp.microsecond // 1000:03d}"
+                writer.writerow([f"{stamp:%d.%m.%Y}", clock, decimal, f"{degrees:.0f}"])

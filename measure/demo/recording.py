@@ -100,16 +100,16 @@ class RecordingRecipe:
     """
 
     seed: int
-    duration: float = 150.0
+    duration: float = 180.0
     rate: int = 30
     columns: int = 20
     step: float = 2.5e-3
     length: float = 1.5
     height: float = 1.0
-    intensity: float = 0.25
+    intensity: float = 0.3
     eddies: float = 60.0
-    width: int = 480
-    rows: int = 360
+    width: int = 400
+    rows: int = 300
     samples: int = 4
     hidden: tuple[Acting, ...] = HIDDEN
 
@@ -127,7 +127,7 @@ class RecordingRecipe:
     @property
     def wind(self) -> float:
         """Mean wind [m/s]."""
-        return self.drawn("wind", 4.5, 5.5)
+        return self.drawn("wind", 4.4, 5.2)
 
     @property
     def mesh(self) -> Mesh:
@@ -226,7 +226,7 @@ def look(recipe: RecordingRecipe) -> RenderParameters:
 def _cloth(recipe: RecordingRecipe) -> tuple[float, float, float]:
     """Area weight [kg/m²], factor on the bending table, damping [s]."""
     return (
-        recipe.drawn("area-weight", 0.13, 0.18), math.exp(recipe.drawn("bending", -0.5, 0.5)),
+        recipe.drawn("area-weight", 0.14, 0.19), math.exp(recipe.drawn("bending", -0.5, 0.5)),
         recipe.drawn("damping", 3e-3, 8e-3),
     )  # fmt: skip
 
@@ -278,12 +278,12 @@ def _log(recipe: RecordingRecipe, path: Path, times: NDArray[np.float64], veloci
     series = logged(CUP, times, velocity, instrument=seed, seed=seed, begin=begin).series
     offset = recipe.drawn("clock", -_LARGEST_OFFSET, _LARGEST_OFFSET)
     first = (int(series.time[0]) - begin) / NANOSECONDS - BEFORE  # by the camera's clock, from its start
-    stamp = (START + timedelta(seconds=first + offset)).replace(microsecond=0)  # the logger stamps its whole seconds
+    stamp = START + timedelta(seconds=first + offset)
     write_log(
         path, series.channels["wind_speed"], series.channels["wind_direction"], first=stamp,
         quiet=round(BEFORE - _LARGEST_OFFSET), seed=recipe.seed,
     )  # fmt: skip
-    return (stamp - START).total_seconds() - first
+    return offset
 
 
 def _noted(recipe: RecordingRecipe, sequence: MeshSequence, zeta: RenderParameters) -> Noted:

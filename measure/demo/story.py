@@ -153,7 +153,7 @@ def _aligned(shell: Transcript) -> None:
     with _Step(shell, "On one clock, in pairs", done, alt="Motion and wind on one clock, and the evidence") as step:
         artifacts = {row["kind"]: row["artifact"] for row in shell.read("ls", "--lake", "lake")["artifacts"]}
         step.found = shell.show(
-            "align", artifacts["camera"][:10], artifacts["wind"][:10], "--by", "estimate", "--plot", "alignment.png",
+            "align", artifacts["camera"][:10], artifacts["wind"][:10], "--search", "60", "--plot", "alignment.png",
             "--lake", "lake",
         )  # fmt: skip
         shell.show("tag", "demo", "--lake", "lake")

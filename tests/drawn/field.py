@@ -58,18 +58,18 @@ class DrawnRecipe:
 
 
 def write_drawn_log(path: Path, recipe: DrawnRecipe) -> float:
-    """The cup's log; the true offset of the clocks [s]: the logger stamps its own whole seconds."""
+    """The cup's log; the true offset of the clocks [s]."""
     wind = recipe.blown()
     times = np.arange(len(wind)) / WIND_RATE
     begin = from_datetime(START) - round(BEFORE * NANOSECONDS)
     velocity = np.stack([wind, 0 * wind, 0 * wind], axis=1)
     series = logged(CUP, times, velocity, instrument=recipe.seed, seed=recipe.seed, begin=begin).series
     first = (int(series.time[0]) - begin) / NANOSECONDS - BEFORE
-    stamp = (START + timedelta(seconds=first + recipe.offset)).replace(microsecond=0)
+    stamp = START + timedelta(seconds=first + recipe.offset)
     write_log(
         path, series.channels["wind_speed"], series.channels["wind_direction"], first=stamp, quiet=60, seed=recipe.seed
     )
-    return (stamp - START).total_seconds() - first
+    return recipe.offset
 
 
 def write_drawn_film(path: Path, winds: NDArray[np.float64], *, rate: int, seed: int, flag: DrawnFlag) -> None:

@@ -41,7 +41,7 @@ def test_the_log_runs_by_a_clock_that_is_off_by_the_hidden_offset(made: tuple[Re
     recording, _ = made
     with recording.log.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file, delimiter=";"))
-    stamps = [datetime.strptime(f"{row['Date']} {row['Time']} +0200", "%d.%m.%Y %H:%M:%S %z") for row in rows]
+    stamps = [datetime.strptime(f"{row['Date']} {row['Time']} +0200", "%d.%m.%Y %H:%M:%S.%f %z") for row in rows]
     since = np.array([(stamp - START).total_seconds() for stamp in stamps])
     speed = np.array([float(row["Wind speed [km/h]"].replace(",", ".")) for row in rows]) / 3.6
     true = np.arange(len(recording.wind)) / 10 - BEFORE
