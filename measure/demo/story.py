@@ -168,10 +168,11 @@ def _measured(shell: Transcript, made: Recording, truths: list[Truth]) -> None:
     done = "From the film alone, a network that was trained on simulated flags estimates the wind."
     alt = "The wind read off the film, beside the log and the true wind"
     with _Step(shell, "Wind from the film", done, alt=alt, page="measured.html") as step:
-        step.found = shell.show(
+        printed = shell.show(
             "measure", "flag", "--flag-size", SIZE, "--windows", f"{_CLIPS:g}s", "--report", "measured.html",
             "--lake", "lake",
         )  # fmt: skip
+        step.found = _head(printed, 3)
         step.picture = _series(shell.folder / "lake", made)
     true = f"{_during(made).mean():.2f} m/s"
     truths.append(Truth(what="mean wind at the flag", true=true, found=_first(step.found), right=None))
