@@ -96,12 +96,6 @@ class LagBins:
         start = len(self.offsets) - 1 - trial
         return slice(start, start + STEPS * (len(self.wind) - 1) + 1, STEPS)
 
-    def longest_overlap(self) -> float:
-        """Longest time that wind and motion share at any trial offset [s]."""
-        there, present = np.isfinite(self.motion), np.isfinite(self.wind)
-        every = range(0, len(self.offsets), STEPS)
-        return self.period * max(int(np.count_nonzero(present & there[self.index(trial)])) for trial in every)
-
     def middle(self, trial: int) -> int:
         """The middle of what both cover at a trial offset, on the camera's clock [UTC ns]."""
         both = np.flatnonzero(np.isfinite(self.wind) & np.isfinite(self.motion[self.index(trial)]))

@@ -36,7 +36,7 @@ import numpy as np
 from flagdata.align.bins import STEPS, LagBins
 from flagdata.align.clock import NINETY
 from flagdata.align.motion import MotionSeries
-from flagdata.align.whitened import FEWEST_BINS, Whitened, fit
+from flagdata.align.whitened import FEWEST_BINS, Whitened, fit, longest_compared
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.signals import Series, WindAverage
@@ -320,7 +320,7 @@ def _no_gusts(bins: LagBins, search: LagSearch) -> Finding:
 
 def _unfit(bins: LagBins, search: LagSearch) -> Finding:
     """Why no model fits at any offset."""
-    longest, least = bins.longest_overlap(), max(search.overlap, FEWEST_BINS * bins.period)
+    longest, least = longest_compared(bins), max(search.overlap, FEWEST_BINS * bins.period)
     if longest < least:
         return _short_overlap(longest, least)
     if not np.nanstd(bins.motion) > 0:

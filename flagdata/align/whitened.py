@@ -167,6 +167,14 @@ def fit(bins: LagBins, *, overlap: float) -> Fit | None:
     return Fit(best=pair, whitest=Whitened.by(own, wind, bins))
 
 
+def longest_compared(bins: LagBins) -> float:
+    """Longest time that a pair can be compared over at any trial offset [s]: the filter takes some bins at the beginning
+    and after each gap."""
+    pair = Whitened.by(autoregression(bins.motion, stride=STEPS), bins.wind, bins)
+    _, counts, _ = pair.search(overlap=0.0)
+    return bins.period * float(counts.max())
+
+
 def _response(smooth: NDArray[np.float64], motion: Series, filters: Series) -> Series:
     """a_w ≥ 0, (widths,), of Σ a_w smooth_w fitted to the motion (n,) behind the filter."""
     columns = np.stack([_filter(column, filters, 1) for column in smooth.T], axis=1)

@@ -145,6 +145,12 @@ def test_too_short_an_overlap_is_refused(scene: Scenes) -> None:
     assert refusals(estimate((motion, wind))) == {"short-overlap"}
 
 
+def test_a_film_of_two_minutes_is_too_short_and_not_unmoved(scene: Scenes) -> None:
+    """Two minutes are asked for, and the estimate cannot use all of them: that is the reason, however the flag moves."""
+    motion, wind = scene(seed=3, duration=120.0)
+    assert refusals(estimate((motion, wind))) == {"short-overlap"}
+
+
 def test_a_peak_at_the_edge_of_the_search_is_refused(scene: Scenes) -> None:
     found = estimate(scene(seed=3, offset=30.0, apart=1.5, flag_noise=0.2), window=30.0, surrogates=60)
     assert "offset-at-edge" in refusals(found)
