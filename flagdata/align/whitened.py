@@ -168,7 +168,7 @@ def fit(bins: LagBins, *, overlap: float) -> Fit | None:
 
 
 def longest_compared(bins: LagBins) -> float:
-    """Longest time that a pair can be compared over at any trial offset [s]: the filter takes some bins at the beginning
+    """Longest time that a pair can be compared over at any trial offset [s]: the filter takes some bins at the start
     and after each gap."""
     pair = Whitened.by(autoregression(bins.motion, stride=STEPS), bins.wind, bins)
     _, counts, _ = pair.search(overlap=0.0)
