@@ -49,8 +49,10 @@ MATERIAL = "camel-ponte-roma"
 _SETTLE = 5.0  # s that are simulated before the first frame
 _LARGEST_OFFSET = 45.0  # s
 _ROUGH = 2e-3  # m, standard deviation of the free vertices' start
-_SURVEYED = {"azimuth": math.radians(3.0), "elevation": math.radians(1.0), "distance": 0.1}
-"""Standard errors with which a person notes down where the camera stood: compass and tape."""
+CLOCK_SIGMA = 0.5
+"""s, standard error with which a person reads the difference of two displays."""
+_SURVEYED = {"azimuth": math.radians(3.0), "elevation": math.radians(1.0), "distance": 0.1, "clock": CLOCK_SIGMA}
+"""Standard errors with which a person notes down where the camera stood, by compass and tape, and the clocks."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,17 +147,19 @@ class RecordingRecipe:
 
 @dataclass(frozen=True, kw_only=True)
 class Noted:
-    """Where the camera stood, as a person notes it down.
+    """Where the camera stood and how the clocks differed, as a person notes it down.
 
     Attributes:
         azimuth: of its axis to the wind, 90° from the side [rad].
         elevation: of its axis [rad].
         distance: from the flag [m].
+        clock: what the logger's display showed less the camera's [s].
     """
 
     azimuth: float
     elevation: float
     distance: float
+    clock: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -205,7 +209,7 @@ def make_recording(
     )  # fmt: skip
     cloth = _cloth(recipe)
     return Recording(
-        video=video, log=log, sensor=sensor, noted=_noted(recipe, sequence, zeta), clock_offset=offset,
+        video=video, log=log, sensor=sensor, noted=_noted(recipe, sequence, zeta, offset), clock_offset=offset,
         wind=np.hypot(velocity[:, 0], velocity[:, 1]), area_weight=cloth[0], damping=cloth[2], acting=recipe.acting,
     )  # fmt: skip
 
@@ -286,15 +290,15 @@ def _log(recipe: RecordingRecipe, path: Path, times: NDArray[np.float64], veloci
     return offset
 
 
-def _noted(recipe: RecordingRecipe, sequence: MeshSequence, zeta: RenderParameters) -> Noted:
+def _noted(recipe: RecordingRecipe, sequence: MeshSequence, zeta: RenderParameters, offset: float) -> Noted:
     camera = stage(Meshes.flag(sequence, heading=0.0), zeta).camera
     true = {
         "azimuth": zeta.camera_angle, "elevation": math.asin(camera.forward[2]),
-        "distance": zeta.camera_radius / math.cos(math.asin(camera.forward[2])),
+        "distance": zeta.camera_radius / math.cos(math.asin(camera.forward[2])), "clock": offset,
     }  # fmt: skip
     return Noted(
         **{
-            name: value + float(stream(recipe.seed, "demo", name).normal(0.0, _SURVEYED[name]))
+            name: value + float(stream(recipe.seed, "demo", "noted", name).normal(0.0, _SURVEYED[name]))
             for name, value in true.items()
         }
     )

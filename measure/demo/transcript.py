@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from flagdata.console import say
-from flagdata.errors import FlagdataError
+from flagdata.errors import FlagdataError, RefusedError
 from measure.demo.cards import Card
 
 
@@ -32,6 +32,29 @@ class Transcript:
         Raises:
             FlagdataError: when it does not exit with 0.
         """
+        printed, code = self._typed(arguments)
+        if code:
+            raise FlagdataError(
+                f"`{self.entries[-1][0]}` ended with {code}", where="the demonstration", fix="see its message above"
+            )
+        return printed
+
+    def attempt(self, *arguments: str) -> str | None:
+        """`show`, or None where the command refuses because the data fail a quality check.
+
+        Raises:
+            FlagdataError: when it ends with anything but 0 and 3.
+        """
+        printed, code = self._typed(arguments)
+        click.echo(printed, nl=False)
+        if code not in (0, RefusedError.exit_code):
+            raise FlagdataError(
+                f"`{self.entries[-1][0]}` ended with {code}", where="the demonstration", fix="see its message above"
+            )
+        return None if code else printed
+
+    def _typed(self, arguments: tuple[str, ...]) -> tuple[str, int]:
+        """What `flagdata ARGUMENTS` prints on stdout, and its exit code."""
         typed = shlex.join(("flagdata", *arguments))
         say(f"\n$ {typed}")
         done = subprocess.run(
@@ -41,15 +64,9 @@ class Transcript:
             text=True,
             check=False,
         )
-        if done.returncode:
-            raise FlagdataError(
-                f"`{typed}` ended with {done.returncode}", where="the demonstration", fix="see its message above"
-            )
-        printed = done.stdout.replace(
-            f"{self.folder.absolute()}{os.sep}", ""
-        )  # a folder that is named when it is whole
-        self.entries.append((typed, printed))
-        return printed
+        # The folder is named when it is whole.
+        self.entries.append((typed, done.stdout.replace(f"{self.folder.absolute()}{os.sep}", "")))
+        return self.entries[-1][1], done.returncode
 
     def show(self, *arguments: str) -> str:
         """`run`, and its stdout printed for the person who watches."""

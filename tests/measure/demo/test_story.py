@@ -1,0 +1,64 @@
+"""The demonstration's steps where a command refuses: what a person would do then is done, and said."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from flagdata.errors import FlagdataError
+from measure.demo import story
+from measure.demo.transcript import Transcript
+
+
+@pytest.fixture
+def codes(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
+    """Exit codes of commands by a word of them, 0 for all others; each prints what was typed."""
+    wanted: dict[str, int] = {}
+
+    def run(arguments: list[str], **others: Any) -> subprocess.CompletedProcess[str]:
+        typed = " ".join(arguments[3:])
+        code = next((code for word, code in wanted.items() if word in typed), 0)
+        printed = '{"artifacts": [{"kind": "camera", "artifact": "c1"}, {"kind": "wind", "artifact": "w1"}]}'
+        return subprocess.CompletedProcess(arguments, code, stdout=printed if "--json" in typed else f"{typed}\n")
+
+    monkeypatch.setattr(subprocess, "run", run)
+    return wanted
+
+
+def test_a_refusal_is_no_failure(codes: dict[str, int], tmp_path: Path) -> None:
+    shell = Transcript(folder=tmp_path)
+    assert shell.attempt("align", "a", "b") == "align a b\n"
+    codes["align"] = 3
+    assert shell.attempt("align", "a", "b") is None
+    assert [typed for typed, _ in shell.entries] == ["flagdata align a b"] * 2
+    codes["align"] = 1
+    with pytest.raises(FlagdataError, match="ended with 1"):
+        shell.attempt("align", "a", "b")
+    with pytest.raises(FlagdataError, match="ended with 1"):
+        shell.run("align", "a", "b")
+
+
+def aligned(shell: Transcript) -> str:
+    (shell.folder / "alignment.png").write_bytes(b"png")
+    made = cast(Any, SimpleNamespace(noted=SimpleNamespace(clock=-12.34)))
+    story._aligned(shell, made)
+    return shell.cards[-1].found
+
+
+def test_where_no_offset_is_found_the_noted_one_is_given_and_the_card_says_so(
+    codes: dict[str, int], tmp_path: Path
+) -> None:
+    codes["--search"] = 3
+    found = aligned(Transcript(folder=tmp_path))
+    assert "refused" in found
+    assert "--by given --offset -12.3 --offset-sigma 0.5" in found
+
+
+def test_where_the_offset_is_found_none_is_given(codes: dict[str, int], tmp_path: Path) -> None:
+    found = aligned(Transcript(folder=tmp_path))
+    assert "refused" not in found
+    assert "--by given" not in found
