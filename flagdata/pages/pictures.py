@@ -38,8 +38,8 @@ def still(frame: NDArray[np.uint8] | Image.Image, *, side: int | None = None) ->
 
 
 def moving(clip: Sequence[NDArray[np.uint8]] | NDArray[np.uint8], *, rate: float, side: int) -> str:
-    """The largest centred square of a clip (frame, height, width), gray or with three colours, endless at `rate` [Hz], as
-    a WebP in a data URL."""
+    """The largest centred square of a clip (frame, height, width), gray or in colour, endless at `rate` [Hz], as a WebP
+    in a data URL."""
     frames = np.asarray(clip)
     square = min(frames.shape[1:3])
     top, left = (frames.shape[1] - square) // 2, (frames.shape[2] - square) // 2

@@ -38,7 +38,7 @@ class Part(StrEnum):
     help="Folder for the pages and the data. What an earlier demonstration wrote there is replaced, unless it was "
     "changed or anything else lies beside it.",
 )
-@click.option("--seed", type=click.IntRange(min=0), default=3, show_default=True, help="Seed of all that is random.")
+@click.option("--seed", type=click.IntRange(min=0), default=2026, show_default=True, help="Seed of all that is random.")
 @click.option(
     "--minutes",
     type=click.FloatRange(SHORTEST, 120),

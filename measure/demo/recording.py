@@ -108,7 +108,7 @@ class RecordingRecipe:
     step: float = 2.5e-3
     length: float = 1.5
     height: float = 1.0
-    intensity: float = 0.3
+    intensity: float = 0.35
     eddies: float = 60.0
     width: int = 400
     rows: int = 300
@@ -129,7 +129,7 @@ class RecordingRecipe:
     @property
     def wind(self) -> float:
         """Mean wind [m/s]."""
-        return self.drawn("wind", 4.4, 5.2)
+        return self.drawn("wind", 2.8, 3.2)
 
     @property
     def mesh(self) -> Mesh:
@@ -230,7 +230,7 @@ def look(recipe: RecordingRecipe) -> RenderParameters:
 def _cloth(recipe: RecordingRecipe) -> tuple[float, float, float]:
     """Area weight [kg/m²], factor on the bending table, damping [s]."""
     return (
-        recipe.drawn("area-weight", 0.14, 0.19), math.exp(recipe.drawn("bending", -0.5, 0.5)),
+        recipe.drawn("area-weight", 0.16, 0.20), math.exp(recipe.drawn("bending", -0.5, 0.5)),
         recipe.drawn("damping", 3e-3, 8e-3),
     )  # fmt: skip
 

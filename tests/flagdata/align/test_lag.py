@@ -146,7 +146,7 @@ def test_too_short_an_overlap_is_refused(scene: Scenes) -> None:
 
 
 def test_a_film_of_two_minutes_is_too_short_and_not_unmoved(scene: Scenes) -> None:
-    """Two minutes are asked for, and the estimate cannot use all of them: that is the reason, however the flag moves."""
+    """Two minutes are asked for, and the estimate cannot use all of them: that is the reason."""
     motion, wind = scene(seed=3, duration=120.0)
     assert refusals(estimate((motion, wind))) == {"short-overlap"}
 
