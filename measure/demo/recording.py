@@ -69,9 +69,10 @@ class Acting:
     strength: float
 
     @property
-    def unit(self) -> str:
-        """Of the strength."""
-        return EFFECTS[self.effect].parameters()[self.parameter].unit
+    def sentence(self) -> str:
+        """Effect, parameter and strength with its unit."""
+        unit = EFFECTS[self.effect].parameters()[self.parameter].unit
+        return f"{self.effect}, {self.parameter} {self.strength:g}" + ("" if unit == "1" else f" {unit}")
 
 
 HIDDEN = (

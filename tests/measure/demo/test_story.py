@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,6 +12,8 @@ import pytest
 
 from flagdata.errors import FlagdataError
 from measure.demo import story
+from measure.demo.cards import Truth
+from measure.demo.recording import Acting
 from measure.demo.transcript import Transcript
 
 
@@ -40,6 +43,21 @@ def test_a_refusal_is_no_failure(codes: dict[str, int], tmp_path: Path) -> None:
         shell.attempt("align", "a", "b")
     with pytest.raises(FlagdataError, match="ended with 1"):
         shell.run("align", "a", "b")
+
+
+def test_the_cloth_is_weighed_with_what_a_person_noted_and_the_truth_stands_beside(
+    codes: dict[str, int], tmp_path: Path
+) -> None:
+    """90 ± 3° from the wind, 20 ± 2° upwards, 8.2 m away."""
+    acting = Acting(effect="tangential-linear-drag", parameter="coefficient", strength=0.2)
+    noted = SimpleNamespace(azimuth=math.pi / 2, elevation=math.radians(20.2), distance=8.24)
+    made = cast(Any, SimpleNamespace(noted=noted, area_weight=0.1754, acting=acting))
+    shell, truths = Transcript(folder=tmp_path), list[Truth]()
+    story.weighing_step(shell, made, truths)
+    (command,) = shell.cards[-1].commands
+    for words in ("--azimuth 90±3", "--elevation 20±2", "--distance 8.2", "--flag-size 1.5x1.0"):
+        assert words in command.replace("'", "")
+    assert [truth.true for truth in truths] == ["0.175 kg/m²", "tangential-linear-drag, coefficient 0.2 kg/(m² s)"]
 
 
 def aligned(shell: Transcript) -> str:
