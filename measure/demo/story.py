@@ -27,8 +27,8 @@ SIMULATIONS = 64
 WEIGHED = 40.0
 """s of the film that the cloth is weighed on."""
 _REFUSED = (
-    "The estimate from motion and gusts was refused: this flag moves hardly more in a stronger wind.\n"
-    "So the difference was given that somebody read off the two displays.\n"
+    "The estimate from motion and gusts was refused, for the reason above the picture.\n"
+    "So the difference was given that somebody read off the two displays:\n"
 )
 _SHOWN = 50  # frames of the film's moving picture
 _CLIPS = 2.4  # s from one window of the wind series to the next
