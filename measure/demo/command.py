@@ -42,7 +42,7 @@ class Part(StrEnum):
 @click.option(
     "--minutes",
     type=click.FloatRange(SHORTEST, 120),
-    default=SHORTEST,
+    default=4.0,
     show_default=True,
     help="Length of the film it makes.",
 )

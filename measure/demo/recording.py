@@ -103,7 +103,7 @@ class RecordingRecipe:
     """
 
     seed: int
-    duration: float = 180.0
+    duration: float = 240.0
     rate: int = 30
     columns: int = 20
     step: float = 2.5e-3
@@ -216,7 +216,8 @@ def make_recording(
 
 
 def look(recipe: RecordingRecipe) -> RenderParameters:
-    """How it is filmed: as in the data set `outdoor`, from 7 to 9 m away, in daylight, by a camera held level."""
+    """How it is filmed: as in the data set `outdoor`, from 7 to 9 m away, in daylight, before the sky or hills, against
+    which the outline of a flag is found."""
     quantities = {
         "camera_radius": recipe.drawn("radius", 7.0, 9.0), "camera_height": recipe.drawn("camera", 1.4, 1.8),
         "camera_angle": math.radians(recipe.drawn("azimuth", 70.0, 110.0)),
@@ -225,7 +226,8 @@ def look(recipe: RecordingRecipe) -> RenderParameters:
         "width": recipe.width, "height": recipe.rows,
     }  # fmt: skip
     outdoor = prior.named("outdoor").with_quantities(quantities, source="the demonstration")
-    return outdoor.draw(child_seed(recipe.seed, "demo", "look"), Assets())
+    plain = replace(outdoor, textures=("flag", "stripes"), backgrounds=("sky", "hills"))
+    return plain.draw(child_seed(recipe.seed, "demo", "look"), Assets())
 
 
 def _cloth(recipe: RecordingRecipe) -> tuple[float, float, float]:
