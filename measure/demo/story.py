@@ -76,12 +76,13 @@ def weighing_step(shell: Transcript, made: Recording, truths: list[Truth]) -> No
         f"{math.degrees(noted.azimuth):.0f}° from the wind's direction and {noted.distance:.1f} m away."
     )
     with _Step(shell, "What the cloth weighs", done, page="weighed.html") as step:
-        step.found = shell.show(
+        printed = shell.attempt(
             "calibrate", "flag", "--flag-size", SIZE, "--azimuth", f"{math.degrees(noted.azimuth):.0f}±3",
             "--elevation", f"{math.degrees(noted.elevation):.0f}±2", "--distance", f"{noted.distance:.1f}",
             "--end", f"{WEIGHED:g}s", "--simulations", str(SIMULATIONS), "--workers", str(_cores()),
             "--cache", "simulations", "--report", "weighed.html", "--lake", "lake",
         )  # fmt: skip
+        step.took(printed)
     truths.append(Truth(what="area weight", true=f"{made.area_weight:.3f} kg/m²", found=_first(step.found), right=None))
     if made.acting is not None:
         truths.append(
@@ -127,6 +128,11 @@ class _Step:
         self._shell, self._title, self._done, self._alt, self._page = shell, title, done, alt, page
         self._began, self._typed = time.monotonic(), len(shell.entries)
         self.found, self.picture = "", ""
+
+    def took(self, printed: str | None) -> None:
+        """What the step's command printed; None where it refused, and left no page."""
+        self.found = printed or "Refused: the film does not pass a check of this command, which says which.\n"
+        self._page = "" if printed is None else self._page
 
     def __enter__(self) -> _Step:
         say(f"\n{self._title}")
@@ -180,12 +186,13 @@ def _measured(shell: Transcript, made: Recording, truths: list[Truth]) -> None:
     done = "From the film alone, a network that was trained on simulated flags estimates the wind."
     alt = "The wind read off the film, beside the log and the true wind"
     with _Step(shell, "Wind from the film", done, alt=alt, page="measured.html") as step:
-        printed = shell.show(
+        printed = shell.attempt(
             "measure", "flag", "--flag-size", SIZE, "--windows", f"{_CLIPS:g}s", "--report", "measured.html",
             "--lake", "lake",
         )  # fmt: skip
-        step.found = _head(printed, 3)
-        step.picture = _series(shell.folder / "lake", made)
+        step.took(None if printed is None else _head(printed, 3))
+        if printed is not None:
+            step.picture = _series(shell.folder / "lake", made)
     true = f"{_during(made).mean():.2f} m/s"
     truths.append(Truth(what="mean wind at the flag", true=true, found=_first(step.found), right=None))
 

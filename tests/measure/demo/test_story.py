@@ -60,6 +60,18 @@ def test_the_cloth_is_weighed_with_what_a_person_noted_and_the_truth_stands_besi
     assert [truth.true for truth in truths] == ["0.175 kg/m²", "tangential-linear-drag, coefficient 0.2 kg/(m² s)"]
 
 
+def test_a_cloth_that_cannot_be_weighed_is_no_failure_of_the_demonstration(
+    codes: dict[str, int], tmp_path: Path
+) -> None:
+    codes["calibrate"] = 3
+    noted = SimpleNamespace(azimuth=1.5, elevation=0.3, distance=8.0)
+    shell, truths = Transcript(folder=tmp_path), list[Truth]()
+    story.weighing_step(shell, cast(Any, SimpleNamespace(noted=noted, area_weight=0.15, acting=None)), truths)
+    assert shell.cards[-1].found.startswith("Refused")
+    assert shell.cards[-1].page == ""
+    assert truths[0].found.startswith("Refused")
+
+
 def aligned(shell: Transcript) -> str:
     (shell.folder / "alignment.png").write_bytes(b"png")
     made = cast(Any, SimpleNamespace(noted=SimpleNamespace(clock=-12.34)))
