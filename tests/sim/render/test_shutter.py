@@ -100,3 +100,13 @@ def test_frames_are_the_same_however_many_are_worked_on_together(camera_of, look
     together = camera_of().render(scene, zeta)
     monkeypatch.setattr("sim.render.raster._TOGETHER", 2)
     assert torch.equal(camera_of().render(scene, zeta), together)
+
+
+def test_a_part_of_a_sequence_is_rendered_as_in_the_whole(camera_of, look) -> None:
+    """The camera aims at the cloth of all frames, not of the part's."""
+    scene, zeta = meshes(sheet(side=1.0), moves=STEADY, rate=RATE), look(exposure_time=0.02, raster_samples=4)
+    renderer = camera_of()
+    whole = renderer.render(scene, zeta)
+    assert torch.equal(renderer.part(scene, zeta, 1, 4), whole[1:4])
+    assert torch.equal(renderer.part(scene, zeta, 0, 2), whole[:2])
+    assert not torch.equal(renderer.render(scene.part(0, 2), zeta), whole[:2])
