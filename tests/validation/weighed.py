@@ -352,8 +352,9 @@ def page(sheet: Mapping[str, Any]) -> str:
     lines += ["", f"{left_out}{check['median_error']:.1%}.", "", heading, "|---|---|---|---|---|---|---|"]
     for row in (*sheet["geometry"]["flags"], *sheet["films"]["flags"]):
         found = "withheld" if row["value"] is None else f"{row['value']:.3f}"
+        misfit = "" if row["misfit"] is None else f"{row['misfit']:.2g}"
         lines.append(
             f"| {row['name']} | {row['code']} | {row['damping'] * 1e3:.2f} | {row['truth']:.3f} | {found} | "
-            f"{row['low']:.3f} to {row['high']:.3f} | {row['misfit']:.2g} |"
+            f"{row['low']:.3f} to {row['high']:.3f} | {misfit} |"
         )
     return "\n".join(lines) + "\n"

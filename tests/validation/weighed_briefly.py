@@ -14,7 +14,6 @@ FLAGDATA_WEIGHED that of the truths.
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping
 from dataclasses import replace
@@ -124,7 +123,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     for place, truth in enumerate(some):
         rows.append({
             "name": f"truth-{place}", "truth": truth["area_weight"], "value": middle[place], "low": low[place],
-            "high": high[place], "misfit": math.nan, "withheld": None, "damping": truth["damping"], "code": "kernel",
+            "high": high[place], "misfit": None, "withheld": None, "damping": truth["damping"], "code": "kernel",
         })  # fmt: skip
     options = Options(flag=loop.FLAG, azimuth=own.azimuth, elevation=own.elevation, simulations=own.count, seed=SEED)
     filmed = []
@@ -140,7 +139,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         filmed.append(
             large.weigh(f"truth-{number}, filmed", read, base, sigma=films.SIGMA, truth=truth, of=(own, options))
         )
-    check = filmed[-1].get("check") or {"count": 0, "held": 0, "median_error": math.nan}
+    check = filmed[-1].get("check") or {"count": 0, "held": 0, "median_error": 0.0}
     sheet = {
         "geometry": {**large.score(rows), "flags": rows}, "films": {**large.score(filmed), "flags": filmed},
         "left_out": check, "observables": list(OBSERVED), "seconds": loop.DURATION,
