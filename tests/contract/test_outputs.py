@@ -43,7 +43,7 @@ ALLOWED = {
     "sim/datasets/record.py": SCRATCH, "sim/datasets/plan.py": SCRATCH,
     "flagdata/dataset/cache.py": "a cache: files named by 64 hex digits and its own two, whichever folder it is in",
     "measure/nulls/bank.py": "makes the folder of a bank that `challenge bank` has claimed; batches by put_if_absent",
-    "measure/calibrate/artifact.py": LAKE,
+    "measure/calibrate/artifact.py": LAKE, "measure/anemometer/storage.py": LAKE,
     "measure/calibrate/design.py": "a cache: files named by 32 hex digits, by put_if_absent, whichever folder it is in",
     "sim/kernel/build.py": "flagdata's own cache folder",
     "models/training/checkpoint.py": "the run folder of a training",
