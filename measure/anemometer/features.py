@@ -56,7 +56,7 @@ class Features:
         layout: of the windows.
         values: (w, feature), a row of NaN where frames are missing.
         names: of the features.
-        summaries: (w, dimension) of the network's first learner, for whoever compares films; NaN likewise.
+        summaries: (w, dimension) of the network's first learner, by which films are compared; NaN likewise.
         winds: (w,) that the network reads by itself [m/s]; NaN likewise.
         clip: (frames, height, width) of the first whole window.
         place: of the camera.

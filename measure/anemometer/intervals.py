@@ -16,7 +16,8 @@ Floats = NDArray[np.float64]
 
 
 def half_width(errors: Floats, level: float) -> float:
-    """Half of the interval that holds with `level` [m/s], of errors (n,); infinite where these are too few for it."""
+    """Half of the interval that contains the wind with `level` [m/s], of errors (n,); infinite where they are too
+    few."""
     n = len(errors)
     rank = math.ceil(level * (n + 1))
     return math.inf if rank > n else float(np.sort(np.abs(errors))[rank - 1])

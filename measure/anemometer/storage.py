@@ -30,7 +30,7 @@ def write(path: Path, model: ReadingModel, about: Mapping[str, Any]) -> None:
     show beside the wind over `feature`, and the `hoist`, `background` and `bare` of each camera's place.
 
     Args:
-        about: what is said of the calibration, JSON values.
+        about: what is reported of the calibration, JSON values.
     """
     import zarr
 

@@ -259,7 +259,7 @@ def _sections(anemometer: Made | None) -> tuple[Section, ...]:
 
 
 def _report(anemometer: Made, report: Path | None, *, as_json: bool) -> None:
-    """What is said of a reading model that was made alone."""
+    """Report a reading model that was made alone."""
     from flagdata.outputs import write_file
     from measure.anemometer.section import page
 

@@ -62,7 +62,7 @@ def test_a_few_features_that_say_much_have_a_penalty_of_their_own() -> None:
     assert validated(rows, wind, blocks, np.zeros(100, bool)).rmse > 1.3 * 0.2
 
 
-def test_intervals_hold_and_the_error_is_that_of_the_features() -> None:
+def test_intervals_contain_the_wind_and_the_error_is_that_of_the_features() -> None:
     """The best linear reading of a window has the variance σ²/(1 + s) of its four features, with s the sum of their
     squared slopes over their noise; the log adds its own scatter and what it misses between samples."""
     found = model()
