@@ -108,16 +108,18 @@ class Law:
     """What wind an observable stands for.
 
     Attributes:
-        scale: c, the wind at an excess of 1 [m/s].
+        scale: the wind at an excess of `reference` [m/s], so that it hardly depends on the exponent.
         exponent: p.
+        reference: in the observable's unit.
     """
 
     scale: float
     exponent: float
+    reference: float = 1.0
 
     def wind(self, excess: Floats) -> Floats:
         """(n,) [m/s]."""
-        return self.scale * excess**self.exponent
+        return self.scale * (excess / self.reference) ** self.exponent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,11 +174,12 @@ def fit(
         raise InputError(f"{own.sum()} rows with a log beside them", where="fit", fix=f"give {_FEWEST} or more")
     free = float(own.sum()) * min(1.0, float(np.median(np.diff(rows.times))) / rows.span)
     speed = float(np.abs(readings[own]).max())
-    middle = math.log(max(speed, _STILL) / max(float(rows.excess[own].max()), 1e-9))
-    bounds = [(middle - 4.0, middle + 4.0), _EXPONENTS, *_NOISE, *(_range(name, known.get(name)) for name in effects)]
+    reference = max(float(np.sqrt(np.square(rows.excess).mean())), 1e-9)
+    middle = math.log(max(speed, _STILL))
+    bounds = [(middle - 4.0, middle + 2.0), _EXPONENTS, *_NOISE, *(_range(name, known.get(name)) for name in effects)]
 
     def made(vector: Floats) -> Disagreement:
-        law = Law(scale=math.exp(vector[0]), exponent=float(vector[1]))
+        law = Law(scale=math.exp(vector[0]), exponent=float(vector[1]), reference=reference)
         chain = Chain(strengths=dict(zip(effects, vector[4:].tolist(), strict=True)))
         return Disagreement(law=law, chain=chain, floor=math.exp(vector[2]), share=math.exp(vector[3]))
 
@@ -195,10 +198,10 @@ def fit(
         shares = qmc.Sobol(len(bounds), scramble=True, rng=stream(seed, "instruments", "starts")).random(_STARTS)
         low, high = np.array(bounds).T
         starts = low + shares * (high - low)
-        starts[:, 0], starts[:, 1] = middle - np.log(np.linspace(0.5, 2.0, _STARTS)), 1.0
+        starts[:, 0], starts[:, 1] = middle - np.linspace(0.0, 1.5, _STARTS), 1.0
         starts[:, 2], starts[:, 3] = math.log(0.1), math.log(0.2)
     else:
-        starts = np.array([_vector(near, effects)])
+        starts = np.clip([_vector(near, effects)], *np.array(bounds).T)
     found = [
         minimize(objective, start, method="Powell", bounds=bounds, options={"maxfev": steps, "xtol": 1e-4})
         for start in starts
