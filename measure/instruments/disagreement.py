@@ -18,7 +18,7 @@ jackknife, Künsch 1989). An effect's share is what errors change by where it al
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -39,7 +39,10 @@ _EXPONENTS = (0.2, 3.0)
 # A log has steps of 0.01 m/s; a flag is not read better than to half a per cent.
 _NOISE = ((math.log(0.005), math.log(2.0)), (math.log(0.005), math.log(1.0)))
 _STARTS = 4
-_STEPS = 4000
+_STEPS = 1500
+_ROUNDS = 5
+_GAIN = 1e-3
+"""Of a log-likelihood, twice: below it a search has ended."""
 _STILL = 1e-3  # m/s: what a flag at rest is taken to show, so that no logarithm fails
 
 
@@ -193,7 +196,6 @@ def fit(
         penalty = sum(((vector[4 + effects.index(name)] - one.low) / one.sigma) ** 2 for name, one in known.items())
         return free * float(terms.mean()) + penalty
 
-    steps = _STEPS if near is None else _STEPS // 4
     if near is None:
         shares = qmc.Sobol(len(bounds), scramble=True, rng=stream(seed, "instruments", "starts")).random(_STARTS)
         low, high = np.array(bounds).T
@@ -202,11 +204,24 @@ def fit(
         starts[:, 2], starts[:, 3] = math.log(0.1), math.log(0.2)
     else:
         starts = np.clip([_vector(near, effects)], *np.array(bounds).T)
-    found = [
-        minimize(objective, start, method="Powell", bounds=bounds, options={"maxfev": steps, "xtol": 1e-4})
-        for start in starts
-    ]
-    return made(min(found, key=lambda one: float(one.fun)).x)
+    return made(min((_descended(objective, start, bounds) for start in starts), key=lambda one: one[1])[0])
+
+
+def _descended(
+    objective: Callable[[Floats], float], start: Floats, bounds: Sequence[tuple[float, float]]
+) -> tuple[Floats, float]:
+    """Where a search from `start` ends, and the objective there: by lines, then by a simplex, which follows valleys
+    between the axes, until neither gains anything."""
+    place, value = start, math.inf
+    for _ in range(_ROUNDS):
+        before = value
+        for method, tolerance in (("Powell", {"xtol": 1e-4, "ftol": 1e-7}), ("Nelder-Mead", {"fatol": 1e-5})):
+            found = minimize(objective, place, method=method, bounds=bounds, options={"maxfev": _STEPS, **tolerance})
+            if found.fun <= value:
+                place, value = np.asarray(found.x), float(found.fun)
+        if before - value < _GAIN:
+            break
+    return place, value
 
 
 def jackknife(
