@@ -41,7 +41,7 @@ def found() -> Disagreement:
 
 def test_the_faults_that_were_put_in_come_out_with_their_uncertainties(found: Disagreement) -> None:
     rows, log = _made()
-    blocks = (rows.times // 12.0).astype(np.int64)
+    blocks = (rows.times // 16.0).astype(np.int64)
     sigmas, errors = jackknife(rows, log, EFFECTS, found, blocks=blocks)
     truth = {"clock-offset": LATE, "anemometer-dead-zone": THRESHOLD, "anemometer-offset": OFFSET}
     for name, tolerance in (("clock-offset", 0.05), ("anemometer-dead-zone", 0.2), ("anemometer-offset", 0.06)):
