@@ -31,7 +31,7 @@ from measure.calibrate.prior import (
 )
 from measure.calibrate.simulation import BATCH, Batch, Flag
 from measure.calibrate.wind import Log
-from measure.challenge.workers import single_threaded
+from measure.workers import single_threaded
 
 FAR = 15.0
 """m from which a flag is filmed where the user gives no distance: beyond some flag lengths it hardly matters."""

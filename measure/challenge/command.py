@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from flagdata.console import LakePlace, LocalPath, document, json_option, progress, say
+from flagdata.errors import UsageError
 
 if TYPE_CHECKING:
     from flagdata.storage import Place
@@ -26,6 +27,7 @@ def challenge() -> None:
 
     \b
       flagdata challenge make out/challenge --seed 7 --sets 60 --workers 2
+      flagdata challenge make out/films --recipe films --seed 7 --sets 40 --workers 2
       flagdata challenge bank out/bank --seed 8 --workers 2
       flagdata challenge run out/challenge --bank out/bank --workers 2
       flagdata challenge score out/challenge --out docs/results
@@ -111,15 +113,20 @@ def bank(
     type=click.IntRange(min=1),
     default=1,
     show_default=True,
-    help="Number of sets that are judged at a time.",
+    help="Number of sets that are judged at a time; of films, processes that simulate.",
 )
-@click.option("--bank", type=LocalPath(), help="Folder of simulated nulls that the sets share.")
+@click.option(
+    "--bank", type=LocalPath(),
+    help="Folder of simulated nulls that the sets share; of films, where their simulations are kept.",
+)  # fmt: skip
 @json_option
 def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path | None, as_json: bool) -> None:
     """Judge the sets that have no verdict yet, and file the verdicts with their hashes."""
+    from flagdata.caches import user_cache
     from measure.challenge.filing import filed
-    from measure.challenge.fitter import ClosingTheLoop
+    from measure.challenge.fitter import ClosingTheLoop, ClosingTheLoopOnFilms
     from measure.challenge.folder import ChallengeFolder
+    from measure.challenge.run import Fitter
     from measure.challenge.run import run as run_challenge
 
     target = ChallengeFolder(folder)
@@ -131,8 +138,12 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
             # What it says stays in the file: who watches a run should not learn to read it.
             say(f"{filing.name} filed after {filing.seconds:.0f} s{' (refused)' if filing.verdict is None else ''}")
 
+        fitter: Fitter = ClosingTheLoop(bank=bank)
+        if target.filmed:
+            # One after another: what the first one simulates, by all workers, is what the others take.
+            fitter = ClosingTheLoopOnFilms(folder=bank or user_cache() / "calibrate", workers=workers)
         filings = run_challenge(
-            target, ClosingTheLoop(bank=bank), seed=seed, only=only, workers=workers, progress=report
+            target, fitter, seed=seed, only=only, workers=1 if target.filmed else workers, progress=report
         )
     if as_json:
         rows = [{"set": f.name, "seconds": f.seconds, "refusal": f.refusal} for f in filings]
@@ -151,14 +162,15 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
     help="File of all graded challenges, to which this one is added under its folder's name.",
 )  # fmt: skip
 @click.option(
-    "--against", type=click.Choice(["true-model", "floor"]), default="true-model", show_default=True,
-    help="Error against which E_red is measured: that of the true model, which is computed, or the verdict's floor.",
+    "--against", type=click.Choice(["true-model", "floor"]),
+    help="Error against which E_red is measured: that of the true model, which is computed, or the verdict's floor. By "
+    "default the true model's, and of films the floor.",
 )  # fmt: skip
 @json_option
 @click.pass_context
 def score(
-    context: click.Context, folder: Path, only: tuple[str, ...], out: Path | None, history: Path | None, against: str,
-    as_json: bool,
+    context: click.Context, folder: Path, only: tuple[str, ...], out: Path | None, history: Path | None,
+    against: str | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Open the keys and grade; ends with 3 where a gate is not met.
 
@@ -170,7 +182,10 @@ def score(
     from measure.challenge.score import score as score_challenge
     from measure.challenge.true_model import true_model_errors
 
-    target, reference = ChallengeFolder(folder), true_model_errors if against == "true-model" else None
+    target = ChallengeFolder(folder)
+    if target.filmed and against == "true-model":
+        raise UsageError("no true model's error is computed of films", where="--against", fix="give floor")
+    reference = None if target.filmed or against == "floor" else true_model_errors
     name = folder.resolve().name
     if out is not None:
         sheets.check(out)

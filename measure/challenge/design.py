@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import combinations
 from typing import TypeVar
 
@@ -66,6 +67,7 @@ def draw(recipe: ChallengeRecipe, *, seed: int, count: int) -> tuple[AnswerKey, 
                 recipe, stream(seed, "set", index), name=f"set-{place + 1:03d}", kind=kind, effects=effects,
                 turn=None if kind is Kind.PAIR else turns[index], numerics=numerics, rate=rates[index],
                 noise=noises[index], varying=varying[index],
+                shared=None if recipe.films is None else stream(seed, "winds"),
             )
         )  # fmt: skip
     return tuple(keys)
@@ -105,19 +107,24 @@ def _key(
     rate: int,
     noise: float,
     varying: bool,
+    shared: np.random.Generator | None,
 ) -> AnswerKey:
     material = recipe.materials[int(rng.integers(len(recipe.materials)))]
     density, bending = recipe.density.at(rng.random()), recipe.bending.at(rng.random())
     damping = recipe.numerics[numerics].damping.at(rng.random())
     intensity = recipe.intensity.at(rng.random())
     table = recipe.outside if kind is Kind.OUTSIDE else recipe.effects
-    return AnswerKey(
+    key = AnswerKey(
         name=name, kind=kind, effects=tuple(_acting(effect, table[effect], turn, rng.random) for effect in effects),
         impact=0.0, material=material, density=density, bending=bending, damping=damping,
         speeds=_speeds(recipe, rng), toward=float(rng.uniform(-math.pi, math.pi)),
         heading=float(rng.uniform(-_HEADING, _HEADING)), intensity=intensity if varying else 0.0,
         rate=rate, noise=noise, numerics=numerics,
     )  # fmt: skip
+    if shared is None:
+        return key
+    intensity = recipe.intensity.at(shared.random()) if recipe.varying else 0.0
+    return replace(key, toward=0.0, speeds=_speeds(recipe, shared), intensity=intensity)
 
 
 def _acting(effect: str, strengths: Strengths, turn: int | None, uniform: Callable[[], float]) -> Acting:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from measure.challenge.films import Filmed
 from measure.observe.trajectory import Experiment
+from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Verdict
 
 
@@ -29,3 +31,37 @@ class ClosingTheLoop:
         from measure.loop.run import Options
 
         return close_loop(experiment, Options(seed=seed, bank=self.bank))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosingTheLoopOnFilms:
+    """`flagdata close-loop` on films, as a user runs it.
+
+    Attributes:
+        folder: where simulations are kept, which all sets share.
+        simulations: of the base model for each recording.
+        kinds: of numerics among null experiments.
+        workers: processes that simulate.
+    """
+
+    folder: Path
+    simulations: int = 128
+    kinds: int = CRITERIA.simulated_kinds
+    workers: int = 1
+
+    def __call__(self, given: Filmed, seed: int) -> Verdict:
+        """The verdict. Simulations are drawn from one seed for all sets, so that they share them, and not from `seed`.
+
+        Raises:
+            FlagdataError: films that do not do.
+        """
+        del seed
+        from measure.calibrate.calibrate import Options as Calibrating
+        from measure.films.run import Options, close_loop
+
+        calibration = Calibrating(
+            flag=given.flag, azimuth=given.azimuth, elevation=given.elevation, distance=given.distance,
+            simulations=self.simulations,
+        )  # fmt: skip
+        options = Options(calibration=calibration, kinds=self.kinds, area_weight=given.area_weight)
+        return close_loop(given.observed(), options, folder=self.folder, workers=self.workers)

@@ -3,6 +3,7 @@
 challenge.json            title, versions, and of every set the hashes of its data and of its sealed key
 sets/set-001/set.json     what a user would know: cloth, pins, rate, noise, wind beside each recording
 sets/set-001/*.npy        markers.npy (marker, 2) [m]; a.npy, b.npy, … (frame, marker, 3) [m] float32
+sets/set-001/*.mp4        in their place, where sets are films: a.mp4, b.mp4, …
 sealed/set-001.json       key and salt; seed.json
 verdicts/set-001.json     as filed, with set-001.sha256
 opened.json               once the keys were opened: hashes of the verdicts that were filed before
@@ -25,6 +26,7 @@ from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownName
 from flagdata.outputs import rewrite
 from flagdata.provenance import canonical, digest, file_hash
 from flagdata.recipes import is_name
+from measure.challenge.films import Filmed, read_films
 from measure.observe.anchors import as_seen
 from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
 from sim.handles import corners
@@ -147,8 +149,18 @@ class ChallengeFolder:
                 fix="restore the folder as it was made",
             )  # fmt: skip
 
+    @property
+    def filmed(self) -> bool:
+        """Whether its sets are films, and not tracked markers."""
+        return self.manifest().get("filmed") is True
+
+    def films(self, name: str) -> Filmed:
+        """A set of films, as `experiment`."""
+        self.checked(name)
+        return read_films(self.data(name))
+
     def experiment(self, name: str) -> Experiment:
-        """A set as what it is to be judged by.
+        """A set of tracked markers as what it is to be judged by.
 
         Raises:
             CorruptError: its data were changed.
@@ -174,10 +186,15 @@ def write_set(
 ) -> str:
     """Write a set's files, all with one time of change; the hash over them."""
     folder.mkdir(parents=True)
-    write_json(folder / "set.json", about)
     np.save(folder / "markers.npy", markers)
     for name, track in positions.items():
         np.save(folder / f"{name}.npy", track)
+    return finish(folder, about)
+
+
+def finish(folder: Path, about: Mapping[str, Any]) -> str:
+    """Write what is stated beside a set's other files, and give all one time of change; the hash over them."""
+    write_json(folder / "set.json", about)
     for path in (*folder.iterdir(), folder):
         os.utime(path, (_EPOCH, _EPOCH))
     return data_hash(folder)

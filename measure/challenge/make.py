@@ -22,7 +22,7 @@ from measure.challenge.folder import ChallengeFolder
 from measure.challenge.meshes import layout, seen
 from measure.challenge.recipe import ChallengeRecipe
 from measure.challenge.simulation import SimulatedSet, batches, simulate
-from measure.challenge.workers import single_threaded
+from measure.workers import single_threaded
 from sim.handles import ARCSIM_STIFFNESS
 from sim.scene import GRAVITY
 
@@ -87,6 +87,7 @@ def _make(
         target.public,
         {
             "schema": "flagdata.challenge/1", "title": recipe.title, "code_version": code_version(),
+            "filmed": recipe.films is not None,
             "sets": {name: entries[name] for name in sorted(entries)},
         },
     )  # fmt: skip
@@ -95,6 +96,25 @@ def _make(
 def _write(
     target: ChallengeFolder, recipe: ChallengeRecipe, seed: int, key: AnswerKey, made: SimulatedSet
 ) -> dict[str, str]:
+    if recipe.films is None:
+        data = _write_markers(target, recipe, seed, key, made)
+    else:
+        from measure.challenge.filming import films_of  # which needs a renderer
+
+        data = files.finish(
+            target.data(key.name),
+            films_of(target.data(key.name), recipe, recipe.films, seed, key, made),
+        )
+    key = replace(key, impact=made.impact, effects=made.effects)
+    salt = stream(seed, key.name, "salt").bytes(32).hex()
+    files.write_json(target.sealed(key.name), {"key": key.as_dict(), "salt": salt})
+    return {"data": data, "commitment": seal(key, salt)}
+
+
+def _write_markers(
+    target: ChallengeFolder, recipe: ChallengeRecipe, seed: int, key: AnswerKey, made: SimulatedSet
+) -> str:
+    """Write a set of tracked markers; the hash of its files."""
     markers = layout(recipe, stream(seed, "markers"))
     weights = seen(recipe.numerics[key.numerics], markers, width=recipe.width, height=recipe.height)
     place = np.append(stream(seed, key.name, "place").uniform(-_AROUND, _AROUND, 2), files.HEIGHT)
@@ -117,11 +137,7 @@ def _write(
             {"name": name, "wind": _log(recipe, wind)} for name, wind in zip(names, made.winds, strict=True)
         ],
     }  # fmt: skip
-    data = files.write_set(target.data(key.name), about=about, markers=markers, positions=positions)
-    key = replace(key, impact=made.impact, effects=made.effects)
-    salt = stream(seed, key.name, "salt").bytes(32).hex()
-    files.write_json(target.sealed(key.name), {"key": key.as_dict(), "salt": salt})
-    return {"data": data, "commitment": seal(key, salt)}
+    return files.write_set(target.data(key.name), about=about, markers=markers, positions=positions)
 
 
 def _log(recipe: ChallengeRecipe, wind: NDArray[np.float64]) -> dict[str, Any]:

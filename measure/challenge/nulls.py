@@ -5,11 +5,12 @@ from __future__ import annotations
 import tomllib
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from flagdata.documents import read_json
-from flagdata.errors import ConflictError, InputError
+from flagdata.errors import ConflictError, InputError, UsageError
 from flagdata.lake import Lake
 from flagdata.outputs import check_folder
 from flagdata.provenance import code_version, recipe_hash
@@ -84,17 +85,28 @@ def nulls_of(recipe: str, *, seed: int, kinds: int, lake: Lake | None) -> tuple[
         lake: that artifacts are read from; None where there is none.
 
     Raises:
+        UsageError: a recipe of films.
         FlagdataError: as the readers of either.
     """
     path = Path(recipe)
     if not (path.suffix == ".toml" and path.is_file() and _of_recordings(path)):
         loaded = load(recipe)
+        if loaded.films is not None:
+            raise UsageError(
+                "films need no bank: their simulations are kept as the first set is judged", where=f"--recipe {recipe}",
+                fix="run `flagdata challenge run` with --bank, the folder to keep them in",
+            )  # fmt: skip
         made = null_batches(loaded, seed=seed, kinds=kinds)
-        return Origin(title=loaded.title, recipe=recipe_hash(asdict(loaded))), made
+        return Origin(title=loaded.title, recipe=recipe_hash(_content(loaded))), made
     experiment = recipes.load(path)
     setting = Setting.of(recipes.read(experiment, lake).experiment)
     origin = Origin(title=experiment.title, recipe=plan.design_hash(setting))
     return origin, plan.batches(setting, kinds=kinds, seed=seed)
+
+
+def _content(recipe: ChallengeRecipe) -> dict[str, Any]:
+    """What nulls of markers are made from: as before there were films, so that older folders are known again."""
+    return {name: value for name, value in asdict(recipe).items() if name != "films"}
 
 
 def _of_recordings(path: Path) -> bool:

@@ -94,6 +94,16 @@ class Outcome:
         return bool(self.true) and set(self.true) <= set(self.named)
 
     @property
+    def class_among_named(self) -> bool:
+        """Whether an effect of a class that acted is among those named, alone or as one of several."""
+        return bool(self.true_classes & {class_of(name) for name in self.named})
+
+    @property
+    def wrong_alone(self) -> bool:
+        """Whether one effect was named alone, and none of its class acted."""
+        return self.conclusion is Conclusion.EFFECT and not self.class_among_named
+
+    @property
     def found_classes(self) -> int:
         """How many of the classes that acted were named."""
         return len(self.true_classes & {class_of(name) for name in self.named})

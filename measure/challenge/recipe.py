@@ -8,6 +8,13 @@ All values are SI. A *range* is `{ low = …, high = …, scale = "linear" | "lo
     [recordings]      count, duration, settle, apart [m/s]; rates, noises: dealt out evenly; speed: a range
     [log]             share: of the sets whose wind varies; rate; intensity: a range; length: integral scale
     [markers]         columns, rows; jitter: as a share of the spacing; one pattern for all sets
+    [films]           where it is there, sets are films in place of markers, and share their winds and what is stated of
+                      the camera's place; angles in degrees. rate, width, pixels-high, view: angle of the picture's
+                      longer side; samples a pixel; azimuth: of the camera's axis to the wind; elevation, upwards;
+                      distance; azimuth-sigma, elevation-sigma, distance-sigma (a share): their standard uncertainty,
+                      by which the true place differs; height: of the flag's middle above the ground;
+                      weight-sigma: standard error of the stated area weight (a share), 0 where none is stated;
+                      backgrounds: kinds that are behind the flag, see `sim.render.prior`
     [numerics.NAME]   columns, rows, diagonals, integrator, step, thickness: of contact, none where it is 0; damping
     [effects.NAME]    parameter, range, negative: share of the sets with the other sign; an effect of the library;
                       values: magnitudes in place of a range; sets of this effect alone have them in turn
@@ -79,6 +86,26 @@ class Numerics:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Filming:
+    """How sets are filmed; attributes as in the module's description."""
+
+    rate: int = 25
+    width: int = 320
+    pixels_high: int = 240
+    view: float = 24.0
+    samples: int = 4
+    azimuth: float = 80.0
+    azimuth_sigma: float = 5.0
+    elevation: float = 0.0
+    elevation_sigma: float = 2.0
+    distance: float = 8.0
+    distance_sigma: float = 0.02
+    height: float = 3.0
+    weight_sigma: float = 0.03
+    backgrounds: tuple[str, ...] = ("sky", "hills", "foliage", "buildings")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Strengths:
     """Strengths at which one effect is set.
 
@@ -135,6 +162,7 @@ class ChallengeRecipe:
     numerics: dict[str, Numerics]
     effects: dict[str, Strengths]
     outside: dict[str, Strengths]
+    films: Filming | None = None
 
     def __post_init__(self) -> None:
         if not self.materials or not self.rates or not self.noises or not self.numerics:
@@ -193,19 +221,27 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
     shares, flag, run = top.table("composition"), top.table("flag"), top.table("recordings")
     log, markers, numerics = top.table("log"), top.table("markers"), top.table("numerics")
     effects, outside, title = top.table("effects"), top.table("outside"), top.text("title", where) or where
-    top.done()
     materials = flag.texts("materials")
     for name in materials:
         material.named(name, where=flag.where)
+    films = None
+    if "films" in top.names():
+        films = top.table("films").record(
+            Filming, rate=POSITIVE, width=Bounds(least=64), pixels_high=Bounds(least=64), view=POSITIVE,
+            samples=POSITIVE, distance=POSITIVE, azimuth_sigma=NOT_NEGATIVE, elevation_sigma=NOT_NEGATIVE,
+            distance_sigma=NOT_NEGATIVE, height=POSITIVE, weight_sigma=NOT_NEGATIVE,
+        )  # fmt: skip
+    top.done()
+    rates = tuple(_whole(run, "rates", rate) for rate in run.numbers("rates")) if films is None else (films.rate,)
     recipe = ChallengeRecipe(
-        title=title,
+        title=title, films=films,
         composition={kind: shares.number(kind.value, 0.0, least=0) for kind in Kind},
         width=flag.number("width", 1.5, above=0), height=flag.number("height", 1.0, above=0),
         materials=materials,
         density=flag.range("density", 1.0, above=0), bending=flag.range("bending", 1.0, above=0),
         count=run.whole("count", 3, least=1), duration=run.number("duration", 10.0, above=0),
         settle=run.number("settle", 4.0, above=0),
-        rates=tuple(_whole(run, "rates", rate) for rate in run.numbers("rates")), noises=run.numbers("noises"),
+        rates=rates, noises=run.numbers("noises") if films is None else (0.0,),
         speed=run.range("speed", 5.0, above=0), apart=run.number("apart", 0.0, least=0),
         varying=log.number("share", 0.0, least=0), log_rate=log.whole("rate", 10, least=1),
         intensity=log.range("intensity", 0.1, above=0), length=log.number("length", 40.0, above=0),

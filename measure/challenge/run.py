@@ -9,15 +9,14 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from importlib.abc import MetaPathFinder
 from multiprocessing import get_context
 from types import ModuleType
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from flagdata.errors import FlagdataError
 from flagdata.rng import child_seed
 from measure.challenge.filing import Filing, file, filed, verdict_json
 from measure.challenge.folder import ChallengeFolder
-from measure.challenge.workers import single_threaded
-from measure.observe.trajectory import Experiment
 from measure.verdict.record import Verdict
+from measure.workers import single_threaded
 
 if TYPE_CHECKING:
     from importlib.machinery import ModuleSpec
@@ -26,16 +25,20 @@ IN_THIS_PROCESS = 0
 _APART = (
     "measure.challenge.outside",
     "measure.challenge.design",
+    "measure.challenge.filming",
     "measure.challenge.simulation",
     "measure.challenge.answer_key",
 )
 
 
 class Fitter(Protocol):
-    """Judges an experiment. With workers it is sent to other processes, so it must be picklable."""
+    """Judges a set of a challenge. With workers it is sent to other processes, so it must be picklable."""
 
-    def __call__(self, experiment: Experiment, seed: int, /) -> Verdict:
+    def __call__(self, given: Any, seed: int, /) -> Verdict:
         """The verdict; the same for the same seed.
+
+        Args:
+            given: an `Experiment`, or of a challenge of films a `Filmed`.
 
         Raises:
             FlagdataError: the data do not do: this is filed as a refusal.
@@ -92,11 +95,11 @@ def run(
 
 
 def _judge(folder: ChallengeFolder, fitter: Fitter, name: str, seed: int) -> Filing:
-    experiment = folder.experiment(name)
+    given = folder.films(name) if folder.filmed else folder.experiment(name)
     data = folder.manifest()["sets"][name]["data"]
     began = time.monotonic()
     try:
-        verdict = fitter(experiment, seed)
+        verdict = fitter(given, seed)
     except FlagdataError as error:
         seconds = time.monotonic() - began
         return Filing(name=name, data=data, seed=seed, verdict=None, refusal=error.as_dict(), seconds=seconds)

@@ -100,6 +100,7 @@ class Sheet:
         by_noise, by_rate: the same, with groups by marker noise in millimetres and by frame rate, over every set in
             which something acted.
         criteria: hashes of the thresholds that the verdicts were made by, sorted; one where all were made alike.
+        filmed: whether the sets were films.
     """
 
     title: str
@@ -108,6 +109,7 @@ class Sheet:
     by_noise: Power | None
     by_rate: Power | None
     criteria: tuple[str, ...] = ()
+    filmed: bool = False
 
     def of_kind(self, *kinds: Kind) -> list[Outcome]:
         """Outcomes of sets of these kinds."""
@@ -190,10 +192,27 @@ class Sheet:
                     levels.append(strength["level"])
         return Coefficients(errors=tuple(errors), covered=Share.of(covered), levels=tuple(sorted(set(levels))))
 
+    def _gates_of_films(self) -> tuple[Gate, ...]:
+        """What is asked of verdicts on films, whose effects are set at strengths that a film shows."""
+        seen = [o for o in self.of_kind(Kind.OUTSIDE) if o.detected]
+        reductions = self.reductions
+        return (
+            Gate(name="false positives on nulls", value=self.false_positives.value, wanted=0.05, at_most=True),
+            Gate(name="class among those named, of one effect", wanted=0.6,
+                 value=self.share(self.of_kind(Kind.ONE), lambda o: o.class_among_named).value),
+            Gate(name="wrong name given alone, of all sets", wanted=0.05, at_most=True,
+                 value=self.share(self.outcomes, lambda o: o.wrong_alone).value),
+            Gate(name="none of the library or partly, of what was detected from outside", wanted=0.5,
+                 value=self.share(seen, lambda o: o.outside_said).value),
+            Gate(name="median E_red", value=float(np.median(reductions)) if reductions else None, wanted=0.5),
+        )  # fmt: skip
+
     @property
     def gates(self) -> tuple[Gate, ...]:
         """What the project asks of itself."""
         reductions = self.reductions
+        if self.filmed:
+            return self._gates_of_films()
         return (
             Gate(name="false positives on nulls", value=self.false_positives.value, wanted=0.05, at_most=True),
             Gate(name="class-level identification of strong effects", wanted=0.9,
@@ -280,7 +299,10 @@ def score(
         if progress is not None:
             progress(1)
     found = graded(manifest["title"], outcomes)
-    return replace(found, criteria=tuple(sorted({h for one in filed.values() if (h := one.criteria) is not None})))
+    return replace(
+        found, criteria=tuple(sorted({h for one in filed.values() if (h := one.criteria) is not None})),
+        filmed=folder.filmed,
+    )  # fmt: skip
 
 
 def graded(title: str, outcomes: Sequence[Outcome]) -> Sheet:

@@ -176,6 +176,10 @@ def _winds(recipe: ChallengeRecipe, seed: int, key: AnswerKey) -> tuple[Floats, 
         return tuple(speed * direction[None] for speed in key.speeds)
     duration = recipe.settle + recipe.duration
     count = round(duration * recipe.log_rate) + 1
+    if recipe.films is not None:
+        return tuple(
+            _turbulent(recipe, key, count, stream(seed, "wind", index), speed) for index, speed in enumerate(key.speeds)
+        )
     series = [
         VonKarman(mean=speed, intensity=key.intensity, length=recipe.length).series(
             stream(seed, key.name, "wind", index), duration=count / recipe.log_rate, rate=recipe.log_rate
@@ -183,6 +187,18 @@ def _winds(recipe: ChallengeRecipe, seed: int, key: AnswerKey) -> tuple[Floats, 
         for index, speed in enumerate(key.speeds)
     ]
     return tuple(s[:, None] * direction for s in series)
+
+
+def _turbulent(
+    recipe: ChallengeRecipe, key: AnswerKey, count: int, rng: np.random.Generator, speed: float
+) -> Floats:  # fmt: skip
+    """(sample, 3) of a wind along +x that is turbulent across and upwards as well, the same in all sets [m/s]."""
+    gusts = Gusts(intensity=key.intensity)
+    series = gusts.with_series(
+        rng, batch=1, speed=speed, length=recipe.length, duration=(count - 1) / recipe.log_rate, rate=recipe.log_rate
+    ).samples[:, :count, 0].numpy()  # fmt: skip
+    parts = np.array([1.0, float(gusts.lateral), float(gusts.vertical)])[:, None] * key.intensity * speed * series
+    return parts.T + np.array([speed, 0.0, 0.0])
 
 
 def _base(

@@ -21,7 +21,7 @@ from flagdata.errors import InputError
 from flagdata.lake.meshes import MeshSequence
 from flagdata.rng import child_seed, stream
 from flagdata.timebase import NANOSECONDS, from_datetime
-from measure.demo.camera import write_film
+from measure.camera import write_film
 from measure.demo.logger import CUP, SENSOR, write_log
 from sim import handles
 from sim.assets import Assets

@@ -9,7 +9,8 @@ from tests.contract.imports import ROOT, imported_from, modules
 
 FITTING = (
     "sim", "models", "measure/observe", "measure/verdict", "measure/forecasting", "measure/probes", "measure/inference",
-    "measure/nulls", "measure/loop", "measure/report", "measure/closing", "measure/propose",
+    "measure/nulls", "measure/loop", "measure/report", "measure/closing", "measure/propose", "measure/observables",
+    "measure/calibrate", "measure/films",
 )  # fmt: skip
 MODULES = modules(*FITTING)
 
@@ -52,5 +53,5 @@ def test_what_fits_needs_no_challenge_and_a_run_loads_nothing_that_makes_one() -
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     fitting, running = done.stdout.splitlines()
     assert fitting == "[]"
-    makers = ("outside", "design", "simulation", "answer_key")
+    makers = ("outside", "design", "filming", "simulation", "answer_key")
     assert not [name for name in makers if f"measure.challenge.{name}" in running]

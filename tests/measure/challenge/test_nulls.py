@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from flagdata.errors import ConflictError, InputError
+from flagdata.errors import ConflictError, InputError, UsageError
 from flagdata.provenance import recipe_hash
 from measure.challenge import nulls
 from measure.challenge.command import challenge
@@ -108,3 +108,8 @@ def test_the_verb_takes_a_recipe_of_close_loop(
     experiment = replace(experiment, recordings=(replace(own_recording, noise=1e-3),))
     with pytest.raises(ConflictError, match="recipe"):
         CliRunner().invoke(challenge, [*arguments, "--seed", "5"], catch_exceptions=False)
+
+
+def test_films_keep_their_simulations_themselves() -> None:
+    with pytest.raises(UsageError, match="films need no bank"):
+        nulls.nulls_of("films", seed=1, kinds=4, lake=None)

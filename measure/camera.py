@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flagdata.lake.meshes import MeshSequence
 from flagdata.rng import stream
-from measure.challenge.workers import single_threaded
+from measure.workers import single_threaded
 from sim.datasets.picture import noisy
 from sim.render import Meshes, RenderParameters
 from sim.render.raster import Raster

@@ -1,0 +1,118 @@
+"""Sets that are films with a log of the wind, as a participant reads them.
+
+All sets of a challenge share the winds and what is stated of the camera's place, as experiments in one tunnel do, so
+that a participant simulates once for all of them. Where the camera really stood differs from what is stated within the
+stated uncertainty.
+
+sets/set-001/set.json     the flag's size, where the camera stood, and the log beside each recording
+sets/set-001/a.mp4, …     the films
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flagdata.documents import read_json
+from flagdata.errors import InputError, NotFoundError
+from measure.calibrate.observed import Observed
+from measure.calibrate.prior import AZIMUTH, ELEVATION, Normal, Uncertain
+from measure.calibrate.simulation import OBSERVED, Flag
+from measure.calibrate.wind import Log
+
+SCHEMA = "flagdata.challenge-films/1"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Filmed:
+    """A set as a participant has it.
+
+    Attributes:
+        flag: its size; it is held at the corners of its hoist.
+        azimuth, elevation: of the camera's axis to the wind, as they are stated.
+        distance: of the camera [m].
+        area_weight: mean and standard deviation, of a cloth that was weighed [kg/m²]; None where it was not.
+        recordings: name → film and log beside it.
+    """
+
+    flag: Flag
+    azimuth: Uncertain
+    elevation: Uncertain
+    distance: float
+    area_weight: tuple[float, float] | None
+    recordings: Mapping[str, tuple[Path, Log]]
+
+    def observed(self) -> tuple[Observed, ...]:
+        """What its films show, in the order of the recordings.
+
+        Raises:
+            FlagdataError: no flag is found.
+        """
+        from measure.estimate.conditioned import ConditionedFilm
+        from measure.estimate.film import CameraFilm
+        from measure.estimate.similarity import FlagSize
+        from measure.observables import OBSERVABLES
+        from measure.observables.watching import watched
+
+        size = FlagSize(length=self.flag.length, height=self.flag.height)
+        found = []
+        for name, (path, log) in self.recordings.items():
+            film = ConditionedFilm(CameraFilm(path), aspect=size.aspect)
+            seen = watched(film, size, first=0.0, last=film.duration)
+            nothing = [math.nan] * len(OBSERVED)
+            readings = [
+                nothing if window is None else [OBSERVABLES[one].of_film(window).value for one in OBSERVED]
+                for window in seen.windows
+            ]
+            found.append(
+                Observed(
+                    name=name, source=name, readings=np.array(readings),
+                    log=log.cut(0.0, len(readings) * seen.seconds),
+                    sigma=np.array([OBSERVABLES[one].sigma for one in OBSERVED]), findings=film.findings(),
+                )
+            )  # fmt: skip
+        return tuple(found)
+
+
+def read_films(folder: Path) -> Filmed:
+    """A set as a participant reads it.
+
+    Raises:
+        NotFoundError: no set there.
+        InputError: files that do not fit.
+    """
+    if not (folder / "set.json").is_file():
+        raise NotFoundError("no set.json", where=str(folder), fix="name the folder of a set")
+    try:
+        about = read_json(folder / "set.json", noun="set")
+        flag, camera, cup = about["flag"], about["camera"], about["anemometer"]
+        weighed = about["area_weight"]
+
+        def angle(known: Uncertain, stated: Any) -> Uncertain:
+            mean, sigma = (math.radians(float(value)) for value in stated)
+            return Uncertain(name=known.name, unit="rad", prior=Normal(mean=mean, sigma=sigma), source="stated")
+
+        return Filmed(
+            flag=Flag(length=float(flag["length"]), height=float(flag["height"])),
+            azimuth=angle(AZIMUTH, camera["azimuth"]), elevation=angle(ELEVATION, camera["elevation"]),
+            distance=float(camera["distance"]),
+            area_weight=None if weighed is None else (float(weighed[0]), float(weighed[0]) * float(weighed[1])),
+            recordings={
+                entry["name"]: (
+                    folder / f"{entry['name']}.mp4",
+                    Log(
+                        times=np.array(entry["times"], dtype=np.float64),
+                        speed=np.array(entry["speed"], dtype=np.float64),
+                        distance=float(cup["distance_constant"]), averaging=float(cup["averaging"]),
+                    ),
+                )
+                for entry in about["recordings"]
+            },
+        )  # fmt: skip
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        raise InputError(f"not a set of films: {error!r}", where=str(folder), fix="restore the folder") from error
