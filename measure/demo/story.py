@@ -190,7 +190,7 @@ def _measured(shell: Transcript, made: Recording, truths: list[Truth]) -> None:
             "measure", "flag", "--flag-size", SIZE, "--windows", f"{_CLIPS:g}s", "--report", "measured.html",
             "--lake", "lake",
         )  # fmt: skip
-        step.took(None if printed is None else _head(printed, 3))
+        step.took(None if printed is None else _first(printed))
         if printed is not None:
             step.picture = _series(shell.folder / "lake", made)
     true = f"{_during(made).mean():.2f} m/s"
