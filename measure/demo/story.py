@@ -71,8 +71,8 @@ def weighing_step(shell: Transcript, made: Recording, truths: list[Truth]) -> No
     noted = made.noted
     done = (
         f"The flag's motion in {WEIGHED:g} s of the film was compared with that of {SIMULATIONS} simulated flags in "
-        "the logged wind, which are few and a short time: more of both narrow the interval. By compass and tape the "
-        "camera stood "
+        "the logged wind, which are few and a short time: more of both narrow the interval. What acts on "
+        "the flag and is not in the model changes the weight. By compass and tape the camera stood "
         f"{math.degrees(noted.azimuth):.0f}° from the wind's direction and {noted.distance:.1f} m away."
     )
     with _Step(shell, "What the cloth weighs", done, page="weighed.html") as step:
