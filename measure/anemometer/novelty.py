@@ -32,6 +32,8 @@ Floats = NDArray[np.float64]
 
 SHIFT, FRAMING, BACKGROUND = 0.45, 0.2, 0.4
 """Levels, fixed on simulated flags of other seeds than those that judge (decision 047)."""
+ENOUGH = 3
+"""Windows of a calibration a feature below which their scatter is not known well enough to recognise the flag."""
 LEAST_WINDOWS, LEAST_SHARE = 3, 0.1
 """Windows, and share of the windows, that must read a wind of the calibration."""
 _BLUR = 3.0
@@ -114,9 +116,11 @@ class Familiar:
         """(n,) whether films are compared at these winds."""
         return (winds >= self.low) & (winds <= self.high)
 
-    def shift(self, values: Floats, winds: Floats) -> float:
+    def shift(self, values: Floats, winds: Floats) -> float | None:
         """Distance of the mean of windows (n, column), less what the means of as few windows scatter by; NaN where too
-        few are `within`."""
+        few are `within`, None where the calibration had too few windows to know their scatter."""
+        if len(self.distances) < ENOUGH * len(self.centre):
+            return None
         shared = self.within(winds)
         if shared.sum() < max(LEAST_WINDOWS, LEAST_SHARE * len(winds)):
             return math.nan
@@ -129,20 +133,20 @@ class Compared:
     """A film beside the calibration.
 
     Attributes:
-        shift: see `Familiar.shift`; NaN where too few windows read a wind of the calibration.
+        shift: see `Familiar.shift`.
         framing: how far the hoist's ends are from where the nearest recording has them, in heights of its hoist; NaN
             where a hoist was not found, infinite where the flag flies to the other side.
         likeness: largest correlation of the backgrounds' details with those of a recording; NaN where there are none.
         same_shape: whether the picture is as wide for its height as that of a recording.
     """
 
-    shift: float
+    shift: float | None
     framing: float
     likeness: float
     same_shape: bool
 
     @classmethod
-    def of(cls, shift: float, here: Place, places: Sequence[Place]) -> Compared:
+    def of(cls, shift: float | None, here: Place, places: Sequence[Place]) -> Compared:
         """A film from a place, beside the recordings' places."""
         alike = [one for one in places if one.background.shape == here.background.shape]
         known = [value for one in alike if not math.isnan(value := _correlation(here, one))]
@@ -154,7 +158,9 @@ class Compared:
     @property
     def figures(self) -> str:
         """In words, what is known."""
-        found = [f"its windows are shifted by {self.shift:.2f} standard deviations"]
+        found = ["the calibration is too short to recognise the flag"]
+        if self.shift is not None:
+            found = [f"its windows are shifted by {self.shift:.2f} standard deviations"]
         found.append(
             "the hoist was not found" if math.isnan(self.framing) else f"the hoist by {self.framing:.2f} of its height"
         )
@@ -180,6 +186,8 @@ class Compared:
             away = "on the other side of the flag" if beyond else f"{self.framing:.2f} of its height away"
             what = f"the flag's hoist is not where it was in the picture: {away}, at most {FRAMING:g} is accepted"
             found.append(_reason("another-framing", what, None if beyond else self.framing))
+        if self.shift is None:
+            return found
         if math.isnan(self.shift):
             found.append(_reason("another-wind", "hardly any window reads a wind in which the flag was calibrated"))
         if self.shift > SHIFT:

@@ -17,6 +17,7 @@ from flagdata.stated import Stated
 from measure.anemometer import measuring
 from measure.anemometer.calibration import Calibrated
 from measure.anemometer.features import Features, Place
+from measure.anemometer.novelty import Compared
 from measure.anemometer.storage import read, write
 from measure.estimate.measuring import Measurement
 from measure.estimate.options import Options
@@ -90,12 +91,23 @@ def test_a_film_of_few_windows_is_no_more_another_flag_than_a_long_one(found: Ca
     for seed in range(30, 42):
         own = features(gusts(6.1, seed=seed), seed=seed)
         used = found.model.used(own)
-        shifts.append(found.model.familiar.shift(used, found.model.read(used)))
+        shifts.append(found.model.familiar.shift(used, found.model.read(used)) or 0.0)
     assert np.sqrt(np.nanmean(np.square(shifts))) < 0.5
     assert np.isfinite(shifts).sum() > 6
     far = features(gusts(120.0, seed=21), seed=21, other=4.0)
     used = found.model.used(far)
     assert found.model.familiar.shift(used, found.model.read(used)) == pytest.approx(np.sqrt(16 / 6), rel=0.15)
+
+
+def test_a_short_calibration_does_not_recognise_the_flag_and_says_so(found: Calibrated) -> None:
+    few = replace(found.model.familiar, distances=found.model.familiar.distances[:17])  # of six features, three each
+    own = features(gusts(120.0, seed=21), seed=21, other=4.0)
+    used = found.model.used(own)
+    shift = few.shift(used, found.model.read(used))
+    assert shift is None
+    judged = Compared.of(shift, place(), (place(),))
+    assert judged.reasons() == []
+    assert "too short to recognise the flag" in judged.figures
 
 
 def test_another_size_and_a_fault_of_the_film_refuse_it(measure: Measure) -> None:
