@@ -8,8 +8,8 @@ and its clock may be off:
 
 both as means over the spans of the table's rows. The error's variance is a² + (s u)²: a flag is read to a share of
 the wind, and in still air an anemometer shows its zero as often as it is asked. c, p, the strengths, a and s are
-those of the greatest likelihood; what is known of a strength beforehand counts by its standard uncertainty. A gain of
-the anemometer and c are one number here: only readings of a flag whose law is known tell them apart.
+those of the greatest likelihood; a strength that is known beforehand counts by its standard uncertainty. A gain of
+the anemometer and c are one number here: only a flag whose law is known separates them.
 
 Rows overlap and errors last: standard errors are of the fit without each block of time in turn (delete-a-block
 jackknife, Künsch 1989). An effect's share is what errors change by where it alone is taken away.
@@ -159,7 +159,7 @@ def fit(
     Args:
         effects: names that are fitted; the others are absent.
         use: (n,) rows that are fitted; None for all.
-        known: effect → what is known of its strength, a value with its standard deviation; others lie in their
+        known: effect → its strength as it is known beforehand, a value with its standard deviation; others lie in their
             priors' ranges, or at the null.
         near: where to start; None to search.
         seed: of the search's starts.
