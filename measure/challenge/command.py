@@ -182,14 +182,13 @@ def score(
     from measure.challenge.score import score as score_challenge
     from measure.challenge.true_model import true_model_errors
 
-    target = ChallengeFolder(folder)
-    if target.filmed and against == "true-model":
-        raise UsageError("no true model's error is computed of films", where="--against", fix="give floor")
-    reference = None if target.filmed or against == "floor" else true_model_errors
-    name = folder.resolve().name
+    target, name = ChallengeFolder(folder), folder.resolve().name
     if out is not None:
         sheets.check(out)
     before = [] if history is None else histories.without(history, name)  # refused before any key is opened
+    if target.filmed and against == "true-model":
+        raise UsageError("no true model's error is computed of films", where="--against", fix="give floor")
+    reference = None if target.filmed or against == "floor" else true_model_errors
     with progress(len(target.chosen(only)), label="grading", unit="set") as advance:
         sheet = score_challenge(target, only=only, reference=reference, progress=advance)
     if out is not None:

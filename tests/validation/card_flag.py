@@ -18,7 +18,7 @@ What was fixed before the judged part was opened (only what lies before `OPENED`
 
 Expected of the judged part: (1) the tracker's own estimate errs by 4 to 8 m/s, the fitted flag by less than 2.5;
 (2) 80 % or more of its rows lie in their intervals of 90 %; (3) the tracker's frequency lies above 12 Hz of its
-axis in 80 % or more of the rows: the flutter stays beside half of the frame rate, where the camera cannot tell on
+axis in 80 % or more of the rows: the flutter stays beside half of the frame rate, where the camera does not show on
 which side; (4) over spans of 2.5 s the root mean square scatters by less than over its own second, as a beat of
 flutter and frames does and a change of amplitude does not.
 

@@ -57,7 +57,7 @@ def test_the_faults_that_were_put_in_come_out_with_their_uncertainties(found: Di
     assert float(np.mean(worse - found.errors(rows, log))) == pytest.approx(-OFFSET, abs=0.06)
 
 
-def test_what_is_known_of_a_clock_holds_it(found: Disagreement) -> None:
+def test_a_prior_of_the_clock_fixes_it(found: Disagreement) -> None:
     rows, log = _made()
     held = fit(rows, log, EFFECTS, known={"clock-offset": parse("0.25±0.0001")}, near=found)
     assert held.chain.clock == pytest.approx(0.25, abs=0.001)
