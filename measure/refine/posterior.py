@@ -75,7 +75,7 @@ def posterior(
     grid = low + step * (np.arange(winds, dtype=np.float64) + 0.5)
     own = space.reported(prior)
     found = np.stack([_likelihood(model, own, grid, y, space) for model, y in zip(models, observed, strict=True)])
-    marginal = logsumexp(found, axis=2).sum(axis=0)
+    marginal = np.asarray(logsumexp(found, axis=2)).sum(axis=0)
     weight = np.exp(marginal - logsumexp(marginal))
     rng = stream(seed, "posterior", "draws")
     chosen = rng.choice(cloths, size=draws, p=weight)
