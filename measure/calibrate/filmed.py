@@ -17,6 +17,7 @@ from measure.calibrate.observed import LONGEST, Observed, cut, first_part
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.tables import of_table
 from measure.calibrate.wind import Log
+from measure.estimate.conditioned import ConditionedFilm
 from measure.estimate.similarity import FlagSize
 from measure.estimate.source import Reading, Subject, subjects
 from measure.observables import OBSERVABLES
@@ -108,6 +109,22 @@ def of_film(
         )  # fmt: skip
     clock = None if subject.artifact is None else subject.artifact.clock_sigma
     log = Log.of(wind, start=film.start, clock=clock or 0.0)
+    return with_log(film, log, size, source=subject.identity, first=first, last=last, advance=advance)
+
+
+def with_log(
+    film: ConditionedFilm, log: Log, size: FlagSize, *, source: str, first: float = 0.0, last: float | None = None,
+    advance: Callable[[int], object] | None = None,
+) -> Observed:  # fmt: skip
+    """The windows of a film beside a log on its clock; the other parameters as for `of_source`.
+
+    Args:
+        source: identity of the film.
+
+    Raises:
+        InputError: a log that does not cover it.
+        RefusedError: no flag is found, or the camera moves and cannot be steadied.
+    """
     end = min(film.duration, math.inf if last is None else last)
     findings: tuple[Finding, ...] = ()
     if end - first > LONGEST + WINDOW:
@@ -126,7 +143,7 @@ def of_film(
         for window in seen.windows
     ]
     return Observed(
-        name=film.name, source=subject.identity, first=first, readings=np.array(readings),
+        name=film.name, source=source, first=first, readings=np.array(readings),
         log=log.cut(first, first + len(readings) * seen.seconds),
         sigma=np.array([OBSERVABLES[name].sigma for name in OBSERVED]), findings=findings,
     )  # fmt: skip

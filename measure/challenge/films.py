@@ -22,7 +22,7 @@ from flagdata.documents import read_json
 from flagdata.errors import InputError, NotFoundError
 from measure.calibrate.observed import Observed
 from measure.calibrate.prior import AZIMUTH, ELEVATION, Normal, Uncertain
-from measure.calibrate.simulation import OBSERVED, Flag
+from measure.calibrate.simulation import Flag
 from measure.calibrate.wind import Log
 
 SCHEMA = "flagdata.challenge-films/1"
@@ -53,30 +53,16 @@ class Filmed:
         Raises:
             FlagdataError: no flag is found.
         """
+        from measure.calibrate.filmed import with_log
         from measure.estimate.conditioned import ConditionedFilm
         from measure.estimate.film import CameraFilm
         from measure.estimate.similarity import FlagSize
-        from measure.observables import OBSERVABLES
-        from measure.observables.watching import watched
 
         size = FlagSize(length=self.flag.length, height=self.flag.height)
-        found = []
-        for name, (path, log) in self.recordings.items():
-            film = ConditionedFilm(CameraFilm(path), aspect=size.aspect)
-            seen = watched(film, size, first=0.0, last=film.duration)
-            nothing = [math.nan] * len(OBSERVED)
-            readings = [
-                nothing if window is None else [OBSERVABLES[one].of_film(window).value for one in OBSERVED]
-                for window in seen.windows
-            ]
-            found.append(
-                Observed(
-                    name=name, source=name, readings=np.array(readings),
-                    log=log.cut(0.0, len(readings) * seen.seconds),
-                    sigma=np.array([OBSERVABLES[one].sigma for one in OBSERVED]), findings=film.findings(),
-                )
-            )  # fmt: skip
-        return tuple(found)
+        return tuple(
+            with_log(ConditionedFilm(CameraFilm(path), aspect=size.aspect), log, size, source=name)
+            for name, (path, log) in self.recordings.items()
+        )
 
 
 def read_films(folder: Path) -> Filmed:
