@@ -202,7 +202,7 @@ def verdict_of(outcome: Outcome) -> Verdict:
         conclusion=judged.conclusion, named=named, words="", test=_test(outcome), parameters=_parameters(outcome),
         ranking=_ranking(outcome), comparisons=comparisons, residuals=(),
         provenance={"seed": options.calibration.seed, "code": code_version(), "options": options.recipe()},
-        findings=tuple((f.kind, f.what) for f in outcome.findings),
+        findings=tuple((f.kind, f.what) for f in outcome.findings if f.severity is not Severity.NOTE),
     )  # fmt: skip
     unseen = [
         one.column.effect for one, errors in zip(effects, outcome.sensitivity.tolist(), strict=True) if errors < SEEN

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from flagdata.errors import UsageError
+from flagdata.findings import Finding, Severity
 from measure.calibrate.observed import Observed
-from measure.films.run import close_loop
+from measure.films.run import close_loop, solve, verdict_of
 from measure.verdict.record import Conclusion
 from tests.measure.films.conftest import ALIKE, EFFECTS, options, recording
 
@@ -108,3 +110,14 @@ def test_a_constant_wind_is_reported_to_hide_what_acts_as_another_weight_does(ch
     verdict = close_loop([recording(mean=5.0, seed=5, swing=0.0)], options(), folder=tmp_path)
     assert [kind for kind, _ in verdict.findings] == ["constant-wind"]
     assert any("one steady wind" in text for text in verdict.assumptions)
+
+
+def test_what_was_merely_noted_on_a_film_is_no_doubt_beside_the_verdict(cheap: list[int], tmp_path: Path) -> None:
+    still, lost = (
+        Finding(kind=kind, severity=severity, what=kind)
+        for kind, severity in (("camera-still", Severity.NOTE), ("camera-lost", Severity.WARNING))
+    )
+    seen = [replace(one, findings=(still, lost)) for one in both()]
+    outcome = solve(seen, options(), folder=tmp_path)
+    assert {finding.kind for finding in outcome.findings} >= {"camera-still", "camera-lost"}
+    assert {kind for kind, _ in verdict_of(outcome).findings} == {"camera-lost"}
