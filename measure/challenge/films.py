@@ -77,7 +77,7 @@ def read_films(folder: Path) -> Filmed:
     try:
         about = read_json(folder / "set.json", noun="set")
         flag, camera, cup = about["flag"], about["camera"], about["anemometer"]
-        weighed = about["area_weight"]
+        weighed, beside = about["area_weight"], {path.name: path for path in folder.iterdir()}
 
         def angle(known: Uncertain, stated: Any) -> Uncertain:
             mean, sigma = (math.radians(float(value)) for value in stated)
@@ -90,7 +90,7 @@ def read_films(folder: Path) -> Filmed:
             area_weight=None if weighed is None else (float(weighed[0]), float(weighed[0]) * float(weighed[1])),
             recordings={
                 entry["name"]: (
-                    folder / f"{entry['name']}.mp4",
+                    beside[f"{entry['name']}.mp4"],
                     Log(
                         times=np.array(entry["times"], dtype=np.float64),
                         speed=np.array(entry["speed"], dtype=np.float64),
@@ -100,5 +100,5 @@ def read_films(folder: Path) -> Filmed:
                 for entry in about["recordings"]
             },
         )  # fmt: skip
-    except (KeyError, IndexError, TypeError, ValueError) as error:
+    except (KeyError, IndexError, TypeError, ValueError, OverflowError, AttributeError, OSError) as error:
         raise InputError(f"not a set of films: {error!r}", where=str(folder), fix="restore the folder") from error

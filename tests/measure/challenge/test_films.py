@@ -119,3 +119,12 @@ def test_films_have_gates_of_their_own() -> None:
     ]
     sheet = replace(graded("films", [Outcome.of(k, filing(k.name, said)) for k, said in sets]), filmed=True)
     assert [(gate.value, gate.met) for gate in sheet.gates[:4]] == [(0.0, True), (1.0, True), (0.0, True), (1.0, True)]
+
+
+def test_a_set_that_names_a_film_outside_its_folder_is_refused(recipe: ChallengeRecipe, tmp_path: Path) -> None:
+    folder = make(tmp_path / "films", recipe, seed=3, count=1).data("set-001")
+    (tmp_path / "mine.mp4").write_bytes(b"not of the set")
+    stated = folder / "set.json"
+    stated.write_text(stated.read_text().replace('"name":"a"', '"name":"../../../mine"'))
+    with pytest.raises(InputError, match="not a set of films"):
+        read_films(folder)
