@@ -129,7 +129,7 @@ def calibrate(
     from measure.calibrate.artifact import artifact, keep
     from measure.calibrate.calibrate import Options
     from measure.calibrate.calibrate import calibrate as calibrated
-    from measure.calibrate.filmed import of_source
+    from measure.calibrate.filmed import of_sources
     from measure.calibrate.page import page
     from measure.calibrate.prior import AZIMUTH, ELEVATION
     from measure.calibrate.simulation import Flag
@@ -159,27 +159,14 @@ def calibrate(
         distance=distance, simulations=simulations, level=level, seed=seed,
     )  # fmt: skip
     with progress(None, label="observe", unit="window") as advance:
-        read = [
-            of_source(
-                source,
-                size,
-                reading,
-                lake=lake,
-                at=branch,
-                first=first,
-                last=last,
-                log=log,
-                offset=offset,
-                advance=advance,
-            )
-            for source in sources
-        ]
-    observed = [one for own, _ in read for one in own]
+        observed, parents = of_sources(
+            sources, size, reading, lake=lake, at=branch, first=first, last=last, log=log, offset=offset,
+            advance=advance,
+        )  # fmt: skip
     with progress(simulations * len(observed), label="calibrate", unit="flag") as advance:
         found = calibrated(
             observed, options, folder=(cache or user_cache() / "calibrate"), workers=workers, advance=advance
         )
-    parents = tuple(dict.fromkeys(parent for _, parent in read if parent is not None))
     wanted = None if lake is None or read_only else artifact(found, reading, parents).id
     text = None if report is None else page(found, _provenance(found, wanted), sections=_sections(anemometer))
     new = lake is not None and wanted is not None and keep(lake, found, reading, parents, branch=branch)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +70,21 @@ def of_source(
     (subject,) = subjects(source, query=None, lake=lake, at=at, reading=reading)
     found = of_film(subject, size, first=first, last=last, advance=advance)
     return (found,), None if subject.artifact is None else subject.artifact.id
+
+
+def of_sources(
+    sources: Sequence[str], size: FlagSize, reading: Reading, *, lake: Lake | None, at: str, first: float,
+    last: float | None, log: str | None, offset: Stated | None, advance: Callable[[int], object] | None = None,
+) -> tuple[list[Observed], tuple[str, ...]]:  # fmt: skip
+    """The recordings of several sources, and the artifacts that they were read from; as `of_source`."""
+    read = [
+        of_source(
+            source, size, reading, lake=lake, at=at, first=first, last=last, log=log, offset=offset, advance=advance
+        )
+        for source in sources
+    ]
+    parents = tuple(dict.fromkeys(parent for _, parent in read if parent is not None))
+    return [one for own, _ in read for one in own], parents
 
 
 def _of_table(

@@ -12,10 +12,10 @@ from flagdata.pages.render import render
 from flagdata.provenance import code_version
 from flagdata.tables import Range, Scale
 from measure.calibrate.calibrate import Calibration, Fitted, Quantity
+from measure.calibrate.panels import Band, against_wind
 from measure.calibrate.prior import CLOTH
 from measure.calibrate.simulation import OBSERVED
 from measure.estimate.page import Section
-from measure.observables import OBSERVABLES
 
 _BLUE, _RUST = "#2b6f8f", "#c4622d"
 _DEGREES = ("azimuth", "elevation")
@@ -82,23 +82,6 @@ def _posterior(found: Calibration) -> str:
 
 
 def _windows(one: Fitted) -> str:
-    from matplotlib.figure import Figure
-
     names = [name for name, used in zip(OBSERVED, one.used, strict=True) if used]
-    columns = min(4, len(names))
-    rows = math.ceil(len(names) / columns)
-    figure = Figure(figsize=(2.75 * columns, 2.5 * rows), layout="constrained")
-    cells = figure.subplots(rows, columns, squeeze=False).ravel()
-    speed = one.observed.speed
-    order = np.argsort(speed)
-    for axes, name in zip(cells, names, strict=False):
-        column = OBSERVED.index(name)
-        axes.fill_between(speed[order], one.low[order, column], one.high[order, column], color=_RUST, alpha=0.3)
-        axes.plot(speed[order], one.middle[order, column], color=_RUST)
-        axes.plot(speed, one.observed.readings[:, column], ".", color=_BLUE)
-        unit = OBSERVABLES[name].unit
-        axes.set_title(name if unit == "1" else f"{name} [{unit}]", fontsize=10)
-        axes.set_xlabel("wind [m/s]")
-    for axes in cells[len(names) :]:
-        axes.remove()
-    return figure_url(figure)
+    band = Band(found=np.stack([one.low, one.middle, one.high]), colour=_RUST)
+    return against_wind(one.observed, names, [band], dots=_BLUE, opacity=0.3)

@@ -7,7 +7,7 @@ A measurement's object is a Zarr folder with the verdict's JSON, its report and 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from measure.observe import Experiment
 from measure.observe.trajectory import described
 from measure.report.document import as_document, from_document
 from measure.report.page import page
-from measure.verdict.record import Verdict
+from measure.verdict.record import Candidate, Verdict
 
 _FORMAT = 1
 _HEAD = "flagdata_measurement"
@@ -42,40 +42,71 @@ class Kept:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Closed:
-    """A loop that was closed.
+class Answer:
+    """A loop that was closed, of whatever kind of recordings, as it is written and kept.
 
     Attributes:
         name: what the measurement is called.
-        experiment: on which.
-        findings: on the recordings.
-        options: how.
         verdict: what came out.
         models: of the verdict.
+        effects: whose strengths are kept beside the cloth that was fitted.
+        findings: on the recordings.
+        page: the report, HTML.
+        recipe: all that went in, JSON values.
+        parents: artifacts that the recordings were read from.
+        seed: of the verdict.
     """
 
     name: str
-    experiment: Experiment
-    findings: tuple[Finding, ...]
-    options: Options
     verdict: Verdict
     models: tuple[NamedModel, ...]
+    effects: tuple[Candidate, ...]
+    findings: tuple[Finding, ...]
+    page: str
+    recipe: Mapping[str, Any]
+    parents: tuple[str, ...]
+    seed: int
 
 
-def keep(lake: Lake, closed: Closed, *, branch: str = "main") -> Kept:
+def answer_of(
+    verdict: Verdict, experiment: Experiment, options: Options, *, name: str, models: tuple[NamedModel, ...],
+    findings: tuple[Finding, ...],
+) -> Answer:  # fmt: skip
+    """That of recordings of markers.
+
+    Args:
+        name: what the measurement is called.
+        models: of the verdict.
+        findings: on the recordings.
+    """
+    bank = None
+    if options.bank is not None:
+        bank = digest(" ".join(file_hash(path) for path in files(options.bank)))
+    recipe = {
+        "close-loop": 1, "experiment": fingerprint(experiment), "level": options.level,
+        "nulls": None if options.bank is not None else [options.nulls, options.most_nulls], "bank": bank,
+    }  # fmt: skip
+    return Answer(
+        name=name, verdict=verdict, models=models, effects=acting(verdict), findings=findings, page=page(verdict),
+        recipe=recipe, parents=tuple(dict.fromkeys(r.source for r in experiment.recordings if r.source)),
+        seed=options.seed,
+    )  # fmt: skip
+
+
+def keep(lake: Lake, answer: Answer, *, branch: str = "main") -> Kept:
     """Publish a verdict and its models in one commit; what is there already is not published again.
 
     Raises:
         FlagdataError: as `Lake.transaction`.
     """
-    measurement = _measurement(closed)
-    models = [_model(closed, model, measurement) for model in closed.models]
-    with lake.transaction(f"close loop: {closed.name}", branch=branch) as transaction:
+    measurement = _measurement(answer)
+    models = [_model(answer, model, measurement) for model in answer.models]
+    with lake.transaction(f"close loop: {answer.name}", branch=branch) as transaction:
         if transaction.find(measurement.id) is not None:
             return Kept(measurement=measurement.id, models=models_of(lake, measurement.id, branch), existing=True)
         staged = transaction.staging(".zarr")
-        write(staged, closed.verdict, page=page(closed.verdict))
-        transaction.add(_measurement(closed, stored=transaction.put(staged)))
+        write(staged, answer.verdict, page=answer.page)
+        transaction.add(_measurement(answer, stored=transaction.put(staged)))
         for model in models:
             transaction.add(model)
     return Kept(measurement=measurement.id, models=tuple(m.id for m in models), existing=False)
@@ -131,46 +162,27 @@ def fingerprint(experiment: Experiment) -> str:
     return array_hash(content, arrays)
 
 
-def _recipe(closed: Closed) -> dict[str, Any]:
-    options = closed.options
-    bank = None
-    if options.bank is not None:
-        bank = digest(" ".join(file_hash(path) for path in files(options.bank)))
-    return {
-        "close-loop": 1, "experiment": fingerprint(closed.experiment), "level": options.level,
-        "nulls": None if options.bank is not None else [options.nulls, options.most_nulls], "bank": bank,
-    }  # fmt: skip
-
-
-def _parents(closed: Closed) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(r.source for r in closed.experiment.recordings if r.source))
-
-
-def _measurement(closed: Closed, stored: str | None = None) -> Artifact:
-    verdict = closed.verdict
+def _measurement(answer: Answer, stored: str | None = None) -> Artifact:
+    verdict = answer.verdict
+    fitted = {p.name: (p.after or p.before).value for p in verdict.parameters}
+    fitted |= {f"{c.effect}.{c.parameter}": c.strength.value for c in answer.effects}
     report = {
         "schema": "flagdata.close-loop-report/1", "conclusion": verdict.conclusion.value, "named": list(verdict.named),
         "words": verdict.words, "p_value": verdict.test.p_value.value, "separating": verdict.separating,
-        "findings": [finding.as_dict() for finding in closed.findings],
+        "findings": [finding.as_dict() for finding in answer.findings],
     }  # fmt: skip
     return Artifact(
-        kind=Kind.MEASUREMENT, name=closed.name, object=stored, parents=_parents(closed), recipe=_recipe(closed),
-        seed=closed.options.seed, parameters=canonical(_found(verdict)), quality=quality_flags(closed.findings),
+        kind=Kind.MEASUREMENT, name=answer.name, object=stored, parents=answer.parents, recipe=dict(answer.recipe),
+        seed=answer.seed, parameters=canonical(fitted), quality=quality_flags(answer.findings),
         report=json.dumps(report, allow_nan=False, ensure_ascii=False),
     )  # fmt: skip
 
 
-def _found(verdict: Verdict) -> dict[str, float]:
-    """What was fitted, by name: of the larger model where effects act."""
-    fitted = {p.name: (p.after or p.before).value for p in verdict.parameters}
-    return {**fitted, **{f"{c.effect}.{c.parameter}": c.strength.value for c in acting(verdict)}}
-
-
-def _model(closed: Closed, model: NamedModel, measurement: Artifact) -> Artifact:
+def _model(answer: Answer, model: NamedModel, measurement: Artifact) -> Artifact:
     effects: Sequence[str] = list(model.content.get("effects", {}))
-    report = {"schema": "flagdata.model-report/1", "words": closed.verdict.words, "findings": []}
+    report = {"schema": "flagdata.model-report/1", "words": answer.verdict.words, "findings": []}
     return Artifact(
-        kind=Kind.MODEL, name=model.name, parents=(measurement.id, *_parents(closed)), seed=closed.options.seed,
-        recipe={**_recipe(closed), "effects": effects}, parameters=canonical(model.content),
+        kind=Kind.MODEL, name=model.name, parents=(measurement.id, *answer.parents), seed=answer.seed,
+        recipe={**answer.recipe, "effects": effects}, parameters=canonical(model.content),
         report=json.dumps(report, allow_nan=False, ensure_ascii=False),
     )  # fmt: skip

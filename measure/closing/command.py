@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +13,7 @@ import click
 from click.core import ParameterSource
 
 from flagdata.commands.confirm import on_command_line
-from flagdata.console import LakePlace, LocalPath, document, in_steps, json_option, say
+from flagdata.console import LakePlace, LocalPath, json_option
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.findings import Finding
 from flagdata.storage import Place
@@ -23,7 +21,6 @@ from measure.closing.command_line import finding_text, null_options, nulls_given
 from measure.films.command_line import Given, film_options, refuse_of_others
 
 if TYPE_CHECKING:
-    from measure.closing.artifacts import Closed, Kept
     from measure.observe import Setup, Up
     from measure.observe.recipe import ExperimentRecipe
     from measure.verdict.record import Verdict
@@ -31,9 +28,6 @@ if TYPE_CHECKING:
 _OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "accept", "rate", "unit", "noise", "up")
 """Options that say how sources of the command line are read."""
 
-
-_FILES = ("report.html", "verdict.json", "base.toml", "model.toml")
-"""What is written; the last one only where an effect was found."""
 
 _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside", "still-away-from-pins")
 """Kinds of findings that look like an effect."""
@@ -157,21 +151,23 @@ def close_loop(
     """
     from flagdata.lake import Lake
     from flagdata.outputs import check_files
-    from measure.closing.artifacts import Closed, keep
+    from measure.closing.artifacts import answer_of
     from measure.closing.close import close_loop as close
     from measure.closing.models import models
+    from measure.closing.output import FILES, deliver
     from measure.closing.sources import Reading, read
     from measure.films.sources import all_films
     from measure.loop.run import Options
     from measure.observe import Setup, observe
     from measure.observe import recipe as recipes
+    from measure.report.words import words
 
     recipe = None if recipe_path is None else recipes.parse(recipe_path)
     if recipe is not None and recipe.recordings:
         _refuse_beside(context, sources)
     elif not sources:
         raise UsageError("no recordings", where="SOURCE", fix="name them, or a recipe that does")
-    check_files(out, *_FILES, command="close-loop")
+    check_files(out, *FILES, command="close-loop")
     lake = None if lake_path is None else Lake.open(lake_path)
     if lake is not None:
         lake.check_writable()
@@ -203,49 +199,11 @@ def close_loop(
     verdict = close(observed.experiment, options, stage=stage_bars())
     verdict = with_warnings(verdict, observed.findings)
     called = name or _name(observed.experiment.recordings[0].name, sources, recipe)
-    closed = Closed(
-        name=called, experiment=observed.experiment, findings=observed.findings, options=options, verdict=verdict,
+    answer = answer_of(
+        verdict, observed.experiment, options, name=called, findings=observed.findings,
         models=models(verdict, observed.experiment, name=called, seed=seed),
     )  # fmt: skip
-    _write(out, closed)
-    with in_steps(lambda: f"the report and the models in {out}"):
-        kept = None if lake is None else keep(lake, closed, branch=branch)
-    _tell(closed, kept, out, as_json=as_json)
-
-
-def _write(out: Path, closed: Closed) -> None:
-    from flagdata.outputs import write_files
-    from measure.closing import toml
-    from measure.report.document import as_document
-    from measure.report.page import page
-
-    content = json.dumps(as_document(closed.verdict), indent=1, allow_nan=False)
-    texts = [page(closed.verdict), content + "\n", *(toml.dumps(model.content) for model in closed.models)]
-    write_files(out, dict(zip_longest(_FILES, texts)), command="close-loop")
-
-
-def _tell(closed: Closed, kept: Kept | None, out: Path, *, as_json: bool) -> None:
-    from measure.report.document import as_document
-    from measure.report.words import words
-
-    if as_json:
-        content = as_document(closed.verdict)
-        content.pop("schema")
-        if kept is not None:
-            content["artifacts"] = {
-                "measurement": kept.measurement, "models": list(kept.models), "existing": kept.existing
-            }  # fmt: skip
-        document("verdict", content)
-    else:
-        click.echo(words(closed.verdict))
-    if kept is not None and kept.existing:
-        say(f"the lake has this measurement already: {kept.measurement}")
-    elif kept is not None:
-        say(f"measurement {kept.measurement}")
-        for model, identity in zip(closed.models, kept.models, strict=True):
-            say(f"model {identity} {model.name}")
-    files = _FILES[: 2 + len(closed.models)]
-    say(f"wrote {', '.join(str(out / file) for file in files)}")
+    deliver(answer, words(verdict), out=out, lake=lake, branch=branch, as_json=as_json)
 
 
 def _refuse_beside(context: click.Context, sources: tuple[str, ...]) -> None:

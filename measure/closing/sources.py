@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,10 +13,12 @@ from flagdata.errors import UsageError
 from flagdata.ingest.anemometer import WindOptions
 from flagdata.ingest.anemometer.confirm import UNASKED, Confirm
 from flagdata.lake import Lake
+from measure.calibrate.observed import Observed
 from measure.observe import Observation, Up
 from measure.observe.recipe import RecordingSource, WindSource, blown, opened
 from measure.observe.wind import LogPlacement
 
+Recorded = TypeVar("Recorded", Observation, Observed)
 _HERE = Path()
 
 
@@ -78,7 +81,7 @@ def read(sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: L
             if given[name] is not None:
                 raise UsageError("no wind is a log", where=f"--{name}", fix="leave it out, or name a log by --wind")
     each = [_wind(wind, reading) for wind in (winds if len(winds) == len(found) else [*winds[:1]] * len(found))]
-    return _distinct(
+    return distinct(
         [blown(seen, wind, _HERE, lake) for seen, wind in zip(found, each or [None] * len(found), strict=True)]
     )
 
@@ -104,10 +107,10 @@ def _wind(text: str, reading: Reading) -> WindSource:
     return WindSource(velocity=(x, y, z))
 
 
-def _distinct(found: Sequence[Observation]) -> list[Observation]:
-    """Names made different where two are the same."""
+def distinct(found: Sequence[Recorded]) -> list[Recorded]:
+    """Recordings with names made different where two are the same."""
     names = [seen.name for seen in found]
     return [
-        replace(seen, name=f"{seen.name} ({index + 1})") if names.count(seen.name) > 1 else seen
-        for index, seen in enumerate(found)
+        replace(seen, name=f"{seen.name} ({number})") if names.count(seen.name) > 1 else seen
+        for number, seen in enumerate(found, start=1)
     ]

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 
 import numpy as np
 
-from flagdata.pages.pictures import figure_url
 from flagdata.pages.render import render
 from flagdata.rng import stream
 from measure.calibrate.observed import Observed
+from measure.calibrate.panels import Band, against_wind
 from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
 from measure.films.evidence import Fit, Sight
@@ -18,7 +17,6 @@ from measure.films.library import Weighable
 from measure.films.run import Outcome
 from measure.films.weigh import hypothesis
 from measure.films.words import level_of
-from measure.observables import OBSERVABLES
 from measure.report import figures, sentences
 from measure.report.page import FILTERS, TONES
 from measure.verdict import quantity
@@ -79,8 +77,6 @@ def bands(
 
 def _against_wind(outcome: Outcome, place: int, *, named: bool) -> str:
     """Each observable of a recording's windows against the wind, with both models' bands."""
-    from matplotlib.figure import Figure
-
     one, sight = outcome.recordings[place], outcome.sights[place]
     both: list[tuple[Weighable | None, Fit, str]] = [(None, outcome.base, _BEFORE)]
     if named and outcome.best is not None:
@@ -92,23 +88,6 @@ def _against_wind(outcome: Outcome, place: int, *, named: bool) -> str:
             sight, one, {**cloth, **places[place]}, fit.weights[0], effect, strength,
             seed=outcome.options.calibration.seed,
         )  # fmt: skip
-        drawn.append((found, colour))
-    names = [name for column, name in enumerate(OBSERVED) if np.isfinite(drawn[0][0][:, :, column]).all()]
-    columns = min(4, len(names))
-    rows = math.ceil(len(names) / columns)
-    figure = Figure(figsize=(2.75 * columns, 2.5 * rows), layout="constrained")
-    cells = figure.subplots(rows, columns, squeeze=False).ravel()
-    speed = one.speed
-    order = np.argsort(speed)
-    for axes, name in zip(cells, names, strict=False):
-        column = OBSERVED.index(name)
-        for found, colour in drawn:
-            axes.fill_between(speed[order], found[0, order, column], found[2, order, column], color=colour, alpha=0.25)
-            axes.plot(speed[order], found[1, order, column], color=colour)
-        axes.plot(speed, one.readings[:, column], ".", color=_DOT)
-        unit = OBSERVABLES[name].unit
-        axes.set_title(name if unit == "1" else f"{name} [{unit}]", fontsize=10)
-        axes.set_xlabel("wind [m/s]")
-    for axes in cells[len(names) :]:
-        axes.remove()
-    return figure_url(figure)
+        drawn.append(Band(found=found, colour=colour))
+    names = [name for column, name in enumerate(OBSERVED) if np.isfinite(drawn[0].found[:, :, column]).all()]
+    return against_wind(one, names, drawn, dots=_DOT, opacity=0.25)

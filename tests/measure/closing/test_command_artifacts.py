@@ -17,7 +17,7 @@ from flagdata.errors import CorruptError, InputError
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
 from measure.closing import toml
-from measure.closing.artifacts import Closed, fingerprint, keep, read
+from measure.closing.artifacts import Answer, answer_of, fingerprint, keep, read
 from measure.closing.models import acting, models
 from measure.loop.run import Options
 from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
@@ -59,10 +59,10 @@ def experiment(specimen: Specimen, *, source: str = "", name: str = "a", speed: 
     return Experiment(specimen=specimen, recordings=(recording,))
 
 
-def closed(observed: Experiment, conclusion: Conclusion = Conclusion.EFFECT) -> Closed:
+def closed(observed: Experiment, conclusion: Conclusion = Conclusion.EFFECT) -> Answer:
     found = concluded(conclusion)
-    return Closed(
-        name="tracks", experiment=observed, findings=(), options=Options(seed=3), verdict=found,
+    return answer_of(
+        found, observed, Options(seed=3), name="tracks", findings=(),
         models=models(found, observed, name="tracks", seed=3),
     )  # fmt: skip
 
