@@ -19,10 +19,10 @@ from flagdata.errors import UsageError
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from flagdata.query import Request, Selection
+    from flagdata.selection import Request, Selection
 
 PEOPLE_LIMIT = 20
-_TIME_LIMIT = 60.0  # s; that of `flagdata.query`, which is not imported for --help
+_TIME_LIMIT = 60.0  # s; that of `flagdata.selection`, which is not imported for --help
 _SHORT = 12  # characters of an identity; look-ups take unique prefixes
 
 # What people see without --columns, by the one kind that was selected.
@@ -94,7 +94,7 @@ def query(
         return
     from flagdata.lake import Lake
     from flagdata.outputs import check_file
-    from flagdata.query import Request, Selection
+    from flagdata.selection import Request, Selection
 
     if arrow is not None:
         check_file(arrow)
@@ -205,7 +205,7 @@ def _csv_cell(value: Any) -> Any:
 def _print_table(catalog: pa.Table, request: Request) -> None:
     from dataclasses import replace
 
-    from flagdata.query import Selection
+    from flagdata.selection import Selection
 
     if request.sql is None and request.columns is None:
         kinds = Selection(catalog, replace(request, columns=("kind",), limit=None)).table()["kind"].unique().to_pylist()
@@ -247,7 +247,7 @@ def _cell(value: Any, *, short: bool) -> str | None:
 
 
 def _describe(*, as_json: bool) -> None:
-    from flagdata.query import COLUMNS
+    from flagdata.selection import COLUMNS
 
     if as_json:
         columns = [

@@ -20,9 +20,9 @@ from flagdata.errors import NotFoundError, RefusedError, UsageError
 from flagdata.lake import Lake
 from flagdata.lake.matching import Where
 from flagdata.lake.tabled import labels_of
-from flagdata.query import Request, Selection
 from flagdata.record import Record
 from flagdata.schema import TRUTH_WINDOW, Kind
+from flagdata.selection import Request, Selection
 
 _ORIGIN = ("artifact", "recording", "session", "seed", "day")
 

@@ -26,8 +26,8 @@ from flagdata.pages.graph import COLOURS
 from flagdata.pages.lineage import SHORT, picture
 from flagdata.pages.render import render, text_of
 from flagdata.printable import printable
-from flagdata.query import COLUMNS, Request, Selection
 from flagdata.schema import Kind
+from flagdata.selection import COLUMNS, Request, Selection
 from flagdata.timebase import iso
 from flagdata.view.films import DRAWN
 from flagdata.view.media import Media

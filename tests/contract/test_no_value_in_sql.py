@@ -6,7 +6,7 @@ import ast
 import re
 from collections.abc import Iterator
 
-from flagdata.query import COLUMNS
+from flagdata.selection import COLUMNS
 from tests.contract.imports import ROOT, modules
 
 TAKES_SQL = {"rows", "pairs", "sides", "sql", "execute", "query", "select", "Request", "ExplicitSplit", "_clips"}
@@ -23,7 +23,7 @@ SUSPECT = re.compile(
 )
 """What is in each module that has anything to do with SQL; parsing the others takes a second."""
 NAMES_ALONE = {
-    "flagdata/query.py": "names of the schema's columns",
+    "flagdata/selection.py": "names of the schema's columns",
     "flagdata/ingest/anemometer/documents/sqlite.py": "names of another file's tables, quoted",
 }
 """Modules that make SQL out of names, which cannot be parameters."""

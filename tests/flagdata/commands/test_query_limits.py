@@ -7,12 +7,12 @@ import time
 import pyarrow as pa
 import pytest
 
-from flagdata import query
+from flagdata import selection
 from flagdata.commands.query import as_document
 from flagdata.commands.query import query as command
 from flagdata.errors import LimitError, UsageError
-from flagdata.query import Request, Selection
 from flagdata.schema import catalog_schema
+from flagdata.selection import Request, Selection
 from tests.refusals import unrefused
 
 EMPTY = catalog_schema().empty_table()
@@ -57,7 +57,7 @@ def test_the_time_is_that_of_all_that_is_asked_of_a_selection() -> None:
 def test_sql_that_gives_more_than_can_be_held_is_refused(
     name: str, limit: int, sql: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(query, name, limit)
+    monkeypatch.setattr(selection, name, limit)
     with pytest.raises(LimitError, match=r"gives more than .* --csv and --arrow"):
         as_document(Selection(EMPTY, Request(sql=sql)), at=None, version=0)
     assert Selection(EMPTY, Request(sql=sql, limit=1000)).table().num_rows == 1000
@@ -84,4 +84,4 @@ def test_no_length_of_time_is_too_long() -> None:
 
 def test_the_commands_default_is_the_librarys() -> None:
     (option,) = [parameter for parameter in command.params if parameter.name == "time_limit"]
-    assert option.default == query.TIME_LIMIT
+    assert option.default == selection.TIME_LIMIT

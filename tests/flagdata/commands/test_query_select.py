@@ -1,4 +1,4 @@
-"""`flagdata.query` over a hand-written catalog: every expected value is worked out from the rows below."""
+"""`flagdata.selection` over a hand-written catalog: every expected value is worked out from the rows below."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flagdata import query
+from flagdata import selection
 from flagdata.commands.query import VIEWS
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.lake.refs import Slice, View
-from flagdata.query import COLUMNS, Request, Selection, select
 from flagdata.schema import CATALOG, Kind, catalog_schema
+from flagdata.selection import COLUMNS, Request, Selection, select
 from tests.refusals import unrefused
 
 NOON = 1_777_636_800_000_000_000  # 2026-05-01T12:00:00Z: date -u -d @1777636800
@@ -79,7 +79,7 @@ def test_a_query_too_large_for_memory_is_an_error_and_leaves_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setitem(query._SEALED, "memory_limit", "50MB")
+    monkeypatch.setitem(selection._SEALED, "memory_limit", "50MB")
     with pytest.raises(UsageError, match="more memory"):
         select(HandWritten(), sql="select count(distinct hash(range)) from range(20_000_000)")
     assert list(tmp_path.iterdir()) == []

@@ -25,8 +25,8 @@ from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, object_names, verify, verify_catalog
 from flagdata.lake.leases import collecting, last_written, leases, open_lease
 from flagdata.lake.transaction import Transaction
-from flagdata.query import select
 from flagdata.schema import Kind
+from flagdata.selection import select
 from flagdata.storage import RemotePath, StoreError
 from flagdata.storage import cache as object_cache
 from flagdata.storage.connection import plain
