@@ -13,7 +13,7 @@ from flagdata.findings import Finding
 from flagdata.lake import Lake
 from flagdata.stated import Stated
 from measure.calibrate.beside import joined
-from measure.calibrate.observed import LONGEST, Observed, cut, first_part
+from measure.calibrate.observed import LONGEST, Excerpt, Observed, cut, first_part
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.tables import of_table
 from measure.calibrate.wind import Log
@@ -161,4 +161,5 @@ def with_log(
         name=film.name, source=source, first=first, readings=np.array(readings),
         log=log.cut(first, first + len(readings) * seen.seconds),
         sigma=np.array([OBSERVABLES[name].sigma for name in OBSERVED]), findings=findings,
+        excerpt=Excerpt.of(seen.windows),
     )  # fmt: skip

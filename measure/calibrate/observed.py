@@ -14,10 +14,31 @@ from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.summary import LEAST_WINDOWS, SHOWN, Projection, shown
 from measure.calibrate.wind import STEADY, Log
+from measure.observables.film import FilmWindow
 from measure.observables.observable import WINDOW
 
 LONGEST = 120.0
 """s of a film that are simulated: two minutes cost minutes."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Excerpt:
+    """A window of the film in pictures.
+
+    Attributes:
+        number: of the window.
+        window: its pictures, and where its hoist is in them.
+    """
+
+    number: int
+    window: FilmWindow
+
+    @classmethod
+    def of(cls, windows: Sequence[FilmWindow | None]) -> Excerpt | None:
+        """The window nearest to the middle of a film's second half; None where no window of that half was read."""
+        half = len(windows) // 2
+        later = [cls(number=half + k, window=one) for k, one in enumerate(windows[half:]) if one is not None]
+        return min(later, key=lambda own: abs(own.number - (half + len(windows)) / 2), default=None)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,6 +56,7 @@ class Observed:
         place: what is shared by recordings from one place with one anemometer, whose gain and view are one; None for
             a recording of a place of its own.
         findings: what was noticed.
+        excerpt: some of its film; None where there is no film.
 
     Raises:
         InputError: shapes that disagree, too few windows, or no observable in enough of them.
@@ -48,6 +70,7 @@ class Observed:
     place: str | None = None
     sigma: Floats = field(default_factory=lambda: np.zeros(len(OBSERVED)))
     findings: tuple[Finding, ...] = ()
+    excerpt: Excerpt | None = None
 
     def __post_init__(self) -> None:
         count = len(OBSERVED)

@@ -159,7 +159,7 @@ class Batch:
         """(flag, place, window, observable), NaN where a window does not show one or a flag diverged."""
         own = self.discretisation
         mesh = self.flag.mesh(self.columns) if own is None else own.mesh(self.flag.mesh(self.columns))
-        positions = self._positions(mesh)
+        positions = self.positions(mesh)
         found = np.full((len(self.seeds), self.places.shape[1], self.windows, len(self.observables)), np.nan)
         for place, flag in enumerate(np.moveaxis(positions, -1, 0)):
             if np.isfinite(flag).all():
@@ -171,7 +171,7 @@ class Batch:
                     )
         return found
 
-    def _positions(self, mesh: Mesh) -> Floats:
+    def positions(self, mesh: Mesh) -> Floats:
         """(frame, vertex, 3, flag) [m] of the film's frames."""
         system, state, integrator = self._assembled(mesh)
         frames: list[Floats] = []

@@ -15,6 +15,7 @@ from measure.calibrate.simulation import OBSERVED
 from measure.films.evidence import Fit, Sight
 from measure.films.library import Weighable
 from measure.films.run import Outcome
+from measure.films.side_by_side import side_by_side
 from measure.films.weigh import hypothesis
 from measure.films.words import level_of
 from measure.report import figures, sentences
@@ -40,7 +41,8 @@ def page(verdict: Verdict, outcome: Outcome) -> str:
         "title": lambda c: sentences.candidate_title(verdict, c),
         "recordings": [
             {"name": one.name, "windows": len(one.readings), "wind": f"{one.speed.mean():.1f}",
-             "picture": _against_wind(outcome, place, named=bool(verdict.named))}
+             "picture": _against_wind(outcome, place, named=bool(verdict.named)),
+             "beside": side_by_side(outcome, place, after=after)}
             for place, one in enumerate(outcome.recordings)
         ],
         "provenance": [(name, value if isinstance(value, str) else json.dumps(value))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 
@@ -92,10 +93,18 @@ def compared(
 
 
 def _halves(recordings: Sequence[Observed], simulations: Simulations) -> list[_Task]:
-    """One half of each recording fitted and the other predicted, both ways; none of recordings that are too short, or
-    that are rows of a table against wind, whose windows are the same."""
+    """One half of each recording fitted and the other predicted, both ways; none where `halved` gives none."""
+    return [
+        _Task(fitted=a, predicted=tuple((place, s, o) for place, (s, o) in enumerate(b)))
+        for a, b in permutations(halved(recordings, simulations), 2)
+    ]
+
+
+def halved(recordings: Sequence[Observed], simulations: Simulations) -> tuple[tuple[tuple[Sight, Observed], ...], ...]:
+    """The models and windows of all first halves, and those of all second halves; nothing of recordings that are too
+    short, or that are rows of a table against wind, whose windows are the same."""
     if min(len(one.readings) for one in recordings) < 2 * LEAST_WINDOWS or any(one.place for one in recordings):
-        return []
+        return ()
     sides: list[list[tuple[Sight, Observed]]] = [[], []]
     for one, design, base, own in zip(
         recordings, simulations.designs, simulations.base, simulations.pairs, strict=True
@@ -103,10 +112,7 @@ def _halves(recordings: Sequence[Observed], simulations: Simulations) -> list[_T
         middle = len(one.readings) // 2
         for side, windows in zip(sides, (slice(0, middle), slice(middle, None)), strict=True):
             side.append((sight(one, design, base, own, windows=windows), part_of(one, windows)))
-    return [
-        _Task(fitted=tuple(a), predicted=tuple((place, s, o) for place, (s, o) in enumerate(b)))
-        for a, b in (sides, sides[::-1])
-    ]
+    return tuple(tuple(side) for side in sides)
 
 
 def _left_out(recordings: Sequence[Observed], sights: Sequence[Sight]) -> list[_Task]:

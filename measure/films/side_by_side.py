@@ -1,0 +1,169 @@
+"""A window of a film beside flags that the models simulate in its wind, seen from the fitted place, in motion.
+
+The models are fitted to the first half of each recording, and the window is of the second one. Turbulence that is
+quicker than the log is drawn anew in each simulation, so that single waves differ, and how high the flag flies, how far
+it reaches and how it beats can be compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.pages.pictures import moving, still
+from flagdata.rng import child_seed
+from measure.calibrate.prior import Floats
+from measure.calibrate.simulation import RATE, Batch
+from measure.films.library import Weighable
+from measure.films.run import Outcome
+from measure.films.simulations import of_recordings
+from measure.films.unseen import halved
+from measure.films.weigh import fitted, hypothesis
+from measure.observables import View
+from measure.observables.cloth import ClothWindow, edges_of, seen_from
+from measure.observables.film import FilmWindow
+from measure.observables.observable import WINDOW
+
+_SIDE = 300
+"""Pixels that a picture is wide and high."""
+_PAPER, _POLE = 236, 120
+_BEFORE, _AFTER = (180, 83, 26), (31, 111, 156)
+"""Colours of the page's two models."""
+_SUBPIXEL = 4
+"""Binary digits of a pixel in which triangles are given to OpenCV."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Moving:
+    """Pictures in motion, as data URLs.
+
+    Attributes:
+        label: what they show.
+        url: of all of them.
+        first: of the first, for whoever asked for less motion.
+    """
+
+    label: str
+    url: str
+    first: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class SideBySide:
+    """One recording's window.
+
+    Attributes:
+        start: of the window in the film [s].
+        wind: its logged mean [m/s].
+        columns: the film first, then each model.
+    """
+
+    start: float
+    wind: float
+    columns: tuple[Moving, ...]
+
+
+def side_by_side(outcome: Outcome, place: int, *, after: str) -> SideBySide | None:
+    """A recording's window beside what was simulated; None without a film, or where it is too short for halves.
+
+    Args:
+        place: of the recording.
+        after: what the model with the effect is called; empty where no effect is named.
+    """
+    observed = outcome.recordings[place]
+    excerpt, halves = observed.excerpt, halved(outcome.recordings, outcome.simulations)
+    if excerpt is None or not halves:
+        return None
+    sights = [sight for sight, _ in halves[0]]
+    seen = of_recordings(sights, [half for _, half in halves[0]], outcome.options.area_weight)
+    film = excerpt.window
+    instants = np.arange(round(WINDOW * RATE)) / RATE
+    shown = [
+        _moving("the film", [film.frames[np.abs(film.times - film.times[0] - at).argmin()] for at in instants.tolist()])
+    ]
+    models: list[tuple[str, Weighable | None, tuple[int, int, int]]] = [("base model", None, _BEFORE)]
+    if after and outcome.best is not None:
+        models.append((after, outcome.best[0], _AFTER))
+    for label, effect, colour in models:
+        own = hypothesis(sights, effect)
+        fit = fitted(sights, seen, effect, seed=outcome.options.calibration.seed)
+        cloth, places, strength = own.values(fit.weights[:1] @ fit.scores[0])
+        window, depth = _flown(outcome, place, excerpt.number, {**cloth, **places[place]}, effect, strength)
+        shown.append(_moving(label, drawn(window, depth, film, colour)))
+    return SideBySide(
+        start=observed.first + excerpt.number * WINDOW, wind=float(observed.speed[excerpt.number]), columns=tuple(shown)
+    )
+
+
+def _flown(
+    outcome: Outcome, place: int, number: int, values: dict[str, Floats], effect: Weighable | None,
+    strength: Floats | None,
+) -> tuple[ClothWindow, Floats]:  # fmt: skip
+    """One flag in the wind of a window, as its place sees it, and how far away (frame, vertex) its cloth is [m].
+
+    Args:
+        values: name → (1,) of the cloth, the place and the anemometer's gain; what is not among them is at the middle
+            of its prior.
+    """
+    design = outcome.simulations.designs[place]
+    middle = {one.name: one.at(np.array([0.5])) for one in design.quantities()}
+    if design.log.distance is not None:
+        middle["distance_constant"] = np.array([design.log.distance])
+    values = middle | values
+    view = View(azimuth=float(values["azimuth"][0]), elevation=float(values["elevation"][0]), distance=design.distance)
+    start = number * WINDOW
+    batch = Batch(
+        flag=design.flag, log=replace(design.log.cut(start, start + WINDOW), clock=0.0), duration=WINDOW,
+        values={name: own for name, own in values.items() if name not in ("azimuth", "elevation")},
+        places=np.array([[[view.azimuth, view.elevation, view.distance]]]),
+        seeds=(child_seed(design.seed, "films", "side by side", number),),
+        effects=() if effect is None or strength is None else ((effect.column, strength),),
+    )  # fmt: skip
+    mesh = design.flag.mesh(batch.columns)
+    positions = batch.positions(mesh)[..., 0] * float(values["scale"][0])
+    hoist, free = edges_of(mesh.rest)
+    window = seen_from(
+        view, positions, times=np.arange(len(positions)) / RATE, faces=mesh.faces, hoist=hoist, free=free,
+        length=design.flag.length, height=design.flag.height,
+    )  # fmt: skip
+    return window, positions @ view.axes(0.0)[2]
+
+
+def drawn(cloth: ClothWindow, depth: Floats, film: FilmWindow, colour: tuple[int, int, int]) -> list[NDArray[np.uint8]]:
+    """Frames (size, size, 3) of cloth as large and where the film has its own, at a pole.
+
+    Args:
+        depth: (n, vertex) distance from the camera, up to a constant [m].
+        film: whose scale and hoist are taken.
+        colour: of cloth that is seen square on.
+    """
+    larger = _SIDE / film.frames.shape[1]
+    hoist, scale = film.hoist.mean(axis=0) * larger, film.scale * larger
+    places = hoist + cloth.points * np.array([film.side, -1.0]) * scale
+    # The first pixel's middle is at 0.5 here and at 0 in OpenCV.
+    fixed = np.rint((places - 0.5) * 2**_SUBPIXEL).astype(np.int32)
+    corners = places[:, cloth.faces]
+    edges = corners[:, :, 1:] - corners[:, :, :1]
+    area = np.abs(edges[..., 0, 0] * edges[..., 1, 1] - edges[..., 0, 1] * edges[..., 1, 0])
+    bright = 0.45 + 0.55 * np.clip(area / np.quantile(area, 0.95), 0.0, 1.0)
+    behind = depth[:, cloth.faces].mean(axis=2)
+    pole = round(float(hoist[0]))
+    made = []
+    for frame, order in enumerate(np.argsort(-behind, axis=1)):
+        picture = np.full((_SIDE, _SIDE, 3), _PAPER, np.uint8)
+        top = round(float(places[frame, cloth.hoist, 1].min() - 0.1 * scale * cloth.height))
+        cv2.line(picture, (pole, top), (pole, _SIDE), (_POLE,) * 3, 2)
+        for face in order:
+            shade = tuple(int(part * bright[frame, face]) for part in colour)
+            cv2.fillConvexPoly(picture, fixed[frame, cloth.faces[face]], shade, shift=_SUBPIXEL)
+        made.append(picture)
+    return made
+
+
+def _moving(label: str, frames: Sequence[NDArray[np.uint8]]) -> Moving:
+    pictures = np.stack(frames)
+    return Moving(label=label, url=moving(pictures, rate=RATE, side=_SIDE), first=still(pictures[0], side=_SIDE))
