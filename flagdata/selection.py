@@ -22,8 +22,9 @@ import pyarrow as pa
 
 from flagdata.errors import LimitError, UnknownNameError, UsageError
 from flagdata.lake.labels import PREFIX, columns
-from flagdata.lake.matching import Where, matching
+from flagdata.lake.matching import Where, condition, matching
 from flagdata.lake.refs import View
+from flagdata.lake.rowfiles import Scan
 from flagdata.schema import CATALOG, Field, Kind, catalog_schema
 
 # name → (what it is, SQL over the stored columns). `start` and `end` stay exact to the nanosecond beside them.
@@ -65,7 +66,7 @@ class Catalogued(Protocol):
 
     def view(self, at: str | None) -> View: ...
 
-    def table(self, view: View) -> pa.Table: ...
+    def scan(self, view: View) -> pa.Table | Scan: ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +115,7 @@ class Selection:
     """The answer to a request over one catalog, computed when it is read.
 
     Args:
-        catalog: rows with the columns of `schema.CATALOG`.
+        catalog: rows with the columns of `schema.CATALOG`; of a scan only those columns are decoded that are asked for.
         request: what is wanted of them.
 
     Raises:
@@ -122,22 +123,32 @@ class Selection:
         LimitError: it takes longer than it may. These are raised by the methods, too.
     """
 
-    def __init__(self, catalog: pa.Table, request: Request) -> None:
+    def __init__(self, catalog: pa.Table | Scan, request: Request) -> None:
         self.request = request
-        if request.where is not None and not isinstance(request.where, str):
-            catalog = matching(catalog, request.where)
+        if request.where and not isinstance(request.where, str):
+            catalog = (
+                catalog.matching(condition(request.where))
+                if isinstance(catalog, Scan)
+                else matching(catalog, request.where)
+            )
         self._connection = duckdb.connect(":memory:", config=_SEALED)
         self._left = request.time_limit
-        labels = columns(catalog)
-        for name, values in labels.items():
-            catalog = catalog.append_column(name, values)
+        self._check = catalog.check if isinstance(catalog, Scan) else None
+        labels: dict[str, pa.Array] = {}
+        if isinstance(catalog, Scan):
+            stored, cells, size = catalog.dataset, catalog.count * len(CATALOG), catalog.size
+        else:
+            labels, stored = columns(catalog), catalog
+            for name, values in labels.items():
+                stored = stored.append_column(name, values)
+            cells, size = stored.num_rows * stored.num_columns, stored.nbytes
         self._labels = {name: Field(type=values.type, about="a label of the user's") for name, values in labels.items()}
         for name in request.columns or ():
             if name not in COLUMNS and name not in labels:
                 raise UnknownNameError.of("column", name, [*COLUMNS, *labels])
-        self._held = max(CELL_LIMIT, 2 * catalog.num_rows * catalog.num_columns), max(BYTE_LIMIT, 2 * catalog.nbytes)
+        self._held = max(CELL_LIMIT, 2 * cells), max(BYTE_LIMIT, 2 * size)
         with self._running():
-            self._connection.register("stored", catalog)
+            self._connection.register("stored", stored)
             self._connection.execute(f"CREATE VIEW catalog AS SELECT {_view_columns(tuple(labels))} FROM stored")
             self._connection.execute("SET TimeZone = 'UTC'")
             self._connection.execute("SET lock_configuration = true")
@@ -181,6 +192,7 @@ class Selection:
                         batch = raw.read_next_batch()
                     except StopIteration:
                         return
+                    batch.validate(full=True)  # a scan may give text that is not UTF-8
                 yield pa.RecordBatch.from_arrays(
                     [array.cast(field.type) for array, field in zip(batch.columns, schema, strict=True)], schema=schema
                 )
@@ -225,6 +237,8 @@ class Selection:
             yield
         except (duckdb.Error, pa.ArrowException, OSError) as error:  # the last two of a stream
             self._refuse_late(begun)
+            if self._check is not None:
+                self._check()  # raises, where a file of the catalog is to blame
             raise explain(error, where=_shown(self.request)) from None
         finally:
             done.set()
@@ -292,7 +306,7 @@ def select(
         where=where, columns=None if columns is None else tuple(columns), order=order, sql=sql, limit=limit,
         time_limit=time_limit,
     )  # fmt: skip
-    return Selection(lake.table(lake.view(at)), request).table()
+    return Selection(lake.scan(lake.view(at)), request).table()
 
 
 def explain(error: Exception, *, where: str | None) -> UsageError:

@@ -19,6 +19,7 @@ from flagdata.errors import UsageError
 if TYPE_CHECKING:
     import pyarrow as pa
 
+    from flagdata.lake.rowfiles import Scan
     from flagdata.selection import Request, Selection
 
 PEOPLE_LIMIT = 20
@@ -103,7 +104,7 @@ def query(
     version = view[0].version
     names = None if columns is None else tuple(name.strip() for name in columns.split(","))
     request = Request(where=where, sql=sql, columns=names, order=order, limit=limit, time_limit=time_limit)
-    catalog = lake.table(view)
+    catalog = lake.scan(view)
     if arrow is not None:
         count = write_arrow(Selection(catalog, request), arrow)
         say(f"{count:,} rows of version {version} → {arrow}")
@@ -202,10 +203,10 @@ def _csv_cell(value: Any) -> Any:
     return ";".join(str(item) for item in value) if isinstance(value, list) else value
 
 
-def _print_table(catalog: pa.Table, request: Request) -> None:
+def _print_table(catalog: pa.Table | Scan, request: Request) -> None:
     from dataclasses import replace
 
-    from flagdata.selection import Selection
+    from flagdata.selection import Request, Selection
 
     if request.sql is None and request.columns is None:
         kinds = Selection(catalog, replace(request, columns=("kind",), limit=None)).table()["kind"].unique().to_pylist()
@@ -218,7 +219,7 @@ def _print_table(catalog: pa.Table, request: Request) -> None:
     selection = Selection(catalog, shown)
     result, total = selection.table(), selection.total()
     if not total:
-        say(f"no rows of {catalog.num_rows:,} match")
+        say(f"no rows of {Selection(catalog, Request()).total():,} match")
         return
     header = [f"{f.name} [{unit}]" if (unit := _unit(f)) else f.name for f in result.schema]
     columns = [[_cell(value, short=short) for value in column.to_pylist()] for column in result.columns]

@@ -40,8 +40,8 @@ from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.files import open_regular
 from flagdata.forks import OneProcess
 from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder, put_if_absent, write_durably
-from flagdata.lake.log import FILE_HASH, PREVIOUS_HASH, Log
-from flagdata.lake.older_rows import with_data_sets
+from flagdata.lake.log import CHECKPOINT, FILE_HASH, PREVIOUS_HASH, Log
+from flagdata.lake.rowfiles import RowFiles, Scan
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
 from flagdata.storage import Place, RemotePath, StoreError
 from flagdata.storage.connection import delta_options, plain
@@ -55,7 +55,6 @@ _CONFIGURATION = {  # neither this package nor another's VACUUM may take what an
     "delta.logRetentionDuration": "interval 36500 days",
 }
 _INFO_PREFIX = "flagdata."
-ROW_ORDER = ("created", "start", "frame_first", "artifact")
 _TIDY_EVERY = 32
 _SMALL = 4 << 20  # B
 _PATIENCE = 120.0  # s, how long a commit competes with other writers before it gives up
@@ -115,7 +114,7 @@ class Catalog:
         self._entries = Log(self._log, marks)
         self._lock = threading.RLock()
         self._table: DeltaTable | None = None
-        self._files: dict[str, pa.Table] = {}
+        self._files = RowFiles(path)
         self._rows: tuple[int, pa.Table] | None = None
         self._history: tuple[int, list[dict[str, Any]]] | None = None
 
@@ -153,8 +152,7 @@ class Catalog:
 
     @_one_at_a_time
     def rows(self, version: int) -> pa.Table:
-        """All rows of one version, of all branches, in the catalog's schema. Columns that old rows lack are null, but
-        for those that `flagdata.lake.older_rows` fills.
+        """All rows of one version, of all branches, see `RowFiles.table`.
 
         Args:
             version: at most `head()`.
@@ -165,13 +163,18 @@ class Catalog:
         """
         if self._rows is not None and self._rows[0] == version:
             return self._rows[1]
-        known = self._files
-        self._files = {name: known[name] if name in known else self._read(name) for name in self._names(version)}
-        parts = list(self._files.values())
-        rows = with_data_sets(pa.concat_tables(parts) if parts else catalog_schema().empty_table())
-        rows = rows.sort_by([(name, "ascending") for name in ROW_ORDER])
+        rows = self._files.table(self._names(version))
         self._rows = (version, rows)
         return rows
+
+    @_one_at_a_time
+    def scan(self, version: int) -> Scan | None:
+        """The same rows, to be decoded as they are asked for, see `RowFiles.scan`.
+
+        Raises:
+            ConflictError, CorruptError: as `rows`.
+        """
+        return self._files.scan(self._names(version))
 
     @_one_at_a_time
     def objects(self) -> frozenset[str]:
@@ -180,8 +183,7 @@ class Catalog:
         Raises:
             CorruptError: the log or a file of the table cannot be read.
         """
-        tables = (self._files[name] if name in self._files else self._read(name) for name in self._entries.files())
-        return frozenset(name for table in tables for name in table["object"].drop_null().to_pylist())
+        return frozenset(self._files.objects(self._entries.files()))
 
     @_one_at_a_time
     def append(self, rows: pa.Table, *, base: int, info: Mapping[str, str]) -> int:
@@ -253,13 +255,13 @@ class Catalog:
         except DeltaError as error:
             raise self._refused(error) from None
         if isinstance(self._log, Path):
-            flush_file(self._log / f"{version:020d}{_CHECKPOINT}")
+            flush_file(self._log / f"{version:020d}{CHECKPOINT}")
             if (hint := self._log / _HINT).exists():
                 flush_file(hint)
             flush_folder(self._log)
         small = [name for name in self._names(version) if (self.path / name).stat().st_size < _SMALL]
         if len(small) > 1:
-            rows = pa.concat_tables(self._read(name) for name in small)
+            rows = pa.concat_tables(self._files.read(name) for name in small)
             info = {"message": f"merge {len(small)} files of the catalog; no row changed"}
             self._commit(table, rows, removed=small, rows_change=False, info=info)
 
@@ -365,10 +367,7 @@ class Catalog:
 
     def _checkpoint(self) -> int:
         """The version of the newest, by the files' names: a process may die before `_last_checkpoint` is written."""
-        return max((int(path.name.removesuffix(_CHECKPOINT)) for path in self._checkpoints()), default=0)
-
-    def _checkpoints(self) -> list[Place]:
-        return list(self._log.glob(f"*{_CHECKPOINT}"))
+        return max(self._entries.checkpoints(), default=0)
 
     def _open(self, version: int) -> DeltaTable:
         with self._log_errors():
@@ -400,9 +399,9 @@ class Catalog:
             raise CorruptError(
                 f"the catalog's log cannot be read: {first}",
                 where=str(self._log),
-                fix=f"delete {_HINT} and *{_CHECKPOINT} there: they save time, the .json files hold all;"
+                fix=f"delete {_HINT} and *{CHECKPOINT} there: they save time, the .json files hold all;"
                 f" if that does not help, {restore}"
-                if self._checkpoints()
+                if self._entries.checkpoints()
                 else restore,
             ) from None
 
@@ -433,27 +432,6 @@ class Catalog:
             raise Moved
         return table
 
-    def _read(self, name: str) -> pa.Table:
-        try:
-            with open_regular(self.path / name) as stream:
-                table = self._conform(pq.read_table(pa.BufferReader(stream.read())))
-            table.validate(full=True)  # text that is not UTF-8, for one
-        except (OSError, pa.ArrowException) as error:
-            raise CorruptError(
-                f"a file of the catalog cannot be read: {error}",
-                where=str(self.path / name),
-                fix="restore it from a copy",
-            ) from None
-        return table
-
-    def _conform(self, table: pa.Table) -> pa.Table:
-        schema = catalog_schema()
-        columns = [
-            table[f.name].cast(f.type) if f.name in table.column_names else pa.nulls(table.num_rows, f.type)
-            for f in schema
-        ]
-        return pa.Table.from_arrays(columns, schema=schema)
-
     def _evolve(self, table: DeltaTable, missing: Sequence[str]) -> None:
         schema = catalog_schema()
         fields = [deltalake.Field.from_arrow(schema.field(name).with_nullable(True)) for name in missing]
@@ -475,7 +453,6 @@ class Catalog:
         self._entries.acknowledge(version)
 
 
-_CHECKPOINT = ".checkpoint.parquet"
 _HINT = "_last_checkpoint"
 _SYSTEM_ERROR = "(os error "  # as the Delta library writes it
 _NO_ANSWER = re.compile(r"Generic S3 error|Error performing [A-Z]+ ")

@@ -94,10 +94,13 @@ class Lineage:
     def __init__(self, history: Iterable[Entry], forks: Mapping[str, View]) -> None:
         self._entries: dict[str, list[Entry]] = {}
         for entry in sorted(history, key=lambda entry: entry["version"]):
-            if "branch" in entry:
+            branch = entry.get("branch")
+            if branch is None:
+                continue
+            if branch not in self._entries:
                 with _reading(entry):
-                    own = Slice(branch=entry["branch"], version=entry["version"])
-                self._entries.setdefault(own.branch, []).append(entry)
+                    Slice(branch=branch, version=entry["version"])  # whether that is a branch's name
+            self._entries.setdefault(branch, []).append(entry)
         self._forks = {**forks, MAIN: ()}
 
     def fork(self, part: Slice) -> View | None:

@@ -11,7 +11,9 @@ Each entry notes the SHA-256 of the one before it, and the mark that of the newe
 from __future__ import annotations
 
 import json
+import os
 import re
+import stat
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -34,7 +36,10 @@ _ACTIONS = {"add", "remove", "metaData", "protocol", "commitInfo", "txn", "cdc",
 _FILE = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
 """Names of files of rows: none leads out of the catalog's folder, also where a lake of somebody else is copied."""
 _NAME = "{:020d}.json"
-_ENTRY = re.compile(r"(\d{20})\.json")
+_ENTRY = re.compile(r"(\d{20})\.json").fullmatch
+CHECKPOINT = ".checkpoint.parquet"
+"""How the names of checkpoints end."""
+
 _MARK = re.compile(r"\d{1,20}")
 
 
@@ -74,10 +79,11 @@ class Log:
         if missing:
             raise self._gap(missing, newest=newest)
         for version in sorted(present.keys() - self._filled):
-            entry = present[version]
+            entry = self.path(version)
             if isinstance(entry, Path):
-                self._text(version)
-            elif entry.stat().st_size == 0:  # as the listing says; a store shows an entry whole or not at all
+                if not _is_filled(entry):
+                    self._text(version)  # raises what is wrong with it
+            elif present[version] == 0:  # a store shows an entry whole or not at all
                 raise self.damaged(version)
         self._filled = set(present)
         return max(newest, acknowledged)
@@ -198,11 +204,17 @@ class Log:
         """The newest version that was acknowledged; -1 in a lake that has had no commit since marks are made."""
         return max(self._marks(), default=-1)
 
-    def _present(self) -> dict[int, Place]:
-        return {int(match[1]): path for path in _paths_in(self.folder) if (match := _ENTRY.fullmatch(path.name))}
+    def checkpoints(self) -> list[int]:
+        """Versions at which the Delta library finds all that is in the entries before."""
+        ends = CHECKPOINT
+        return [int(name.removesuffix(ends)) for name in _sizes_in(self.folder) if name.endswith(ends)]
+
+    def _present(self) -> dict[int, int | None]:
+        """Version of each entry → its size, where a listing states it."""
+        return {int(match[1]): size for name, size in _sizes_in(self.folder).items() if (match := _ENTRY(name))}
 
     def _marks(self) -> list[int]:
-        return [int(path.name) for path in _paths_in(self.marks) if _MARK.fullmatch(path.name)]
+        return [int(name) for name in _sizes_in(self.marks) if _MARK.fullmatch(name)]
 
     def _gap(self, missing: list[int], *, newest: int) -> LogGapError:
         names = ", ".join(self.path(version).name for version in missing[:3])
@@ -215,14 +227,25 @@ class Log:
         )
 
 
-def _paths_in(folder: Place) -> list[Place]:
-    """What is in a folder, nothing if it is not there."""
+def _sizes_in(folder: Place) -> dict[str, int | None]:
+    """Name of what is in a folder → its size where the listing states it; nothing if the folder is not there."""
     try:
-        return list(folder.iterdir())
+        if isinstance(folder, Path):
+            return dict.fromkeys(os.listdir(folder))  # noqa: PTH208 — a path for each name takes ten times as long
+        return {path.name: path.stat().st_size for path in folder.iterdir()}
     except FileNotFoundError:
-        return []
+        return {}
     except OSError as error:
         raise _unreadable(folder, error) from None
+
+
+def _is_filled(path: Path) -> bool:
+    """Whether there is a file that is not empty."""
+    try:
+        status = path.stat()
+    except OSError:
+        return False
+    return stat.S_ISREG(status.st_mode) and status.st_size > 0
 
 
 def _content_of(path: Place) -> str:

@@ -27,8 +27,16 @@ def matching(rows: pa.Table, values: Values) -> pa.Table:
         UnknownNameError: no such column.
         UsageError: a value that the column cannot hold.
     """
-    conditions = [_condition(column, value) for column, value in values.items()]
-    return rows.filter(reduce(and_, conditions)) if conditions else rows
+    return rows.filter(condition(values)) if values else rows
+
+
+def condition(values: Values) -> pc.Expression:
+    """What rows with these values, at least one, meet.
+
+    Raises:
+        UnknownNameError, UsageError: as `matching`.
+    """
+    return reduce(and_, (_condition(column, value) for column, value in values.items()))
 
 
 def _condition(column: str, value: object) -> pc.Expression:

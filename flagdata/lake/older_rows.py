@@ -13,6 +13,8 @@ import pyarrow.compute as pc
 from flagdata.documents import column_json
 from flagdata.schema import CATALOG, Kind
 
+SINCE = max(CATALOG["dataset"].since, CATALOG["side"].since)
+"""Rows of this format version and later need nothing filled."""
 _SIDES = ("train", "validation", "test")
 _DIGITS = 5  # of a film's number, at least
 
@@ -23,9 +25,8 @@ def with_data_sets(rows: pa.Table) -> pa.Table:
     Args:
         rows: with the catalog's columns.
     """
-    since = max(CATALOG["dataset"].since, CATALOG["side"].since)
     films = rows.filter(
-        (pc.field("format_version") < since)
+        (pc.field("format_version") < SINCE)
         & (pc.field("kind") == Kind.RECORDING.value)
         & pc.field("seed").is_valid()
         & pc.field("dataset").is_null()

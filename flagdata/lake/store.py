@@ -10,13 +10,14 @@ import pyarrow.compute as pc
 from flagdata.errors import NotFoundError, UnknownNameError
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
-from flagdata.lake.catalog import ROW_ORDER, Catalog
+from flagdata.lake.catalog import Catalog
 from flagdata.lake.layout import STAGING, check_writable
 from flagdata.lake.lineage import Lineage
-from flagdata.lake.matching import Where, matching
+from flagdata.lake.matching import Values, Where, condition, matching
 from flagdata.lake.objects import Objects
 from flagdata.lake.refs import Refs, Slice, View
 from flagdata.lake.remote_objects import RemoteObjects
+from flagdata.lake.rowfiles import ROW_ORDER, Scan, in_order
 from flagdata.lake.tabled import folded, with_labels
 from flagdata.schema import CATALOG
 from flagdata.storage import Place, RemotePath
@@ -38,6 +39,7 @@ class Store:
         self.objects = RemoteObjects(path) if isinstance(path, RemotePath) else Objects(path)
         self.refs = Refs(path / "refs")
         self.staging = path / STAGING
+        self._lineage: tuple[int, dict[str, View], Lineage] | None = None
 
     def check_writable(self) -> None:
         """Whether this process may write here: called before the first second of work that ends in a commit.
@@ -65,11 +67,13 @@ class Store:
             NotFoundError: no such ref.
             UnknownNameError: no such column.
         """
-        table = self.table(self.view(at))
-        if isinstance(where, str):
-            table = _filter(table, where)
-        elif where is not None:
-            table = matching(table, where)
+        view = self.view(at)
+        if where is None or where == {}:
+            table = self.table(view)
+        elif isinstance(where, str):
+            table = _filter(self.scan(view), where)
+        else:
+            table = self.matching(view, where)
         if columns is None:
             return table
         for column in columns:
@@ -95,17 +99,18 @@ class Store:
         return self._row(artifact, at)["artifact"][0].as_py()
 
     def _row(self, artifact: str, at: str | None) -> pa.Table:
-        table = self.table(self.view(at))
-        ids, names = table["artifact"].to_pylist(), table["name"].to_pylist()
-        matches = [row for row, known in enumerate(ids) if artifact and known.startswith(artifact)]
-        how = "begin with"
-        if not matches:
-            matches, how = [row for row, name in enumerate(names) if artifact and name == artifact], "are named"
-        if len(matches) != 1:
-            what = f"{len(matches)} artifacts {how} {artifact!r}" if matches else f"no artifact {artifact!r}"
-            fix = "give the id of one: flagdata ls lists them" if matches else "flagdata ls lists them"
+        view = self.view(at)
+        rows = self.scan(view)
+        names = rows.table(["artifact", "name"]) if isinstance(rows, Scan) else rows
+        matches, how = names.filter(pc.starts_with(names["artifact"], artifact)), "begin with"  # type: ignore[attr-defined]
+        if not matches.num_rows:
+            matches, how = names.filter(pc.field("name") == artifact), "are named"
+        if matches.num_rows != 1 or not artifact:
+            several = matches.num_rows and artifact
+            what = f"{matches.num_rows} artifacts {how} {artifact!r}" if several else f"no artifact {artifact!r}"
+            fix = "give the id of one: flagdata ls lists them" if several else "flagdata ls lists them"
             raise NotFoundError(what, where=str(self.path), fix=fix)
-        return table.slice(matches[0], 1)
+        return self.matching(view, {"artifact": matches["artifact"][0].as_py()})
 
     def view(self, at: str | None) -> View:
         """What a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""
@@ -123,13 +128,44 @@ class Store:
             rows = pa.concat_tables([rows, self._own(part)])
         return with_labels(rows, folded(lineage.labelled(view[0])))
 
+    def scan(self, view: View) -> pa.Table | Scan:
+        """What `table` gives, decoded as it is asked for where the view is one branch's rows without labels."""
+        if len(view) == 1 and not self.lineage().labelled(view[0]):
+            found = self.catalog.scan(view[0].version)
+            if found is not None:
+                return found.matching(pc.field("branch") == view[0].branch)
+        return self.table(view)
+
+    def matching(self, view: View, values: Values) -> pa.Table:
+        """Rows of a view with these values, see `flagdata.lake.matching`.
+
+        Raises:
+            UnknownNameError, UsageError: as there.
+        """
+        rows = self.scan(view)
+        if isinstance(rows, Scan):
+            return in_order(rows.matching(condition(values)).table(CATALOG))
+        return matching(rows, values)
+
+    def identities(self, view: View) -> pa.ChunkedArray:
+        """The ids of all rows of a view."""
+        rows = self.scan(view)
+        return rows.table(["artifact"])["artifact"] if isinstance(rows, Scan) else rows["artifact"]
+
     def lineage(self) -> Lineage:
         """How branches came to be, as known at the head."""
-        return Lineage(self.catalog.history(), {name: ref.view for name, ref in self.refs.branches().items()})
+        history = self.catalog.history()
+        forks = {name: ref.view for name, ref in self.refs.branches().items()}
+        if self._lineage is None or self._lineage[:2] != (history[0]["version"], forks):
+            self._lineage = (history[0]["version"], forks, Lineage(history, forks))
+        return self._lineage[2]
 
     def _own(self, part: Slice) -> pa.Table:
         """The rows of one branch at one version."""
-        return self.catalog.rows(part.version).filter(pc.field("branch") == part.branch)
+        rows = self.catalog.rows(part.version)
+        if rows["branch"].unique().to_pylist() == [part.branch]:
+            return rows  # a filter would copy all columns
+        return rows.filter(pc.field("branch") == part.branch)
 
     def _commits(self) -> dict[str, View]:
         lineage = self.lineage()
@@ -141,7 +177,7 @@ class Store:
         return {commit: lineage.view(part) for commit, part in parts.items() if lineage.fork(part) is not None}
 
 
-def _filter(table: pa.Table, where: str) -> pa.Table:
+def _filter(table: pa.Table | Scan, where: str) -> pa.Table:
     from flagdata.selection import Request, Selection  # it knows what a view is, so it imports this package
 
     return Selection(table, Request(where=where, order=_ORDER)).table()

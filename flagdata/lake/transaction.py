@@ -9,7 +9,7 @@ from __future__ import annotations
 import secrets
 import shutil
 import uuid
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -17,7 +17,6 @@ from pathlib import Path
 from types import TracebackType
 
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from flagdata.checksums import files_of
 from flagdata.errors import ConflictError, FlagdataError, NotFoundError, UsageError
@@ -73,6 +72,7 @@ class Transaction:
         self._result: CommitResult | None = None
         self._lake = lake
         self._known: frozenset[str] = frozenset()
+        self._seen: int | None = None  # the head that these are of
         self._pending: dict[str, Artifact] = {}
         self._existing: dict[str, None] = {}
         self._sizes: dict[str, int] = {}  # of the objects that the lease holds
@@ -80,7 +80,7 @@ class Transaction:
 
     def __enter__(self) -> Transaction:
         self._lake.check_writable()
-        self._known = _identities(self._look()[1])
+        self._look()
         with disk_errors("starting a transaction", self._lake.staging):
             self._held = open_lease(self._lake.staging)
         return self
@@ -193,10 +193,20 @@ class Transaction:
             raise UsageError("the transaction is not open", fix="use it inside its with-block")
         return self._held
 
-    def _look(self) -> tuple[int, pa.Table]:
-        """The head, and the rows that the branch shows at it."""
+    def _look(self) -> tuple[int, frozenset[str]]:
+        """The head, and the ids of the rows that the branch shows at it."""
         head = self._lake.catalog.head()
-        return head, self._lake.table(self._lake.refs.view(self.branch, head))
+        if head != self._seen:
+            self._known = frozenset(self._lake.identities(self._lake.refs.view(self.branch, head)).to_pylist())
+            self._seen = head
+        return head, self._known
+
+    def _there(self, version: int, identities: Collection[str]) -> dict[str, Artifact]:
+        """Artifacts that the branch shows at a version, by id."""
+        if not identities:
+            return {}
+        rows = self._lake.matching(self._lake.refs.view(self.branch, version), {"artifact": list(identities)})
+        return {row["artifact"]: Artifact.from_row(row) for row in rows.to_pylist()}
 
     def _publish(self) -> CommitResult:
         if self._pending and self._lake.catalog.is_due_for_tidying():
@@ -206,8 +216,7 @@ class Transaction:
         commit = f"c{secrets.token_hex(8)}"
 
         def attempt() -> CommitResult:
-            version, shown = self._look()
-            known = _identities(shown)
+            version, known = self._look()
             fresh = {i: replace(a, created=created) for i, a in self._pending.items() if i not in known}
             existing = (*self._existing, *(identity for identity in self._pending if identity in known))
             if gone := [identity for identity in self._existing if identity not in known]:
@@ -215,8 +224,7 @@ class Transaction:
                     f"{gone[0]} was withdrawn from branch {self.branch!r} meanwhile", where=str(self._lake.path),
                     fix="do it again",
                 )  # fmt: skip
-            there = shown.filter(pc.field("artifact").isin(existing)).to_pylist() if existing else []
-            artifacts = {row["artifact"]: Artifact.from_row(row) for row in there} | fresh
+            artifacts = self._there(version, existing) | fresh
             if not fresh:
                 return CommitResult(version=version, commit=None, added=(), existing=existing, artifacts=artifacts)
             self._check_parents(fresh.values(), known)
@@ -265,7 +273,3 @@ class Transaction:
         else:
             raise NotFoundError("there is no such file or folder", where=str(path), fix="write the object first")
         return inside
-
-
-def _identities(rows: pa.Table) -> frozenset[str]:
-    return frozenset(rows["artifact"].to_pylist())

@@ -44,7 +44,7 @@ class HandWritten:
     def view(self, at: str | None) -> View:
         return (Slice(branch="main", version=3),)
 
-    def table(self, view: View) -> pa.Table:
+    def scan(self, view: View) -> pa.Table:
         return TABLE
 
 

@@ -1,0 +1,189 @@
+"""The catalog's Parquet files: read whole as one table in order, or column by column while a query runs.
+
+A million rows have some 400 MB as a table and 20 MB as files, of which a query uses a few columns and a commit the
+identities alone. A table is sorted, and so copied, only where its files are not in order already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.dataset as ds
+import pyarrow.parquet as pq
+
+from flagdata.errors import CorruptError
+from flagdata.files import open_regular
+from flagdata.lake.older_rows import SINCE, with_data_sets
+from flagdata.schema import catalog_schema
+from flagdata.storage import Place
+
+ROW_ORDER = ("created", "start", "frame_first", "artifact")
+_NUMBERS = ROW_ORDER[:-1]
+_LAST = np.iinfo(np.int64).max
+
+
+class RowFiles:
+    """The files of rows in a folder; what was read of one version is kept for the next."""
+
+    def __init__(self, folder: Place) -> None:
+        self._folder = folder
+        self._contents: dict[str, pa.Buffer] = {}
+        self._tables: dict[str, pa.Table] = {}
+
+    def table(self, names: Sequence[str]) -> pa.Table:
+        """All rows of these files in the catalog's schema and `ROW_ORDER`. Columns that old rows lack are null, but
+        for those that `flagdata.lake.older_rows` fills.
+
+        Raises:
+            CorruptError: a file cannot be read.
+        """
+        self._tables = {name: self.read(name) for name in names}
+        parts = sorted((part for part in self._tables.values() if part.num_rows), key=_first_created)
+        rows = with_data_sets(pa.concat_tables(parts) if parts else catalog_schema().empty_table())
+        return in_order(rows)
+
+    def scan(self, names: Sequence[str]) -> Scan | None:
+        """The same rows, by commit, of which only the columns and rows that are asked for are decoded; `None` where
+        rows of an older format have columns to be filled, or a file lacks columns.
+
+        Raises:
+            CorruptError: a file cannot be read.
+        """
+        self._contents = {name: self._content(name) for name in names}
+        form = ds.ParquetFileFormat()
+        found: list[tuple[int, ds.Fragment]] = []
+        count = size = 0
+        for name, content in self._contents.items():
+            with self._reading(name):
+                file = pq.read_metadata(pa.BufferReader(content))
+                if not file.num_rows:
+                    continue
+                oldest, created = _statistics(file)
+                if oldest < SINCE:
+                    return None
+                found.append((created, form.make_fragment(content)))
+            count += file.num_rows
+            size += sum(file.row_group(number).total_byte_size for number in range(file.num_row_groups))
+        fragments = [fragment for _, fragment in sorted(found, key=lambda pair: pair[0])]
+        dataset = ds.FileSystemDataset(fragments, catalog_schema(), form)
+        return Scan(dataset=dataset, count=count, size=size, check=lambda: self.table(names))
+
+    def read(self, name: str) -> pa.Table:
+        """The rows of one file, as they are in it.
+
+        Raises:
+            CorruptError: it cannot be read.
+        """
+        if name in self._tables:
+            return self._tables[name]
+        with self._reading(name):
+            table = _conform(pq.read_table(pa.BufferReader(self._content(name))))
+            table.validate(full=True)  # text that is not UTF-8, for one
+        return table
+
+    def objects(self, names: Iterable[str]) -> Iterator[str]:
+        """Names of the objects that rows of these files point to."""
+        for name in names:
+            yield from self.read(name)["object"].drop_null().to_pylist()
+
+    def _content(self, name: str) -> pa.Buffer:
+        if name in self._contents:
+            return self._contents[name]
+        with self._reading(name), open_regular(self._folder / name) as stream:
+            return pa.py_buffer(stream.read())
+
+    @contextmanager
+    def _reading(self, name: str) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, pa.ArrowException) as error:
+            raise CorruptError(
+                f"a file of the catalog cannot be read: {error}",
+                where=str(self._folder / name),
+                fix="restore it from a copy",
+            ) from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scan:
+    """Rows that are decoded as a query asks for them.
+
+    Attributes:
+        dataset: the rows, with the catalog's columns.
+        count: how many they are, at most.
+        size: of all columns, decoded [B], about.
+        check: reads all of it at once; raises CorruptError where a file is damaged.
+    """
+
+    dataset: ds.Dataset
+    count: int
+    size: int
+    check: Callable[[], object]
+
+    def matching(self, condition: pc.Expression) -> Scan:
+        """Those of the rows that meet a condition."""
+        return replace(self, dataset=self.dataset.filter(condition))
+
+    def table(self, columns: Iterable[str]) -> pa.Table:
+        """Some columns of the rows.
+
+        Raises:
+            CorruptError: a file cannot be read.
+        """
+        try:
+            return self.dataset.to_table(columns=list(columns))
+        except (OSError, pa.ArrowException):
+            self.check()
+            raise
+
+
+def _conform(table: pa.Table) -> pa.Table:
+    schema = catalog_schema()
+    columns = [
+        table[f.name].cast(f.type) if f.name in table.column_names else pa.nulls(table.num_rows, f.type) for f in schema
+    ]
+    return pa.Table.from_arrays(columns, schema=schema)
+
+
+def _statistics(file: pq.FileMetaData) -> tuple[int, int]:
+    """The lowest format version of a file's rows and when the first was committed [us]; 0 where it does not state
+    them."""
+    lowest: dict[str, list[int]] = {"format_version": [], "created": []}
+    for number in range(file.num_row_groups):
+        group = file.row_group(number)
+        for column in map(group.column, range(group.num_columns)):
+            if column.path_in_schema in lowest:
+                statistics = column.statistics
+                if statistics is None or not statistics.has_min_max:
+                    return 0, 0
+                lowest[column.path_in_schema].append(statistics.min_raw)
+    return min(lowest["format_version"], default=0), min(lowest["created"], default=0)
+
+
+def _first_created(part: pa.Table) -> int:
+    return int(part["created"].cast(pa.int64()).to_numpy().min())
+
+
+def in_order(rows: pa.Table) -> pa.Table:
+    """The rows in `ROW_ORDER`; they are copied only where they are not in it."""
+    return rows if _is_ordered(rows) else rows.sort_by([(name, "ascending") for name in ROW_ORDER])
+
+
+def _is_ordered(rows: pa.Table) -> bool:
+    """Whether rows are in `ROW_ORDER`, in which what is unknown comes last."""
+    if rows.num_rows < 2:
+        return True
+    equal = np.ones(rows.num_rows - 1, dtype=np.bool_)
+    for name in _NUMBERS:
+        values = rows[name].cast(pa.int64()).fill_null(_LAST).to_numpy()
+        if (equal & (values[:-1] > values[1:])).any():
+            return False
+        equal &= values[:-1] == values[1:]
+    (ties,) = np.nonzero(equal)
+    first, second = (rows["artifact"].take(pa.array(index)).to_pylist() for index in (ties, ties + 1))
+    return all(one <= other for one, other in zip(first, second, strict=True))

@@ -1,0 +1,84 @@
+"""Queries and commits decode what they use of the catalog's files, and give what the whole table would."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from flagdata.errors import CorruptError
+from flagdata.lake import Artifact, Lake
+from flagdata.lake.rowfiles import ROW_ORDER, RowFiles, Scan, in_order
+from flagdata.schema import Kind, catalog_schema
+from flagdata.selection import select
+from tests.flagdata.lake.conftest import overwrite
+
+Put = Callable[..., Artifact]
+
+
+def test_queries_look_ups_and_commits_do_not_decode_whole_rows(
+    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    identities = [put_text(lake, name).id for name in ("one", "two", "three")]
+
+    def refuse(self: RowFiles, name: str) -> pa.Table:
+        raise AssertionError(f"all of {name} was decoded")
+
+    monkeypatch.setattr(RowFiles, "read", refuse)
+    lake = Lake.open(lake.path)
+    assert select(lake, sql="select kind, count(*) n from catalog group by kind").to_pylist() == [
+        {"kind": "wind", "n": 3}
+    ]
+    assert lake.artifact("two").id == identities[1]
+    assert lake.rows({"name": ["three", "one"]})["name"].to_pylist() == ["one", "three"]
+    assert put_text(lake, "four").id == lake.rows("name = 'four'")["artifact"][0].as_py()
+    with lake.transaction("again") as transaction:
+        transaction.add(Artifact(kind=Kind.MEASUREMENT, name="fifth", parents=(identities[0],)))
+        assert not transaction.add(lake.artifact("one"))
+    assert transaction.result.existing == (identities[0],)
+
+
+def test_a_scan_is_the_table_of_every_view(lake: Lake, put_text: Put) -> None:
+    kept, gone = put_text(lake, "kept"), put_text(lake, "gone")
+    lake.branch("side")
+    put_text(lake, "aside", branch="side")
+    lake.withdraw([kept.id], "not on the side", branch="side")
+    lake.withdraw([gone.id], "nor here")
+    lake.label([kept.id], {"good": True}, "looked at")
+    for at in ("0", "1", "2", None, "side"):
+        view = lake.view(at)
+        scanned = lake.scan(view)
+        rows = scanned.table(catalog_schema().names) if isinstance(scanned, Scan) else scanned
+        assert rows.to_pylist() == lake.table(view).to_pylist()
+    assert select(lake, "label_good", columns=["name"]).to_pylist() == [{"name": "kept"}]
+
+
+def test_rows_are_sorted_as_arrow_sorts_them() -> None:
+    row = Artifact(kind=Kind.CLIP, name="c", source_hash="a" * 64, recipe={}).row()
+    starts: list[tuple[int | None, int | None]] = [(2, 1), (1, None), (1, 3), (None, 5), (1, 3), (2, 0)]
+    rows = [{**row, "start": s, "end": s, "frame_first": f, "artifact": f"{k:032x}"} for k, (s, f) in enumerate(starts)]
+    table = pa.Table.from_pylist(rows, schema=catalog_schema())
+    ordered = table.sort_by([(name, "ascending") for name in ROW_ORDER])
+    assert in_order(table).equals(ordered)
+    assert in_order(ordered) is ordered
+    swapped = ordered.take([1, 0, 2, 3, 4, 5])  # the two of one start and frame
+    assert in_order(swapped).equals(ordered)
+
+
+def test_a_damaged_column_is_named_by_its_file(lake: Lake, put_text: Put) -> None:
+    put_text(lake, "gusts")
+    (file,) = lake.catalog.path.glob("*.parquet")
+    content = bytearray(file.read_bytes())
+    group = pq.read_metadata(pa.BufferReader(bytes(content))).row_group(0)
+    name = next(group.column(k) for k in range(group.num_columns) if group.column(k).path_in_schema == "name")
+    first = name.data_page_offset
+    content[first : first + name.total_compressed_size] = b"\xff" * name.total_compressed_size
+    overwrite(file, bytes(content))
+    lake = Lake.open(lake.path)
+    assert select(lake, columns=["kind"]).to_pylist() == [{"kind": "wind"}]
+    for look in (lambda: select(lake, "name = 'gusts'"), lambda: lake.artifact("gusts"), lake.rows):
+        with pytest.raises(CorruptError, match="cannot be read") as caught:
+            look()
+        assert caught.value.where == str(file)
