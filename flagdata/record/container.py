@@ -280,7 +280,10 @@ def in_order(file: Bytes, summary: Summary, topic: str, *, where: str) -> bool:
         return False
     channel = summary.channels[topic].id
     chunks = [chunk for chunk in summary.chunks if channel in chunk.message_index_offsets]
-    if any(chunk.compression for chunk in chunks) or sum(_count(chunk, channel) for chunk in chunks) != kept.count:
+    if (
+        any(chunk.compression for chunk in chunks)
+        or sum(message_count(chunk, channel) for chunk in chunks) != kept.count
+    ):
         return False
     bounds = [(chunk.message_start_time, chunk.message_end_time) for chunk in chunks]
     overlaps = {i + k for i, (one, other) in enumerate(pairwise(bounds)) if other[0] <= one[1] for k in (0, 1)}
@@ -301,7 +304,7 @@ def _index_span(chunk: ChunkIndex, channel: int) -> tuple[int, int]:
     return first, min(later, default=chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length)
 
 
-def _count(chunk: ChunkIndex, channel: int) -> int:
+def message_count(chunk: ChunkIndex, channel: int) -> int:
     """How many messages of a channel a chunk has, by the length of their index."""
     first, end = _index_span(chunk, channel)
     return (end - first - _INDEX.size) // _INDEX_ENTRY
@@ -324,7 +327,7 @@ def _places(
                     f"the record's chunks are compressed ({chunk.compression})", where=where,
                     fix=_RECOVER + " to rewrite it",
                 )  # fmt: skip
-            count = _count(chunk, channel)
+            count = message_count(chunk, channel)
             first, last = (0, count) if span is None else (span[0] - before, span[0] + span[1] - before)
             if span is None or (first < count and last > 0):
                 parts.append((chunk, max(first, 0), last))

@@ -3,7 +3,8 @@
 A crash, a full disk or a pulled cable leaves a file without the summary that readers by offset need. Everything before
 the break is sound: whole chunks are checked by their CRC-32, and whole messages of a last, partial, uncompressed chunk
 are kept too, named as unchecked. After a stretch that cannot be read (a bad sector) the pass goes on at the next chunk
-whose checksum is right. Nothing is invented: every message written is byte for byte one that was read.
+whose checksum is right; where the summary is sound, the messages between are kept that have a right checksum of their
+own. Nothing is invented: every message written is byte for byte one that was read.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import IO, Any
@@ -29,9 +31,10 @@ from flagdata.errors import CorruptError, FlagdataError, NotFoundError
 from flagdata.findings import Finding, Severity
 from flagdata.record import messages
 from flagdata.record.checksums import CHECKSUMS, ChecksummedWriter
-from flagdata.record.container import CHUNK_HEAD, MAGIC, MESSAGE_HEAD, RECORD_HEAD, parse, read_summary
+from flagdata.record.container import CHUNK_HEAD, MAGIC, MESSAGE_HEAD, RECORD_HEAD, Summary, parse, read_summary
 from flagdata.record.metadata import SALVAGE
 from flagdata.record.output import Output
+from flagdata.record.sound import SoundMessages
 from flagdata.record.source import open_bytes
 from flagdata.record.writer import CHUNK_BYTES, PROFILE, Chunking, library_name
 from flagdata.timebase import iso
@@ -82,8 +85,11 @@ def salvage(source: Path, target: Path) -> tuple[Finding, ...]:
         try:
             with out:
                 copy = _Copy(out)
-                _definitions(source, copy)
-                _Pass(stream, size=source.stat().st_size, where=str(source), copy=copy).run()
+                summary = _summary(source)
+                if summary is not None:
+                    copy.define(summary)
+                sound = SoundMessages(source, summary)
+                _Pass(stream, size=source.stat().st_size, where=str(source), copy=copy, sound=sound).run()
                 if not copy.counts:
                     raise CorruptError("no whole message is left in the record", where=str(source), fix="it is lost")
                 copy.finish()
@@ -93,19 +99,15 @@ def salvage(source: Path, target: Path) -> tuple[Finding, ...]:
     return tuple(copy.findings)
 
 
-def _definitions(source: Path, copy: _Copy) -> None:
-    """Schemas and channels from the summary, where it is sound: the chunk that holds them first may be damaged."""
+def _summary(source: Path) -> Summary | None:
+    """The record's summary, where it is sound."""
     file = open_bytes(source)
     try:
-        summary = read_summary(file, where=str(source))
+        return read_summary(file, where=str(source))
     except CorruptError:
-        return
+        return None
     finally:
         file.close()
-    for schema in summary.schemas.values():
-        copy.schema(schema)
-    for channel in summary.channels.values():
-        copy.channel(channel)
 
 
 class _Copy:
@@ -121,6 +123,13 @@ class _Copy:
         self._salvaged = 0
         self._writer = ChecksummedWriter(out, chunk_size=CHUNK_BYTES[Chunking.COMMITTED])
         self._writer.start(profile=PROFILE, library=library_name())
+
+    def define(self, summary: Summary) -> None:
+        """Schemas and channels of a sound summary: the chunk that holds them first may be damaged."""
+        for schema in summary.schemas.values():
+            self.schema(schema)
+        for channel in summary.channels.values():
+            self.channel(channel)
 
     def find(self, kind: str, severity: Severity, what: str, *, where: str | None = None, count: int = 1) -> None:
         self.findings.append(Finding(kind=kind, severity=severity, what=what, where=where, count=count))
@@ -200,11 +209,14 @@ class _Copy:
 class _Pass:
     """One pass through the damaged file."""
 
-    def __init__(self, stream: IO[bytes], *, size: int, where: str, copy: _Copy) -> None:
+    def __init__(self, stream: IO[bytes], *, size: int, where: str, copy: _Copy, sound: SoundMessages) -> None:
         self._stream = stream
         self._size = size
         self._where = where
         self._copy = copy
+        self._sound = sound
+        self._damaged: list[int] = []  # which findings are of damage whose lost messages are not counted
+        self._lost = 0  # messages, in the findings that count them
 
     def run(self) -> None:
         while True:
@@ -220,14 +232,16 @@ class _Pass:
             if known and start + RECORD_HEAD + length <= self._size and length <= CHUNK_LIMIT:
                 self._record(opcode, self._stream.read(length), start)
                 continue
-            if opcode == Opcode.CHUNK:
-                self._partial(start)
             following = self._next_chunk(start + 1)
+            spared = self._spared(start, self._size if following is None else following)
+            if opcode == Opcode.CHUNK and spared is None:
+                self._stream.seek(start + RECORD_HEAD)
+                self._partial(start)
             if following is None:
                 if known:
                     return self._cut_off(start, f"inside a {_name(opcode)}")
-                return self._unreadable(start, self._size)
-            self._unreadable(start, following)
+                return self._unreadable(start, self._size, spared)
+            self._unreadable(start, following, spared)
             self._stream.seek(following)
 
     def _next_chunk(self, start: int) -> int | None:
@@ -261,17 +275,31 @@ class _Pass:
         except FlagdataError as error:
             self._copy.find("damaged-record", Severity.ERROR, f"a record left out: {error.what}", where=f"byte {start}")
 
+    def _spared(self, start: int, end: int) -> tuple[int, int] | None:
+        """Copy the messages of damaged bytes of the file that are sound by themselves: how many these are, and how many
+        there were; `None` where the record does not state it."""
+        found = self._sound.between(start, end)
+        if found is None:
+            return None
+        for message in found:
+            if message is not None:
+                self._copy.message(message)
+        lost = sum(message is None for message in found)
+        self._lost += lost
+        return len(found) - lost, len(found)
+
     def _chunk(self, content: bytes, start: int) -> None:
         chunk = parse(Chunk.read, content, where=self._where)
+        end = start + RECORD_HEAD + len(content)
         if chunk.uncompressed_size > CHUNK_LIMIT:
-            return self._damaged_chunk(start, f"it claims to unpack to {chunk.uncompressed_size} bytes")
+            return self._damaged_chunk(start, end, f"it claims to unpack to {chunk.uncompressed_size} bytes")
         try:
             inside, length = get_chunk_data_stream(chunk)
             records = inside.read(length)
         except Exception as error:  # noqa: BLE001  mcap, zstandard and lz4 each raise errors of their own
-            return self._damaged_chunk(start, f"it does not unpack: {error}")
+            return self._damaged_chunk(start, end, f"it does not unpack: {error}")
         if chunk.uncompressed_crc and zlib.crc32(records) != chunk.uncompressed_crc:
-            return self._damaged_chunk(start, "its checksum is wrong")
+            return self._damaged_chunk(start, end, "its checksum is wrong")
         for opcode, record in _whole_records(records):
             self._inner(opcode, record)
         return None
@@ -340,8 +368,13 @@ class _Pass:
         for opcode, record in _whole_records(self._rest(), among=frozenset(Opcode)):
             if opcode == Opcode.STATISTICS and len(record) >= 8:
                 held = int.from_bytes(record[:8], "little")
-        if held is not None and held > self._copy.counts.total():
-            lost = held - self._copy.counts.total()
+        lost = 0 if held is None else held - self._copy.counts.total() - self._lost
+        if lost > 0 and len(self._damaged) == 1:
+            (place,) = self._damaged
+            known = self._copy.findings[place]
+            said = f"{known.what}; {lost} of the record's {held} messages are lost with it"
+            self._copy.findings[place] = replace(known, what=said, count=lost)
+        elif lost > 0:
             self._copy.find(
                 "lost-messages", Severity.ERROR, f"{lost} of {held} messages of the record are lost", count=lost
             )
@@ -357,14 +390,30 @@ class _Pass:
             "cut-off", Severity.WARNING, f"the file ends {place}, at byte {self._size}", where=f"byte {start}"
         )
 
-    def _unreadable(self, start: int, end: int) -> None:
-        self._copy.find(
-            "unreadable", Severity.ERROR, f"bytes {start} to {end} hold no record that can be read",
-            where=f"byte {start}", count=end - start,
-        )  # fmt: skip
+    def _unreadable(self, start: int, end: int, spared: tuple[int, int] | None) -> None:
+        if spared is None:
+            self._damage("unreadable", start, f"bytes {start} to {end} hold no record that can be read")
+        else:
+            self._damage("unreadable", start, f"bytes {start} to {end} are damaged", spared)
 
-    def _damaged_chunk(self, start: int, why: str) -> None:
-        self._copy.find("damaged-chunk", Severity.ERROR, f"a chunk left out: {why}", where=f"byte {start}")
+    def _damaged_chunk(self, start: int, end: int, why: str) -> None:
+        spared = self._spared(start, end)
+        self._damage("damaged-chunk", start, ("a chunk left out: " if spared is None else "a chunk: ") + why, spared)
+
+    def _damage(self, kind: str, start: int, what: str, spared: tuple[int, int] | None = None) -> None:
+        """One finding for one place."""
+        if spared is None:
+            self._damaged.append(len(self._copy.findings))
+            self._copy.find(kind, Severity.ERROR, what, where=f"byte {start}")
+            return
+        kept, there = spared
+        if not there:
+            self._copy.find(kind, Severity.WARNING, f"{what}; no message was there", where=f"byte {start}")
+            return
+        self._copy.find(
+            kind, Severity.ERROR, f"{what}; {there - kept} of its {there} messages are lost", where=f"byte {start}",
+            count=there - kept,
+        )  # fmt: skip
 
 
 def _whole_records(body: bytes, *, among: frozenset[Opcode] = _IN_CHUNK) -> Iterator[tuple[int, bytes]]:

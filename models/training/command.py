@@ -114,7 +114,7 @@ def trained(
     from models.targets import Scaling
     from models.training.checkpoint import check_folder
     from models.training.inputs import film_rows, prepare_clips, prepare_films, stated
-    from models.training.publish import data_identity, network_artifact, publish
+    from models.training.publish import data_identity, network_artifact, publish, recordings_of
     from models.training.steps import Training
 
     recipe.check()
@@ -124,7 +124,8 @@ def trained(
     source.lake.check_writable()
     train_pairs, validation_pairs = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))
     data = data_identity(source.lake, train_pairs, validation_pairs, at=at)
-    wanted = network_artifact(recipe, data).id
+    recordings = recordings_of(train_pairs, validation_pairs)
+    wanted = network_artifact(source.lake, recipe, data, recordings, branch=branch).id
     known = source.lake.rows({"artifact": wanted}, at=branch, columns=["artifact"]).num_rows
     if known:
         say("this model was trained before")
@@ -170,7 +171,9 @@ def trained(
             ranks.barrier()  # no rank leaves while another still talks to it
         if not first:
             return None
-        row, card = publish(source.lake, recipe, data, done, batches=training.batches.state(), branch=branch)
+        row, card = publish(
+            source.lake, recipe, data, recordings, done, batches=training.batches.state(), branch=branch
+        )  # fmt: skip
     finally:
         held.close()
         if several:

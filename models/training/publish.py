@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -15,6 +16,8 @@ from models.training.recipe import TrainingRecipe
 from models.training.steps import Trained
 
 CURVES = "curves.png"
+PARENTS = 100
+"""Recordings that a model's row names as what it was made from, at most; their number is in its recipe."""
 
 
 def data_identity(lake: Lake, train: Pairs, validation: Pairs, *, at: str | None) -> dict[str, Any]:
@@ -25,10 +28,26 @@ def data_identity(lake: Lake, train: Pairs, validation: Pairs, *, at: str | None
     }  # fmt: skip
 
 
-def network_artifact(recipe: TrainingRecipe, data: dict[str, Any]) -> Artifact:
-    """The row of a model without its result; its identity, hence, is what goes in: recipe, data and seed."""
-    held = {"recipe": recipe.identity(), "data": {key: data[key] for key in ("train", "validation")}}
-    return Artifact(kind=Kind.NETWORK, name=recipe.name, recipe=held, seed=recipe.seed)
+def recordings_of(train: Pairs, validation: Pairs) -> list[str]:
+    """Ids of the recordings that a training learns from, sorted."""
+    return sorted({*train.table.recording.tolist(), *validation.table.recording.tolist()})
+
+
+def network_artifact(
+    lake: Lake, recipe: TrainingRecipe, data: dict[str, Any], recordings: Sequence[str], *, branch: str
+) -> Artifact:
+    """The row of a model without its result; its identity, hence, is what goes in: recipe, data and seed.
+
+    Its parents are the first `PARENTS` of the recordings that the branch shows: of thousands, ids in order are a random
+    sample. The fingerprints in its recipe state all data exactly.
+    """
+    held = {
+        "recipe": recipe.identity(), "data": {key: data[key] for key in ("train", "validation")},
+        "recordings": len(recordings),
+    }  # fmt: skip
+    shown = lake.rows({"artifact": recordings}, at=branch, columns=["artifact"])["artifact"].to_pylist()
+    parents = sorted(shown)[:PARENTS]
+    return Artifact(kind=Kind.NETWORK, name=recipe.name, recipe=held, seed=recipe.seed, parents=parents)
 
 
 def card_of(
@@ -48,14 +67,16 @@ def card_of(
 
 
 def publish(
-    lake: Lake, recipe: TrainingRecipe, data: dict[str, Any], trained: Trained, *, batches: dict[str, Any], branch: str
-) -> tuple[Artifact, dict[str, Any]]:
-    """Commit a model and return its row and card; one that is there already is kept.
+    lake: Lake, recipe: TrainingRecipe, data: dict[str, Any], recordings: Sequence[str], trained: Trained, *,
+    batches: dict[str, Any], branch: str,
+) -> tuple[Artifact, dict[str, Any]]:  # fmt: skip
+    """Commit a model and return its row and card; one that is there already is kept. A recording that was withdrawn
+    from the branch since the training began is not among its parents.
 
     Raises:
         FlagdataError: the disk refuses it.
     """
-    artifact = network_artifact(recipe, data)
+    artifact = network_artifact(lake, recipe, data, recordings, branch=branch)
     with lake.transaction(f"train {recipe.name}, seed {recipe.seed}", branch=branch) as transaction:
         staged = transaction.staging(".model")
         staged.mkdir()

@@ -30,7 +30,7 @@ from flagdata.locks import alone_in
 from models import estimator, shipping
 from models.storage import WEIGHTS, read_card
 from models.targets import Cloth
-from models.training import inputs
+from models.training import inputs, publish
 from models.training.command import sides_of
 from models.training.inputs import prepare_clips, prepare_films
 from models.training.recipe import TRAININGS, load, parse
@@ -67,6 +67,25 @@ def test_a_model_is_an_artifact_with_what_it_came_from(lake: Path) -> None:
     assert card["code_version"]
     assert card["batches"]["epoch"] == card["epochs"] == 3
     assert not list(Lake.open(lake).object_path(rows[0]["object"]).glob("*.pt"))
+
+
+def test_a_model_was_made_from_the_recordings_of_both_sides(lake: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = Lake.open(lake)
+    recipe = load(str(lake.parent / "small.toml"))
+    source = flagdata.open(lake)
+    train, validation = (sides_of(source, recipe, side, at="v1") for side in ("train", "validation"))
+    clips = {*train.table.artifact.tolist(), *validation.table.artifact.tolist()}
+    catalog = opened.rows(at="v1", columns=["artifact", "recording"]).to_pylist()
+    made_from = {row["recording"] for row in catalog if row["artifact"] in clips}
+    model = opened.rows({"kind": "network"}).to_pylist()[0]
+    assert set(model["parents"]) == made_from
+    monkeypatch.setattr(publish, "PARENTS", 2)
+    data = publish.data_identity(opened, train, validation, at="v1")
+    bounded = publish.network_artifact(
+        opened, recipe, data, [*publish.recordings_of(train, validation), "f" * 32], branch="main"
+    )
+    assert bounded.parents == tuple(sorted(made_from)[:2])
+    assert bounded.recipe["recordings"] == len(made_from) + 1
 
 
 def test_training_again_changes_nothing(lake: Path) -> None:
