@@ -20,6 +20,7 @@ EFFECTS = Registry(
         "lift": "sim.effects.lift:Lift",
         "added-mass": "sim.effects.added_mass:AddedMass",
         "reactive-loading": "sim.effects.reactive_loading:ReactiveLoading",
+        "finite-span-loading": "sim.effects.finite_span_loading:FiniteSpanLoading",
         "porosity": "sim.effects.porosity:Porosity",
         "permeability": "sim.effects.permeability:Permeability",
         "air-density": "sim.effects.air_density:AirDensityChange",

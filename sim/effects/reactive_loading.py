@@ -52,24 +52,24 @@ class ReactiveLoading(ForceEffect):
         return super().apply(system, state)
 
     def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        relative = velocity - wind
-        normal = mean_normals(cloth, position)
-        turning = mean_normal_rates(cloth, position, velocity)
-        across = (relative * normal).sum(1, keepdim=True)
-        slip = across * normal - relative
+        return -self.mass * momentum_rates(cloth, position, velocity, wind) * mean_normals(cloth, position)
 
-        g0, g1, g2 = shape_gradients(cloth, position)
-        v0, v1, v2 = cloth.at_corners(across)
-        s0, s1, s2 = cloth.at_corners(slip)
-        following = ((s0 + s1 + s2) / 3 * (g0 * v0 + g1 * v1 + g2 * v2)).sum(1, keepdim=True)
-        spreading = (v0 + v1 + v2) / 3 * (g0 * s0 + g1 * s1 + g2 * s2).sum(1, keepdim=True)
-        swept = (cloth.areas / 3)[:, None, None] * (following + spreading / 2)
-        convective = cloth.shared_out(swept)
-        return (
-            -self.mass
-            * (rest_areas(cloth)[:, None, None] * (turning * relative).sum(1, keepdim=True) + convective)
-            * normal
-        )
+
+def momentum_rates(cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    """A vertex's rest area times D V without the acceleration's term (see above): (vertex, 1, batch) [m³/s²]."""
+    relative = velocity - wind
+    normal = mean_normals(cloth, position)
+    turning = mean_normal_rates(cloth, position, velocity)
+    across = (relative * normal).sum(1, keepdim=True)
+    slip = across * normal - relative
+
+    g0, g1, g2 = shape_gradients(cloth, position)
+    v0, v1, v2 = cloth.at_corners(across)
+    s0, s1, s2 = cloth.at_corners(slip)
+    following = ((s0 + s1 + s2) / 3 * (g0 * v0 + g1 * v1 + g2 * v2)).sum(1, keepdim=True)
+    spreading = (v0 + v1 + v2) / 3 * (g0 * s0 + g1 * s1 + g2 * s2).sum(1, keepdim=True)
+    swept = (cloth.areas / 3)[:, None, None] * (following + spreading / 2)
+    return rest_areas(cloth)[:, None, None] * (turning * relative).sum(1, keepdim=True) + cloth.shared_out(swept)
 
 
 def shape_gradients(cloth: Cloth, position: Tensor) -> tuple[Tensor, Tensor, Tensor]:

@@ -143,10 +143,13 @@ class Acting {
     if (!sheets_) return;
     turn(x, level);
     scratch_.resize(7 * L * p.vertices);
-    const Sheet<V> sheet = {p.vertices, p.faces, p.face, p.gradients, p.areas, p.vertex_areas, x, level,
+    Sheet<V> sheet = {p.vertices, p.faces, p.face, p.gradients, p.areas, p.vertex_areas, x, level,
                             flows_ ? air_.data() : reinterpret_cast<const T*>(&wind), !flows_, normals_.data(),
-                            turning_.data(), scratch_.data()};
-    each<SheetForce>([&](const Effect<T>& effect, auto act) { act(number(effect), sheet, f); });
+                            turning_.data(), scratch_.data(), nullptr};
+    each<SheetForce>([&](const Effect<T>& effect, auto act) {
+      sheet.own = reinterpret_cast<const V*>(effect.of_element + b * p.vertices * effect.own * L);
+      act(number(effect), sheet, f);
+    });
   }
 
   // Adds the moments of effects at a hinge.

@@ -1,0 +1,205 @@
+"""The base model and candidates beside the published numbers: readings, their errors, a fit on some, the others judged.
+
+The error of a prediction is made of two parts, added in squares: the standard error over starts, and the largest change
+by another mesh (20 or 40 cells along the length for 30), another step (0.9 or 0.5 of the stability limit for 0.7), each
+less what starts alone would change. Numerics are varied at `_PROBED`, and a reading's largest relative change there
+counts for all flags.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tests.validation.paper_flag.cached import cached
+from tests.validation.real_flags import runs, waves
+from tests.validation.real_flags.published import FLAGS, PUBLISHED, STREAMING, Published, Role
+from tests.validation.real_flags.runs import READINGS, Flag, Numerics, simulated
+
+Effects = Mapping[str, Mapping[str, float]]
+Values = NDArray[np.float64]
+
+NAMED = "finite-span-loading"
+CANDIDATES: Mapping[str, tuple[str, tuple[float, ...]]] = {
+    NAMED: ("share", (0.15, 0.25, 0.35, 0.5)),
+    "reactive-loading": ("mass", (0.05, 0.15)),
+    "lift": ("coefficient", (0.5, 2.0)),
+    "tangential-quadratic-drag": ("coefficient", (0.01, 0.03)),
+}
+"""Effect → its strength, and the values at which it is simulated beside 0, the base model. The first is the one that
+the waves ask for; the others are wrong-effect controls with the same freedom."""
+_ALL = Numerics(starts=3)
+_FOUR = Numerics()
+_PROBED = tuple(flag for flag in STREAMING if flag.speed == 10)
+VARIANTS: Mapping[str, Numerics] = {
+    "as in the table": _FOUR,
+    "20 cells along": replace(_FOUR, columns=20),
+    "40 cells along": replace(_FOUR, columns=40),
+    "steps × 1.29": replace(_FOUR, safety=0.9),
+    "steps × 0.71": replace(_FOUR, safety=0.5),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """A candidate fitted to the numbers of the role "fit".
+
+    Attributes:
+        strength: at the least misfit.
+        interval: of the strengths that fit when one number of one flag is left out.
+        misfit: mean square of ln(prediction/published) over the tolerance's, of what was fitted to.
+    """
+
+    name: str
+    strength: float
+    interval: tuple[float, float]
+    misfit: float
+
+    @property
+    def effects(self) -> Effects:
+        """As `simulated` takes them."""
+        return {self.name: {CANDIDATES[self.name][0]: self.strength}}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Predictions:
+    """A model's readings of all flags.
+
+    Attributes:
+        mean: (flag, reading) over the starts.
+        error: (flag, reading) one standard error, of starts and numerics.
+        changes: variant → (probed flag, reading) its means, for the sheet.
+    """
+
+    mean: Values
+    error: Values
+    changes: Mapping[str, Values]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bench:
+    """Simulates, once for each model and numerics.
+
+    Attributes:
+        keep: folder of intermediate results; None keeps none.
+    """
+
+    keep: Path | None
+
+    def run(self, flags: Sequence[Flag], effects: Effects, numerics: Numerics) -> Values:
+        """(flag, start, reading)."""
+        inputs = {"flags": [asdict(flag) for flag in flags], "effects": effects, "numerics": asdict(numerics)}
+        made = cached(
+            self.keep, inputs, (runs, waves), lambda: {"values": simulated(flags, effects=effects, numerics=numerics)}
+        )
+        return made["values"]
+
+    def predictions(self, effects: Effects) -> Predictions:
+        """A model's readings with their errors."""
+        values = self.run(FLAGS, effects, _ALL)
+        probed = {name: self.run(_PROBED, effects, how) for name, how in VARIANTS.items()}
+        mean, error = values.mean(1), values.std(1, ddof=1) / math.sqrt(values.shape[1])
+        changes = {name: one.mean(1) for name, one in probed.items()}
+        numeric = numerical_error(list(probed.values()))
+        return Predictions(mean=mean, error=np.hypot(error, numeric * np.abs(mean)), changes=changes)
+
+    def fit(self, name: str) -> Fit:
+        """The strength of a candidate that suits the numbers of the role "fit" best."""
+        parameter, strengths = CANDIDATES[name]
+        grid = np.array([0.0, *strengths])
+        tables = [self.run(STREAMING, {name: {parameter: s}} if s else {}, _FOUR).mean(1) for s in grid]
+        return fitted(name, grid, np.array([on_all(table) for table in tables]))
+
+
+def on_all(values: Values) -> Values:
+    """(flag, reading) of `STREAMING` among those of `FLAGS`, NaN elsewhere."""
+    table = np.full((len(FLAGS), len(READINGS)), np.nan)
+    table[[FLAGS.index(flag) for flag in STREAMING]] = values
+    return table
+
+
+def numerical_error(probed: Sequence[Values]) -> Values:
+    """(reading,) largest relative change by a variant, less what starts alone would change; the first is the reference.
+
+    Args:
+        probed: (flag, start, reading) of each variant.
+    """
+    reference, *others = probed
+    chance = reference.var(1, ddof=1) / reference.shape[1]
+    largest = np.zeros(reference.shape[-1])
+    for other in others:
+        change = (other.mean(1) - reference.mean(1)) ** 2 - chance - other.var(1, ddof=1) / other.shape[1]
+        largest = np.maximum(largest, np.sqrt(np.clip(change, 0, None) / reference.mean(1) ** 2).max(0))
+    return largest
+
+
+def misfits(values: Values, role: Role) -> Values:
+    """ln(prediction/middle of the band) over half the band's logarithmic width, of all numbers of a role."""
+    found = []
+    for one in PUBLISHED:
+        if one.role is role and one.predicted is not None:
+            for prediction, (low, high) in zip(one.predicted(values), one.bands.values(), strict=True):
+                if low > 0:
+                    found.append((math.log(prediction) - math.log(low * high) / 2) / (math.log(high / low) / 2))
+    return np.array(found)
+
+
+def fitted(name: str, grid: Values, tables: Values) -> Fit:
+    """The least mean square misfit over strengths, by readings linear between those of the grid.
+
+    Args:
+        grid: (strength,) rising.
+        tables: (strength, flag, reading).
+    """
+    fine = np.linspace(grid[0], grid[-1], 201)
+    rows = []
+    for strength in fine:
+        upper = int(np.clip(np.searchsorted(grid, strength), 1, len(grid) - 1))
+        share = (strength - grid[upper - 1]) / (grid[upper] - grid[upper - 1])
+        rows.append(misfits((1 - share) * tables[upper - 1] + share * tables[upper], Role.FIT))
+    squares = np.array(rows) ** 2
+    left_out = [fine[int(np.argmin(np.delete(squares, i, axis=1).mean(1)))] for i in range(squares.shape[1])]
+    best = int(np.argmin(squares.mean(1)))
+    return Fit(
+        name=name, strength=float(round(fine[best], 3)), interval=(float(min(left_out)), float(max(left_out))),
+        misfit=float(squares[best].mean()),
+    )  # fmt: skip
+
+
+class Verdict:
+    """Words for how a prediction lies to its band."""
+
+    HELD = "held"
+    NOT_HELD = "not held"
+    OPEN = "within the error"
+    NOT_COMPARABLE = "not comparable"
+
+
+def judged(prediction: float, error: float, band: tuple[float, float]) -> str:
+    """Held within the band, not held where it lies outside by more than three of its errors, else open."""
+    low, high = band
+    outside = max(low - prediction, prediction - high)
+    if not math.isfinite(prediction):
+        return Verdict.NOT_COMPARABLE
+    if outside <= 0:
+        return Verdict.HELD
+    return Verdict.NOT_HELD if outside > 3 * error else Verdict.OPEN
+
+
+def with_errors(one: Published, predictions: Predictions) -> list[tuple[float, float]]:
+    """The predictions of a published number, each with one standard error, by moving each reading by its own."""
+    if one.predicted is None:
+        return []
+    middle = np.array(one.predicted(predictions.mean))
+    variance = np.zeros(len(middle))
+    for flag, reading in np.ndindex(predictions.mean.shape):
+        moved = predictions.mean.copy()
+        moved[flag, reading] += predictions.error[flag, reading]
+        change = np.array(one.predicted(moved)) - middle
+        variance += np.where(np.isfinite(change), change, 0.0) ** 2
+    return list(zip(middle.tolist(), np.sqrt(variance).tolist(), strict=True))
