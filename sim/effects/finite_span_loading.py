@@ -3,11 +3,11 @@
 As `sim.effects.reactive_loading`, −m_a (∂t + U ∂x)² η, with the air's mass of potential flow for a wave of wavenumber
 k on a strip of height H,
 
-    m(k) = s ρ / (k/2 + 4/(π H)),
+    m(k) = s ρ / ((k/2)^(3/2) + (4/(π H))^(3/2))^(2/3),
 
 which is 2 ρ/k for waves that are short beside H (an unbounded sheet, both sides) and π ρ H/4 for long ones (Lighthill's
-elongated body, J. Fluid Mech. 9:305, 1960, mean over the height); between them the reciprocals are added
-(`tests/sim/effects/test_finite_span_loading.py` compares with the potential flow of a strip; the effect of the span on
+elongated body, J. Fluid Mech. 9:305, 1960, mean over the height); between them the exponent is chosen, and the mass
+within 4 % of the potential flow of a strip (`tests/sim/effects/test_finite_span_loading.py`; the effect of the span on
 flutter: Eloy, Souilliez and Schouveiler, J. Fluids Struct. 23:904, 2007). A mass that does not fall with k would make
 every short wave grow.
 
@@ -52,7 +52,9 @@ _ALONG, _ACROSS = 12, 5
 
 @dataclass(frozen=True, kw_only=True)
 class FiniteSpanLoading(ForceEffect):
-    """−m (∂t + U ∂x)² η with the mass m(k) = s ρ/(k/2 + 4/(π H)) of a wave of wavenumber k on a strip of height H.
+    """−m (∂t + U ∂x)² η with the mass of air s m(k) that a wave of wavenumber k on a strip of height H moves.
+
+    m(k) = ρ ((k/2)^(3/2) + (4/(π H))^(3/2))^(−2/3): 2 ρ/k for short waves, π ρ H/4 for long ones.
 
     Attributes:
         share: s; 1 for potential flow.
@@ -108,7 +110,7 @@ class FiniteSpanLoading(ForceEffect):
 
 def strip_mass(wavenumber: float | NDArray[np.float64], height: float) -> float | NDArray[np.float64]:
     """m/ρ of potential flow for waves [1/m] on a strip of a height [m], mean over it [m]."""
-    return 1 / (wavenumber / 2 + 4 / (np.pi * height))
+    return ((wavenumber / 2) ** 1.5 + (4 / (np.pi * height)) ** 1.5) ** (-2 / 3)
 
 
 def extent(mesh: Mesh) -> tuple[float, float]:

@@ -63,8 +63,8 @@ class Numerics:
     safety: float = 0.7
     contact: bool = True
     starts: int = 4
-    settle: float = 4.0
-    kept: float = 8.0
+    settle: float = 3.0
+    kept: float = 6.0
     rate: float = 50.0
     seed: int = 1
 
