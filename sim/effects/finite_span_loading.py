@@ -108,8 +108,8 @@ class FiniteSpanLoading(ForceEffect):
         return self.share * self.density * strip_mass(np.pi / length, height)
 
 
-def strip_mass(wavenumber: float | NDArray[np.float64], height: float) -> float | NDArray[np.float64]:
-    """m/ρ of potential flow for waves [1/m] on a strip of a height [m], mean over it [m]."""
+def strip_mass(wavenumber: float, height: float) -> float:
+    """m/ρ of potential flow for a wave [1/m] on a strip of a height [m], mean over it [m]."""
     return ((wavenumber / 2) ** 1.5 + (4 / (np.pi * height)) ** 1.5) ** (-2 / 3)
 
 
@@ -147,7 +147,7 @@ def relative_masses(mesh: Mesh) -> NDArray[np.float64]:
     """
     length, height = extent(mesh)
     k = np.hypot(np.pi / length * np.arange(_ALONG), (np.pi / height * np.arange(_ACROSS))[:, None]).ravel()
-    masses = np.asarray(strip_mass(k, height)) / strip_mass(np.pi / length, height)
+    masses = np.array([strip_mass(one, height) for one in k]) / strip_mass(np.pi / length, height)
     cell = np.sqrt(2 * mesh.areas.mean())
     squares = (cosines(mesh) ** 2 * mesh.vertex_areas[:, None]).sum(0)
     return np.where(k < np.pi / (2 * cell), masses / squares, 0.0)

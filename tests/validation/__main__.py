@@ -27,6 +27,7 @@ VALIDATIONS = {
     "paper-flag": "tests.validation.paper_flag.validate",
     "power": "tests.validation.power",
     "real-flag": "tests.validation.real_flag",
+    "real-flags": "tests.validation.real_flags.validate",
     "refinement": "tests.validation.refinement",
     "renderers": "tests.validation.renderers",
     "robot-cloth": "tests.validation.robot_cloth",

@@ -50,7 +50,7 @@ class Numerics:
     """How a flag is simulated.
 
     Attributes:
-        columns: cells along the length.
+        columns: cells along the length, so many that those over the height are even: there is a middle line.
         safety: share of the stability limit that a step takes.
         contact: whether layers keep apart.
         starts: how many runs, which differ by 1 mm of noise in the start.
@@ -59,7 +59,7 @@ class Numerics:
         seed: of the noise.
     """
 
-    columns: int = 30
+    columns: int = 18
     safety: float = 0.7
     contact: bool = True
     starts: int = 4

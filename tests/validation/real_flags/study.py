@@ -1,8 +1,8 @@
 """The base model and candidates beside the published numbers: readings, their errors, a fit on some, the others judged.
 
 The error of a prediction is made of two parts, added in squares: the standard error over starts, and the largest change
-by another mesh (20 or 40 cells along the length for 30), another step (0.9 or 0.5 of the stability limit for 0.7), each
-less what starts alone would change. Numerics are varied at `_PROBED`, and a reading's largest relative change there
+by another mesh (12 or 27 cells along the length for 18), another step (0.9 or 0.5 of the stability limit for 0.7), each
+less what starts alone would change. Numerics are varied at `PROBED`, and a reading's largest relative change there
 counts for all flags.
 """
 
@@ -33,12 +33,12 @@ CANDIDATES: Mapping[str, tuple[str, tuple[float, ...]]] = {
 }
 """Effect → its strength, and the values at which it is simulated beside 0, the base model. The first is the one that
 the waves ask for; the others are wrong-effect controls with the same freedom."""
-_TWO, _FOUR = Numerics(starts=2), Numerics(starts=4)
-_PROBED = tuple(flag for flag in STREAMING if flag.speed == 10)
+TWO, _FOUR = Numerics(starts=2), Numerics(starts=4)
+PROBED = tuple(flag for flag in STREAMING if flag.speed == 10)
 VARIANTS: Mapping[str, Numerics] = {
     "as in the table": _FOUR,
-    "20 cells along": replace(_FOUR, columns=20),
-    "40 cells along": replace(_FOUR, columns=40),
+    "12 cells along": replace(_FOUR, columns=12),
+    "27 cells along": replace(_FOUR, columns=27),
     "steps × 1.29": replace(_FOUR, safety=0.9),
     "steps × 0.71": replace(_FOUR, safety=0.5),
 }
@@ -51,13 +51,13 @@ class Fit:
     Attributes:
         strength: at the least misfit.
         interval: of the strengths that fit when one number of one flag is left out.
-        misfit: mean square of ln(prediction/published) over the tolerance's, of what was fitted to.
+        readings: (flag, reading) there, of `STREAMING`, linear between the strengths simulated; NaN for other flags.
     """
 
     name: str
     strength: float
     interval: tuple[float, float]
-    misfit: float
+    readings: Values
 
     @property
     def effects(self) -> Effects:
@@ -86,12 +86,15 @@ class Bench:
 
     Attributes:
         keep: folder of intermediate results; None keeps none.
+        seed: of the starts.
     """
 
     keep: Path | None
+    seed: int = 1
 
     def run(self, flags: Sequence[Flag], effects: Effects, numerics: Numerics) -> Values:
         """(flag, start, reading)."""
+        numerics = replace(numerics, seed=self.seed)
         inputs = {"flags": [asdict(flag) for flag in flags], "effects": effects, "numerics": asdict(numerics)}
         made = cached(
             self.keep, inputs, (runs, waves), lambda: {"values": simulated(flags, effects=effects, numerics=numerics)}
@@ -100,8 +103,8 @@ class Bench:
 
     def predictions(self, effects: Effects) -> Predictions:
         """A model's readings with their errors."""
-        values = self.run(FLAGS, effects, _TWO)
-        probed = {name: self.run(_PROBED, effects, how) for name, how in VARIANTS.items()}
+        values = self.run(FLAGS, effects, TWO)
+        probed = {name: self.run(PROBED, effects, how) for name, how in VARIANTS.items()}
         mean = values.mean(1)
         relative = np.hypot(scatter(values) / math.sqrt(values.shape[1]), numerical_error(list(probed.values())))
         changes = {name: one.mean(1) for name, one in probed.items()}
@@ -111,7 +114,7 @@ class Bench:
         """The strength of a candidate that suits the numbers of the role "fit" best."""
         parameter, strengths = CANDIDATES[name]
         grid = np.array([0.0, *strengths])
-        tables = [self.run(STREAMING, {name: {parameter: s}} if s else {}, _TWO).mean(1) for s in grid]
+        tables = [self.run(STREAMING, {name: {parameter: s}} if s else {}, TWO).mean(1) for s in grid]
         return fitted(name, grid, np.array([on_all(table) for table in tables]))
 
 
@@ -143,13 +146,12 @@ def numerical_error(probed: Sequence[Values]) -> Values:
 
 
 def misfits(values: Values, role: Role) -> Values:
-    """ln(prediction/middle of the band) over half the band's logarithmic width, of all numbers of a role."""
+    """What predictions are off the middle of their bands by, in halves of the width: all bands of a role."""
     found = []
     for one in PUBLISHED:
         if one.role is role and one.predicted is not None:
             for prediction, (low, high) in zip(one.predicted(values), one.bands.values(), strict=True):
-                if low > 0:
-                    found.append((math.log(prediction) - math.log(low * high) / 2) / (math.log(high / low) / 2))
+                found.append((prediction - (low + high) / 2) / ((high - low) / 2))
     return np.array(found)
 
 
@@ -161,17 +163,18 @@ def fitted(name: str, grid: Values, tables: Values) -> Fit:
         tables: (strength, flag, reading).
     """
     fine = np.linspace(grid[0], grid[-1], 201)
-    rows = []
+    rows, between = [], []
     for strength in fine:
         upper = int(np.clip(np.searchsorted(grid, strength), 1, len(grid) - 1))
         share = (strength - grid[upper - 1]) / (grid[upper] - grid[upper - 1])
-        rows.append(misfits((1 - share) * tables[upper - 1] + share * tables[upper], Role.FIT))
+        between.append((1 - share) * tables[upper - 1] + share * tables[upper])
+        rows.append(misfits(between[-1], Role.FIT))
     squares = np.array(rows) ** 2
     left_out = [fine[int(np.argmin(np.delete(squares, i, axis=1).mean(1)))] for i in range(squares.shape[1])]
     best = int(np.argmin(squares.mean(1)))
     return Fit(
         name=name, strength=float(round(fine[best], 3)), interval=(float(min(left_out)), float(max(left_out))),
-        misfit=float(squares[best].mean()),
+        readings=between[best],
     )  # fmt: skip
 
 
