@@ -11,17 +11,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
 from measure.calibrate import numerics
 from measure.calibrate.design import FAR, Design, simulated
-from measure.calibrate.emulator import SOUGHT, Emulator, Posterior, Sight, posterior, weighed
+from measure.calibrate.emulator import Emulator, informative
 from measure.calibrate.observed import Observed, constant_wind
+from measure.calibrate.posterior import Posterior, Sight, posterior, weighed
 from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Floats, Uncertain
+from measure.calibrate.scatter import TAKEN_APART
 from measure.calibrate.simulation import OBSERVED, Flag
 from measure.calibrate.summary import shown
 
-ANSWER = 2
+ANSWER = 3
 """Raised when the same recordings and options get another answer."""
 DETERMINED = 0.8
 """Share of the prior's spread, in ranks, below which a posterior is an answer: above it, it is the prior."""
@@ -241,17 +244,66 @@ def calibrate(
         advance: called with the number of flags that were simulated or found.
 
     Raises:
-        InputError: see `Observed` and `Emulator.fit`.
+        InputError: see `Observed`, `designs_of` and `Emulator.fit`.
     """
     made: list[tuple[Observed, Mapping[str, Floats], Floats]] = []
-    for one in recordings:
-        design = Design(
-            flag=options.flag, log=one.log, duration=one.duration, azimuth=options.azimuth,
-            elevation=options.elevation, count=options.simulations, seed=options.seed, distance=options.distance,
-        )  # fmt: skip
+    for one, design in zip(recordings, designs_of(recordings, options), strict=True):
         readings = simulated(design, folder=folder, workers=workers, advance=advance)
         made.append((one, design.values(), readings))
     return answered(made, options)
+
+
+def designs_of(recordings: Sequence[Observed], options: Options) -> list[Design]:
+    """What is simulated for each of several recordings of one cloth.
+
+    Raises:
+        InputError: a recording that is given twice.
+    """
+    names = [f"{one.source} {one.name} {one.first:g}" for one in recordings]
+    twice = [one.name for place, one in enumerate(recordings) if names[place] in names[:place]]
+    if twice:
+        raise InputError(f"{twice[0]} is given twice", where="recordings", fix="give each recording of the flag once")
+    return [
+        Design(
+            flag=options.flag, log=one.log, duration=one.duration, azimuth=options.azimuth,
+            elevation=options.elevation, count=options.simulations, seed=options.seed, distance=options.distance,
+            recording=name, place=name if one.place is None else one.place,
+        )
+        for one, name in zip(recordings, names, strict=True)
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Simulated:
+    """A recording with its simulations.
+
+    Attributes:
+        values: name → (simulation,).
+        summaries: (simulation, summary) with what numerics and pixels may add to them.
+        used: (summary,) those that are weighed by.
+    """
+
+    observed: Observed
+    values: Mapping[str, Floats]
+    summaries: Floats
+    used: NDArray[np.bool_]
+
+    def rows(self, which: NDArray[np.int64]) -> _Simulated:
+        """With some of the simulations."""
+        values = {name: own[which] for name, own in self.values.items()}
+        return replace(self, values=values, summaries=self.summaries[which])
+
+    def sight(self, options: Options) -> Sight:
+        """With an emulator fitted to the simulations.
+
+        Raises:
+            InputError: see `Emulator.fit`.
+        """
+        one = self.observed
+        return Sight(
+            emulator=Emulator.fit(self.values, self.summaries, self.used, name=one.name), azimuth=options.azimuth,
+            elevation=options.elevation, place=one.place,
+        )  # fmt: skip
 
 
 def answered(simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats]], options: Options) -> Calibration:
@@ -261,26 +313,16 @@ def answered(simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats]
     Raises:
         InputError: see `Emulator.fit`.
     """
-    made: list[tuple[Observed, Mapping[str, Floats], Floats, NDArray[np.bool_]]] = []
-    sights: list[Sight] = []
+    made = []
     for one, values, readings in simulations:
         summaries = with_errors(one, readings, seed=options.seed)
-        used = np.tile(shown(one.readings), 2 if one.projection.changes else 1)
-        emulator = Emulator.fit(values, summaries, used)
-        made.append((one, values, summaries, used))
-        sights.append(
-            Sight(
-                emulator=emulator,
-                observed=one.summary,
-                azimuth=options.azimuth,
-                elevation=options.elevation,
-                place=one.place,
-            )
-        )
-    found = posterior(sights, seed=options.seed)
+        looked = np.tile(shown(one.readings), 2 if one.projection.changes else 1)
+        used = informative(values, summaries, looked, name=one.name)
+        made.append(_Simulated(observed=one, values=values, summaries=summaries, used=used))
+    sights = [one.sight(options) for one in made]
+    found = posterior(sights, [one.observed.summary for one in made], seed=options.seed)
     fitted = tuple(
-        _fitted(one, sight, summaries, found, place, options)
-        for place, ((one, _, summaries, _), sight) in enumerate(zip(made, sights, strict=True))
+        _fitted(one, sight, found, place, options) for place, (one, sight) in enumerate(zip(made, sights, strict=True))
     )
     calibration = Calibration(
         options=options, draws=found, recordings=fitted, check=left_out(made, options),
@@ -330,43 +372,38 @@ def _assumed(about: Uncertain, level: float) -> Quantity:
     return quantity(about, about.at(np.linspace(0.0, 1.0, 1001)), level)
 
 
-def left_out(
-    made: Sequence[tuple[Observed, Mapping[str, Floats], Floats, NDArray[np.bool_]]], options: Options
-) -> Check:
-    """Weigh simulations of the first recording's log, an eighth at a time, by emulators fitted to the others."""
-    _, values, summaries, used = made[0]
-    complete = np.flatnonzero(np.isfinite(summaries[:, used]).all(axis=1))
+def left_out(made: Sequence[_Simulated], options: Options) -> Check:
+    """Weigh simulations of all recordings together, an eighth at a time, by emulators fitted to the others; of the
+    first recording alone where the others are of other cloths."""
+    weights = [one.values[CLOTH[0].name] for one in made]
+    made = [one for one, own in zip(made, weights, strict=True) if np.array_equal(own, weights[0])]
+    complete = np.flatnonzero(np.all([np.isfinite(one.summaries[:, one.used]).all(axis=1) for one in made], axis=0))
     rng = stream(options.seed, "calibrate", "check")
     chosen = rng.permutation(complete)[:_CHECKED]
     errors: list[float] = []
     held = 0
-    for fold in range(_FOLDS):
+    for fold in range(min(_FOLDS, len(chosen))):
         own = chosen[fold::_FOLDS]
-        rest = np.setdiff1d(np.arange(len(summaries)), own)
-        emulator = Emulator.fit({name: v[rest] for name, v in values.items()}, summaries[rest], used)
-        if not len(own):
-            continue
-        sight = Sight(
-            emulator=emulator, observed=summaries[own[0]], azimuth=options.azimuth, elevation=options.elevation
-        )
-        weight = weighed(sight, summaries[own], seed=child_seed(options.seed, "check", fold))[SOUGHT[0]]
-        truth = values[SOUGHT[0]][own]
+        rest = np.setdiff1d(np.arange(len(weights[0])), own)
+        sights = [one.rows(rest).sight(options) for one in made]
+        seed = child_seed(options.seed, "check", fold)
+        weight = weighed(sights, [one.summaries[own] for one in made], seed=seed)[CLOTH[0].name]
+        truth = weights[0][own]
         low, middle, high = np.quantile(weight, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=1)
         held += int(((low <= truth) & (truth <= high)).sum())
         errors.extend(np.abs(middle / truth - 1).tolist())
-    return Check(count=len(errors), held=held, error=float(np.median(errors)))
+    return Check(count=len(errors), held=held, error=float(np.median(errors)) if errors else math.nan)
 
 
 def _placed(options: Options) -> tuple[Uncertain, ...]:
     return (*(q for q in NUISANCES if q.name == "gain"), options.azimuth, options.elevation)
 
 
-def _fitted(
-    one: Observed, sight: Sight, summaries: Floats, found: Posterior, place: int, options: Options
-) -> Fitted:  # fmt: skip
+def _fitted(made: _Simulated, sight: Sight, found: Posterior, place: int, options: Options) -> Fitted:
     """What the emulator says that flags of the posterior show."""
+    one, summaries = made.observed, made.summaries
     values = {**found.cloth, **found.places[place]}
-    predicted = sight.emulator.predict(values, seed=options.seed)
+    predicted = sight.emulator.draw(values, seed=options.seed)
     used = sight.emulator.used
     count = len(OBSERVED)
     # What depends on nothing that is regressed on is that of simulations at random.
@@ -409,6 +446,8 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
         if one.failed > 0.1 * calibration.options.simulations:
             what = f"{one.failed} of {calibration.options.simulations} simulations of {one.observed.name} were left out"
             found.append(Finding(kind="failed-simulations", severity=Severity.WARNING, what=what))
+    if not calibration.draws.together:
+        found.append(TAKEN_APART)
     check, level = calibration.check, calibration.options.level
     if check.held < check.count * level - 2.6 * math.sqrt(check.count * level * (1 - level)):
         what = (

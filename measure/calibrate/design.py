@@ -17,12 +17,13 @@ import numpy as np
 from flagdata.errors import CorruptError
 from flagdata.lake.durable import put_if_absent
 from flagdata.provenance import canonical, digest
-from flagdata.rng import child_seed
+from flagdata.rng import child_seed, stream
 from measure.calibrate.prior import (
     AZIMUTH,
     CLOTH,
     DISTANCE,
     ELEVATION,
+    FABRIC,
     NUISANCES,
     Floats,
     Uncertain,
@@ -49,6 +50,9 @@ class Design:
         count: of simulations.
         seed: of all draws.
         distance: of the camera [m].
+        recording: what recordings of one cloth differ by: their simulations are of the same cloths, each recording's in
+            turbulence of its own.
+        place: the same of places and anemometers, which recordings may share.
     """
 
     flag: Flag
@@ -59,18 +63,25 @@ class Design:
     count: int = 128
     seed: int = 0
     distance: float = FAR
+    recording: str = ""
+    place: str = ""
 
     def quantities(self) -> tuple[Uncertain, ...]:
         """What differs among the simulations."""
         known = self.log.distance is not None
         return (
-            *CLOTH, *NUISANCES, self.azimuth, self.elevation, *(() if known else (DISTANCE,)),
+            *CLOTH, *FABRIC, *NUISANCES, self.azimuth, self.elevation, *(() if known else (DISTANCE,)),
             *((clock_error(self.log.clock),) if self.log.clock else ()),
         )  # fmt: skip
 
     def values(self) -> Mapping[str, Floats]:
         """Name → (count,), by ascending damping, so that batches can be simulated in long steps."""
-        drawn = dict(draws(self.quantities(), self.count, seed=self.seed, name="design"))
+        # In another order in each place: two scramblings of a Sobol sequence are correlated, row by row.
+        own = child_seed(self.seed, "calibrate", "place", self.place)
+        order = stream(own, "calibrate", "order").permutation(self.count)
+        there = draws(self.quantities(), self.count, seed=own, name="design")
+        drawn = {name: values[order] for name, values in there.items()}
+        drawn |= draws((*CLOTH, *FABRIC), self.count, seed=self.seed, name="cloths")
         if self.log.distance is not None:
             drawn[DISTANCE.name] = np.full(self.count, self.log.distance)
         order = np.argsort(drawn["damping"], kind="stable")
@@ -87,7 +98,7 @@ class Design:
                 values={name: own[first : first + BATCH] for name, own in shared.items()},
                 places=places[first : first + BATCH, None],
                 seeds=tuple(
-                    child_seed(self.seed, "calibrate", "flag", place)
+                    child_seed(self.seed, "calibrate", "flag", self.recording, place)
                     for place in range(first, min(first + BATCH, self.count))
                 ),
             )

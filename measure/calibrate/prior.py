@@ -100,11 +100,18 @@ CLOTH = (
     ),
 )  # fmt: skip
 """What is sought."""
-NUISANCES = (
+FABRIC = (
     Uncertain(
         name="stretching", unit="1", prior=_log(0.5, 2.0),
         source="factor on the table of the fabric that a simulation draws, as nulls of verdicts vary it",
     ),
+    Uncertain(
+        name="fabric", unit="1", prior=Range(low=0.0, high=1.0),
+        source="place in the list of the fabrics that Wang et al. 2011 measured, none of which is a flag's",
+    ),
+)  # fmt: skip
+"""What a cloth is beside, the same in all recordings of it: left to the scatter."""
+NUISANCES = (
     Uncertain(name="gain", unit="1", prior=Normal(mean=1.0, sigma=0.03), source="classes of cups, IEC 61400-12-1"),
     Uncertain(
         name="scale", unit="1", prior=Normal(mean=1.0, sigma=0.01),
@@ -115,7 +122,8 @@ NUISANCES = (
         source="integral length along the wind, 50 to 100 m at 10 m height and less near the ground (ESDU 85020)",
     ),
 )  # fmt: skip
-"""What a simulation needs beside, known only so far. Gain and scale are fitted, the others left to the scatter."""
+"""What a simulation needs beside, another one in each recording. Gain and scale are fitted, eddies are left to the
+scatter."""
 DISTANCE = Uncertain(
     name="distance_constant", unit="m", prior=_log(1.5, 5.0), source="cups (ISO 17713-1; WMO-No. 8)",
 )  # fmt: skip

@@ -51,7 +51,7 @@ SETTLE = 4.0
 """s before the film's first frame that are simulated and not looked at: two swings of a flag of 1.5 m."""
 BATCH = 16
 """Flags that are simulated together: what a vector register holds in single precision."""
-VERSION = 3
+VERSION = 4
 """Raised where the same batch gives other numbers."""
 OBSERVED = (
     "droop", "extension", "middle-speed", "frequency", "bandwidth", "amplitude-up", "amplitude-across", "area",
@@ -101,7 +101,7 @@ class Batch:
         log: of the wind beside it.
         duration: of the film, a whole number of windows [s].
         values: name of a quantity → (flag,): area_weight, bending, damping, stretching, gain, scale, eddies,
-            distance_constant; clock_error [s] where the log's clock is uncertain.
+            fabric, distance_constant; clock_error [s] where the log's clock is uncertain.
         places: azimuth, elevation [rad] and distance [m] of each place, (flag, place, 3).
         seeds: (flag,) of the start and the turbulence.
         columns: of the mesh.
@@ -208,7 +208,7 @@ class Batch:
         own = {name: float(values[place]) for name, values in self.values.items()}
         return cloth(
             own["area_weight"], own["bending"], max(own["damping"] - damped, 0.0), stretching=own["stretching"],
-            fabric=FABRICS[int(stream(self.seeds[place], "calibrate", "fabric").integers(len(FABRICS)))],
+            fabric=FABRICS[int(own["fabric"] * len(FABRICS))],
         )  # fmt: skip
 
     def _wind(self, system: System) -> SegmentWind:

@@ -12,7 +12,7 @@ from measure.films.page import page
 from measure.films.run import Outcome
 from measure.verdict.record import Verdict
 
-ANSWER = 1
+ANSWER = 2
 """Raised when the same recordings and options get another answer."""
 
 

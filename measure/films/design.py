@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from flagdata.rng import child_seed, stream
 from measure.calibrate.design import Design
 from measure.calibrate.discretisation import LITTLE, Discretisation
-from measure.calibrate.prior import CLOTH, NUISANCES, Floats, draws
+from measure.calibrate.prior import CLOTH, FABRIC, Floats, draws
 from measure.calibrate.simulation import Batch
 from measure.films.library import Weighable
 from measure.observables.observable import WINDOW
@@ -98,11 +98,13 @@ def nulls(designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed:
         places: for each recording the first one of its place.
     """
     count = kinds * TOGETHER
-    fabric = (*CLOTH, *(one for one in NUISANCES if one.name == "stretching"))
-    cloths = draws(fabric, count, seed=seed, name="null cloths")
+    cloths = draws((*CLOTH, *FABRIC), count, seed=seed, name="null cloths")
     found = []
     for number, design in zip(places, designs, strict=True):
-        own = dict(draws(design.quantities(), count, seed=child_seed(seed, "films", number), name="null places"))
+        own = {
+            one.name: one.at(stream(seed, "films", "null places", number, one.name).random(count))
+            for one in design.quantities()
+        }
         own |= cloths
         if design.log.distance is not None:
             own["distance_constant"] = np.full(count, design.log.distance)
@@ -117,7 +119,7 @@ def nulls(designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed:
             batches.append(
                 replace(
                     first, values=values, places=seen[part][:, None], discretisation=numerics,
-                    seeds=tuple(child_seed(seed, "films", "null", int(place)) for place in part),
+                    seeds=tuple(child_seed(seed, "films", "null", design.recording, int(place)) for place in part),
                 )
             )  # fmt: skip
         found.append(batches)

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln, logsumexp, ndtr
 
-from measure.calibrate.emulator import BESIDE
-from measure.calibrate.prior import CLOTH, NUISANCES, Floats, Uncertain
-from measure.films.model import Model
-from measure.films.scatter import Scatter, scatter
+from measure.calibrate.prior import Floats, Uncertain
+from measure.calibrate.scatter import Scatter, scatter
+from measure.calibrate.sights import Placed, dimension, values
+from measure.films.model import Model, missed
 
 _STEPS = 14
 _DIFFERENCE = 1e-3
@@ -35,24 +35,14 @@ _TAIL = 6.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sight:
+class Sight(Placed):
     """One recording's model and place.
 
     Attributes:
         model: of its summaries.
-        azimuth, elevation: their priors.
-        place: what recordings from one place with one anemometer share; None for a place of its own.
     """
 
     model: Model
-    azimuth: Uncertain
-    elevation: Uncertain
-    place: str | None = None
-
-    @property
-    def quantities(self) -> tuple[Uncertain, ...]:
-        """That are fitted for it alone."""
-        return (*(one for one in NUISANCES if one.name in BESIDE), self.azimuth, self.elevation)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,30 +113,19 @@ class Hypothesis:
     @cached_property
     def scatter(self) -> Scatter:
         """Of all recordings' summaries about their prediction."""
-        return scatter([one.model for one in self.sights], None if self.effect is None else self.effect.name)
+        models = [one.model for one in self.sights]
+        beside = None if self.effect is None else missed(models, self.effect.name)
+        return scatter([one.base for one in models], beside)
 
     @property
     def dimension(self) -> int:
         """Of the scores: cloth, then each recording's place, then the strength."""
-        own = sum(len(self.sights[first].quantities) for first in set(self._owners))
-        return len(CLOTH) + own + (self.effect is not None)
-
-    @property
-    def _owners(self) -> list[int]:
-        """For each sight the first one of its place."""
-        return first_of([one.place for one in self.sights])
+        return dimension(self.sights) + (self.effect is not None)
 
     def values(self, scores: Floats) -> tuple[dict[str, Floats], list[dict[str, Floats]], Floats | None]:
         """Cloths, places of each recording, and strengths beyond null, at normal scores (n, dimension)."""
-        shares = iter(ndtr(scores).T)
-        cloth = {one.name: one.at(next(shares)) for one in CLOTH}
-        owners = self._owners
-        own = {
-            first: {one.name: one.at(next(shares)) for one in self.sights[first].quantities}
-            for first in sorted(set(owners))
-        }
-        places = [own[first] for first in owners]
-        return cloth, places, None if self.effect is None else self.effect.at(next(shares))
+        cloth, places = values(scores, self.sights)
+        return cloth, places, None if self.effect is None else self.effect.at(ndtr(scores[:, -1]))
 
     def predicted(self, scores: Floats) -> tuple[Floats, Floats, Floats]:
         """Means (n, k) of all recordings' summaries, their variances (n, k) in the scatter's coordinates, and the area
@@ -249,8 +228,3 @@ def quantiles(values: Floats, weights: Floats, shares: Sequence[float]) -> list[
     order = np.argsort(values)
     total: NDArray[np.float64] = np.cumsum(weights[order])
     return [float(values[order][min(int(np.searchsorted(total, share)), len(order) - 1)]) for share in shares]
-
-
-def first_of(places: Sequence[str | None]) -> list[int]:
-    """For each recording the first one of its place; None is a place of its own."""
-    return [number if name is None else list(places).index(name) for number, name in enumerate(places)]

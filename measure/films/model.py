@@ -1,36 +1,36 @@
 """What summaries a recording would have of a cloth, a place, and an effect of a strength.
 
-Without an effect this is the regression of `measure.refine.metamodel` on the base model's simulations, of all summaries
-that the recording shows. An effect adds what it changed in pairs of simulations,
+Without an effect this is the emulator of a calibration, of all summaries that the recording shows. An effect adds what
+it changed in pairs of simulations,
 
     Δ = Dᵀz(s, θ),   z = (u, u², u ln w),
 
 u the strength or its logarithm, whichever predicts pairs that are left out better, and w the area weight. How far what
-is shown lies from its prediction is in `measure.films.scatter`.
+is shown lies from its prediction is in `measure.calibrate.scatter`. With an effect its covariance has a second part, R,
+of the residuals of pairs about the effect's regression: h R for what so few pairs leave open of it, and R once more for
+what the regression misses.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError
-from measure.calibrate.emulator import regressors
+from measure.calibrate.emulator import Emulator
 from measure.calibrate.prior import Floats
 from measure.films.library import Weighable
-from measure.refine.metamodel import Metamodel, least
 
-SHOWN_BY = 0.8
-"""Share of the simulations that are to show a summary that is used."""
 _RIDGE = 1e-3
 """Added to ZᵀZ, whose columns are of the order of one."""
 FEWEST_PAIRS = 8
 _MIDDLE_WEIGHT = 0.15
 """kg/m² about which the area weight changes what an effect does."""
+_SHRUNK = 0.5
+"""Share of the pairs' covariances between summaries that is kept: they are from some dozen residuals."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,64 +62,36 @@ class Model:
 
     Attributes:
         base: of the summaries that are used.
-        used: (2·observable,) which.
-        residuals: (simulation, k) of the base model's simulations; NaN of those that do not show all.
-        weights: (simulation,) their area weights [kg/m²], by which recordings of the same cloths are known.
         responses: name of an effect → what it changes.
     """
 
-    base: Metamodel
-    used: NDArray[np.bool_]
-    residuals: Floats
-    weights: Floats
-    responses: Mapping[str, Response]
+    base: Emulator
+    responses: Mapping[str, Response] = field(default_factory=dict)
 
     @property
-    def factor(self) -> Floats:
-        """Lower Cholesky factor of the scale matrix."""
-        return np.asarray(np.linalg.cholesky(self.base.scatter / self.base.freedom), dtype=np.float64)
+    def used(self) -> NDArray[np.bool_]:
+        """(2·observable,) which summaries are used."""
+        return self.base.used
 
     def predict(
         self, values: Mapping[str, Floats], effect: str | None = None, strength: Floats | None = None
     ) -> tuple[Floats, Floats, Floats]:
         """Means (n, k) of the used summaries, factors (n,) of the scatter, and of the pairs' residuals' covariance."""
-        x = (regressors(values) - self.base.centre) / self.base.spread
-        x = np.concatenate([np.ones((len(x), 1)), x], axis=1)
-        mean, stretch = x @ self.base.coefficients, 1 + ((x @ self.base.inverse) * x).sum(axis=1)
+        mean, stretch = self.base.predict(values)
         if effect is None or strength is None:
-            return mean, stretch, np.zeros(len(x))
+            return mean, stretch, np.zeros(len(mean))
         own = self.responses[effect]
         z = own.features(strength, values["area_weight"])
         return mean + z @ own.coefficients, stretch, ((z @ own.inverse) * z).sum(axis=1)
 
 
-def fit(values: Mapping[str, Floats], summaries: Floats, shown: NDArray[np.bool_], *, name: str) -> Model:
-    """The base model's part.
-
-    Args:
-        values: name → (n,) of the simulations.
-        summaries: (n, k), NaN where a simulation does not show one.
-        shown: (k,) those that the recording shows.
-        name: of the recording.
-
-    Raises:
-        InputError: too few simulations show what the recording shows.
-    """
-    there = np.isfinite(summaries)
-    used = shown & (there.mean(axis=0) > SHOWN_BY)
-    complete = np.asarray(there[:, used].all(axis=1) & used.any(), dtype=np.bool_)
-    x, y = regressors(values)[complete], summaries[complete][:, used]
-    needed = least(x.shape[1] + 1, int(used.sum())) + 8
-    if len(x) < needed:
-        raise InputError(
-            f"{len(x)} of {len(summaries)} simulations show what the film shows, and {needed} are needed", where=name,
-            fix="check --flag-size, --attachment and --azimuth: flags that were simulated so look otherwise",
-        )  # fmt: skip
-    base = Metamodel.fit(x, y, np.arange(len(x)))
-    model = Model(base=base, used=used, residuals=np.zeros(0), weights=values["area_weight"], responses={})
-    mean, _, _ = model.predict(values)
-    residuals = np.where(complete[:, None], summaries[:, used] - mean, np.nan)
-    return replace(model, residuals=residuals)
+def missed(models: Sequence[Model], effect: str) -> Floats:
+    """(k, k) covariance R of the pairs' residuals, of several recordings' summaries together."""
+    responses = [one.responses[effect] for one in models]
+    residuals = np.concatenate([one.residuals for one in responses], axis=1)
+    whole = residuals[np.isfinite(residuals).all(axis=1)]
+    own = whole.T @ whole / max(len(whole) - len(responses[0].inverse), 1)
+    return np.asarray(_SHRUNK * own + (1 - _SHRUNK) * np.diag(np.diag(own)))
 
 
 def responded(
@@ -138,7 +110,7 @@ def responded(
         return None
     change, strengths = change[there], strengths[there]
     values = {name: own[there] for name, own in values.items()}
-    white = np.linalg.solve(model.factor, change.T).T
+    white = np.linalg.solve(model.base.factor, change.T).T
     tried = []
     for logarithmic in (False, True) if effect.low > 0 else (False,):
         z = _features(effect, logarithmic, strengths, values["area_weight"])

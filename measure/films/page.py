@@ -69,7 +69,7 @@ def bands(
         {name: own[rows] for name, own in values.items()}, None if effect is None else effect.name,
         None if strength is None else strength[rows],
     )  # fmt: skip
-    mean = mean + (rng.standard_normal(mean.shape) @ sight.model.factor.T) * np.sqrt(stretch)[:, None]
+    mean = mean + (rng.standard_normal(mean.shape) @ sight.model.base.factor.T) * np.sqrt(stretch)[:, None]
     whole = np.full((_DRAWS, len(sight.model.used)), np.nan)
     whole[:, sight.model.used] = mean
     windows = observed.projection.at(whole.reshape(_DRAWS, -1, len(OBSERVED)))

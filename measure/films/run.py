@@ -24,6 +24,7 @@ from flagdata.provenance import code_version
 from measure.calibrate.calibrate import Options as Calibrating
 from measure.calibrate.observed import Observed, constant_wind
 from measure.calibrate.prior import CLOTH, Floats
+from measure.calibrate.scatter import TAKEN_APART
 from measure.calibrate.simulation import OBSERVED
 from measure.films.evidence import Fit, Sight, quantiles
 from measure.films.judge import Judged, judge
@@ -37,13 +38,6 @@ from measure.forecasting.setting import Stage
 from measure.nulls.conformal import GroupedConformal
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Candidate, Conclusion, Estimate, NullTest, Parameter, Verdict
-
-_APART = Finding(
-    kind="recordings-taken-apart", severity=Severity.WARNING,
-    what="the recordings are too many for the simulations, or their logs are described differently: what is unknown of "
-    "the cloth was taken as another one in each, so that probabilities of effects are too sure",
-    fix="give fewer recordings, or more simulations with --simulations",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +113,7 @@ class Outcome:
     def findings(self) -> tuple[Finding, ...]:
         """On the recordings."""
         own = (finding for one in self.recordings for finding in one.findings)
-        return (*constant_wind(self.recordings), *own, *([] if self.together else [_APART]))
+        return (*constant_wind(self.recordings), *own, *([] if self.together else [TAKEN_APART]))
 
 
 def close_loop(
@@ -221,8 +215,9 @@ def departing(outcome: Outcome) -> tuple[Departure, ...]:
     for one, own, place in zip(outcome.recordings, outcome.sights, places, strict=True):
         mean, _, _ = own.model.predict({**cloth, **place})
         off = one.summary[own.model.used] - outcome.base.weights[0] @ mean
-        scatter = np.sqrt(np.diag(own.model.factor @ own.model.factor.T))
-        for column, size, sigma in zip(np.flatnonzero(own.model.used).tolist(), off, scatter, strict=True):
+        for column, size, sigma in zip(
+            np.flatnonzero(own.model.used).tolist(), off, own.model.base.deviations, strict=True
+        ):
             if column < len(OBSERVED) and abs(size) >= SEEN * sigma:
                 found.append(
                     Departure(

@@ -11,15 +11,17 @@ from numpy.typing import NDArray
 
 from flagdata.rng import stream
 from measure.calibrate.calibrate import Options as Calibrating
-from measure.calibrate.calibrate import with_errors
+from measure.calibrate.calibrate import designs_of, with_errors
 from measure.calibrate.design import Design, read
+from measure.calibrate.emulator import Emulator
 from measure.calibrate.observed import Observed
 from measure.calibrate.prior import Floats
+from measure.calibrate.sights import first_of
 from measure.calibrate.summary import Projection, shown
 from measure.films.design import TOGETHER, Pairs, lasting, nulls, pairs
-from measure.films.evidence import Experiments, Sight, first_of
+from measure.films.evidence import Experiments, Sight
 from measure.films.library import Weighable
-from measure.films.model import fit, responded
+from measure.films.model import Model, responded
 from measure.forecasting.setting import Stage
 
 
@@ -44,14 +46,6 @@ class Simulations:
     weights: Floats
 
 
-def design_of(observed: Observed, options: Calibrating) -> Design:
-    """A calibration's design for a recording."""
-    return Design(
-        flag=options.flag, log=observed.log, duration=observed.duration, azimuth=options.azimuth,
-        elevation=options.elevation, count=options.simulations, seed=options.seed, distance=options.distance,
-    )  # fmt: skip
-
-
 def gathered(
     recordings: Sequence[Observed],
     options: Calibrating,
@@ -72,7 +66,7 @@ def gathered(
     Raises:
         CorruptError: a kept batch that cannot be read.
     """
-    designs = [design_of(one, options) for one in recordings]
+    designs = designs_of(recordings, options)
     until = lasting(designs)
     made = [[pairs(design, effect, until=until) for effect in effects] for design in designs]
     null = nulls(designs, first_of([one.place for one in recordings]), kinds=kinds, seed=options.seed)
@@ -116,13 +110,14 @@ def sight(
         windows: a part of it, of which means alone are modelled; None for all of it.
 
     Raises:
-        InputError: as `measure.films.model.fit`.
+        InputError: as `Emulator.fit`.
     """
     seen = observed if windows is None else part_of(observed, windows)
     summaries = with_errors(seen, base if windows is None else base[:, windows], seed=design.seed)
     changes = seen.projection.changes
     values = design.values()
-    model = fit(values, summaries, np.tile(shown(seen.readings), 1 + changes), name=observed.name)
+    looked = np.tile(shown(seen.readings), 1 + changes)
+    model = Model(base=Emulator.fit(values, summaries, looked, name=observed.name))
     found = {}
     for made, readings in own:
         count = readings.shape[1]

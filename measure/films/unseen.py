@@ -158,7 +158,7 @@ def _predicted(
     result = []
     for number, (_, one, own) in enumerate(task.predicted):
         scatter = np.full(len(one.model.used), np.nan)
-        scatter[one.model.used] = np.sqrt(np.diag(one.model.base.scatter) / one.model.base.freedom)
+        scatter[one.model.used] = one.model.base.deviations
         result.append(
             Prediction(
                 observed=own.summary[: len(OBSERVED)], before=before[number],

@@ -27,8 +27,9 @@ import torch
 from flagdata.rng import stream
 from measure.calibrate.calibrate import Options, with_errors
 from measure.calibrate.design import simulated
-from measure.calibrate.emulator import Emulator, Sight, weighed
+from measure.calibrate.emulator import Emulator, informative
 from measure.calibrate.observed import Observed
+from measure.calibrate.posterior import Sight, weighed
 from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
 from measure.forecasting.observer import SegmentWind
@@ -115,10 +116,11 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     )
     rows, blank = [], Observed(name="", source="", readings=seen[0], log=own.log)
     summaries = with_errors(blank, base, seed=SEED)
-    emulator = Emulator.fit(own.values(), summaries, np.ones(summaries.shape[1], dtype=bool))
+    shown = informative(own.values(), summaries, np.ones(summaries.shape[1], dtype=bool), name="briefly")
+    emulator = Emulator.fit(own.values(), summaries, shown, name="briefly")
     observed = blank.projection.of(seen).reshape(len(seen), -1)
-    sight = Sight(emulator=emulator, observed=observed[0], azimuth=own.azimuth, elevation=own.elevation)
-    draws = weighed(sight, observed, seed=SEED)["area_weight"]
+    sight = Sight(emulator=emulator, azimuth=own.azimuth, elevation=own.elevation)
+    draws = weighed([sight], [observed], seed=SEED)["area_weight"]
     low, middle, high = np.quantile(draws, [0.05, 0.5, 0.95], axis=1).tolist()
     for place, truth in enumerate(some):
         rows.append({

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.rng import stream
-from measure.calibrate import calibrate, emulator
+from flagdata.rng import child_seed, stream
+from measure.calibrate import calibrate, posterior
 from measure.calibrate.design import Design
 from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
@@ -39,11 +39,15 @@ def cheap() -> Iterator[list[Design]]:
     def simulated(design: Design, *, folder: Path, workers: int, advance: object) -> Floats:
         asked.append(design)
         starts = np.arange(round(design.duration / WINDOW)) * WINDOW
-        return readings(dict(design.values()), design.log.mean_speed(starts, starts + WINDOW), seed=design.seed)
+        return readings(
+            dict(design.values()),
+            design.log.mean_speed(starts, starts + WINDOW),
+            seed=child_seed(design.seed, design.recording),
+        )
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(calibrate, "simulated", simulated)
-        patch.setattr(emulator, "WALKERS", 96)
-        patch.setattr(emulator, "STEPS", 300)
-        patch.setattr(emulator, "_CHECK", (32, 120))
+        patch.setattr(posterior, "WALKERS", 96)
+        patch.setattr(posterior, "STEPS", 300)
+        patch.setattr(posterior, "CHECK", (32, 120))
         yield asked

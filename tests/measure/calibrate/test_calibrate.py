@@ -35,7 +35,13 @@ def _observed(weight: float, *, gain: float = 1.0, speed: Floats = _GUSTY, seed:
         "azimuth": np.array([math.radians(70)]),
     }  # fmt: skip
     own = readings(values, log.mean_speed(starts, starts + 2.5), seed=seed)[0]
-    return Observed(name=f"flag {weight}", source=f"{weight}", readings=own, log=log)
+    return Observed(name=f"flag {weight}", source=f"{weight}, {seed}", readings=own, log=log)
+
+
+def _sigma(places: int) -> float:
+    """Of the logarithm of the weight: twice the gain's 3 %, of each place anew, and an error of the droop by the mesh
+    of 0.0085, the same in all recordings, over 0.3."""
+    return math.hypot(0.06 / math.sqrt(places), 0.0085 / 0.3)
 
 
 def _found(*recordings: Observed) -> Calibration:
@@ -52,9 +58,9 @@ def plain(cheap: list[Design]) -> Calibration:
 
 def test_the_weight_is_known_as_well_as_twice_the_gain(plain: Calibration) -> None:
     weight = plain.weight
-    # The ratio is known to 1 % and the gain to 3 %: the weight to 6 %.
+    # The ratio is known to 1 %, the gain to 3 %, and what numerics add to 3 %: the weight to 7 %.
     assert weight.value == pytest.approx(0.17, rel=0.05)
-    assert weight.sigma / 0.17 == pytest.approx(0.06, rel=0.3)
+    assert weight.sigma / 0.17 == pytest.approx(_sigma(1), rel=0.2)
 
 
 def test_damping_is_determined_and_bending_is_not(plain: Calibration) -> None:
@@ -67,7 +73,7 @@ def test_damping_is_determined_and_bending_is_not(plain: Calibration) -> None:
 @pytest.mark.usefixtures("cheap")
 def test_a_second_recording_with_an_error_of_its_own_narrows_the_weight(plain: Calibration) -> None:
     one, two = plain, _found(_observed(0.17), _observed(0.17, seed=10))
-    assert two.weight.sigma == pytest.approx(one.weight.sigma / math.sqrt(2), rel=0.3)
+    assert two.weight.sigma / one.weight.sigma == pytest.approx(_sigma(2) / _sigma(1), rel=0.15)
     assert len(two.places) == 2
 
 
@@ -153,12 +159,13 @@ def test_draws_fill_the_priors_range_evenly() -> None:
 
 @pytest.mark.usefixtures("cheap")
 def test_rows_of_one_place_share_the_anemometers_gain() -> None:
-    """Three winds of one place show the weight no better than the gain allows: to 6 %; of three places, to 6 %/√3."""
+    """Three winds of one place show the weight no better than the gain allows: to 6 %; of three places, to 6 %/√3. What
+    numerics may add is the same in all."""
     winds = (4.0, 6.0, 9.0)
     apart = [_observed(0.17, speed=np.full(190, wind), seed=number) for number, wind in enumerate(winds)]
     together = [replace(one, place="tunnel") for one in apart]
     shared = _found(*together)
-    assert shared.weight.sigma / 0.17 == pytest.approx(0.06, rel=0.3)
-    assert _found(*apart).weight.sigma / shared.weight.sigma == pytest.approx(1 / math.sqrt(3), rel=0.25)
+    assert shared.weight.sigma / 0.17 == pytest.approx(_sigma(1), rel=0.2)
+    assert _found(*apart).weight.sigma / 0.17 == pytest.approx(_sigma(3), rel=0.2)
     assert len({place[0].value for place in shared.places}) == 1
     assert "constant-wind" not in {finding.kind for finding in shared.findings}

@@ -13,7 +13,7 @@ import pytest
 
 from measure.calibrate.design import Design, simulated
 from measure.calibrate.prior import Floats
-from measure.calibrate.simulation import OBSERVED, Batch, Flag, cloth, mean_bending
+from measure.calibrate.simulation import FABRICS, OBSERVED, Batch, Flag, cloth, mean_bending
 from measure.calibrate.wind import Log
 from sim.integrate.implicit import BackwardEuler
 from sim.integrate.symplectic import Symplectic
@@ -26,7 +26,7 @@ def _batch(weights: list[float]) -> Batch:
     count = len(weights)
     fixed = {
         "bending": 4e-5, "damping": 8e-3, "stretching": 1.0, "gain": 1.0, "scale": 1.0, "eddies": 60.0,
-        "distance_constant": 0.0,
+        "distance_constant": 0.0, "fabric": 0.5,
     }  # fmt: skip
     return Batch(
         flag=Flag(length=1.5, height=1.0), log=_LOG, duration=5.0, columns=8, seeds=tuple(range(count)),
@@ -51,9 +51,24 @@ def test_a_cloth_has_the_bending_it_is_given() -> None:
 
 
 def test_simulations_draw_their_fabrics() -> None:
-    scenes = _batch([0.2] * 12)._scenes(Flag(length=1.5, height=1.0).mesh(4), damped=0.0)
-    drawn = {scene.material.name for scene in scenes}
-    assert len(drawn) > 3
+    design = Design(flag=Flag(length=1.5, height=1.0), log=_LOG, duration=5.0, count=32, seed=1)
+    scenes = [one for batch in design.batches() for one in batch._scenes(design.flag.mesh(4), damped=0.0)]
+    drawn = [scene.material.name for scene in scenes]
+    assert {drawn.count(name) for name in FABRICS} <= {2, 3, 4, 5}  # of 32 each of ten evenly: a Sobol sequence
+
+
+def test_recordings_of_a_flag_are_simulated_with_the_same_cloths_in_places_of_their_own() -> None:
+    one, other = (
+        Design(flag=Flag(length=1.5, height=1.0), log=log, duration=5.0, count=32, seed=1, recording=name, place=name)
+        for name, log in (("one", _LOG), ("other", replace(_LOG, distance=None, clock=0.1)))
+    )
+    first, second = one.values(), other.values()
+    for name in ("area_weight", "bending", "damping", "stretching", "fabric"):
+        assert np.array_equal(first[name], second[name])
+    for name in ("gain", "scale", "eddies", "azimuth", "elevation"):
+        assert abs(np.corrcoef(first[name], second[name])[0, 1]) < 0.5
+    seeds = [seed for design in (one, other) for batch in design.batches() for seed in batch.seeds]
+    assert len(set(seeds)) == 64
 
 
 def test_no_integrator_damps_more_than_its_cloths() -> None:

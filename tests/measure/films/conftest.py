@@ -103,5 +103,5 @@ def options(
     *, kinds: int = 40, only: tuple[str, ...] = EFFECTS, area_weight: tuple[float, float] | None = None
 ) -> Options:
     """Of a flag seen from a stated azimuth."""
-    calibration = Calibrating(flag=Flag(length=1.5, height=1.0), azimuth=AZIMUTH, simulations=64)
+    calibration = Calibrating(flag=Flag(length=1.5, height=1.0), azimuth=AZIMUTH, simulations=128)
     return Options(calibration=calibration, kinds=kinds, only=only, area_weight=area_weight)

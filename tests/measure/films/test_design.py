@@ -57,7 +57,7 @@ def test_more_kinds_of_nulls_leave_the_first_ones_as_they_are(design: Design) ->
 def test_a_null_cloth_is_one_in_all_recordings_and_so_is_a_shared_place(design: Design) -> None:
     shared = nulls([design, design], [0, 0], kinds=1, seed=3)
     apart = nulls([design, design], [0, 1], kinds=1, seed=3)
-    for name in ("area_weight", "bending", "damping", "stretching"):
+    for name in ("area_weight", "bending", "damping", "stretching", "fabric"):
         assert np.array_equal(apart[0][0].values[name], apart[1][0].values[name])
     assert np.array_equal(shared[0][0].places, shared[1][0].places)
     assert not np.array_equal(apart[0][0].places, apart[1][0].places)

@@ -2,10 +2,9 @@
 
 What is not regressed on, the fabric most of all, is the same in all recordings of a cloth: the residuals of droop and
 extension of two recordings are correlated by 0.9. So their covariance is that of all recordings' summaries at once,
-from simulated flags that are the same cloths in all of them.
-
-With an effect the covariance has a second part, R, of the residuals of pairs about the effect's regression: h R for
-what so few pairs leave open of it, and R once more for what the regression misses.
+from simulated flags that are the same cloths in all of them. It is the predictive one, S/(n − p − k − 1) of n
+simulations' residuals with p regressors and k summaries (`measure.refine.metamodel`), so that it is the wider the more
+summaries so few simulations are asked for.
 """
 
 from __future__ import annotations
@@ -18,16 +17,21 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import gammaln
 
+from flagdata.findings import Finding, Severity
+from measure.calibrate.emulator import Emulator
 from measure.calibrate.prior import Floats
-from measure.films.model import Model
 
 FEWEST_FREEDOM = 20
 """Degrees of freedom below which recordings are taken as independent."""
 HEAVY = 10.0
 """Most degrees of freedom of the t distribution: residuals of simulations have a kurtosis of 4, 3 + 6/(ν − 4)."""
 _MISSED = 1.0
-_SHRUNK = 0.5
-"""Share of the pairs' covariances between summaries that is kept: they are from some dozen residuals."""
+TAKEN_APART = Finding(
+    kind="recordings-taken-apart", severity=Severity.WARNING,
+    what="the recordings are too many for the simulations: what is unknown of the cloth was taken as another one in "
+    "each, so that intervals are too narrow and probabilities too sure",
+    fix="give fewer recordings, or more simulations with --simulations",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,36 +70,34 @@ class Scatter:
         return np.asarray((np.square(offset @ self.white.T) / variances).sum(axis=1))
 
 
-def scatter(models: Sequence[Model], effect: str | None) -> Scatter:
-    """Of recordings of one cloth, without or with an effect."""
-    covariance, freedom, together = _covariance(models)
+def scatter(emulators: Sequence[Emulator], beside: Floats | None = None) -> Scatter:
+    """Of recordings of one cloth.
+
+    Args:
+        beside: (k, k) a second covariance of all their summaries, of what acts beside the base model.
+    """
+    covariance, freedom, together = _covariance(emulators)
     freedom = min(freedom, HEAVY)
-    scale = covariance * (freedom - 2) / freedom
-    factor = np.linalg.cholesky(scale)
+    factor = np.linalg.cholesky(covariance * (freedom - 2) / freedom)
     inverse = np.linalg.inv(factor)
-    open_, turned = np.zeros(len(scale)), np.eye(len(scale))
-    if effect is not None:
-        residuals = np.concatenate([one.responses[effect].residuals for one in models], axis=1)
-        whole = residuals[np.isfinite(residuals).all(axis=1)]
-        features = models[0].responses[effect].inverse.shape[0]
-        own = whole.T @ whole / max(len(whole) - features, 1)
-        own = _SHRUNK * own + (1 - _SHRUNK) * np.diag(np.diag(own))
-        open_, turned = np.linalg.eigh(inverse @ own @ inverse.T)
+    open_, turned = np.zeros(len(factor)), np.eye(len(factor))
+    if beside is not None:
+        open_, turned = np.linalg.eigh(inverse @ beside @ inverse.T)
     return Scatter(
         white=np.asarray(turned.T @ inverse, dtype=np.float64), open=np.maximum(open_, 0.0), freedom=freedom,
         together=together, determinant=float(np.log(np.diag(factor)).sum()),
     )  # fmt: skip
 
 
-def _covariance(models: Sequence[Model]) -> tuple[Floats, float, bool]:
-    """Of the base model's residuals, its degrees of freedom, and whether it is of all recordings together."""
-    first = models[0]
-    if all(np.array_equal(one.weights, first.weights) for one in models):
-        residuals = np.concatenate([one.residuals for one in models], axis=1)
+def _covariance(emulators: Sequence[Emulator]) -> tuple[Floats, float, bool]:
+    """Predictive one of the residuals, its degrees of freedom, and whether it is of all recordings together."""
+    first = emulators[0]
+    if all(np.array_equal(one.weights, first.weights) for one in emulators):
+        residuals = np.concatenate([one.residuals for one in emulators], axis=1)
         whole = residuals[np.isfinite(residuals).all(axis=1)]
-        freedom = len(whole) - len(first.base.coefficients) - residuals.shape[1] + 1
-        if freedom >= FEWEST_FREEDOM or len(models) == 1:
-            count = len(whole) - len(first.base.coefficients)
-            return np.asarray(whole.T @ whole / max(count, 1)), max(float(freedom), 3.0), True
-    blocks = [one.base.scatter / (one.base.rows - len(one.base.coefficients)) for one in models]
-    return np.asarray(block_diag(*blocks)), min(one.base.freedom for one in models), False
+        freedom = float(len(whole) - len(first.model.coefficients) - residuals.shape[1] + 1)
+        if freedom >= FEWEST_FREEDOM or len(emulators) == 1:
+            freedom = max(freedom, 3.0)
+            return np.asarray(whole.T @ whole / (freedom - 2)), freedom, True
+    blocks = [one.model.scatter / max(one.model.freedom - 2, 1.0) for one in emulators]
+    return np.asarray(block_diag(*blocks)), max(min(one.model.freedom for one in emulators), 3.0), False
