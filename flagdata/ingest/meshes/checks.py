@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.meshes.joints import t_joints
 from flagdata.ingest.meshes.pieces import in_pieces
 from flagdata.lake.meshes import Mesh, MeshSequence, RaggedMeshSequence
 
@@ -75,7 +76,7 @@ def findings(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
         for kind, count, what in kinds
         if count
     )  # fmt: skip
-    return (*odd, *in_pieces(sequence))
+    return (*odd, *in_pieces(sequence), *t_joints(sequence))
 
 
 def _edge_ratio(mesh: Mesh) -> float:
