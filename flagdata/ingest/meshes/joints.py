@@ -52,9 +52,10 @@ def _joints(mesh: Mesh) -> NDArray[np.int64]:
     vertex = corners[np.concatenate([np.asarray(found, dtype=np.int64) for found in beside])]
     first, last = border[number].astype(np.int64).T
     along, off = _beside(rest, vertex, first, last)
-    inside = (along > _WITHIN) & (along < 1 - _WITHIN) & (off < _ON_THE_LINE)
     along_in_space, off_in_space = _beside(space, vertex, first, last)
-    inside &= (np.abs(along_in_space - along) < _NEAR) & (off_in_space < _NEAR)
+    inside = (off < _ON_THE_LINE) & (off_in_space < _NEAR) & (np.abs(along_in_space - along) < _NEAR)
+    for share in (along, along_in_space):
+        inside &= (share > _WITHIN) & (share < 1 - _WITHIN)
     return np.unique(vertex[inside])
 
 
