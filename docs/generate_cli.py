@@ -9,15 +9,18 @@ from typing import Any
 
 import click
 
-from flagdata.cli import VERBS, root
+from flagdata.cli import GROUPS, VERBS, root
+from flagdata.commands.sections import LongCommand
 
 PAGE = Path(__file__).with_name("cli.md")
 _HEAD = """\
 # Commands
 
-This page is generated from the commands; `flagdata VERB --help` prints the same.
+This page is generated from the commands; `flagdata help VERB` prints the same. `flagdata catalog` lists the names of
+scenes, effects, materials, sensors, data sets and models that commands and recipes take.
 
-Results go to stdout and everything else to stderr. With `--json` the result is one JSON document. The exit code is 0
+Results go to stdout and everything else to stderr. With `--json`, before or after the
+command's name, the result is one JSON document. The exit code is 0
 when the command is done, 1 when it failed, 2 when it was called wrongly, and 3 when a gate was not met: an alignment
 that cannot be trusted, a lake that does not verify. The environment variable `FLAGDATA_LAKE` names the lake where
 `--lake` is not given.
@@ -38,8 +41,12 @@ def commands() -> Iterator[tuple[str, click.Command]]:
 
 def reference() -> str:
     """The page."""
-    parts = [_HEAD, "| command | what it does |\n|---|---|"]
-    parts[-1] += "".join(f"\n| [`{verb}`](#flagdata-{verb}) | {about} |" for verb, (_, about) in VERBS.items()) + "\n"
+    parts = [_HEAD, "| | command | what it does |\n|---|---|---|"]
+    for group, (title, verbs) in GROUPS.items():
+        rows = [f"[`{verb}`](#flagdata-{verb}) | {about} |" for verb, (_, about) in verbs.items()]
+        starts = (f"**{group}**: {title}", *[""] * (len(rows) - 1))
+        parts[-1] += "".join(f"\n| {start} | {row}" for start, row in zip(starts, rows, strict=True))
+    parts[-1] += "\n"
     parts += [_section(name, command) for name, command in commands()]
     return "\n".join(parts)
 
@@ -50,10 +57,9 @@ def _section(name: str, command: click.Command) -> str:
     usage = " ".join([name, *command.collect_usage_pieces(context)])
     lines = [f"{level} {name}", "", f"`{usage}`", "", _prose(inspect.cleandoc(command.help or ""))]
     options = [entry for entry in command.params if isinstance(entry, click.Option)]
-    if options:
-        lines += ["| option | meaning |", "|---|---|"]
-        lines += [_row(option, context) for option in options]
-        lines.append("")
+    for title, part in (command.sections() if isinstance(command, LongCommand) else {"option": options}).items():
+        if part:
+            lines += [f"| {title} | meaning |", "|---|---|", *(_row(option, context) for option in part), ""]
     return "\n".join(lines)
 
 

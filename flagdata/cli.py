@@ -5,60 +5,104 @@ from __future__ import annotations
 import sys
 import traceback
 from importlib import import_module
+from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
+from flagdata.commands.help import print_help
 from flagdata.console import document, fail, foreseen
 from flagdata.errors import UnknownNameError, UsageError
 
-# verb → (where its click command is, one line of help shown without importing it)
-VERBS: dict[str, tuple[str, str]] = {
-    "init": ("flagdata.commands.lake:init", "Create an empty lake."),
-    "ingest": ("flagdata.commands.ingest:ingest", "Bring camera files, anemometer logs and mesh sequences in."),
-    "align": ("flagdata.commands.align:align", "Put a camera and an anemometer, or two anemometers, on one clock."),
-    "declare": ("flagdata.commands.declare:declare", "State the constant wind of a film, as of a wind tunnel."),
-    "declare-cloths": (
-        "flagdata.commands.declare_cloths:declare_cloths",
-        "Ingest films of measured cloths, by a table.",
-    ),
-    "realign": ("flagdata.commands.align:realign", "Rewrite a recording with another clock model."),
-    "simulate": ("sim.commands:simulate", "Simulate cloth in the wind: mesh sequences from a recipe or a scene."),
-    "build": ("sim.datasets.command:build", "Build a data set: sequences, their films, ground truth and a card."),
-    "train": ("models.training.command:train", "Train a network on the clips of a lake, and commit it."),
-    "evaluate": ("models.evaluation.command:evaluate", "Evaluate trained networks on test clips, in one table."),
-    "measure": ("measure.estimate.command:measure", "Measure wind and cloth from a film, with intervals, or refuse."),
-    "observe": ("measure.observables.command:observe", "Read droop, extension, speed and frequency off a film."),
-    "calibrate": ("measure.calibrate.command:calibrate", "Weigh a filmed flag's cloth with the log of the wind."),
-    "close-loop": ("measure.closing.command:close_loop", "Find what the model of a cloth lacks, and add it."),
-    "propose": ("measure.propose.command:propose", "Propose an effect that the library lacks, and test it."),
-    "ls": ("flagdata.commands.lake:ls", "List artifacts."),
-    "show": ("flagdata.commands.lake:show", "Show one artifact, its parents and its report."),
-    "lineage": ("flagdata.commands.looking:lineage", "Show what an artifact was made from, and what from it."),
-    "view": ("flagdata.commands.looking:view", "Look at a lake in the browser: artifacts, films beside winds, SQL."),
-    "log": ("flagdata.commands.lake:log", "List commits."),
-    "tag": ("flagdata.commands.lake:tag", "Name a version for good, list or delete tags."),
-    "branch": ("flagdata.commands.lake:branch", "Begin, list or delete branches."),
-    "merge": ("flagdata.commands.lake:merge", "Commit on main what a branch changed."),
-    "diff": ("flagdata.commands.lake:diff", "Rows and objects added and removed between two versions."),
-    "label": ("flagdata.commands.label:label", "Put columns of your own on artifacts."),
-    "withdraw": ("flagdata.commands.lake:withdraw", "Hide artifacts from a branch; tags still show them."),
-    "query": ("flagdata.commands.query:query", "Select rows of the catalog by filter or SQL."),
-    "export": (
-        "flagdata.commands.export:export",
-        "Write WebDataset, Parquet, LeRobot, Zarr, MP4 + CSV, MCAP, CSV of the wind or OBJ folders.",
-    ),
-    "push": ("flagdata.commands.transfer:push", "Move versions to another lake."),
-    "pull": ("flagdata.commands.transfer:pull", "Bring versions of another lake in."),
-    "clone": ("flagdata.commands.transfer:clone", "Make a lake with all versions of another."),
-    "verify": ("flagdata.commands.upkeep:verify", "Re-hash every object."),
-    "doctor": ("flagdata.commands.upkeep:doctor", "Find and explain what is wrong with a lake, or a data set."),
-    "du": ("flagdata.commands.looking:du", "Show what takes space, by kind and by version."),
-    "gc": ("flagdata.commands.upkeep:gc", "Delete unreferenced files."),
-    "expire": ("flagdata.commands.upkeep:expire", "Let old versions expire, with a trace."),
-    "recover": ("flagdata.commands.upkeep:recover", "Salvage a record that was cut off."),
-    "challenge": ("measure.challenge.command:challenge", "Benchmark close-loop on blind data sets."),
-    "blender-setup": ("sim.blender.command:blender_setup", "Make the environment that Blender renders in."),
-    "demo": ("measure.demo.command:demo", "Make a synthetic recording and run every step on it."),
+# group → what it is about, and its verbs: where the click command is, one line of help shown without importing it
+GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
+    "field": ("recordings from the field", {
+        "ingest": ("flagdata.commands.ingest:ingest", "Bring camera files, anemometer logs and mesh sequences in."),
+        "align": ("flagdata.commands.align:align", "Put a camera and an anemometer, or two anemometers, on one clock."),
+        "realign": ("flagdata.commands.align:realign", "Rewrite a recording with another clock model."),
+        "declare": ("flagdata.commands.declare:declare", "State the constant wind of a film, as of a wind tunnel."),
+        "declare-cloths": (
+            "flagdata.commands.declare_cloths:declare_cloths",
+            "Ingest films of measured cloths, by a table.",
+        ),
+        "recover": ("flagdata.commands.upkeep:recover", "Salvage a record that was cut off."),
+    }),
+    "look": ("what a lake holds", {
+        "ls": ("flagdata.commands.lake:ls", "List artifacts."),
+        "show": ("flagdata.commands.lake:show", "Show one artifact, its parents and its report."),
+        "lineage": ("flagdata.commands.looking:lineage", "Show what an artifact was made from, and what from it."),
+        "view": (
+            "flagdata.commands.looking:view",
+            "Look at a lake in the browser: artifacts, films beside winds, SQL.",
+        ),
+        "query": ("flagdata.commands.query:query", "Select rows of the catalog by filter or SQL."),
+        "log": ("flagdata.commands.lake:log", "List commits."),
+        "diff": ("flagdata.commands.lake:diff", "Rows and objects added and removed between two versions."),
+        "du": ("flagdata.commands.looking:du", "Show what takes space, by kind and by version."),
+        "catalog": (
+            "flagdata.commands.catalog:catalog",
+            "List the scenes, sensors, effects, materials, data sets and models by name.",
+        ),
+    }),
+    "physics": ("wind and cloth from recordings, and simulation", {
+        "measure": (
+            "measure.estimate.command:measure",
+            "Measure wind and cloth from a film, with intervals, or refuse.",
+        ),
+        "observe": ("measure.observables.command:observe", "Read droop, extension, speed and frequency off a film."),
+        "calibrate": ("measure.calibrate.command:calibrate", "Weigh a filmed flag's cloth with the log of the wind."),
+        "close-loop": ("measure.closing.command:close_loop", "Find what the model of a cloth lacks, and add it."),
+        "propose": ("measure.propose.command:propose", "Propose an effect that the library lacks, and test it."),
+        "simulate": ("sim.commands:simulate", "Simulate cloth in the wind: mesh sequences from a recipe or a scene."),
+        "challenge": ("measure.challenge.command:challenge", "Benchmark close-loop on blind data sets."),
+    }),
+    "learn": ("data sets and networks", {
+        "build": ("sim.datasets.command:build", "Build a data set: sequences, their films, ground truth and a card."),
+        "train": ("models.training.command:train", "Train a network on the clips of a lake, and commit it."),
+        "evaluate": ("models.evaluation.command:evaluate", "Evaluate trained networks on test clips, in one table."),
+    }),
+    "lake": ("versions, copies and upkeep", {
+        "init": ("flagdata.commands.lake:init", "Create an empty lake."),
+        "tag": ("flagdata.commands.lake:tag", "Name a version for good, list or delete tags."),
+        "branch": ("flagdata.commands.lake:branch", "Begin, list or delete branches."),
+        "merge": ("flagdata.commands.lake:merge", "Commit on main what a branch changed."),
+        "label": ("flagdata.commands.label:label", "Put columns of your own on artifacts."),
+        "withdraw": ("flagdata.commands.lake:withdraw", "Hide artifacts from a branch; tags still show them."),
+        "export": (
+            "flagdata.commands.export:export",
+            "Write WebDataset, Parquet, LeRobot, Zarr, MP4 + CSV, MCAP, CSV of the wind or OBJ folders.",
+        ),
+        "push": ("flagdata.commands.transfer:push", "Move versions to another lake."),
+        "pull": ("flagdata.commands.transfer:pull", "Bring versions of another lake in."),
+        "clone": ("flagdata.commands.transfer:clone", "Make a lake with all versions of another."),
+        "verify": ("flagdata.commands.upkeep:verify", "Re-hash every object."),
+        "doctor": ("flagdata.commands.upkeep:doctor", "Find and explain what is wrong with a lake, or a data set."),
+        "gc": ("flagdata.commands.upkeep:gc", "Delete unreferenced files."),
+        "expire": ("flagdata.commands.upkeep:expire", "Let old versions expire, with a trace."),
+    }),
+    "project": ("this installation", {
+        "demo": ("measure.demo.command:demo", "Make a synthetic recording and run every step on it."),
+        "blender-setup": ("sim.blender.command:blender_setup", "Make the environment that Blender renders in."),
+        "completion": ("flagdata.commands.completion:completion", "Print the completion of commands for a shell."),
+        "help": ("flagdata.commands.help:help_", "Show the help of flagdata, or of a command."),
+    }),
+}  # fmt: skip
+
+VERBS: dict[str, tuple[str, str]] = {verb: entry for _, verbs in GROUPS.values() for verb, entry in verbs.items()}
+
+# what `flagdata catalog` lists → (where the names are, what takes one)
+NAMES: dict[str, tuple[str, str]] = {
+    "scenes": ("sim.run.reading:SCENES", "simulate RECIPE"),
+    "materials": ("sim.material:MATERIALS", "close-loop --material, measure --material, [material] of a recipe"),
+    "effects": ("sim.effects:EFFECTS", "[effects] of a recipe"),
+    "sensor-effects": ("sim.effects:SENSOR_EFFECTS", "[sensor] of a recipe"),
+    "sensors": ("flagdata.ingest.anemometer.recipe:SENSORS", "ingest --sensor, close-loop --sensor"),
+    "log-formats": ("flagdata.ingest.anemometer.formats.registry:FORMATS", "ingest --as"),
+    "datasets": ("sim.datasets.reading:DATASETS", "build RECIPE"),
+    "training": ("models.training.recipe:TRAININGS", "train RECIPE"),
+    "models": ("models.estimator:SHIPPED", "measure --model, calibrate --model"),
+    "challenges": ("measure.challenge.recipe:CHALLENGES", "challenge make --recipe"),
+    "exports": ("flagdata.export.plan:FORMATS", "export FORMAT"),
 }
 
 _HELP = "see the command's --help"
@@ -84,19 +128,36 @@ class LazyGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl([(verb, about) for verb, (_, about) in VERBS.items()])
+        for group, (title, verbs) in GROUPS.items():
+            with formatter.section(f"{group.capitalize()} ({title})"):
+                formatter.write_dl([(verb, about) for verb, (_, about) in verbs.items()])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        verbs = [CompletionItem(verb, help=about) for verb, (_, about) in VERBS.items() if verb.startswith(incomplete)]
+        return [*verbs, *click.Command.shell_complete(self, ctx, incomplete)]
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=LazyGroup, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--debug", is_flag=True, envvar="FLAGDATA_DEBUG", help="Show the traceback of an error; also FLAGDATA_DEBUG."
 )
+@click.option("--json", "as_json", is_flag=True, help="As --json of the command.")
 @click.version_option(package_name="flagdata")
 @click.pass_context
-def root(context: click.Context, debug: bool) -> None:
+def root(context: click.Context, debug: bool, as_json: bool) -> None:
     """Measure the physics of cloth in the wind from video and anemometer logs."""
     context.call_on_close(lambda: _show_traceback() if debug else None)
+    if context.invoked_subcommand is None:
+        print_help(context, as_json=as_json)
+    elif as_json:
+        context.default_map = {context.invoked_subcommand: _with_json(context, context.invoked_subcommand)}
+
+
+def _with_json(context: click.Context, verb: str) -> dict[str, Any]:
+    """Defaults of a verb with --json, and of the commands below it."""
+    command = root.get_command(context, verb)
+    below = list(command.commands) if isinstance(command, click.Group) else []
+    return {"as_json": True, **{name: {"as_json": True} for name in below}}
 
 
 def _show_traceback() -> None:

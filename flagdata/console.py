@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -82,9 +83,21 @@ def is_text(text: str) -> bool:
     return True
 
 
-def say(text: str) -> None:
-    """A line for people, on stderr; bytes of a file's name that are no UTF-8 are escaped."""
-    click.echo(text.encode(errors="backslashreplace").decode(), err=True)
+_COLOURS = {"warning": "yellow", "error": "red", "flagdata": "red"}
+
+
+def say(text: str, *, mark: str | None = None) -> None:
+    """A line for people, on stderr; bytes of a file's name that are no UTF-8 are escaped.
+
+    Args:
+        mark: "note", "warning" or "error" before it, or "flagdata" before the error that ends a command: in colour on a
+            terminal, unless the environment variable NO_COLOR is set.
+    """
+    line = text.encode(errors="backslashreplace").decode()
+    if mark is not None:
+        coloured = mark in _COLOURS and not os.environ.get("NO_COLOR")
+        line = f"{click.style(f'{mark}:', fg=_COLOURS[mark], bold=True) if coloured else f'{mark}:'} {line}"
+    click.echo(line, err=True)  # which takes the colour out where stderr is no terminal
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -165,7 +178,7 @@ def following(published: str, doing: str) -> Iterator[None]:
         yield
     except Exception as error:  # noqa: BLE001  whatever it is, the command has done what cannot be undone
         known = foreseen(error)
-        _report(f"warning: {published} is published, but {doing} failed: {known.what}", known)
+        _report(f"{published} is published, but {doing} failed: {known.what}", known, mark="warning")
 
 
 @contextmanager
@@ -197,8 +210,8 @@ def fail(error: FlagdataError, *, as_json: bool) -> int:
     return error.exit_code
 
 
-def _report(what: str, error: FlagdataError) -> None:
-    say(f"flagdata: {what}")
+def _report(what: str, error: FlagdataError, *, mark: str = "flagdata") -> None:
+    say(what, mark=mark)
     if error.where:
         say(f"  where: {error.where}")
     say(f"  fix:   {error.fix}")

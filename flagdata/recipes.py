@@ -67,6 +67,11 @@ class Shelf:
         entries = (entry.name for entry in (files("catalogs") / self.folder).iterdir())
         return tuple(sorted(name.removesuffix(_SUFFIX) for name in entries if name.endswith(_SUFFIX)))
 
+    def titles(self) -> dict[str, str]:
+        """Recipe of the catalog → what it is, one line."""
+        tables = {name: parsed(self.named(name).text, where=name) for name in self.names()}
+        return {name: str(table.get("title") or table["about"]) for name, table in tables.items()}
+
     def named(self, name: str, *, where: str | None = None) -> Found:
         """The recipe of that name in the catalog.
 

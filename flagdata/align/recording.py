@@ -81,10 +81,10 @@ class Pair:
 
     @classmethod
     def of(cls, lake: Lake, camera: str, wind: str, *, at: str | None = None) -> Pair:
-        """Look both up by id or unique prefix of it."""
+        """Look both up, see `Lake.artifact`."""
         artifacts = []
         for identity, kind in ((camera, Kind.CAMERA), (wind, Kind.WIND)):
-            artifact = lake.artifact(identity, at=at)
+            artifact = lake.artifact(identity, at=at, kinds=(kind,))
             if artifact.kind is not kind or artifact.object is None:
                 raise UsageError(
                     f"{artifact.name!r} is a {artifact.kind}, not a {kind}",
@@ -395,12 +395,12 @@ def _clips_of(lake: Lake, recording: Artifact, branch: str) -> tuple[str, ...]:
 
 
 def parents_of(lake: Lake, recording: str, *, at: str | None = None) -> tuple[Artifact, Sequence[str]]:
-    """A recording by id or unique prefix, and its camera's and wind's ids.
+    """A recording by id or name, and its camera's and wind's ids.
 
     Raises:
         UsageError: it is no recording of a camera and an anemometer.
     """
-    artifact = lake.artifact(recording, at=at)
+    artifact = lake.artifact(recording, at=at, kinds=(Kind.RECORDING,))
     if artifact.kind is not Kind.RECORDING or len(artifact.parents) < 2:
         raise UsageError(
             f"{artifact.name!r} is a {artifact.kind} with {len(artifact.parents)} parents, not an aligned recording",

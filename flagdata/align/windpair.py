@@ -37,13 +37,13 @@ class WindPair:
 
     @classmethod
     def of(cls, lake: Lake, reference: str, sensor: str, *, at: str | None = None) -> WindPair:
-        """Look both up by id or unique prefix of it.
+        """Look both up, see `Lake.artifact`.
 
         Raises:
             UsageError: artifacts of other kinds, or one artifact twice.
             InputError: one holds no samples.
         """
-        found = [lake.artifact(identity, at=at) for identity in (reference, sensor)]
+        found = [lake.artifact(identity, at=at, kinds=(Kind.WIND,)) for identity in (reference, sensor)]
         for artifact in found:
             if artifact.kind is not Kind.WIND or artifact.object is None:
                 raise UsageError(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from flagdata.commands.durations import DURATION
+from flagdata.commands.sections import LongCommand
 from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
 from flagdata.timebase import NANOSECONDS
 
@@ -70,7 +71,7 @@ def _clock_options(command: F) -> F:
     return command
 
 
-@click.command()
+@click.command(cls=LongCommand)
 @click.argument("first", metavar="CAMERA|REFERENCE")
 @click.argument("second", metavar="WIND|SENSOR")
 @_clock_options
@@ -94,7 +95,8 @@ def align(
     lake = Lake.open(lake_path)
     if not dry_run:
         lake.check_writable()
-    if {lake.artifact(which, at=branch).kind for which in (first, second)} == {Kind.WIND}:
+    devices = (Kind.CAMERA, Kind.WIND)
+    if {lake.artifact(which, at=branch, kinds=devices).kind for which in (first, second)} == {Kind.WIND}:
         from flagdata.commands.align_logs import align_logs
 
         unused = {"--window": window, "--response": response, "--response-sigma": response_sigma, "--plot": plot}
@@ -111,7 +113,7 @@ def align(
     )  # fmt: skip
 
 
-@click.command()
+@click.command(cls=LongCommand)
 @click.argument("recording")
 @_clock_options
 def realign(
@@ -217,7 +219,7 @@ def _warn_of_clocks(pair: Pair, options: ClockOptions) -> None:
         (start + shift, end + shift), (pair.wind.start, pair.wind.end), names=(pair.camera.name, pair.wind.name)
     )
     if found is not None:
-        say(f"warning: {found.what}; {found.fix}")
+        say(f"{found.what}; {found.fix}", mark="warning")
 
 
 def _outcome(pair: Pair, options: ClockOptions, *, recipe: dict[str, Any], plot: Path | None) -> Outcome:

@@ -58,7 +58,7 @@ def align_logs(
         names=(pair.sensor.name, pair.reference.name),
     )  # fmt: skip
     if apart is not None:
-        say(f"warning: {apart.what}; {apart.fix}")
+        say(f"{apart.what}; {apart.fix}", mark="warning")
     with progress(None, label="comparing", unit="part") as advance:
         found = log_clock(
             pair.reference_series, pair.sensor_series, names=pair.names, search=search,

@@ -27,11 +27,12 @@ def declare(
     """
     from flagdata.align.constant import ConstantWind, declared_recording
     from flagdata.lake import Lake
+    from flagdata.schema import Kind
 
     wind = ConstantWind(speed=speed, sigma=sigma)
     lake = Lake.open(lake_path)
     lake.check_writable()
-    film = lake.artifact(camera, at=branch)
+    film = lake.artifact(camera, at=branch, kinds=(Kind.CAMERA,))
     with progress(film.frame_count, label="copying", unit="frame") as advance:
         stated, made = declared_recording(lake, film, wind, name=name, session=session, branch=branch, progress=advance)
     if as_json:

@@ -20,11 +20,12 @@ from flagdata.commands.ingest_options import (
     wind_options,
 )
 from flagdata.commands.ingest_sources import ingest_sources, sniff_sources
+from flagdata.commands.sections import LongCommand
 from flagdata.console import LocalPath, json_option, lake_option
 from flagdata.errors import UsageError
 
 
-@click.command()
+@click.command(cls=LongCommand)
 @click.argument("sources", nargs=-1, required=True, type=LocalPath(), metavar="SOURCE...")
 @click.option("--sniff", is_flag=True, help="Only say what each source seems to be, and why; the lake is not touched.")
 @click.option(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Mapping
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_MOST = 20
+"""Parents, and artifacts made from one, that are listed without --all."""
+_INNER = ("recipe", "parameters", "clock_model", "recipe_hash")
+"""Columns that are JSON or hashes, for --all."""
 _SHORT = 12  # characters of an id that are shown; look-ups take any unique beginning
 
 
@@ -77,11 +82,16 @@ def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
 
 @click.command()
 @click.argument("artifact")
+@click.option("--all", "whole", is_flag=True, help="All columns, with their JSON, and all that was made from it.")
 @at_option
 @json_option
 @lake_option
-def show(artifact: str, at: str | None, as_json: bool, lake_path: str) -> None:
-    """Show one artifact: all it says, what it was made from and what was made from it."""
+def show(artifact: str, whole: bool, at: str | None, as_json: bool, lake_path: str) -> None:
+    """Show one artifact: what it says, what it was made from and what was made from it.
+
+    ARTIFACT is an id or its beginning, a name, the file it came from, or NAME@TAG. Of a verdict or a measurement its
+    sentence comes first, of a network its card.
+    """
     from flagdata.ingest.before import unconfirmed
     from flagdata.lake import Lake
     from flagdata.lake.labels import PREFIX
@@ -109,18 +119,40 @@ def show(artifact: str, at: str | None, as_json: bool, lake_path: str) -> None:
             },
         )  # fmt: skip
         return
+    for name, text in _gist(lake, row):
+        click.echo(f"{name:<15} {text}")
+    left_out = ("parents", "report") if whole else ("parents", "report", *_INNER)
     for column, value in row.items():
-        if value is not None and value != [] and column not in ("parents", "report"):
+        if value is not None and value != [] and column not in left_out:
             click.echo(f"{column:<15} {said(column, value)}")
     for name, value in labels.items():
         click.echo(f"{PREFIX + name:<15} {value}")
     if path is not None:
         click.echo(f"{'path':<15} {path}")
     for label, relatives in (("made from", parents), ("made into", children)):
-        for relative in relatives:
+        for relative in relatives if whole else relatives[:_MOST]:
             click.echo(f"{label:<15} {relative['artifact'][:_SHORT]} {relative['kind']} {relative['name']}")
+        if len(relatives) > _MOST and not whole:
+            kinds = Counter(relative["kind"] for relative in relatives[_MOST:])
+            more = ", ".join(counted(count, kind) for kind, count in sorted(kinds.items()))
+            click.echo(f"{label:<15} … and {more} more (--all lists them)")
     for finding in (*(row["report"] or {}).get("findings", []), *(finding.as_dict() for finding in doubts)):
         click.echo(f"{finding.get('severity', 'note'):<15} {finding.get('kind')}: {finding.get('what')}")
+
+
+def _gist(lake: Lake, row: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """What matters of an artifact of its kind: a sentence of its report, what a model adds, a network's card."""
+    from flagdata.schema import Kind
+
+    report = row["report"] or {}
+    if sentence := report.get("sentence") or report.get("words"):
+        yield "says", sentence
+    if row["kind"] == Kind.MODEL and row["parameters"]:
+        yield "adds", ", ".join(row["parameters"].get("effects", {})) or "nothing to the base model"
+    if row["kind"] == Kind.NETWORK and row["object"]:
+        card = json.loads((lake.object_path(row["object"]) / "card.json").read_text(encoding="utf-8"))
+        size = f"{card['parameters']:,} parameters, {card['epochs']} epochs, seed {card['seed']}"
+        yield "card", f"{card['title']}; {size}"
 
 
 @click.command()

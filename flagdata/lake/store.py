@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Collection, Sequence
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from flagdata.errors import NotFoundError, UnknownNameError
+from flagdata.lake import naming
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Catalog
@@ -19,10 +21,12 @@ from flagdata.lake.refs import Refs, Slice, View
 from flagdata.lake.remote_objects import RemoteObjects
 from flagdata.lake.rowfiles import ROW_ORDER, Scan, in_order
 from flagdata.lake.tabled import folded, with_labels
-from flagdata.schema import CATALOG
+from flagdata.schema import CATALOG, Kind
 from flagdata.storage import Place, RemotePath
 
 _ORDER = ", ".join(ROW_ORDER)
+_NAMES = 10_000
+"""Names at most among which one that is nearly right is sought."""
 
 
 class Store:
@@ -81,14 +85,17 @@ class Store:
                 raise UnknownNameError.of("column", column, CATALOG)
         return table.select(list(columns))
 
-    def artifact(self, artifact: str, *, at: str | None = None) -> Artifact:
-        """The artifact of that id, of an id that begins so if only one does, or else of that name if only one has it.
+    def artifact(self, artifact: str, *, at: str | None = None, kinds: Collection[Kind] = ()) -> Artifact:
+        """The artifact that `artifact` means, as in `flagdata.lake.naming`, or NAME@REF at that tag or branch.
+
+        Args:
+            kinds: which of several of that name are meant, if they are of these.
 
         Raises:
             NotFoundError: none, or several.
             InputError, CorruptError: its row is malformed.
         """
-        return Artifact.from_row(self._row(artifact, at).to_pylist()[0])
+        return Artifact.from_row(self._row(artifact, at, kinds).to_pylist()[0])
 
     def identity(self, artifact: str, *, at: str | None = None) -> str:
         """The full id of what `artifact` means, as in `artifact`; its row may be malformed.
@@ -98,19 +105,26 @@ class Store:
         """
         return self._row(artifact, at)["artifact"][0].as_py()
 
-    def _row(self, artifact: str, at: str | None) -> pa.Table:
+    def _row(self, artifact: str, at: str | None, kinds: Collection[Kind] = ()) -> pa.Table:
         view = self.view(at)
         rows = self.scan(view)
-        names = rows.table(["artifact", "name"]) if isinstance(rows, Scan) else rows
-        matches, how = names.filter(pc.starts_with(names["artifact"], artifact)), "begin with"  # type: ignore[attr-defined]
-        if not matches.num_rows:
-            matches, how = names.filter(pc.field("name") == artifact), "are named"
-        if matches.num_rows != 1 or not artifact:
-            several = matches.num_rows and artifact
-            what = f"{matches.num_rows} artifacts {how} {artifact!r}" if several else f"no artifact {artifact!r}"
-            fix = "give the id of one: flagdata ls lists them" if several else "flagdata ls lists them"
-            raise NotFoundError(what, where=str(self.path), fix=fix)
-        return self.matching(view, {"artifact": matches["artifact"][0].as_py()})
+        named = naming.condition(artifact)
+        columns = rows.matching(named).table(naming.COLUMNS) if isinstance(rows, Scan) else rows.filter(named)
+        found = naming.meant(columns.select(naming.COLUMNS).to_pylist(), artifact, kinds=kinds)
+        name, _, ref = artifact.rpartition("@")
+        if not found and name and at is None:
+            return self._row(name, ref, kinds)
+        if len(found) == 1:
+            return self.matching(view, {"artifact": found[0]["artifact"]})
+        where, listed = str(self.path), "flagdata ls lists them"
+        if not found:
+            names = (rows.table(["name"]) if isinstance(rows, Scan) else rows)["name"].unique().to_pylist()
+            close = difflib.get_close_matches(artifact, filter(None, names[:_NAMES]), n=1)
+            suggestion = f"did you mean {close[0]!r}? {listed}" if close else listed
+            raise NotFoundError(f"no artifact {artifact!r}", where=where, fix=suggestion)
+        several = ", ".join(f"{row['kind']} {row['artifact'][:12]}" for row in found[:4])
+        what = f"{artifact!r} may mean {len(found)} artifacts: {several}{', …' if len(found) > 4 else ''}"
+        raise NotFoundError(what, where=where, fix=f"give the id of one: {listed}")
 
     def view(self, at: str | None) -> View:
         """What a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""

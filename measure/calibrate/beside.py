@@ -53,7 +53,7 @@ def joined(
         RefusedError: no offset can be estimated.
     """
     table = rows_of(path, size)
-    artifact = lake.artifact(log, at=at)
+    artifact = lake.artifact(log, at=at, kinds=(Kind.WIND,))
     if artifact.kind is not Kind.WIND or artifact.object is None:
         raise UsageError(
             f"{artifact.name!r} is a {artifact.kind}, not a wind",

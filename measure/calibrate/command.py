@@ -12,6 +12,7 @@ import click
 from click.core import ParameterSource
 
 from flagdata.commands.durations import DURATION
+from flagdata.commands.sections import LongCommand
 from flagdata.commands.statements import STATED
 from flagdata.console import LakePlace, LocalPath, document, following, json_option, progress, say
 from flagdata.errors import InputError, RefusedError, UsageError
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from measure.estimate.source import Reading
 
 
-@click.command()
+@click.command(cls=LongCommand)
 @click.argument("sources", nargs=-1, required=True, metavar="RECORDING...")
 @click.option("--only", type=click.Choice(["weight", "anemometer"]), help="Do one of both: weighing simulates, which "
               "takes minutes, a reading model takes as long as reading the film.")  # fmt: skip
@@ -230,7 +231,7 @@ def _anemometer(
     say(f"the flag as an anemometer {done.found.sentence}")
     for finding in done.found.findings:
         if finding.severity is not Severity.NOTE:
-            say(f"{finding.severity.value}: {finding.what}" + (f"; {finding.fix}" if finding.fix else ""))
+            say(finding.what + (f"; {finding.fix}" if finding.fix else ""), mark=finding.severity.value)
     if done.artifact is not None:
         say(f"{done.artifact[:12]}  reading model, {'committed' if done.new else 'there already'}")
         say(f"for flagdata measure: --model {done.name}")
@@ -312,6 +313,6 @@ def _print(found: Calibration) -> None:
     say(f"  intervals of {check.held} of {check.count} simulations left out contain their weight, median error "
         f"{check.error:.1%}")  # fmt: skip
     for finding in found.findings:
-        say(f"{finding.severity.value}: {finding.what}" + (f"; {finding.fix}" if finding.fix else ""))
+        say(finding.what + (f"; {finding.fix}" if finding.fix else ""), mark=finding.severity.value)
     if found.stated is not None:
         say(f"for flagdata measure: --area-weight {found.stated}")

@@ -13,6 +13,7 @@ import click
 from click.core import ParameterSource
 
 from flagdata.commands.confirm import on_command_line
+from flagdata.commands.sections import LongCommand
 from flagdata.console import LakePlace, LocalPath, json_option
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.findings import Finding
@@ -33,7 +34,7 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside", "still-
 """Kinds of findings that look like an effect."""
 
 
-@click.command("close-loop")
+@click.command("close-loop", cls=LongCommand)
 @click.argument("sources", metavar="SOURCE...", nargs=-1)
 @click.option("--recipe", "recipe_path", type=LocalPath(), metavar="FILE.toml",
               help="Recipe of the cloth, pins, wind and test; it may name the recordings as well.")  # fmt: skip

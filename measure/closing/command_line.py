@@ -72,7 +72,7 @@ def refuse(findings: Iterable[Finding]) -> None:
     for finding in findings:
         if finding.severity is Severity.ERROR:
             raise InputError(finding.what, where=finding.where, fix=finding.fix or "correct the data")
-        say(f"{finding.severity.value}: {finding_text(finding)}")
+        say(finding_text(finding), mark=finding.severity.value)
 
 
 def finding_text(finding: Finding) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from flagdata.console import LocalPath, say
+from flagdata.console import LocalPath, document, json_option, say
 from measure.demo.cards import Truth
 from measure.demo.transcript import Transcript
 
@@ -53,7 +53,8 @@ class Part(StrEnum):
     show_default=True,
     help="What to show.",
 )
-def demo(out: Path, seed: int, minutes: float, part: str) -> None:
+@json_option
+def demo(out: Path, seed: int, minutes: float, part: str, as_json: bool) -> None:
     """Film a simulated flag beside an anemometer, on which something acts that no file states, and take the two files
     through every step, to pages to open.
 
@@ -69,7 +70,7 @@ def demo(out: Path, seed: int, minutes: float, part: str) -> None:
     say(f"This takes about {_expected(minutes, part):.0f} minutes on two idle cores.")
     truths: list[Truth] = []
     with fresh_folder(out, schema=SCHEMA) as scratch:
-        shell = Transcript(folder=scratch)
+        shell = Transcript(folder=scratch, aside=as_json)
         shell.show("init", "lake")
         if Part.FIELD in parts:
             recording = field_steps(shell, seed, minutes * 60, truths)
@@ -78,7 +79,10 @@ def demo(out: Path, seed: int, minutes: float, part: str) -> None:
         if Part.LOOP in parts:
             loop_step(shell, seed, truths)
         write_index(scratch, shell.cards, truths, seconds=time.monotonic() - began)
-    say(f"\nOpen {out / 'index.html'}")
+    if as_json:
+        document("demo", {"page": str(out / "index.html")})
+    else:
+        say(f"\nOpen {out / 'index.html'}")
 
 
 def _expected(minutes: float, part: str) -> float:

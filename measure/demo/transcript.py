@@ -23,6 +23,8 @@ class Transcript:
     """Runs verbs of the command line in a folder and keeps what was typed and printed."""
 
     folder: Path
+    aside: bool = False
+    """Whether what commands print goes to stderr: stdout is for a document."""
     entries: list[tuple[str, str]] = field(default_factory=list)
     cards: list[Card] = field(default_factory=list)
 
@@ -46,7 +48,7 @@ class Transcript:
             FlagdataError: when it ends with anything but 0 and 3.
         """
         printed, code = self._typed(arguments)
-        click.echo(printed, nl=False)
+        click.echo(printed, nl=False, err=self.aside)
         if code not in (0, RefusedError.exit_code):
             raise FlagdataError(
                 f"`{self.entries[-1][0]}` ended with {code}", where="the demonstration", fix="see its message above"
@@ -71,7 +73,7 @@ class Transcript:
     def show(self, *arguments: str) -> str:
         """`run`, and its stdout printed for the person who watches."""
         printed = self.run(*arguments)
-        click.echo(printed, nl=False)
+        click.echo(printed, nl=False, err=self.aside)
         return printed
 
     def read(self, *arguments: str) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flagdata.commands.durations import DURATION
+from flagdata.commands.sections import LongCommand
 from flagdata.commands.statements import STATED
 from flagdata.console import LakePlace, LocalPath, document, following, json_option, progress, say
 from flagdata.errors import RefusedError, UsageError
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from measure.refine.refinement import Refinement
 
 
-@click.command()
+@click.command(cls=LongCommand)
 @click.argument("source", required=False, metavar="[SOURCE]")
 @click.option("--query", metavar="EXPR", help='SQL condition over clips, instead of SOURCE: "wind between 3 and 6".')
 @click.option("--flag-size", metavar="LxH", help="Length along the wind and height along the pole [m], as in 1.5x1.0; "
@@ -331,7 +332,7 @@ def _several(job: _Job, found: Sequence[Subject], *, as_json: bool) -> None:
 def _warn(findings: Sequence[Finding]) -> None:
     for finding in findings:
         if finding.severity is not Severity.NOTE:
-            say(f"{finding.severity.value}: {finding.what}")
+            say(finding.what, mark=finding.severity.value)
 
 
 def _report(done: _Done, *, series: bool) -> None:

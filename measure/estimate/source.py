@@ -14,6 +14,7 @@ from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageEr
 from flagdata.ingest.camera import CropBox, parse_crop
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.matching import matching
+from flagdata.lake.naming import COLUMNS, meant
 from flagdata.provenance import digest, file_hash
 from flagdata.record import Record
 from flagdata.schema import Kind
@@ -30,7 +31,6 @@ from models.storage import CARD, WEIGHTS
 
 FILMED = (Kind.RECORDING, Kind.CLIP, Kind.CAMERA)
 """Kinds of artifacts that have frames."""
-LEAST_PREFIX = 6
 CALIBRATED = "anemometer"
 """Key of the recipes of reading models (`measure.anemometer`)."""
 
@@ -158,18 +158,14 @@ def subjects(
 
 def _named(lake: Lake, source: str, at: str | None) -> Artifact:
     """The film of a name; a recording rather than the film that it was aligned from and whose name it has."""
-    rows = lake.rows({"kind": FILMED}, at=at, columns=["artifact", "kind", "name", "parents"]).to_pylist()
-    meant = [row for row in rows if row["name"] == source and row["kind"] != Kind.CLIP]
-    aligned = {parent for row in meant for parent in row["parents"] or ()}
-    meant = [row for row in meant if row["artifact"] not in aligned]
-    if not meant and len(source) >= LEAST_PREFIX:
-        meant = [row for row in rows if row["artifact"].startswith(source)]
-    if not meant:
+    rows = lake.rows({"kind": FILMED}, at=at, columns=COLUMNS).to_pylist()
+    found = meant(rows, source)
+    if not found:
         raise UnknownNameError.of("file or film of the lake", source, {row["name"] for row in rows})
-    if len(meant) > 1:
-        several = ", ".join(f"{row['kind']} {row['artifact'][:12]}" for row in meant[:4])
-        raise UsageError(f"{source!r} names {len(meant)} films: {several}", where="SOURCE", fix="give the id of one")
-    return lake.artifact(meant[0]["artifact"], at=at)
+    if len(found) > 1:
+        several = ", ".join(f"{row['kind']} {row['artifact'][:12]}" for row in found[:4])
+        raise UsageError(f"{source!r} names {len(found)} films: {several}", where="SOURCE", fix="give the id of one")
+    return lake.artifact(found[0]["artifact"], at=at)
 
 
 def _stored(lake: Lake, artifact: Artifact, reading: Reading) -> Subject:
@@ -242,21 +238,19 @@ def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
     if chosen in shipped:
         return _loaded(estimator.SHIPPED / chosen, None)
     rows = [] if lake is None else _models(lake, at)
-    meant = [row for row in rows if row["name"] == chosen]
-    meant = meant or [row for row in rows if len(chosen) >= LEAST_PREFIX and row["artifact"].startswith(chosen)]
-    if not meant or lake is None:
+    same = meant(rows, chosen)
+    if not same or lake is None:
         raise UnknownNameError.of("model", chosen, shipped | {str(row["name"]) for row in rows}, where="--model")
-    if len(meant) > 1:
-        raise UsageError(f"{len(meant)} models are called {chosen!r}", where="--model", fix="give the id of one")
-    artifact = lake.artifact(meant[0]["artifact"], at=at)
+    if len(same) > 1:
+        raise UsageError(f"{len(same)} models are called {chosen!r}", where="--model", fix="give the id of one")
+    artifact = lake.artifact(same[0]["artifact"], at=at)
     folder = lake.object_path(str(artifact.object))
     return _loaded(folder, artifact) if artifact.kind is Kind.NETWORK else _calibrated(folder, artifact, lake, at)
 
 
 def _models(lake: Lake, at: str | None) -> list[dict[str, Any]]:
     """Networks and reading models of a lake: artifact and name."""
-    columns = ["artifact", "name", "kind", "recipe"]
-    rows = lake.rows({"kind": (Kind.NETWORK, Kind.MEASUREMENT)}, at=at, columns=columns).to_pylist()
+    rows = lake.rows({"kind": (Kind.NETWORK, Kind.MEASUREMENT)}, at=at, columns=(*COLUMNS, "recipe")).to_pylist()
     return [row for row in rows if row["kind"] == Kind.NETWORK or CALIBRATED in json.loads(row["recipe"] or "{}")]
 
 

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from flagdata.addresses import local_path
 from flagdata.errors import UsageError
 from flagdata.lake import Lake
+from flagdata.lake.naming import COLUMNS, meant
 from measure.calibrate.columns import names
 from measure.calibrate.filmed import is_table
-from measure.estimate.source import FILMED, LEAST_PREFIX
+from measure.estimate.source import FILMED
 from measure.observables import OBSERVABLES
 
 _DESCRIPTIONS = (".toml", ".json")
@@ -50,10 +51,5 @@ def is_film(source: str, *, lake: Lake | None, at: str, otherwise: bool = False)
         return "marker" not in columns and bool(columns & set(OBSERVABLES))
     if lake is None:
         return otherwise
-    rows = lake.rows({}, at=at, columns=["artifact", "kind", "name"]).to_pylist()
-    kinds = {
-        row["kind"]
-        for row in rows
-        if row["name"] == source or (len(source) >= LEAST_PREFIX and row["artifact"].startswith(source))
-    }
+    kinds = {row["kind"] for row in meant(lake.rows({}, at=at, columns=COLUMNS).to_pylist(), source)}
     return bool(kinds & set(FILMED)) if kinds else otherwise

@@ -7,12 +7,13 @@ from pathlib import Path
 import click
 
 from flagdata.commands.durations import DURATION
+from flagdata.commands.sections import LongCommand
 from flagdata.console import LakePlace, LocalPath, document, json_option, progress, say
 from flagdata.errors import RefusedError, UsageError
 from flagdata.storage import Place
 
 
-@click.command()
+@click.command(cls=LongCommand)
 @click.argument("source", metavar="SOURCE")
 @click.option("--flag-size", metavar="LxH", required=True, help="Length along the wind and height along the pole [m], "
               "as in 1.5x1.0; the height gives the scale.")  # fmt: skip

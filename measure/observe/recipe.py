@@ -360,7 +360,7 @@ def _read(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Obs
     _refuse(source, ("take", "rate", "rest_unit"), "an artifact")
     if source.unit != "m":
         raise UsageError("an artifact is in metres", where=source.source, fix="leave the unit out")
-    artifact = lake.artifact(source.source)
+    artifact = lake.artifact(source.source, kinds=(Kind.MARKERS, Kind.MESHES))
     if artifact.kind is Kind.MARKERS:
         return (markers.from_artifact(lake, artifact),)
     return (meshes.from_artifact(lake, artifact),)
@@ -399,4 +399,4 @@ def _track(source: WindSource, folder: Path, lake: Lake | None) -> tuple[WindTra
         )  # fmt: skip
     if lake is None:
         raise NotFoundError("no such log", where=source.log, fix="check the path, or open a lake for ids")
-    return wind.from_artifact(lake, lake.artifact(source.log), placement)
+    return wind.from_artifact(lake, lake.artifact(source.log, kinds=(Kind.WIND,)), placement)

@@ -12,6 +12,7 @@ import click
 
 from flagdata.addresses import lake_place
 from flagdata.caches import beside
+from flagdata.commands.sections import LongCommand
 from flagdata.commands.statements import STATED
 from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
 from flagdata.errors import InputError
@@ -35,7 +36,7 @@ _BEFORE: dict[str, tuple[str, ...]] = {"train": (), "validation": ("train",), "t
 """Side → the sides that a network has learned from, or was selected by, before it is judged on it."""
 
 
-@click.command()
+@click.command(cls=LongCommand)
 @click.argument("models", metavar="MODEL...", nargs=-1, required=True)
 @click.option("--dataset", default="flagsim-wide", show_default=True, help="Data set whose clips are judged.")
 @click.option("--side", type=click.Choice(("train", "validation", "test")), default="test", show_default=True,
@@ -184,22 +185,22 @@ class _Desk:
 
     def _models(self, names: Sequence[str]) -> list[tuple[Artifact | None, Estimator]]:
         from flagdata.errors import UnknownNameError
+        from flagdata.lake.naming import COLUMNS, meant
         from flagdata.schema import Kind
         from models import estimator
 
         lake = self._source.lake
-        rows = lake.rows({"kind": Kind.NETWORK}, at=self._at, columns=["artifact", "name"]).to_pylist()
+        rows = lake.rows({"kind": Kind.NETWORK}, at=self._at, columns=COLUMNS).to_pylist()
         found: list[tuple[Artifact | None, Estimator]] = []
         for name in names:
             if name == "shipped" or name.startswith("shipped/"):
                 ours = estimator.shipped(name.partition("/")[2] or estimator.DEFAULT)
                 found.append((None, replace(ours, name=f"{ours.name}, as shipped")))  # beside its seeds, if they are
                 continue
-            meant = [row["artifact"] for row in rows if row["name"] == name]
-            meant = meant or [row["artifact"] for row in rows if len(name) >= 6 and row["artifact"].startswith(name)]
-            if not meant:
+            same = [row["artifact"] for row in meant(rows, name)]
+            if not same:
                 raise UnknownNameError.of("network", name, sorted({row["name"] for row in rows} | {"shipped"}))
-            for artifact in sorted(meant):
+            for artifact in sorted(same):
                 row = lake.artifact(artifact, at=self._at)
                 found.append((row, estimator.load(lake.object_path(str(row.object)))))
         return found

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from flagdata.addresses import local_path
 from flagdata.errors import CorruptError, NotFoundError, UnknownNameError
 from flagdata.lake import Artifact, Lake
+from flagdata.lake.naming import COLUMNS, meant
 from flagdata.schema import Kind
 from sim.run import reading
 from sim.run.recipe import Recipe
-
-_SHORTEST = 6
-"""Characters of an id that are taken for one."""
 
 
 def load(source: str, lake: Lake, *, branch: str = "main") -> Recipe:
@@ -29,8 +26,8 @@ def load(source: str, lake: Lake, *, branch: str = "main") -> Recipe:
     """
     if local_path(source).suffix in (".toml", ".json") or source in reading.SCENES.names():
         return reading.load(source)
-    rows = lake.rows("kind = 'model'", at=branch, columns=["artifact", "name"]).to_pylist()
-    found = [row["artifact"] for row in rows if _means(source, row)]
+    rows = lake.rows({"kind": Kind.MODEL}, at=branch, columns=COLUMNS).to_pylist()
+    found = [row["artifact"] for row in meant(rows, source)]
     if len(found) > 1:
         raise NotFoundError(f"{len(found)} models are meant by {source!r}", where=str(lake.path), fix=_one_of(found))
     if not found:
@@ -51,10 +48,6 @@ def of_artifact(artifact: Artifact) -> Recipe:
         raise CorruptError("no model that can be simulated", where=where, fix="close the loop again")
     recipe = reading.of_content(json.loads(artifact.parameters), name=artifact.name, folder=Path(), where=where)
     return replace(recipe, model=artifact.id)
-
-
-def _means(source: str, row: Mapping[str, Any]) -> bool:
-    return row["name"] == source or (len(source) >= _SHORTEST and row["artifact"].startswith(source))
 
 
 def _one_of(found: Iterable[str]) -> str:

@@ -73,9 +73,11 @@ def test_show_finds_an_artifact_by_its_name_where_only_one_has_it(run: Run, lake
     assert run("show", "sonic", "--json").document["artifact"]["artifact"] == second.id
     with lake.transaction("another of that name") as tx:
         tx.add(Artifact(kind="wind", name="cup", object=second.object))
+    listed = run("ls", "--json").document["artifacts"]
+    of_one_name = [f"{row['kind']} {row['artifact'][:12]}" for row in listed if row["name"] == "cup"]
     ended = run("show", "cup")
     assert ended.code == 1
-    assert ended.err.splitlines()[0] == "flagdata: 2 artifacts are named 'cup'"
+    assert ended.err.splitlines()[0] == f"flagdata: 'cup' may mean 2 artifacts: {', '.join(of_one_name)}"
     assert "give the id of one" in ended.err
     assert run("show", first.id, "--json").document["artifact"]["name"] == "cup"
 

@@ -1,0 +1,68 @@
+"""`flagdata catalog`: the names that other commands take, with a line on each."""
+
+from __future__ import annotations
+
+import json
+import sys
+import textwrap
+from collections.abc import Mapping
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+
+import click
+
+from flagdata.console import document, json_option, table
+from flagdata.errors import UnknownNameError
+from flagdata.recipes import Shelf
+
+
+@click.command()
+@click.argument("kind", required=False)
+@json_option
+def catalog(kind: str | None, as_json: bool) -> None:
+    """List the names that come with flagdata: scenes, materials, effects, sensors, data sets, models and more.
+
+    With KIND that kind alone, a line on each name. What a lake holds is listed by `flagdata ls`.
+    """
+    from flagdata.cli import NAMES
+
+    if kind is not None and kind not in NAMES:
+        raise UnknownNameError.of("kind of name", kind, NAMES)
+    kinds = NAMES if kind is None else {kind: NAMES[kind]}
+    found = {name: titles(target) for name, (target, _) in kinds.items()}
+    if as_json:
+        listed = [{"kind": name, "taken_by": kinds[name][1], "names": names} for name, names in found.items()]
+        document("catalog", {"kinds": listed})
+    elif kind is not None:
+        table((kind, "what it is"), found[kind].items())
+    else:
+        for name, names in found.items():
+            click.echo(f"{name} ({kinds[name][1]})")
+            click.echo(textwrap.fill(", ".join(names), initial_indent="  ", subsequent_indent="  ",
+                                     break_on_hyphens=False, width=80))  # fmt: skip
+
+
+def titles(target: str) -> Mapping[str, str]:
+    """Name → what it is, of a shelf of recipes, a registry, or a folder of networks.
+
+    Args:
+        target: "module:attribute".
+    """
+    module, _, attribute = target.partition(":")
+    held = getattr(import_module(module), attribute)
+    if isinstance(held, Shelf):
+        return held.titles()
+    if isinstance(held, Path):
+        cards = {path.parent.name: json.loads(path.read_text(encoding="utf-8")) for path in held.glob("*/card.json")}
+        return {name: str(cards[name]["title"]) for name in sorted(cards)}
+    return {name: _line(held[name]) for name in held}
+
+
+def _line(entry: object) -> str:
+    """What an entry of a registry says of itself, or the first line of its module."""
+    if isinstance(entry, partial):
+        entry = entry()
+    module = entry.__module__ if isinstance(entry, type) else type(entry).__module__
+    about = getattr(entry, "about", None) or (sys.modules[module].__doc__ or "").strip().splitlines()[0]
+    return str(about).rstrip(".")

@@ -1,0 +1,39 @@
+"""`flagdata help`: the help of the program or of one of its commands, on stdout."""
+
+from __future__ import annotations
+
+import click
+
+from flagdata.console import document, json_option
+from flagdata.errors import UnknownNameError
+
+
+@click.command("help")
+@click.argument("verbs", nargs=-1, metavar="[VERB]")
+@json_option
+@click.pass_context
+def help_(context: click.Context, verbs: tuple[str, ...], as_json: bool) -> None:
+    """Show the help of flagdata, or of the command VERB.
+
+    \b
+      flagdata help
+      flagdata help measure
+      flagdata help challenge make
+    """
+    shown = context.find_root()
+    for verb in verbs:
+        group = shown.command
+        known = group.list_commands(shown) if isinstance(group, click.Group) else []
+        found = group.get_command(shown, verb) if isinstance(group, click.Group) and verb in known else None
+        if found is None:
+            raise UnknownNameError.of("command", verb, known, where=shown.command_path)
+        shown = click.Context(found, info_name=verb, parent=shown)
+    print_help(shown, as_json=as_json)
+
+
+def print_help(shown: click.Context, *, as_json: bool) -> None:
+    """The help of a command on stdout."""
+    if as_json:
+        document("help", {"command": shown.command_path, "help": shown.get_help()})
+    else:
+        click.echo(shown.get_help())
