@@ -191,5 +191,5 @@ def _findings(energies: list[float], shifts: list[float], gains: list[float]) ->
             )
         )
     if energies and not np.nanmax(np.array([0.0, *energies])) > 0:
-        found.append(Finding(kind="no-motion", severity=Severity.ERROR, what="nothing moves in the picture"))
+        found.append(Finding(kind="no-motion", severity=Severity.ERROR, what="no motion is found in the picture"))
     return tuple(found)

@@ -197,8 +197,8 @@ def calibrated(
     spread = float(logged.std())
     if checked.rmse >= spread:
         raise RefusedError(
-            f"the film does not show the wind: what is read of windows left out errs by {checked.rmse:.2f} m/s, as "
-            f"much as their mean would ({spread:.2f} m/s)",
+            f"the wind that is read of windows left out errs by {checked.rmse:.2f} m/s, as much as their mean would "
+            f"({spread:.2f} m/s): what moves may not be the flag, or film and log may not be of one time",
             where=recordings[0].name, fix="check the flag with --crop or --flag, and the clocks with flagdata align",
         )  # fmt: skip
     model = ReadingModel(

@@ -165,7 +165,9 @@ def _place(film: ConditionedFilm, hoist: NDArray[np.float64], side: float) -> Pl
     found, reference = film.found, film.reference
     if found is None or reference is None or found.region is None:
         raise RefusedError(
-            "nothing moves like cloth in the film", where=film.name, fix="give another film, or --crop around the flag"
+            "no motion like cloth's was found in the film",
+            where=film.name,
+            fix="give another film, or --crop around the flag",
         )
     rows, columns = reference.shape
     longer = max(rows, columns)

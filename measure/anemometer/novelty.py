@@ -177,8 +177,8 @@ class Compared:
             found.append(_reason("another-picture", "the picture is of another shape than that of the calibration"))
         if self.likeness < BACKGROUND:
             what = (
-                "the film is from another place than the calibration: the pictures' backgrounds correlate by "
-                f"{self.likeness:.2f}, at least {BACKGROUND:g} is required"
+                f"the pictures' backgrounds correlate by {self.likeness:.2f}, at least {BACKGROUND:g} is required: the "
+                "film may be from another place than the calibration"
             )
             found.append(_reason("another-place", what, self.likeness))
         if math.isnan(self.likeness) and self.framing > FRAMING:
@@ -192,9 +192,9 @@ class Compared:
             found.append(_reason("another-wind", "hardly any window reads a wind in which the flag was calibrated"))
         if self.shift > SHIFT:
             what = (
-                "the film does not show the flag of the calibration, or not from the same side of the wind: what its "
-                f"windows show beside the wind is off by {self.shift:.2f} standard deviations, at most {SHIFT:g} is "
-                "accepted"
+                f"what its windows show beside the wind is off by {self.shift:.2f} standard deviations, at most "
+                f"{SHIFT:g} is accepted: it may be another flag than that of the calibration, or seen from another "
+                "side of the wind"
             )
             found.append(_reason("another-flag", what, self.shift))
         return found

@@ -434,9 +434,9 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
         found.extend(one.observed.findings)
         if one.unlike is not None:
             what = (
-                f"no simulated flag looks like {one.observed.name} (p = {one.misfit:.1g}): {one.unlike}. The cloth is "
-                "not separated from what is behind it, or its size, attachment or place is another than stated, or "
-                "something acts on it that the model lacks. The weight is withheld"
+                f"no simulated flag looks like {one.observed.name} (p = {one.misfit:.1g}): {one.unlike}. The cloth "
+                "may not be separated from what is behind it, or its size, attachment or place be another than stated, "
+                "or something may act on it that the model lacks. The weight is withheld"
             )
             fix = (
                 "look at the readings with flagdata observe --picture, check --flag-size, --attachment, --azimuth, "

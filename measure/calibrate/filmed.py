@@ -149,7 +149,7 @@ def with_log(
     findings += film.findings()
     if lost := [one for one in findings if one.kind == "camera-lost" and (one.value or 0.0) > _LOST]:
         raise RefusedError(
-            f"the camera moves and cannot be steadied: {lost[0].what}", where=film.name,
+            f"the camera may move, and cannot be followed: {lost[0].what}", where=film.name,
             fix="film from a tripod, or choose a part with --start and --end",
         )  # fmt: skip
     nothing = [math.nan] * len(OBSERVED)

@@ -85,7 +85,8 @@ class Observed:
             )  # fmt: skip
         if not shown(self.readings).any():
             raise InputError(
-                f"no flag is found: no observable is shown by {SHOWN:.0%} of the windows", where=self.name,
+                f"no observable could be read in {SHOWN:.0%} of the windows: what is followed may not be the flag",
+                where=self.name,
                 fix="look at the film with flagdata observe --picture, and choose the flag with --crop or --flag",
             )  # fmt: skip
 

@@ -7,11 +7,11 @@ A gate looks at one window and gives reasons, each with the p-value of a familia
 several windows; how many of them may be strange, and from which p on one is, `measure.gate.several` says.
 
 A flag has one size. Where it is not given, the model looks at the film as that of each of several sizes, and each of
-them is judged as if it had been given: by the same windows, at the same level. The sizes at which the recording is
-refused are left out of the answer, and it is refused if none is left. This is the test of the composite hypothesis "of
-one of these sizes", whose p-value is the largest of its parts' (Lehmann and Romano, Testing Statistical Hypotheses,
-2005, section 3.1): a familiar recording is refused at its own size at most at the stated rate, and at all sizes no more
-often, however many are tried. So nothing is shown without the size that would not be shown with one of those sizes.
+them is judged as if it had been given: by the same windows, at the same level. Where the recording is refused at all of
+them it is unlike what the model was trained on: this is the test of the composite hypothesis "of one of these sizes",
+whose p-value is the largest of its parts' (Lehmann and Romano, Testing Statistical Hypotheses, 2005, section 3.1), and
+refuses a familiar recording no more often than its own size does. Where it is refused at some of them only, the size
+decides, and it is asked for. So nothing is shown without the size that would be refused with one of those sizes.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ from measure.gate.blank import blank
 from measure.gate.several import refusing, window_rate
 from models.estimator import Estimator
 from models.outliers import Familiarity
+
+GIVE_SIZE = "give --flag-size, the length along the wind times the height along the pole in metres, as in 1.5x1.0"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,7 +136,8 @@ class Verdict:
         false_alarm: share of familiar recordings that are refused, at most.
         level: p at or below which a window is strange.
         refusing: how many strange windows refuse the recording.
-        sizes: (i,) places of the sizes at which it is not refused; all of them where it is.
+        considered: how many sizes were.
+        sizes: (i,) places of the sizes at which it is not refused; all of them where it is at each.
         size: place of the size at which it is least strange.
         p: of the window that decides there, the `refusing`-th strangest.
         window_p: (k,) of each window there.
@@ -146,6 +149,7 @@ class Verdict:
     false_alarm: float
     level: float
     refusing: int
+    considered: int
     sizes: tuple[int, ...]
     size: int
     p: float
@@ -160,12 +164,20 @@ class Verdict:
         return self.p <= self.level
 
     @property
+    def undecided(self) -> bool:
+        """Whether the flag's size decides, which was not given."""
+        return len(self.sizes) < self.considered
+
+    @property
     def refused(self) -> bool:
-        return bool(self.faults) or self.unlike
+        return bool(self.faults) or self.unlike or self.undecided
 
     @property
     def reasons(self) -> tuple[Reason, ...]:
         """All of them, the weightiest first."""
+        if self.undecided:
+            what = f"at {len(self.sizes)} of {self.considered} sizes of the flag it is, at the others it is not"
+            return (*self.faults, Reason(kind="size-needed", what=what, p=self.p, fix=GIVE_SIZE))
         return self.faults if self.faults and not self.unlike else (*self.faults, *self.window_reasons)
 
     @property
@@ -197,6 +209,8 @@ class Verdict:
             return f"the film cannot be measured: {self.faults[0].what}{more}"
         if self.unlike:
             return f"this is not like what the network was trained on: {self.reasons[0].what}; {windows} ({rate})"
+        if self.undecided:
+            return f"whether this is like what the network was trained on depends on the size: {self.reasons[0].what}"
         return f"like what the network was trained on; {windows} ({rate})"
 
     def as_dict(self) -> Mapping[str, Any]:
@@ -234,8 +248,8 @@ def verdict(
     order = np.argsort(p[:, size], kind="stable")
     speaking = int((p[:, size] <= at).sum()) if deciding[size] <= at else count
     return Verdict(
-        false_alarm=false_alarm, level=at, refusing=needed, sizes=kept, size=size, p=float(deciding[size]),
-        window_p=tuple(p[:, size].tolist()),
+        false_alarm=false_alarm, level=at, refusing=needed, considered=p.shape[1], sizes=kept, size=size,
+        p=float(deciding[size]), window_p=tuple(p[:, size].tolist()),
         blank=tuple(all(reasons[0].blank for reasons in sizes) for sizes in windows),
         faults=tuple(Reason.counted(fault) for fault in faults),
         window_reasons=tuple(windows[int(order[speaking // 2])][size]),

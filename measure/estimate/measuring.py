@@ -205,9 +205,9 @@ def _without_windows(film: Film, layout: Layout, distinct: Distinct, faults: Seq
     if distinct.repeated and not still:
         repeated = REASONS["repeated-frames"]
         return RefusedError(
-            f"{repeated.sentence}: {distinct.share:.0%} of {distinct.frames} frames repeat the one before, so that the "
-            f"camera took {(1 - distinct.share) * film.rate:.3g} pictures a second; none of {layout.count} windows has "
-            "enough",
+            f"{repeated.sentence}: {distinct.share:.0%} of {distinct.frames} frames repeat the one before, and "
+            f"{(1 - distinct.share) * film.rate:.3g} different pictures a second are left; none of {layout.count} "
+            "windows has enough",
             where=film.name, fix=repeated.fix,
         )  # fmt: skip
     if faults:

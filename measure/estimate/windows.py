@@ -196,7 +196,7 @@ def findings_of(layout: Layout, *, found: int, interpolated: int, frames: int, r
             Finding(
                 kind="frames-repeated", severity=Severity.WARNING, count=repeated, value=repeated / frames,
                 what=f"{repeated} of {frames} frames ({repeated / frames:.0%}) repeat the one before and were left "
-                f"out: the camera took {(1 - repeated / frames) / layout.period:.3g} pictures a second",
+                f"out: {(1 - repeated / frames) / layout.period:.3g} different pictures a second are left",
             )
         )  # fmt: skip
     return tuple(notes)

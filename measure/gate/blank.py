@@ -55,7 +55,7 @@ def blank(frames: NDArray[np.uint8]) -> Blank | None:
     if most > LEAST_DEVIATION:
         return None
     what = (
-        f"nothing moves in the picture: its gray levels change by {most:.1f} at most (standard deviation in time), and "
-        f"up to {LEAST_DEVIATION:g} comes of rounding and coding"
+        f"no motion is found in the picture: its gray levels change by {most:.1f} at most (standard deviation in "
+        f"time), and up to {LEAST_DEVIATION:g} comes of rounding and coding"
     )
     return Blank(kind="no-motion", sentence=what, fix=REASONS["no-motion"].fix, check="strength", value=most)

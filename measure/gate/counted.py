@@ -63,7 +63,7 @@ def _all(watch: FilmWatch, found: Conditioning, follower: Follower) -> Iterator[
         if 0 < spot < _SMALL:
             yield _reason("scale", spot, f"what moves spans {spot:.0f} px, {_SMALL:.0f} are needed")
         else:
-            yield _reason("no-motion", 0.0, "no region of the picture moves like cloth")
+            yield _reason("no-motion", 0.0, "no region of the picture changes as cloth does")
         return
     shares = (box[0] / width, box[1] / height, min(box[2] / width, 1.0), min(box[3] / height, 1.0))
     twins = watch.twins(shares)
@@ -74,15 +74,15 @@ def _all(watch: FilmWatch, found: Conditioning, follower: Follower) -> Iterator[
         what = f"in {follower.lost} of {total} frames the background was not found"
         yield _reason("moving-camera", follower.lost / total, what)
     if edges := {name: share for name, share in found.cut_share.items() if share > _AT_EDGE}:
-        what = ", ".join(f"at the {name} edge in {share:.0%} of the frames" for name, share in edges.items())
+        what = ", ".join(f"the {name} edge in {share:.0%} of the frames" for name, share in edges.items())
         yield _reason("cut-off", max(edges.values()), what)
     elif not len(found.camera.corners) and watch.resting() < _RESTING:  # cloth that is cut off hides what stands still
-        yield _reason("moving-camera", float(watch.resting()), "nothing in the picture stands still")
+        yield _reason("moving-camera", float(watch.resting()), "no edge in the picture stays in its place")
     span = max(box[2] - box[0], box[3] - box[1])
     if span < _SMALL:
-        yield _reason("scale", span, f"its places span {span:.0f} px, {_SMALL:.0f} are needed")
+        yield _reason("scale", span, f"it spans {span:.0f} px, {_SMALL:.0f} are needed")
     elif (grain := watch.grain(region.mask)) < _GRAIN:
-        what = f"it is as fine as leaves: averaged over a fortieth of the picture, {grain:.0%} of the change is left"
+        what = f"averaged over a fortieth of the picture, {grain:.0%} of it is left, of cloth {_GRAIN:.0%} or more"
         yield _reason("unlike-cloth", grain, what)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 @dataclass(frozen=True, kw_only=True)
 class Reason:
     """Attributes:
-    sentence: for the message, without a final stop.
+    sentence: what was found and what it may mean, without a final stop; the figure follows it.
     fix: what the user can do.
     of_motion: whether it concerns the moving region, and so needs one.
     """
@@ -20,37 +20,39 @@ class Reason:
 
 REASONS: dict[str, Reason] = {
     "scene-cut": Reason(
-        sentence="the picture cuts to another scene",
-        fix="choose a part of the film between two cuts by --start and --end",
+        sentence="the picture changes at once, as where two scenes are joined",
+        fix="choose a part of the film between two such places by --start and --end",
     ),
     "too-few-frames": Reason(sentence="there are too few frames", fix="give a longer film"),
     "low-frame-rate": Reason(sentence="there are too few frames a second", fix="film at 25 frames a second or more"),
     "repeated-frames": Reason(
-        sentence="frames are repeated", fix="give a film whose frames are all different, or one taken in better light"
+        sentence="many frames look alike, as in a film that loops, stands still or was made with fewer frames a second",
+        fix="give a film whose frames are all different, as the camera wrote it",
     ),
     "too-dark": Reason(
-        sentence="the picture is too dark, too flat or too noisy", fix="film by daylight, or expose longer"
+        sentence="the cloth may not stand out from darkness, haze or noise",
+        fix="film by daylight, or expose longer",
     ),
     "no-motion": Reason(
-        sentence="nothing in the picture moves like a flag",
+        sentence="no motion like a flag's was found",
         fix="crop to the flag, or choose a part of the film in which it flies",
     ),
     "unlike-cloth": Reason(
-        sentence="the motion is unlike that of simulated cloth",
+        sentence="the motion is finer than cloth's, as of leaves or water",
         fix="make sure that the crop shows a flag on a pole and little else that moves",
         of_motion=True,
     ),
     "moving-camera": Reason(
-        sentence="the camera moves, and the background does not show how",
+        sentence="the camera may move: its motion could not be followed",
         fix="film from a tripod, with something that stands still in the picture",
     ),
     "cut-off": Reason(
-        sentence="the picture's edge cuts through the moving cloth",
+        sentence="part of the cloth may lie outside the picture: motion reaches the picture's edge",
         of_motion=True,
         fix="film so that the whole flag is in the picture, or choose another by --flag",
     ),
     "scale": Reason(
-        sentence="the flag is too small or too large in the picture",
+        sentence="the flag fills less or more of the picture than in the training clips",
         fix="film from nearer, so that the flag spans 100 pixels or more",
         of_motion=True,
     ),

@@ -118,7 +118,7 @@ class Watcher:
         self._held = []
         if self._film.found is None or self._film.found.region is None:
             raise RefusedError(
-                "nothing moves like cloth in the film", where=self._film.name,
+                "no motion like cloth's was found in the film", where=self._film.name,
                 fix="give another film, or --crop around the flag",
             )  # fmt: skip
 

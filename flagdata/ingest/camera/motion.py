@@ -166,7 +166,11 @@ def _region(maps: NDArray[np.float32], motion: NDArray[np.float32], *, where: st
     noise = 1.4826 * float(np.median(np.abs(smooth - middle)))
     peak = float(np.percentile(smooth, 99.5))
     if peak - middle < _FAINTEST:
-        raise RefusedError("nothing moves in the image", where=where, fix="give the crop as x,y,width,height")
+        raise RefusedError(
+            f"no motion is found in the image: gray levels change by {peak - middle:.2g}, less than {_FAINTEST:g}",
+            where=where,
+            fix="give the crop as x,y,width,height",
+        )
     moving = smooth > middle + max(_FAINTEST / 2, min(4 * noise, 0.5 * (peak - middle)), 0.1 * (peak - middle))
     # Parts of one flag that move apart by a few pixels are one region.
     labels = np.empty(moving.shape, dtype=np.int32)

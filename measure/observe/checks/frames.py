@@ -93,7 +93,9 @@ def without_repeats(seen: Observation, sigma: float) -> Observation:
     where = f"recording {seen.name!r}"
     steps = _steps(seen.positions)
     if (steps == 0).mean() > _FROZEN:
-        raise InputError("nothing moves: nearly all frames are the same", where=where, fix="record the cloth in a wind")
+        raise InputError(
+            "no motion is found: nearly all frames are the same", where=where, fix="record the cloth in a wind"
+        )
     square = steps - 6 * sigma**2
     usual = _neighbourhood(square)
     repeat = np.zeros(len(seen.positions), dtype=bool)
@@ -105,7 +107,7 @@ def without_repeats(seen: Observation, sigma: float) -> Observation:
         rate = (len(repeat) - count) / (len(repeat) - 1) / float(seen.times[1] - seen.times[0])
         raise InputError(
             f"{count} of {len(repeat)} frames repeat the one before", where=f"{where}, frame {int(repeat.argmax())}",
-            fix=f"the cloth was tracked at about {rate:.4g} Hz: drop the repeats and give that rate",
+            fix=f"it may have been tracked at about {rate:.4g} Hz: drop the repeats and give that rate",
         )  # fmt: skip
     positions = np.array(seen.positions)
     positions[repeat] = np.nan
@@ -166,7 +168,8 @@ def check_motion(positions: Floats, sigma: float, size: float, *, where: str) ->
     least = max(3 * np.sqrt(3) * sigma, _STILL * size)
     if motion < least:
         raise InputError(
-            f"nothing moves: {1e3 * motion:.3g} mm on the average, with {1e3 * sigma:.3g} mm of noise", where=where,
+            f"no motion is found: {1e3 * motion:.3g} mm on the average, with {1e3 * sigma:.3g} mm of noise",
+            where=where,
             fix="record the cloth in a wind; a still cloth says nothing of damping, inertia or gusts",
         )  # fmt: skip
 

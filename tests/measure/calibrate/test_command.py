@@ -129,7 +129,7 @@ def test_a_table_without_a_flag_is_refused(tmp_path: Path) -> None:
     rows = [f"{2.5 * number},5.0," for number in range(20)]
     path.write_text("\n".join(["time,wind,droop", *rows]) + "\n")
     done = _run(path, "--flag-size", "1.5x1.0")
-    assert "no flag is found" in f"{done.exception}"
+    assert "no observable could be read" in f"{done.exception}"
 
 
 @pytest.mark.parametrize(

@@ -213,7 +213,7 @@ def test_a_refused_film_ends_with_3_and_shows_no_estimate(strange: Path, tmp_pat
 def test_a_still_film_is_given_no_number_even_anyway(tmp_path: Path, form: tuple[str, ...]) -> None:
     still = write_video(tmp_path / "still.mkv", pictures(1, height=40, width=56).repeat(40, axis=0))
     done = run(still, *SIZED, "--anyway", *form, code=3)
-    assert "no number is given, not even with --anyway: nothing moves in the picture" in done.stdout + done.stderr
+    assert "no number is given, not even with --anyway: no motion is found in the picture" in done.stdout + done.stderr
     assert "m/s" not in done.stdout + done.stderr
     assert not form or "quantities" not in done.stdout
 

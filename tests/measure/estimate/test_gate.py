@@ -44,10 +44,16 @@ def test_a_gate_of_few_clips_may_ask_for_a_smaller_p() -> None:
     assert verdict([[reason(0.02)]], false_alarm=0.05, level=lambda rate: 0.6 * rate).refused
 
 
-def test_a_film_that_is_familiar_as_that_of_one_size_is_not_refused() -> None:
+def test_a_film_that_is_familiar_at_one_size_alone_is_refused_until_its_size_is_given() -> None:
+    """So leaving the size out lets no film pass that is refused with one of the sizes considered."""
     found = verdict([[reason(0.001), reason(0.4)]], false_alarm=0.05, level=exact)
     assert (found.p, found.sizes, found.size) == (0.4, (1,), 1)
-    assert not found.refused
+    assert found.refused
+    assert not found.unlike
+    assert [one.kind for one in found.reasons] == ["size-needed"]
+    assert "at 1 of 2 sizes of the flag it is" in found.sentence
+    assert found.reasons[0].fix.startswith("give --flag-size")
+    assert not verdict([[reason(0.3), reason(0.4)]], false_alarm=0.05, level=exact).refused
 
 
 def test_a_film_that_is_refused_at_every_size_is_refused_however_its_windows_pass_at_different_sizes() -> None:

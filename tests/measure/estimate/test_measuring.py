@@ -318,11 +318,12 @@ def test_without_its_size_a_film_is_refused_as_it_is_with_each_size(model: Estim
     assert judged([[0.001] if k % 2 else [0.5] for k in range(40)], WHOLE).verdict.refused
 
 
-def test_a_size_at_which_the_film_would_be_refused_is_no_part_of_the_answer(model: Estimator) -> None:
+def test_a_size_at_which_the_film_would_be_refused_is_asked_for_and_no_part_of_the_answer(model: Estimator) -> None:
     film = even(8 * FRAMES, rate=50.0)
     found = measure(film, model, gate=Listed(*[0.001, 0.4, 0.5] * 40), dependence=APART, options=Options())
     every = measure(film, model, gate=Listed(*[0.4, 0.4, 0.5] * 40), dependence=APART, options=Options())
-    assert not found.verdict.refused
+    assert [one.kind for one in found.verdict.reasons] == ["size-needed"]
+    assert not every.verdict.refused
     assert found.sizes.scale.tolist() == every.sizes.scale.tolist()[1:]
     assert len(found.draws) == len(every.draws) * 2 // 3
     assert found.quantities[1].assumed[0] > every.quantities[1].assumed[0]

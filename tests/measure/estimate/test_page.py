@@ -54,7 +54,7 @@ def test_a_bound_is_shown_as_one_without_a_value(model: Estimator) -> None:
 def test_a_film_in_which_nothing_moves_is_shown_without_estimates_even_anyway(model: Estimator) -> None:
     still = measured(Pictures(times=np.arange(24) / 25.0, images=pictures(1).repeat(24, axis=0)), model)
     text = drawn(still, anyway=True)
-    assert "nothing moves in the picture" in text
+    assert "no motion is found in the picture" in text
     assert "What the film says" not in text
     assert "m/s" not in re.sub(r"data:[^\"]*", "", text)
 

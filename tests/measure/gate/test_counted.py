@@ -91,9 +91,9 @@ def test_cloth_at_an_edge_is_counted_by_frames_and_named_by_its_edge(plain: Fram
     assert fault.kind == "cut-off"
     assert fault.value is not None
     assert fault.value > 0.8
-    assert f"at the right edge in {fault.value:.0%} of the frames" in fault.what
+    assert f"the right edge in {fault.value:.0%} of the frames" in fault.what
     (mirrored,) = counted(np.ascontiguousarray(plain[:, :, :middle][:, :, ::-1]))
-    assert "at the left edge in" in mirrored.what
+    assert "the left edge in" in mirrored.what
 
 
 def test_a_cut_to_another_scene_has_its_instant(plain: Frames) -> None:

@@ -97,7 +97,7 @@ def test_where_nothing_moves_no_reason_is_about_what_moves(model: Estimator, gat
     assert not {"scale", "cut-off", "several-flags", "unlike-cloth"} & set(kinds)
     without = judge(np.repeat(still[:1], 12, axis=0), model, gate)
     assert [one.kind for one in without.reasons] == ["no-motion"]
-    assert "nothing moves in the picture" in without.sentence
+    assert "no motion is found in the picture" in without.sentence
     assert without.reasons[0].blank
 
 

@@ -34,7 +34,7 @@ class Still:
 
 
 def test_a_film_in_which_nothing_moves_is_refused() -> None:
-    with pytest.raises(RefusedError, match="nothing moves like cloth"):
+    with pytest.raises(RefusedError, match="no motion like cloth"):
         watched(ConditionedFilm(Still()), SIZE)
 
 

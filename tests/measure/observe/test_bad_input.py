@@ -100,9 +100,9 @@ def test_nothing_tracked_is_refused(seen: Observation):
 
 def test_a_still_cloth_is_refused(seen: Observation):
     noise = NOISE * np.random.default_rng(1).standard_normal(seen.positions.shape)
-    with pytest.raises(InputError, match="nothing moves"):
+    with pytest.raises(InputError, match="no motion is found"):
         observe([replace(seen, positions=seen.positions[:1] + noise)], SETUP)
-    with pytest.raises(InputError, match="nothing moves"):
+    with pytest.raises(InputError, match="no motion is found"):
         observe([replace(seen, positions=np.repeat(seen.positions[:1], len(seen.times), axis=0))], SETUP)
 
 

@@ -1,0 +1,84 @@
+"""Refusals: each reason is on the page, states no cause as a fact, and no two of one command lead in a circle."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+
+import pytest
+
+from docs.generate_cli import commands
+from measure.gate.reasons import REASONS
+from tests.contract.imports import ROOT, modules, tree
+from tests.docs.pages import DOCS
+
+WINDOWS = {"unlike-training", "size-needed"}
+CALIBRATED = {"another-picture", "another-place", "another-framing", "another-wind", "another-flag"}
+PLAIN = {"too-few-frames", "low-frame-rate", "no-motion", "scale", "several-flags"}
+"""Reasons that state what was counted, and infer nothing from it."""
+VERBS = {
+    "measure": ("measure/estimate", "measure/gate", "measure/anemometer", "measure/refine"),
+    "observe": ("measure/observables", "measure/estimate"),
+    "calibrate": ("measure/calibrate", "measure/anemometer", "measure/observables", "measure/estimate"),
+    "align": ("flagdata/align", "flagdata/commands/align.py", "flagdata/commands/align_logs.py"),
+    "ingest": ("flagdata/ingest", "flagdata/commands/ingest_options.py", "flagdata/commands/confirm.py"),
+    "close-loop": ("measure/closing", "measure/films", "measure/observe", "measure/calibrate"),
+}
+"""Where the refusals of each command are."""
+CONDITIONAL = {
+    "measure": {"--refine"},  # asked for beside --cache, which may be left out as well
+    "align": {"--by"},  # a film that cannot be estimated; refused of two logs, which are always compared
+    "ingest": {
+        "--azimuth",  # components without a heading; refused where the log has a direction already
+        "--date",  # stamps without a day; refused where stamps have one
+        "--episode", "--topic", "--stream",  # where a file has several; refused of files that have none
+        "--join",  # never asked for: the fix names ingesting without it
+        "--unit",  # a heading without a unit; refused where the format states it
+    },
+}  # fmt: skip
+"""Options that a refusal of one kind of source asks for, and one of another kind refuses: walked through by hand."""
+_ASKED = re.compile(r"(?:give|add|state|name|choose|use|by)\b[^;.]*?(?<!leave )(?<!leave out )(--[a-z][a-z-]+)")
+_REFUSED = re.compile(r"leave (?:out )?(--[a-z][a-z-]+)(?! or)")
+
+
+def fixes(*places: str) -> Iterator[str]:
+    """The text of every `fix` under the folders or files, an expression in it as {}."""
+    for path in modules(*{place.split("/")[0] for place in places}):
+        if any(str(path.relative_to(ROOT)).startswith(place) for place in places):
+            for node in ast.walk(tree(path)):
+                if isinstance(node, ast.keyword) and node.arg == "fix":
+                    parts = [n.value for n in ast.walk(node.value) if isinstance(n, ast.Constant)]
+                    yield " ".join(part for part in parts if isinstance(part, str))
+
+
+def test_every_reason_of_the_gate_is_on_the_page_and_no_other() -> None:
+    page = (DOCS / "refusals.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^\| `([a-z-]+)` \|", page, flags=re.MULTILINE)
+    assert shown[: len(REASONS)] == list(REASONS)
+    assert set(shown) - set(VERBS) == {*REASONS, *WINDOWS, *CALIBRATED}
+    for kind in CALIBRATED:
+        assert f'"{kind}"' in (ROOT / "measure" / "anemometer" / "novelty.py").read_text(encoding="utf-8"), kind
+
+
+def test_what_a_reason_advises_can_be_done() -> None:
+    options = {o for name, c in commands() if name == "flagdata measure" for p in c.params for o in p.opts}
+    for kind, reason in REASONS.items():
+        assert set(re.findall(r"--[a-z-]+", reason.fix)) <= options, kind
+
+
+@pytest.mark.parametrize(
+    "kind", ["scene-cut", "repeated-frames", "too-dark", "moving-camera", "cut-off", "unlike-cloth"]
+)
+def test_a_reason_states_what_was_found_and_what_it_may_mean(kind: str) -> None:
+    assert re.search(r"\b(may|as in|as of|as where)\b", REASONS[kind].sentence)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_no_refusal_asks_for_what_another_one_of_the_command_refuses(verb: str) -> None:
+    texts = list(fixes(*VERBS[verb]))
+    assert len(texts) > 10
+    own = {o for name, c in commands() if name == f"flagdata {verb}" for p in c.params for o in p.opts}
+    asked = {option for text in texts for option in _ASKED.findall(text)} & own
+    refused = {option for text in texts for option in _REFUSED.findall(text)} & own
+    assert asked & refused == CONDITIONAL.get(verb, set())
