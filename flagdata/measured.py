@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import RefusedError
 from flagdata.findings import Finding
+from flagdata.html import table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +38,14 @@ class Estimate:
     constrained: bool
     assumed: tuple[float, float]
     given: bool
+
+    @property
+    def text(self) -> str:
+        """Value, interval and unit; "as given" or "not constrained" where that is so."""
+        low, high = self.interval
+        value = "" if self.value is None else f"{self.value:.3g} "
+        remark = ", as given" if self.given else "" if self.constrained else ", not constrained by the film"
+        return f"{value}[{low:.3g}, {high:.3g}] {self.unit}{remark}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,7 +84,7 @@ class Answer:
     windows: Windows
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Measured:
     """A film, measured or refused.
 
@@ -142,3 +151,16 @@ class Measured:
     def windows(self) -> Windows:
         """The windows, each by itself. Raises as `answer`."""
         return self.answer.windows
+
+    def __repr__(self) -> str:
+        if self.given is None:
+            return f"Measured({self.film}: refused: {self.verdict})"
+        mark = "refused, not to be relied on: " if self.refused else ""
+        return f"Measured({self.film}: {mark}{self.given.sentence})"
+
+    def _repr_html_(self) -> str:
+        rows = {} if self.given is None else {
+            name.replace("_", " "): one.text for name, one in self.given.quantities.items()
+        }  # fmt: skip
+        rows |= {"film": f"{self.duration:.2f} s at {self.rate:.4g} Hz", "gate": self.verdict}
+        return table(repr(self), rows | {f"{one.severity.value} {one.kind}": one.what for one in self.findings})

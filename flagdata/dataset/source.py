@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-from flagdata.dataset.cache import DecodedCache
-from flagdata.dataset.pairs import Pairs
-from flagdata.dataset.resolve import SideSize, resolve, side_sizes
-from flagdata.dataset.splits import ExplicitSplit, HashedSplit
-from flagdata.dataset.tolerance import Tolerance
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
 from flagdata.errors import UsageError
+from flagdata.html import table
 from flagdata.lake import Lake
+from flagdata.rows import Rows
 from flagdata.storage import Place
+
+if TYPE_CHECKING:
+    from flagdata.dataset.cache import DecodedCache
+    from flagdata.dataset.pairs import Pairs
+    from flagdata.dataset.resolve import SideSize
+    from flagdata.dataset.splits import ExplicitSplit, HashedSplit
+    from flagdata.dataset.tolerance import Tolerance
 
 
 class Source:
-    """Typed pairs out of a lake.
+    """A lake as a source of rows and typed pairs.
 
     Attributes:
         lake: the lake itself, for rows, artifacts and refs.
@@ -30,6 +38,21 @@ class Source:
             NotFoundError: no lake there.
         """
         return cls(Lake.open(path))
+
+    def query(
+        self,
+        where: str | Mapping[str, Any] | None = None,
+        *,
+        sql: str | None = None,
+        columns: Sequence[str] | None = None,
+        order: str | None = None,
+        limit: int | None = None,
+        at: str | None = None,
+    ) -> Rows:
+        """Rows of the catalog; arguments and errors as of `flagdata.query`."""
+        from flagdata.selection import select
+
+        return Rows(select(self.lake, where, at=at, columns=columns, order=order, sql=sql, limit=limit))
 
     def pairs(
         self,
@@ -64,6 +87,11 @@ class Source:
             UsageError: a filter that is not SQL, a window that is no length of time, clips of several windows where
                 none is named, or a seed that is no whole number.
         """
+        from flagdata.dataset.pairs import Pairs
+        from flagdata.dataset.resolve import resolve
+        from flagdata.dataset.splits import HashedSplit
+        from flagdata.dataset.tolerance import Tolerance
+
         if not isinstance(seed, int):
             raise UsageError(f"the seed {seed!r}", where="seed", fix="give a whole number")
         resolved = resolve(
@@ -99,4 +127,18 @@ class Source:
             UnknownNameError: no such column.
             UsageError: a filter that is not SQL.
         """
+        from flagdata.dataset.resolve import side_sizes
+        from flagdata.dataset.splits import HashedSplit
+
         return side_sizes(self.lake, where=where, at=at, split_by=split_by or HashedSplit())
+
+    def __repr__(self) -> str:
+        held = ", ".join(f"{count} {kind}" for kind, count in self._held().items()) or "empty"
+        return f"Lake({self.lake.path}: {held})"
+
+    def _repr_html_(self) -> str:
+        return table(f"Lake {self.lake.path}", {kind: str(count) for kind, count in self._held().items()})
+
+    def _held(self) -> dict[str, int]:
+        """Kind → artifacts on main, by name of the kind."""
+        return dict(sorted(Counter(self.lake.rows(columns=["kind"])["kind"].to_pylist()).items()))

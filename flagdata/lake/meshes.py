@@ -30,9 +30,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, LimitError
+from flagdata.html import table
 from flagdata.lake.durable import disk_errors
 from flagdata.provenance import canonical
 from flagdata.schema import CHANNELS
+from flagdata.timebase import NANOSECONDS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -64,7 +66,7 @@ class Mesh:
     rest: Floats
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class MeshSequence:
     """A moving mesh of one topology.
 
@@ -96,12 +98,18 @@ class MeshSequence:
     def __len__(self) -> int:
         return len(self.time)
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({_described(self)})"
+
+    def _repr_html_(self) -> str:
+        return table(_described(self), {name: str(value) for name, value in self.attributes.items()})
+
     def frame(self, index: int) -> Mesh:
         """The mesh at one time; negative indices count from the end."""
         return Mesh(time=int(self.time[index]), positions=self.positions[index], faces=self.faces, rest=self.rest)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class RaggedMeshSequence:
     """A moving mesh whose topology changes, as remeshing simulators write it.
 
@@ -139,6 +147,12 @@ class RaggedMeshSequence:
     def __len__(self) -> int:
         return len(self.time)
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({_described(self)})"
+
+    def _repr_html_(self) -> str:
+        return table(_described(self), {name: str(value) for name, value in self.attributes.items()})
+
     def frame(self, index: int) -> Mesh:
         """The mesh at one time; negative indices count from the end."""
         i = range(len(self.time))[index]
@@ -150,6 +164,12 @@ class RaggedMeshSequence:
             faces=self.faces[faces],
             rest=self.rest[vertices],
         )
+
+
+def _described(sequence: MeshSequence | RaggedMeshSequence) -> str:
+    seconds = (int(sequence.time[-1]) - int(sequence.time[0])) / NANOSECONDS if len(sequence) else 0.0
+    first = sequence.frame(0)
+    return f"{len(sequence)} frames in {seconds:.2f} s, {len(first.rest)} vertices, {len(first.faces)} faces"
 
 
 def write_meshes(path: Path, sequence: MeshSequence | RaggedMeshSequence) -> None:

@@ -77,13 +77,8 @@ def read(path: Path, size: FlagSize) -> Columns:
     where = str(path)
     headings, rows = _cells(path)
     wanted = [(place, *_parsed(text)) for place, text in enumerate(headings) if not _named(text).endswith(_REASON)]
-    known = [*_UNITS, *OBSERVABLES, *(f"{name}{SIGMA}" for name in OBSERVABLES)]
     names = [name for _, name, _ in wanted]
-    if unknown := [name for name in names if name not in known]:
-        raise InputError(
-            f"columns {', '.join(unknown)} are not known", where=where,
-            fix=f"keep, and name, these: {', '.join(known)}; a unit stands behind a name, as in droop [deg]",
-        )  # fmt: skip
+    known_columns(names, where=where)
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise InputError(f"columns {', '.join(twice)} stand twice", where=where, fix="keep one of each")
     lines = tuple(number for number, row in enumerate(rows, start=2) if any(cell.strip() for cell in row))
@@ -103,6 +98,18 @@ def read(path: Path, size: FlagSize) -> Columns:
             numbers = _converted(cells, lines, name, where, float)
             values[name] = np.array([math.nan if one is None else one * scale for one in numbers])
     return Columns(where=where, values=values, origin=origin, lines=lines)
+
+
+def known_columns(names: Sequence[str], *, where: str) -> None:
+    """Raises:
+    InputError: a name that no column of a table of observables has.
+    """
+    known = [*_UNITS, *OBSERVABLES, *(f"{name}{SIGMA}" for name in OBSERVABLES)]
+    if unknown := [name for name in names if name not in known]:
+        raise InputError(
+            f"columns {', '.join(unknown)} are not known", where=where,
+            fix=f"keep, and name, these: {', '.join(known)}; a unit stands behind a name, as in droop [deg]",
+        )  # fmt: skip
 
 
 def names(path: Path) -> set[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from contextlib import nullcontext
 from pathlib import Path
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from flagdata.lake import Lake
     from measure.anemometer.making import Made
     from measure.calibrate.calibrate import Calibration
-    from measure.calibrate.prior import Uncertain
     from measure.estimate.page import Section
     from measure.estimate.similarity import FlagSize
     from measure.estimate.source import Reading
@@ -131,6 +129,7 @@ def calibrate(
     from measure.calibrate.calibrate import Options
     from measure.calibrate.calibrate import calibrate as calibrated
     from measure.calibrate.filmed import of_sources
+    from measure.calibrate.known import known
     from measure.calibrate.page import page
     from measure.calibrate.prior import AZIMUTH, ELEVATION
     from measure.calibrate.simulation import Flag
@@ -263,29 +262,6 @@ def _report(anemometer: Made, report: Path | None, *, as_json: bool) -> None:
         document("calibrate", {"anemometer": anemometer.as_dict()})
     else:
         click.echo(anemometer.found.sentence)
-
-
-def known(about: Uncertain, stated: Stated, *, where: str) -> Uncertain:
-    """An angle as the user states it [°], an exact value with the uncertainty of a direction.
-
-    Raises:
-        UsageError: an azimuth that is not between 0 and 180, or an elevation beyond 60.
-    """
-    from dataclasses import replace
-
-    from flagdata.tables import Range
-    from measure.calibrate.prior import DIRECTION, Normal
-
-    least, most = (1.0, 179.0) if about.name == "azimuth" else (-60.0, 60.0)
-    if stated.low < least or stated.high > most:
-        raise UsageError(f"{stated.text}°", where=where, fix=f"give degrees from {least:g} to {most:g}, as in 70±7")
-    low, high = math.radians(stated.low), math.radians(stated.high)
-    if low < high:
-        return replace(about, prior=Range(low=low, high=high), source="stated")
-    sigma = math.radians(stated.sigma)
-    # An azimuth is to the wind, whose direction is not better known than it is lined up.
-    total = math.hypot(sigma, DIRECTION) if about.name == "azimuth" else max(sigma, math.radians(1.0))
-    return replace(about, prior=Normal(mean=low, sigma=total), source="stated")
 
 
 def _provenance(found: Calibration, artifact: str | None) -> dict[str, str]:

@@ -63,20 +63,31 @@ def of_table(path: Path, size: FlagSize, *, beside: Beside | None = None) -> tup
         InputError: no such table, or one whose columns do not say what its rows are of.
         FlagdataError: a file that cannot be read.
     """
-    table = read(path, size)
-    if not any(name in table for name in OBSERVED):
+    return of_columns(read(path, size), name=path.stem, identity=file_hash(path), beside=beside)
+
+
+def of_columns(table: Columns, *, name: str, identity: str, beside: Beside | None) -> tuple[Observed, ...]:
+    """The recordings of a table whose columns were read; as `of_table`.
+
+    Args:
+        name: of the table.
+        identity: hash of its content.
+
+    Raises:
+        InputError: as `of_table`.
+    """
+    if not any(one in table for one in OBSERVED):
         raise InputError("no column is an observable", where=table.where, fix=f"name one of {', '.join(OBSERVED)}")
     if (WIND in table) == (beside is not None):
         what = "no column wind" if beside is None else "a column wind, and a log of the wind beside it"
         raise InputError(what, where=table.where, fix="give the wind in the table or as a log (--log), in one of them")
-    identity = file_hash(path)
     if TIME not in table:
         if beside is not None:
             raise InputError("no column time to join the log by", where=table.where, fix="add the rows' times")
-        return _against_wind(table, name=path.stem, identity=identity)
-    if extra := [name for name in (DURATION, COUNT) if name in table]:
+        return _against_wind(table, name=name, identity=identity)
+    if extra := [one for one in (DURATION, COUNT) if one in table]:
         raise InputError(f"columns {TIME} and {', '.join(extra)}", where=table.where, fix="keep one of them")
-    return (_against_time(table, name=path.stem, identity=identity, beside=beside),)
+    return (_against_time(table, name=name, identity=identity, beside=beside),)
 
 
 def rows_of(path: Path, size: FlagSize) -> Columns:

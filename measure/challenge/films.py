@@ -53,9 +53,9 @@ class Filmed:
         Raises:
             FlagdataError: no flag is found.
         """
+        from flagdata.film import CameraFilm
         from measure.calibrate.filmed import with_log
         from measure.estimate.conditioned import ConditionedFilm
-        from measure.estimate.film import CameraFilm
         from measure.estimate.similarity import FlagSize
 
         size = FlagSize(length=self.flag.length, height=self.flag.height)

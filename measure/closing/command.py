@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,22 +15,17 @@ from flagdata.commands.confirm import on_command_line
 from flagdata.commands.sections import LongCommand
 from flagdata.console import LakePlace, LocalPath, json_option
 from flagdata.errors import UnknownNameError, UsageError
-from flagdata.findings import Finding
 from flagdata.storage import Place
-from measure.closing.command_line import finding_text, null_options, nulls_given, refuse, stage_bars
+from measure.closing.command_line import null_options, nulls_given, refuse, stage_bars
+from measure.closing.findings import with_warnings
 from measure.films.command_line import Given, film_options, refuse_of_others
 
 if TYPE_CHECKING:
     from measure.observe import Setup, Up
     from measure.observe.recipe import ExperimentRecipe
-    from measure.verdict.record import Verdict
 
 _OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "accept", "rate", "unit", "noise", "up")
 """Options that say how sources of the command line are read."""
-
-
-_DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside", "still-away-from-pins")
-"""Kinds of findings that look like an effect."""
 
 
 @click.command("close-loop", cls=LongCommand)
@@ -288,14 +282,3 @@ def _places(text: str) -> tuple[tuple[float, float], ...]:
             ) from error
         places.append((u, v))
     return tuple(places)
-
-
-def with_warnings(verdict: Verdict, findings: Sequence[Finding]) -> Verdict:
-    """The verdict with the remarks on its data; with those in its words that may themselves be what was found."""
-    warnings = [finding_text(finding) for finding in findings if finding.kind in _DOUBTFUL]
-    beware = (
-        f" The data themselves may be wrong, which would look like an effect: {'; '.join(warnings)}."
-        if warnings
-        else ""
-    )
-    return replace(verdict, words=verdict.words + beware, findings=tuple((f.kind, finding_text(f)) for f in findings))

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from flagdata.console import LocalPath, say
-from flagdata.errors import InputError, UsageError
-from flagdata.findings import Finding, Severity
+from flagdata.errors import UsageError
+from flagdata.findings import Finding
+from measure.closing.findings import checked, finding_text
 
 if TYPE_CHECKING:
     from measure.forecasting.setting import Stage
@@ -67,19 +68,11 @@ def nulls_given(
     return {name: value for name, value in said.items() if value is not None}
 
 
-def refuse(findings: Iterable[Finding]) -> None:
-    """Errors end it here: what is wrong with the data must not come out as an effect."""
+def refuse(findings: Sequence[Finding]) -> None:
+    """Report what was found, up to an error, which ends it."""
     for finding in findings:
-        if finding.severity is Severity.ERROR:
-            raise InputError(finding.what, where=finding.where, fix=finding.fix or "correct the data")
+        checked((finding,))
         say(finding_text(finding), mark=finding.severity.value)
-
-
-def finding_text(finding: Finding) -> str:
-    """Where it was found, and what; a warning with what to do."""
-    where = f"{finding.where}: " if finding.where else ""
-    fix = f" ({finding.fix})" if finding.fix and finding.severity is Severity.WARNING else ""
-    return f"{where}{finding.what}{fix}"
 
 
 def stage_bars() -> Stage:

@@ -103,11 +103,13 @@ def measure(
 ) -> None:
     """Measure wind and area weight from a film of a flag, with intervals.
 
-    SOURCE is a video file, a folder of images, or a recording, clip or camera of --lake by its name or id. A gate looks
-    first: a film unlike those the network was trained on is refused with the reason, exit code 3, and nothing estimated
-    is shown. With --lake the measurement becomes an artifact; the same one again adds nothing.
+    SOURCE is a video file, a folder of images, a recording, clip or camera of --lake by its name or id, or the film
+    that comes with the package, example:flag, whose truth is printed beside. A gate looks first: a film unlike
+    those the network was trained on is refused with the reason, exit code 3, and nothing estimated is shown. With
+    --lake the measurement becomes an artifact; the same one again adds nothing.
 
     \b
+      flagdata measure example:flag
       flagdata measure clip.mp4 --flag-size 1.5x1.0 --report clip.html
       flagdata measure recording-7 --lake lake --windows 1.2s --csv
       flagdata measure --lake lake --query "wind between 3 and 6" --json
@@ -121,7 +123,7 @@ def measure(
     from measure.estimate.measuring import Options
     from measure.estimate.run import weight
     from measure.estimate.similarity import parse_size
-    from measure.estimate.source import Reading, box_of, network, subjects
+    from measure.estimate.source import Reading, box_of, network, size_of, subjects
 
     if report is not None:
         check_file(report, command="measure")
@@ -135,7 +137,7 @@ def measure(
     stated, origin = weight(area_weight, material, lake=lake, at=seen)
     if stated is not None and origin is not None:
         say(f"area weight {stated.text} kg/m² of {material}: {origin}")
-    size = None if flag_size is None else parse_size(flag_size)
+    size = size_of(source, None if flag_size is None else parse_size(flag_size))
     aspect = None if size is None else size.aspect
     reading = Reading(crop=box, flag=flag, aspect=aspect, true_fps=true_fps, sequence_fps=sequence_fps)
     options = Options(
@@ -336,10 +338,15 @@ def _warn(findings: Sequence[Finding]) -> None:
 
 
 def _report(done: _Done, *, series: bool) -> None:
+    from measure.estimate.answer import SHORT
+
     measured = done.measured
     mark = "refused by the gate, not to be relied on: " if measured.verdict.refused else ""
     click.echo(mark + measured.sentence)
     say(f"  {measured.verdict.sentence}; {measured.combined} of {len(measured.verdict.window_p)} windows in the answer")
+    known = done.subject.known or {}
+    if shown := [f"{SHORT[q.name]} {known[q.name]:.3g} {q.unit}" for q in measured.quantities if q.name in known]:
+        say(f"  simulated with {', '.join(shown)}")
     for finding in measured.bounds:
         if finding.severity is Severity.NOTE:
             say(f"  {finding.what}; {finding.fix}")

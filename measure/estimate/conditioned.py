@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
+from flagdata.film import Film
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import CropBox
 from flagdata.schema import FRAME_SIZE
 from measure.estimate.cut_off import CutOff
-from measure.estimate.film import Film
 from measure.gate.counted import reasons
 from measure.gate.watch import FilmWatch
 from models.conditioning import Conditioning, Follower, conditioning_of

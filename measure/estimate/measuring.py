@@ -11,11 +11,11 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.errors import FlagdataError, RefusedError, UsageError
+from flagdata.film import Film
 from flagdata.findings import Finding, Severity
 from flagdata.rng import child_seed, stream
 from measure.estimate.answer import Quantity, sentence
 from measure.estimate.combine import OWN, Dependence
-from measure.estimate.film import Film
 from measure.estimate.gate import Gate, Verdict, verdict
 from measure.estimate.joint import DRAWS, Joint, Look, WindowAnswer
 from measure.estimate.options import Options

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from flagdata.errors import UsageError
+from flagdata.film_array import Frames
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import CropBox
 from flagdata.lake import Lake
@@ -19,7 +20,7 @@ from measure.estimate.dependence import of_model
 from measure.estimate.material import weight_of
 from measure.estimate.measuring import Measurement, Options, measure
 from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Network, Reading, Subject, gate_beside, network, subjects
+from measure.estimate.source import Network, Reading, Subject, gate_beside, network, size_of, subjects
 
 
 def run(
@@ -60,21 +61,22 @@ def weight(
 
 
 def measured(
-    source: Path | str, *, flag_size: tuple[float, float] | None,
+    source: Path | str | Frames, *, flag_size: tuple[float, float] | None,
     area_weight: float | tuple[float, float] | str | Stated | None, material: str | None, step: float | None,
     crop: tuple[int, int, int, int] | None, flag: int | None, start: float | None, end: float | None,
     true_fps: float | None, sequence_fps: float | None, level: float, seed: int, model: str | None,
-    false_alarm: float, lake: Path | str | None, at: str | None, anyway: bool,
+    false_alarm: float, lake: Lake | None, at: str | None, anyway: bool,
 ) -> Measured:  # fmt: skip
     """What `flagdata.measure` does; see there for what it takes.
 
     Raises:
         FlagdataError: see `flagdata.measure`.
     """
-    opened = None if lake is None else Lake.open(lake)
     given = None if area_weight is None else Stated.of(area_weight)
-    stated, _ = weight(given, material, lake=opened, at=at)
+    stated, _ = weight(given, material, lake=lake, at=at)
     size = None if flag_size is None else FlagSize(length=flag_size[0], height=flag_size[1])
+    if not isinstance(source, Frames):
+        size = size_of(source, size)
     options = Options(
         size=size, step=step, first=start, last=end, level=level, false_alarm=false_alarm, seed=seed,
         area_weight=stated,
@@ -83,8 +85,8 @@ def measured(
     reading = Reading(
         crop=box, flag=flag, aspect=None if size is None else size.aspect, true_fps=true_fps, sequence_fps=sequence_fps
     )
-    (subject,) = subjects(str(source), query=None, lake=opened, at=at, reading=reading)
-    found = run(subject, network(model, lake=opened, at=at), options)
+    (subject,) = _subjects(source, lake=lake, at=at, reading=reading)
+    found = run(subject, network(model, lake=lake, at=at), options)
     verdict = found.verdict
     return Measured(
         film=found.film, rate=found.rate, duration=found.duration, network=found.model, refused=verdict.refused,
@@ -99,6 +101,16 @@ def measured(
         findings=found.noticed(anyway=anyway), figures=subject.film.as_dict(),
         given=_answer(found) if found.shown(anyway=anyway) else None,
     )  # fmt: skip
+
+
+def _subjects(source: Path | str | Frames, *, lake: Lake | None, at: str | None, reading: Reading) -> list[Subject]:
+    if not isinstance(source, Frames):
+        return subjects(str(source), query=None, lake=lake, at=at, reading=reading)
+    if reading.true_fps is not None or reading.sequence_fps is not None:
+        raise UsageError(
+            "frames of an array have their times", where="true_fps, sequence_fps", fix="leave the options out"
+        )
+    return [Subject(film=reading.conditioned(source))]
 
 
 def _answer(found: Measurement) -> Answer:

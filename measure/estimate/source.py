@@ -11,6 +11,8 @@ from typing import Any
 
 from flagdata.addresses import local_path
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
+from flagdata.examples import Example, example_of
+from flagdata.film import RecordFilm
 from flagdata.ingest.camera import CropBox, parse_crop
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.matching import matching
@@ -18,19 +20,18 @@ from flagdata.lake.naming import COLUMNS, meant
 from flagdata.provenance import digest, file_hash
 from flagdata.record import Record
 from flagdata.schema import Kind
+from flagdata.sources import film_at, frames_have_instants, stored_film
 from measure.anemometer.reading import ReadingModel
 from measure.anemometer.storage import read as read_reading_model
 from measure.estimate.checked import CheckedGate
 from measure.estimate.conditioned import ConditionedFilm, WholeFilm
-from measure.estimate.film import CameraFilm, RecordFilm
 from measure.estimate.gate import Gate, gate_of
+from measure.estimate.similarity import FlagSize
 from measure.gate import storage
 from models import estimator
 from models.estimator import Estimator
 from models.storage import CARD, WEIGHTS
 
-FILMED = (Kind.RECORDING, Kind.CLIP, Kind.CAMERA)
-"""Kinds of artifacts that have frames."""
 CALIBRATED = "anemometer"
 """Key of the recipes of reading models (`measure.anemometer`)."""
 
@@ -72,12 +73,14 @@ class Subject:
         artifact: of the lake; None of a plain file.
         path: of the plain file or folder; None of an artifact.
         record: the artifact's record, which may hold wind and truth.
+        example: that the film belongs to; None of any other.
     """
 
     film: ConditionedFilm
     artifact: Artifact | None = None
     path: Path | None = None
     record: Record | None = None
+    example: Example | None = None
 
     @property
     def recording(self) -> str | None:
@@ -86,7 +89,9 @@ class Subject:
 
     @property
     def known(self) -> Mapping[str, float] | None:
-        """What a simulated record states of itself."""
+        """What a simulated record or an example states of itself."""
+        if self.example is not None:
+            return self.example.truth
         return None if self.record is None else self.record.truth
 
     @property
@@ -104,6 +109,12 @@ class Subject:
         for entry in sorted(entry for entry in self.path.iterdir() if entry.is_file()):
             total.update(f"{entry.name} {file_hash(entry)}\n".encode(errors="surrogateescape"))
         return total.hexdigest()
+
+
+def size_of(source: str | Path | None, given: FlagSize | None) -> FlagSize | None:
+    """The flag's size as it was given, else as an example states it."""
+    example = None if given is not None or source is None else example_of(source)
+    return given if example is None else FlagSize(length=example.flag_size[0], height=example.flag_size[1])
 
 
 def box_of(crop: str | None) -> CropBox | None:
@@ -136,47 +147,25 @@ def subjects(
     """
     if (source is None) == (query is None):
         raise UsageError("name a film or give a query over clips, one of them", fix="see flagdata measure --help")
-    path = None if source is None else local_path(source)
-    if path is not None and path.exists():
-        film = CameraFilm(path, true_fps=reading.true_fps, sequence_fps=reading.sequence_fps)
-        return [Subject(film=reading.conditioned(film), path=path)]
-    if lake is None:
-        what = "a query needs a lake" if source is None else f"there is no file {source!r}, and no lake was named"
-        raise NotFoundError(what, fix="correct the path, or name the lake by --lake")
-    if reading.true_fps is not None or reading.sequence_fps is not None:
-        raise UsageError(
-            "the frames of a lake have their instants", where="--true-fps, --sequence-fps",
-            fix="leave the options out; they belong to ingest",
-        )  # fmt: skip
     if source is not None:
-        return [_stored(lake, _named(lake, source, at), reading)]
+        film, place = film_at(source, lake=lake, at=at, true_fps=reading.true_fps, sequence_fps=reading.sequence_fps)
+        fit = reading.conditioned(film)
+        if isinstance(place, Path):
+            return [Subject(film=fit, path=place, example=example_of(source))]
+        return [Subject(film=fit, artifact=place, record=film.record if isinstance(film, RecordFilm) else None)]
+    if lake is None:
+        raise NotFoundError("a query needs a lake", fix="name the lake by --lake")
+    if reading.true_fps is not None or reading.sequence_fps is not None:
+        raise frames_have_instants()
     rows = matching(lake.rows(query, at=at), {"kind": Kind.CLIP})
     if not rows.num_rows:
         raise NotFoundError("no clip matches", where=query, fix="look with flagdata query --where")
-    return [_stored(lake, Artifact.from_row(row), reading) for row in rows.to_pylist()]
-
-
-def _named(lake: Lake, source: str, at: str | None) -> Artifact:
-    """The film of a name; a recording rather than the film that it was aligned from and whose name it has."""
-    rows = lake.rows({"kind": FILMED}, at=at, columns=COLUMNS).to_pylist()
-    found = meant(rows, source)
-    if not found:
-        raise UnknownNameError.of("file or film of the lake", source, {row["name"] for row in rows})
-    if len(found) > 1:
-        several = ", ".join(f"{row['kind']} {row['artifact'][:12]}" for row in found[:4])
-        raise UsageError(f"{source!r} names {len(found)} films: {several}", where="SOURCE", fix="give the id of one")
-    return lake.artifact(found[0]["artifact"], at=at)
-
-
-def _stored(lake: Lake, artifact: Artifact, reading: Reading) -> Subject:
-    if artifact.object is None:
-        raise InputError(f"the {artifact.kind} has no frames of its own", where=artifact.name, fix="name its recording")
-    clip = artifact.kind is Kind.CLIP
-    film = RecordFilm(
-        lake.record_place(artifact.object), name=artifact.name,
-        first=(artifact.frame_first or 0) if clip else 0, count=artifact.frame_count if clip else None,
-    )  # fmt: skip
-    return Subject(film=reading.conditioned(film), artifact=artifact, record=film.record)
+    found: list[Subject] = []
+    for row in rows.to_pylist():
+        artifact = Artifact.from_row(row)
+        film = stored_film(lake, artifact)
+        found.append(Subject(film=reading.conditioned(film), artifact=artifact, record=film.record))
+    return found
 
 
 def gate_beside(found: Network, *, false_alarm: float) -> Gate:

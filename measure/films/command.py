@@ -14,8 +14,8 @@ from flagdata.errors import UsageError
 from flagdata.lake import Lake
 from flagdata.stated import Stated
 from measure.calibrate.calibrate import Options as Calibrating
-from measure.calibrate.command import known
 from measure.calibrate.filmed import of_sources
+from measure.calibrate.known import known
 from measure.calibrate.prior import AZIMUTH, ELEVATION
 from measure.calibrate.simulation import Flag
 from measure.closing.command_line import stage_bars

@@ -8,9 +8,9 @@ from flagdata.addresses import local_path
 from flagdata.errors import UsageError
 from flagdata.lake import Lake
 from flagdata.lake.naming import COLUMNS, meant
+from flagdata.sources import FILMED
 from measure.calibrate.columns import names
 from measure.calibrate.filmed import is_table
-from measure.estimate.source import FILMED
 from measure.observables import OBSERVABLES
 
 _DESCRIPTIONS = (".toml", ".json")

@@ -77,7 +77,7 @@ def simulate(
         UsageError: no workers, a device that is not there, or a step or effect that does not fit the scene.
         InputError: a scene that cannot be simulated.
     """
-    _check_device(device)
+    check_device(device)
     if workers < 1:
         raise UsageError(f"{workers} workers", where="--workers", fix="give at least one")
     crew = Crew(recipe)
@@ -93,9 +93,9 @@ def simulate(
     failed: list[Mapping[str, Any]] = []
     begun = time.perf_counter()
     waiting = batches(crew, steppers, pending)
-    for stepper, outcomes in _outcomes(crew, waiting, device=device, workers=workers, progress=progress):
-        good = [o for o in outcomes if o.sequence is not None]
-        failed += [failure_of(o) for o in outcomes if o.failure is not None]
+    for stepper, done in outcomes(crew, waiting, device=device, workers=workers, progress=progress):
+        good = [o for o in done if o.sequence is not None]
+        failed += [failure_of(o) for o in done if o.failure is not None]
         if good:
             added += publish(lake, recipe, good, step=stepper.step, branch=branch)
     seconds = time.perf_counter() - begun
@@ -116,7 +116,7 @@ def batches(crew: Crew, steppers: Sequence[Stepper], pending: Sequence[int]) -> 
     return found
 
 
-def _outcomes(
+def outcomes(
     crew: Crew,
     batches: Sequence[tuple[Stepper, list[int]]],
     *,
@@ -207,7 +207,10 @@ def failure_of(outcome: Outcome) -> dict[str, Any]:
     return {"index": outcome.member.index, "seed": outcome.member.seed, "kind": kind, "what": what}
 
 
-def _check_device(device: str) -> None:
+def check_device(device: str) -> None:
+    """Raises:
+    UsageError: a device that is not there.
+    """
     try:
         torch.zeros(1, device=device)
     except (RuntimeError, AssertionError) as error:

@@ -20,9 +20,9 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.film import Film
 from flagdata.rng import child_seed
 from measure.estimate.dependence import of_model
-from measure.estimate.film import Film
 from measure.estimate.long_films import simulated
 from measure.estimate.measuring import Options, measure
 from measure.estimate.similarity import FlagSize

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.film import CameraFilm
 from measure.estimate.combine import UNKNOWN
 from measure.estimate.conditioned import ConditionedFilm
-from measure.estimate.film import CameraFilm
 from measure.estimate.gate import gate_of
 from measure.estimate.measuring import Options, measure
 from measure.estimate.similarity import FlagSize

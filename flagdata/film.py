@@ -1,4 +1,4 @@
-"""A film to measure: frames at their instants, from a video file, a folder of images, or a record of a lake."""
+"""A film: frames at their instants, from a video file, a folder of images, or a record of a lake."""
 
 from __future__ import annotations
 

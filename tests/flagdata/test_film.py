@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
+from flagdata.film import CameraFilm, RecordFilm
 from flagdata.record import Record, RecordWriter
 from flagdata.timebase import NANOSECONDS
-from measure.estimate.film import CameraFilm, RecordFilm
 from tests.measure.estimate.conftest import pictures, write_video
 
 START = 1_700_000_000 * NANOSECONDS

@@ -1,0 +1,1 @@
+"""The calls of `flagdata`, each a door to what the command of its name does; `flagdata` exports them lazily."""

@@ -1,0 +1,118 @@
+"""A lake from Python: opened, its catalog asked, its pairs taken."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from flagdata.dataset.source import Source
+from flagdata.lake import Lake
+from flagdata.rows import Rows
+from flagdata.storage import Place
+
+if TYPE_CHECKING:
+    from flagdata.dataset.cache import DecodedCache
+    from flagdata.dataset.pairs import Pairs
+    from flagdata.dataset.splits import ExplicitSplit, HashedSplit
+    from flagdata.dataset.tolerance import Tolerance
+
+AnyLake: TypeAlias = Source | Lake | Place | str
+"""A lake that is open, its folder, or its address `s3://bucket/prefix`."""
+
+
+def open(path: Place | str) -> Source:  # noqa: A001  read as flagdata.open
+    """The lake in the folder `path`, or at `s3://bucket/prefix`.
+
+    ```python
+    lake = flagdata.open("field.lake")
+    lake.query("kind = 'clip' and wind > 3")
+    lake.pairs(at="v1").loader(32)
+    ```
+
+    Args:
+        path: of the lake.
+
+    Returns:
+        The lake as a source of rows and typed pairs; its attribute `lake` is the lake itself.
+
+    Raises:
+        NotFoundError: no lake there.
+    """
+    return Source.open(path)
+
+
+def query(
+    lake: AnyLake,
+    where: str | Mapping[str, Any] | None = None,
+    *,
+    sql: str | None = None,
+    columns: Sequence[str] | None = None,
+    order: str | None = None,
+    limit: int | None = None,
+    at: str | None = None,
+) -> Rows:
+    """Rows of a lake's catalog, as `flagdata query` selects them.
+
+    ```python
+    rows = flagdata.query("field.lake", "kind = 'clip' and wind between 3 and 6", order="wind desc")
+    rows["wind"]  # (n,) array [m/s]
+    ```
+
+    Args:
+        lake: an open lake, or where it is.
+        where: an SQL condition over the catalog's columns, or values that columns must have; None is every row.
+        sql: one SELECT over the table `catalog`, instead of `where`, `columns` and `order`.
+        columns: wanted, in order; None is every stored column. `flagdata query --describe` lists them with their units.
+        order: SQL order terms, as in "wind desc, start".
+        limit: rows at most.
+        at: tag, branch, version number or commit; None is the head of main.
+
+    Raises:
+        UsageError: SQL that cannot be run.
+        UnknownNameError: a column that is not there.
+        NotFoundError: no such lake, or no such version.
+        LimitError: it takes longer, or gives more, than it may.
+    """
+    return opened(lake).query(where, sql=sql, columns=columns, order=order, limit=limit, at=at)
+
+
+def pairs(
+    lake: AnyLake,
+    where: str | None = None,
+    *,
+    at: str | None = None,
+    split: str | None = None,
+    split_by: HashedSplit | ExplicitSplit | None = None,
+    window: float | None = None,
+    tolerance: Tolerance | None = None,
+    seed: int = 0,
+    cache: DecodedCache | None = None,
+) -> Pairs:
+    """Clips of a lake with their ground truth, for training: typed, split without leaks, the same at the same tag.
+
+    ```python
+    for batch in flagdata.pairs("field.lake", at="v1", split="train").loader(32, workers=2):
+        batch.clip, batch.wind, batch.wind_sigma  # (n, 1, 30, h, w) uint8, (n,) m/s, (n,) m/s
+    ```
+
+    Args:
+        lake: an open lake, or where it is.
+        where, at, split, split_by, window, tolerance, seed, cache: as for `Source.pairs`.
+
+    Raises:
+        MissingExtraError: torch is not installed.
+        NotFoundError: no such lake or version, or no clip matches.
+        RefusedError: an explicit split leaks, the side is empty, or no pair is within the tolerance.
+        UnknownNameError: no such column or side.
+        UsageError: a filter that is not SQL, or a window that is no length of time.
+    """
+    return opened(lake).pairs(
+        where, at=at, split=split, split_by=split_by, window=window, tolerance=tolerance, seed=seed, cache=cache
+    )
+
+
+def opened(lake: AnyLake) -> Source:
+    """An open lake, whatever names it."""
+    if isinstance(lake, Source):
+        return lake
+    return Source(lake) if isinstance(lake, Lake) else Source.open(lake)

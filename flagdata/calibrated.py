@@ -1,0 +1,85 @@
+"""What `flagdata.calibrate` returns: the cloth of a flag as its posterior, or why no weight is given."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.errors import RefusedError
+from flagdata.findings import Finding
+from flagdata.html import table
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weighed:
+    """One quantity of a cloth, SI.
+
+    Attributes:
+        unit: of all numbers.
+        value: the posterior's median; None where the recordings do not determine it.
+        sigma: its standard deviation.
+        interval: at the level.
+        assumed: what was assumed, at the same level.
+    """
+
+    unit: str
+    value: float | None
+    sigma: float
+    interval: tuple[float, float]
+    assumed: tuple[float, float]
+
+    @property
+    def text(self) -> str:
+        """Value, interval and unit; what was assumed where nothing is determined."""
+        if self.value is None:
+            return f"not determined (assumed: {self.assumed[0]:.4g} to {self.assumed[1]:.4g} {self.unit})"
+        return f"{self.value:.4g} [{self.interval[0]:.4g}, {self.interval[1]:.4g}] {self.unit}"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Calibrated:
+    """The cloth of a flag.
+
+    Attributes:
+        sentence: the area weight in one line, as `flagdata calibrate` prints it.
+        level: of the intervals.
+        quantities: "area_weight", "bending", "damping" as far as they are known.
+        draws: name → (n,) draws of their joint posterior.
+        withheld: why no weight is given, where no simulated flag looks like a recording; None where one does.
+        stated: the area weight as `flagdata.measure(area_weight=…)` takes it; None where it is not determined.
+        findings: what a reader has to know.
+        document: everything, as `flagdata calibrate --json` writes it.
+    """
+
+    sentence: str
+    level: float
+    quantities: Mapping[str, Weighed]
+    draws: Mapping[str, NDArray[np.float64]]
+    withheld: str | None
+    stated: str | None
+    findings: tuple[Finding, ...]
+    document: Mapping[str, Any]
+
+    @property
+    def area_weight(self) -> float:
+        """The posterior's median [kg/m²].
+
+        Raises:
+            RefusedError: it is withheld, or not determined.
+        """
+        found = next(iter(self.quantities.values())).value
+        if found is None:
+            fix = "look at `findings`; add recordings in other winds"
+            raise RefusedError(self.sentence, where="area weight", fix=fix)
+        return found
+
+    def __repr__(self) -> str:
+        return f"Calibrated({self.sentence})"
+
+    def _repr_html_(self) -> str:
+        rows = {name.replace("_", " "): one.text for name, one in self.quantities.items()}
+        return table(self.sentence, rows | {f"{one.severity.value} {one.kind}": one.what for one in self.findings})

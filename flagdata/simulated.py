@@ -1,0 +1,74 @@
+"""Simulated cloth as arrays: what `flagdata.simulate` returns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.html import table
+from flagdata.lake.meshes import MeshSequence
+from flagdata.timebase import NANOSECONDS
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Simulated:
+    """The members of a recipe that were simulated to the end, on one mesh.
+
+    Attributes:
+        name: of the recipe.
+        members: each as a mesh sequence, which `flagdata.render` films.
+        parameters: name → (member,) what each drew or was given, SI: "wind_speed", "density", "damping", …
+        failed: why a member is not there: its number → the reason.
+    """
+
+    name: str
+    members: tuple[MeshSequence, ...]
+    parameters: Mapping[str, NDArray[np.float64]]
+    failed: Mapping[int, str]
+
+    def __len__(self) -> int:
+        return len(self.members)
+
+    def __getitem__(self, member: int) -> MeshSequence:
+        return self.members[member]
+
+    def __iter__(self) -> Iterator[MeshSequence]:
+        return iter(self.members)
+
+    @property
+    def positions(self) -> NDArray[np.float32]:
+        """(member, frame, vertex, 3) [m], z up."""
+        return np.stack([one.positions for one in self.members])
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """(frame,) since the first frame that is kept [s]."""
+        time = self.members[0].time
+        return (time - time[0]) / NANOSECONDS
+
+    @property
+    def rest(self) -> NDArray[np.float32]:
+        """(vertex, 2) material coordinates [m]."""
+        return self.members[0].rest
+
+    @property
+    def faces(self) -> NDArray[np.int32]:
+        """(face, 3) vertices of each, counter-clockwise seen from the front."""
+        return self.members[0].faces
+
+    def _rows(self) -> dict[str, str]:
+        frames, vertices, _ = self.members[0].positions.shape
+        wind = self.parameters["wind_speed"]
+        blown = f"{wind[0]:g} m/s" if len(self) == 1 else f"{wind.min():.2f} to {wind.max():.2f} m/s"
+        rows = {"cloths": str(len(self)), "wind": blown, "frames": f"{frames} in {self.time[-1]:.2f} s"}
+        failed = {f"member {index}": f"failed: {why}" for index, why in self.failed.items()}
+        return {**rows, "vertices": str(vertices), **failed}
+
+    def __repr__(self) -> str:
+        return f"Simulated({self.name}: " + ", ".join(f"{name} {value}" for name, value in self._rows().items()) + ")"
+
+    def _repr_html_(self) -> str:
+        return table(f"Simulated {self.name}", self._rows())

@@ -1,0 +1,130 @@
+"""Closing the loop from Python: `flagdata.close_loop`, with recordings as arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from flagdata.closed import Closed, Strength
+from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.lake.meshes import MeshSequence
+from measure.closing.close import close_loop
+from measure.closing.findings import checked, with_warnings
+from measure.loop.run import Options
+from measure.nulls.plan import FEWEST_NULLS
+from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
+from measure.observe.meshes import from_sequence
+from measure.observe.trajectory import DENSITY_UNCERTAINTY
+from measure.report import sentences
+from measure.report.document import as_document
+from measure.report.page import page
+from measure.report.words import words
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.record import Verdict
+from sim.material import MATERIALS, named
+
+Recordings: TypeAlias = ArrayLike | MeshSequence | Sequence[ArrayLike | MeshSequence]
+Pins: TypeAlias = str | Sequence[tuple[float, float]]
+
+
+def closed(
+    recordings: Recordings, *, wind: Any, rest: ArrayLike | None, rate: float | None, material: str, pins: Pins,
+    size: tuple[float, float] | None, density_uncertainty: float | None, noise: float | None, level: float | None,
+    nulls: int | None, seed: int, workers: int,
+) -> Closed:  # fmt: skip
+    """What `flagdata.close_loop` does.
+
+    Raises:
+        FlagdataError: see `flagdata.close_loop`.
+    """
+    options = Options(
+        seed=seed, workers=workers, level=CRITERIA.level if level is None else level,
+        nulls=FEWEST_NULLS if nulls is None else nulls,
+    )  # fmt: skip
+    tracked = _tracked(recordings, rest=rest, rate=rate, wind=wind, noise=noise)
+    observed = observe(tracked, _setup(material, pins, size, density_uncertainty))
+    return _answer(with_warnings(close_loop(observed.experiment, options), checked(observed.findings)))
+
+
+def _setup(material: str, pins: Pins, size: tuple[float, float] | None, density_uncertainty: float | None) -> Setup:
+    if material not in MATERIALS.names():
+        raise UnknownNameError.of("material", material, MATERIALS.names(), where="material")
+    names = [one.value for one in Hold]
+    if isinstance(pins, str) and pins not in names:
+        raise UnknownNameError.of("attachment", pins, names, where="pins")
+    places = Hold(pins) if isinstance(pins, str) else tuple((float(u), float(v)) for u, v in pins)
+    return Setup(
+        material=named(material), pins=places, outline=None if size is None else sheet(*size),
+        density_uncertainty=DENSITY_UNCERTAINTY if density_uncertainty is None else density_uncertainty,
+    )  # fmt: skip
+
+
+def _tracked(
+    recordings: Recordings, *, rest: ArrayLike | None, rate: float | None, wind: Any, noise: float | None
+) -> list[Observation]:
+    """One of each recording, with the wind beside it."""
+    several = _several(recordings)
+    winds = wind if isinstance(wind, list) else [wind] * len(several)
+    if len(winds) != len(several):
+        raise UsageError(
+            f"{len(winds)} winds for {len(several)} recordings", where="wind",
+            fix="give one, or a list with one for each recording",
+        )  # fmt: skip
+    return [
+        _observation(one, name=f"recording {number}", rest=rest, rate=rate, wind=_track(own), noise=noise)
+        for number, (one, own) in enumerate(zip(several, winds, strict=True), start=1)
+    ]
+
+
+def _several(recordings: Recordings) -> list[ArrayLike | MeshSequence]:
+    if isinstance(recordings, MeshSequence) or (isinstance(recordings, np.ndarray) and recordings.ndim == 3):
+        return [recordings]
+    return list(recordings)  # type: ignore[arg-type]
+
+
+def _observation(
+    one: ArrayLike | MeshSequence, *, name: str, rest: ArrayLike | None, rate: float | None, wind: WindTrack,
+    noise: float | None,
+) -> Observation:  # fmt: skip
+    if isinstance(one, MeshSequence):
+        return replace(from_sequence(one, name=name), wind=wind, noise=noise)
+    if rest is None or rate is None:
+        raise UsageError("positions without rest coordinates and rate", where=name, fix="give rest= and rate=")
+    positions, places = (np.asarray(values, dtype=np.float64) for values in (one, rest))
+    return from_arrays(name=name, positions=positions, rest=places, rate=rate, wind=wind, noise=noise)
+
+
+def _track(wind: Any) -> WindTrack:
+    """A speed along +x, a velocity, or times and velocities."""
+    if isinstance(wind, tuple) and len(wind) == 2:
+        times, velocity = (np.asarray(part, dtype=np.float64) for part in wind)
+        return WindTrack(times=times, velocity=velocity)
+    velocity = np.atleast_1d(np.asarray(wind, dtype=np.float64))
+    if velocity.shape == (1,):
+        velocity = np.array([velocity[0], 0.0, 0.0])
+    if velocity.shape != (3,) or not math.isfinite(float(velocity.sum())):
+        raise InputError(
+            f"a wind of shape {velocity.shape}", where="wind",
+            fix="give a speed, a velocity (x, y, z), or times (n,) and velocities (n, 3)",
+        )  # fmt: skip
+    return WindTrack(times=np.zeros(1), velocity=velocity[None])
+
+
+def _answer(verdict: Verdict) -> Closed:
+    strengths = {
+        one.effect: Strength(
+            parameter=one.parameter, value=one.strength.value, low=one.strength.low, high=one.strength.high,
+            unit=one.strength.unit, level=one.strength.level,
+        )
+        for one in sentences.named_candidates(verdict)
+    }  # fmt: skip
+    return Closed(
+        conclusion=verdict.conclusion.value, named=verdict.named, sentence=sentences.heading(verdict),
+        words=words(verdict), p_value=verdict.test.p_value.value, strengths=strengths, document=as_document(verdict),
+        page=page(verdict),
+    )  # fmt: skip

@@ -1,0 +1,43 @@
+"""A mesh sequence as a camera sees it, as an array: what `flagdata.render` does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import torch
+
+from flagdata.errors import UsageError
+from flagdata.film_array import Frames
+from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
+from flagdata.timebase import NANOSECONDS
+from sim.assets import Assets
+from sim.render import RENDERERS, Meshes, prior
+
+
+def rendered(
+    sequence: MeshSequence | RaggedMeshSequence, *, look: str, parameters: Mapping[str, float], cloth: str,
+    heading: float | None, renderer: str, photos: Path | None, seed: int,
+) -> Frames:  # fmt: skip
+    """A film of a moving cloth.
+
+    Raises:
+        FlagdataError: see `flagdata.render`.
+    """
+    if cloth not in ("flag", "hanging-cloth"):
+        raise UsageError(f"cloth {cloth!r}", where="cloth", fix="give 'flag' or 'hanging-cloth'")
+    assets = Assets(photos=photos)
+    zeta = prior.named(look).with_quantities(dict(parameters), source="given").draw(seed, assets)
+    toward = _toward(sequence) if heading is None else heading
+    meshes = Meshes.flag(sequence, heading=toward) if cloth == "flag" else Meshes.hanging(sequence, heading=toward)
+    with torch.no_grad():
+        pictures = RENDERERS[renderer](assets=assets).render(meshes, zeta)
+    first = int(sequence.time[0])
+    name = str(sequence.attributes.get("recipe", "rendered"))
+    return Frames(images=pictures.cpu().numpy(), time=(sequence.time - first) / NANOSECONDS, name=name)
+
+
+def _toward(sequence: MeshSequence | RaggedMeshSequence) -> float:
+    """Where the air goes to, as a simulated sequence states it [rad]; +x for any other."""
+    stated = sequence.attributes.get("parameters")
+    return float(stated.get("wind_toward", 0.0)) if isinstance(stated, Mapping) else 0.0
