@@ -5,6 +5,7 @@ from __future__ import annotations
 from tests.evidence import run_all
 
 BENCHMARKS = {
+    "catalog": "tests.benchmarks.bench_catalog",
     "effects": "tests.benchmarks.bench_effects",
     "lake": "tests.benchmarks.bench_lake",
     "logs": "tests.benchmarks.bench_logs",
