@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import re
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterator, Mapping
@@ -11,6 +13,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch.utils.data import DataLoader, Dataset
 
 from flagdata.dataset.sample import Batch, Sample, collate
@@ -24,7 +27,8 @@ RunIn: TypeAlias = Literal["threads", "fork", "spawn", "forkserver"]
 State: TypeAlias = dict[str, str | int | None]
 
 _AHEAD = 2  # batches that each thread reads ahead, as many as torch's worker processes do
-_MOVING = ("epoch", "cursor", "at")  # parts of a state that may differ from the loader that takes it up
+_MOVING = ("epoch", "before", "cursor", "share", "at")  # parts of a state that may differ from the loader that goes on
+_SHARE = re.compile(r"(\d+) of ([1-9]\d*)")
 
 
 class Batchable(Dataset[Sample], ABC):
@@ -48,8 +52,10 @@ class Batchable(Dataset[Sample], ABC):
 class PairLoader:
     """Iterates over the batches of one epoch; a new iteration after the end begins the next epoch.
 
-    The order of an epoch depends on the pairs, the seed and the epoch's number, never on the number of workers. An
-    iteration that was left early is taken up where it stopped, in this process or, through `state_dict`, in another.
+    The order of an epoch depends on the pairs, the seed and the epoch's number, never on the number of workers or
+    shares; `order_hash` is a hash of it. An iteration that was left early is taken up where it stopped, in this process
+    or, through `state_dict`, in others: with as many shares each goes on with its own batches; with another number they
+    divide anew what the epoch has left, once all shares had handed out equally many.
 
     Args:
         pairs: the dataset.
@@ -66,7 +72,7 @@ class PairLoader:
 
     Attributes:
         epoch: number of the epoch that the next batch belongs to, from 0.
-        cursor: batches of it that were handed out.
+        cursor: batches of it that were handed out by this share.
 
     Raises:
         UsageError: sizes that cannot be, an unknown option, or pinned memory where there is no accelerator.
@@ -101,6 +107,7 @@ class PairLoader:
         self.pairs = pairs
         self.epoch = 0
         self.cursor = 0
+        self._before = 0  # batches of this epoch that another number of shares handed out
         self._batch_size = batch_size
         self._order: Order = order
         self._last: Last = last
@@ -129,17 +136,36 @@ class PairLoader:
 
     def __len__(self) -> int:
         """Batches of this share in a whole epoch."""
+        return self._total() // self._share[1]
+
+    def _total(self) -> int:
+        """Batches of all shares in a whole epoch."""
         whole, rest = divmod(len(self.pairs), self._batch_size)
-        return (whole + (rest > 0 and self._last == "keep")) // self._share[1]
+        return whole + (rest > 0 and self._last == "keep")
 
     def batches(self, epoch: int) -> list[list[int]]:
-        """Indices of the pairs in each batch of this share in an epoch, in order."""
-        n, size = len(self.pairs), self._batch_size
-        shuffled = self._order == "shuffled"
-        order = stream(self.pairs.seed, "pairs", "order", epoch).permutation(n) if shuffled else np.arange(n)
+        """Indices of the pairs in each batch of this share in a whole epoch, in order."""
+        return self._from(epoch, 0)
+
+    def _from(self, epoch: int, first: int) -> list[list[int]]:
+        """Batches of this share in an epoch of which all shares together handed out `first` before."""
+        size, order = self._batch_size, self._ordered(epoch)
         index, count = self._share
-        numbers = range(index, len(self) * count, count)
-        return [order[k * size : (k + 1) * size].tolist() for k in numbers]
+        end = first + (self._total() - first) // count * count
+        return [order[k * size : (k + 1) * size].tolist() for k in range(first + index, end, count)]
+
+    def _ordered(self, epoch: int) -> NDArray[np.int64]:
+        n = len(self.pairs)
+        if self._order == "stored":
+            return np.arange(n)
+        return stream(self.pairs.seed, "pairs", "order", epoch).permutation(n)
+
+    def order_hash(self, epoch: int) -> str:
+        """SHA-256 of the samples and their order in an epoch, in hexadecimal: equal for any workers and shares."""
+        order = self._ordered(epoch).astype("<i8").tobytes()
+        return hashlib.sha256(
+            f"{self.pairs.fingerprint} {self._batch_size} {self._last}\n".encode() + order
+        ).hexdigest()
 
     def __iter__(self) -> Iterator[Batch]:
         """The batches of the epoch that are left.
@@ -151,13 +177,17 @@ class PairLoader:
         return self._run(self._iteration)
 
     def _run(self, iteration: int) -> Iterator[Batch]:
-        self._todo.batches = self.batches(self.epoch)[self.cursor :]
+        batches = self._from(self.epoch, self._before)
+        self._todo.batches = batches[self.cursor :]
+        if not self._todo.batches:  # what was left is less than a batch for each share
+            self.epoch, self.cursor, self._before = self.epoch + 1, 0, 0
+            return
         for batch in self._in_this_process() if self._processes is None else self._processes:
             if iteration != self._iteration:
                 raise UsageError("another iteration of this loader has begun", fix="use one loader for each iteration")
             self.cursor += 1
-            if self.cursor == len(self):
-                self.epoch, self.cursor = self.epoch + 1, 0
+            if self.cursor == len(batches):
+                self.epoch, self.cursor, self._before = self.epoch + 1, 0, 0
             yield batch
 
     def _in_this_process(self) -> Iterator[Batch]:
@@ -190,18 +220,22 @@ class PairLoader:
             "last": self._last,
             "share": f"{self._share[0]} of {self._share[1]}",
             "epoch": self.epoch,
+            "before": self._before,
             "cursor": self.cursor,
         }
 
     def load_state_dict(self, state: Mapping[str, str | int | None]) -> None:
-        """Go to where `state` was taken: the next iteration gives the same batches, bit for bit.
+        """Go to where `state` was taken: the next iteration gives the same batches, bit for bit. Taken with another
+        number of shares, it is that of any of them after equally many batches.
 
         Raises:
             RefusedError: it was taken of other data, another seed, or other batches.
             UsageError: it is not a state of a loader.
         """
         own = self.state_dict()
-        if set(state) != set(own):
+        state = {"before": 0, **state}  # which states of older versions lack
+        share = _SHARE.fullmatch(str(state.get("share")))
+        if set(state) != set(own) or share is None:
             raise UsageError("this is not a state of a loader of pairs", fix="give what state_dict returned")
         different = [name for name in own if name not in _MOVING and state[name] != own[name]]
         if different:
@@ -211,11 +245,17 @@ class PairLoader:
                 where=f"data at {state['at'] or 'the head of main'}",
                 fix="resolve the query at the same tag, with the same options",
             )
-        epoch, cursor = state["epoch"], state["cursor"]
-        if not (isinstance(epoch, int) and isinstance(cursor, int) and epoch >= 0 and 0 <= cursor < len(self)):
-            raise UsageError(f"no batch {cursor!r} in epoch {epoch!r}", fix="give what state_dict returned")
+        numbers = [value for value in (state["epoch"], state["before"], state["cursor"]) if isinstance(value, int)]
+        count, total = int(share[2]), self._total()
+        if len(numbers) < 3 or min(numbers) < 0 or numbers[1] + numbers[2] * count >= total:
+            raise UsageError(
+                f"no batch {state['cursor']!r} in epoch {state['epoch']!r}", fix="give what state_dict returned"
+            )
+        epoch, before, cursor = numbers
         self._iteration += 1
-        self.epoch, self.cursor = epoch, cursor
+        self.epoch = epoch
+        same = count == self._share[1]
+        self._before, self.cursor = (before, cursor) if same else (before + cursor * count, 0)
 
 
 class _Todo:

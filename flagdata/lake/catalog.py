@@ -4,11 +4,11 @@ Each append is one Parquet file and one log entry. The file is written and flush
 only if its version number is free, so of two writers at the same version one wins and the other gets `Moved` and
 looks again. The log is never expired: a tag must be readable for as long as the lake exists.
 
-After every `_TIDY_EVERY` versions the small files are merged, in a commit of its own that changes no row, and a
-checkpoint is written, which bounds the log that must be replayed. The old files stay, since old versions are made of
-them. (Each file costs a fresh reader about 1 ms; tidying takes about 0.1 s, so some 3 ms a commit.) The library's own
-checkpoints are off: it does not flush them to the disk, so a power cut could leave one that is empty and a table that
-does not open.
+After every `_TIDY_EVERY` versions the small files are merged, in a commit of its own that changes no row; a checkpoint
+is written, which bounds the log that must be replayed, and a summary of what the log states. The old files stay, since
+old versions are made of them. (Each file costs a fresh reader about 1 ms; tidying takes about 0.1 s, so some 3 ms a
+commit.) The library's own checkpoints are off: it does not flush them to the disk, so a power cut could leave one that
+is empty and a table that does not open.
 
 Each commit notes the SHA-256 of its file, which `verify` compares and `gc` relies on. (Not the checksums that Parquet
 can keep of its pages: the hash covers the whole file, footer too, costs readers nothing, and `sha256sum` prints it.)
@@ -42,6 +42,7 @@ from flagdata.forks import OneProcess
 from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder, put_if_absent, write_durably
 from flagdata.lake.log import CHECKPOINT, FILE_HASH, PREVIOUS_HASH, Log
 from flagdata.lake.rowfiles import RowFiles, Scan
+from flagdata.lake.summaries import Summaries
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
 from flagdata.storage import Place, RemotePath, StoreError
 from flagdata.storage.connection import delta_options, plain
@@ -112,6 +113,7 @@ class Catalog:
         self._marks = marks
         self._log = path / "_delta_log"
         self._entries = Log(self._log, marks)
+        self._summaries = Summaries(marks.parent / "history", self._entries)
         self._lock = threading.RLock()
         self._table: DeltaTable | None = None
         self._files = RowFiles(path)
@@ -259,6 +261,7 @@ class Catalog:
             if (hint := self._log / _HINT).exists():
                 flush_file(hint)
             flush_folder(self._log)
+        self._summaries.extend(self.history()[::-1])
         small = [name for name in self._names(version) if (self.path / name).stat().st_size < _SMALL]
         if len(small) > 1:
             rows = pa.concat_tables(self._files.read(name) for name in small)
@@ -305,6 +308,9 @@ class Catalog:
         head = self.head()
         known = self._history
         if known is None or known[0] > head:
+            summarised = self._summaries.read(head)
+            known = (len(summarised) - 1, [dict(version) for version in reversed(summarised)])
+        if not known[1] or head - known[0] > 2 * _TIDY_EVERY:  # the Delta library reads many entries at once
             known = (head, self._whole_history(head))
         # Entries never change, so that a process reads each once: in a bucket each is a request.
         unread = range(head, known[0], -1)

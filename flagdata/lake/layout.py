@@ -19,7 +19,7 @@ from flagdata.storage import Place, RemotePath
 
 STORES = {"mcap": ".mcap", "zarr": ".zarr", "model": ".model"}
 STAGING = "staging"
-_NOTES = ("catalog", "catalog/_delta_log", "refs", "refs/tags", "refs/branches", "refs/newest")
+_NOTES = ("catalog", "catalog/_delta_log", "refs", "refs/tags", "refs/branches", "refs/newest", "refs/history")
 FOLDERS = (*_NOTES, STAGING, *STORES)
 """All folders of a lake, each after the one it is in; a store or mark that is missing is made when needed."""
 

@@ -56,6 +56,7 @@ class Log:
         self.folder = folder
         self.marks = marks
         self._filled: set[int] = set()
+        self._numbers: dict[str, int] = {}  # name of what was in the folder → its version, -1 of no entry
         self._put = (-1, "")
 
     def path(self, version: int) -> Place:
@@ -211,7 +212,11 @@ class Log:
 
     def _present(self) -> dict[int, int | None]:
         """Version of each entry → its size, where a listing states it."""
-        return {int(match[1]): size for name, size in _sizes_in(self.folder).items() if (match := _ENTRY(name))}
+        sizes = _sizes_in(self.folder)
+        for name in sizes.keys() - self._numbers.keys():
+            match = _ENTRY(name)
+            self._numbers[name] = int(match[1]) if match else -1
+        return {version: size for name, size in sizes.items() if (version := self._numbers[name]) >= 0}
 
     def _marks(self) -> list[int]:
         return [int(name) for name in _sizes_in(self.marks) if _MARK.fullmatch(name)]
@@ -225,6 +230,11 @@ class Log:
         return LogGapError(
             f"an entry of the catalog's log is missing: {names}{more}", where=str(self.path(missing[0])), fix=fix
         )
+
+
+def names_in(folder: Place) -> list[str]:
+    """Names of what is in a folder; nothing if the folder is not there."""
+    return list(_sizes_in(folder))
 
 
 def _sizes_in(folder: Place) -> dict[str, int | None]:

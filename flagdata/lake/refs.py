@@ -105,7 +105,7 @@ class Refs:
         self.root = root
 
     def make_folders(self) -> None:
-        for kind in ("tags", "branches"):
+        for kind in ("tags", "branches", "history"):
             (self.root / kind).mkdir(parents=True)
 
     def tags(self) -> dict[str, Ref]:

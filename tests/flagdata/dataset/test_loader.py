@@ -147,9 +147,64 @@ def test_shares_of_processes_that_train_together_are_equal_and_disjoint(pairs, e
     shares = [epoch(pairs.loader(7, share=(index, 3), workers=2)) for index in range(3)]
     assert [len(share) for share in shares] == [2, 2, 2]  # of 7 batches; the seventh is in no share
     assert [batch for turn in zip(*shares, strict=True) for batch in turn] == expected[0][:6]
-    alone = pairs.loader(7, share=(0, 3)).state_dict()
-    with pytest.raises(RefusedError, match="share was '0 of 3', is '1 of 3'"):
-        pairs.loader(7, share=(1, 3)).load_state_dict(alone)
+
+
+_WAYS = [(0, "threads"), (1, "fork"), (4, "fork"), (4, "spawn"), (1, "forkserver")]
+
+
+@pytest.mark.filterwarnings("ignore:This DataLoader will create")
+@pytest.mark.parametrize("shares", [(1, 2), (2, 1), (2, 3)])
+def test_another_number_of_shares_and_workers_takes_up_exactly_what_an_epoch_has_left(pairs, expected, shares):
+    before, after = shares
+    handed, states = [], []
+    for index in range(before):
+        loader = pairs.loader(7, share=(index, before))
+        handed.append([contents(batch) for _, batch in zip(range(2), loader, strict=False)])
+        states.append(loader.state_dict())
+    handed = [batch for turn in zip(*handed, strict=True) for batch in turn]
+    assert handed == expected[0][: 2 * before]
+    later = []
+    for index in range(after):
+        workers, run_in = _WAYS[(before + 2 * after + index) % 3]
+        loader = pairs.loader(7, share=(index, after), workers=workers, run_in=run_in)
+        loader.load_state_dict(states[index % before])
+        later.append(epoch(loader))
+        assert (loader.epoch, loader.cursor) == (1, 0)
+        assert loader.order_hash(0) == pairs.loader(7).order_hash(0)
+    left = (len(expected[0]) - 2 * before) // after * after
+    assert [batch for turn in zip(*later, strict=True) for batch in turn] == expected[0][2 * before :][:left]
+
+
+@pytest.mark.filterwarnings("ignore:This DataLoader will create")
+@pytest.mark.parametrize(("workers", "run_in"), _WAYS[3:])
+def test_processes_started_anew_take_up_a_state_of_two_shares(pairs, expected, workers, run_in):
+    loader = pairs.loader(7, share=(1, 2))
+    next(iter(loader))
+    alone = pairs.loader(7, workers=workers, run_in=run_in)
+    alone.load_state_dict(json.loads(json.dumps(loader.state_dict())))
+    assert epoch(alone) == expected[0][2:]
+
+
+def test_a_state_in_the_middle_of_shares_taken_up_anew_goes_on_with_as_many(pairs, expected):
+    two = [pairs.loader(7, share=(index, 2)) for index in range(2)]
+    one = pairs.loader(7)
+    next(iter(one))
+    for loader in two:
+        loader.load_state_dict(one.state_dict())
+    second = pairs.loader(7, share=(1, 2))
+    next(iter(two[1]))
+    second.load_state_dict(two[1].state_dict())
+    assert epoch(second) == [expected[0][4], expected[0][6]]
+    old = {name: value for name, value in pairs.loader(7).state_dict().items() if name != "before"}
+    one.load_state_dict(old)
+    assert (one.epoch, one.cursor) == (0, 0)
+
+
+def test_the_hash_of_an_order_is_of_the_data_the_seed_and_the_epoch(field_lake, pairs):
+    loader, other = pairs.loader(7), flagdata.open(field_lake.path).pairs(at="v1", seed=12).loader(7)
+    hashes = {loader.order_hash(0), loader.order_hash(1), other.order_hash(0), pairs.loader(8).order_hash(0)}
+    assert len(hashes) == 4
+    assert pairs.loader(7, share=(1, 2), workers=3).order_hash(1) == loader.order_hash(1)
 
 
 @pytest.mark.skipif(torch.accelerator.is_available(), reason="there is an accelerator")

@@ -479,4 +479,4 @@ def test_an_entry_before_the_checkpoint_that_is_cut_off_is_named(
     entry = log / f"{1:020d}.json"
     entry.write_bytes(entry.read_bytes()[: len(entry.read_bytes()) // 2])
     with pytest.raises(CorruptError, match=entry.name):
-        Lake.open(lake.path).catalog.history()
+        Lake.open(lake.path).catalog.changed_entries()
