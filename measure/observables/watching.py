@@ -14,14 +14,17 @@ from measure.estimate.conditioned import ConditionedFilm
 from measure.estimate.similarity import FlagSize
 from measure.observables.film import FilmWindow
 from measure.observables.observable import WINDOW
-from models.conditioning.outline import SAMPLE, Outliner, halved
+from models.conditioning.outline import Outliner
+from models.conditioning.stills import SAMPLE, halved
 
 CHUNK = 30.0
 """Length of film [s] that one still picture is of: light and shade change over longer ones."""
-_CLEAR = 0.7
-"""Share of a mask's free outline that has to be clear."""
+_EXPECTED = 0.9
+"""Least coefficient of Dice with the true silhouette that is expected of a mask."""
 _STEADY = 0.4
 """Share by which a mask's area may differ from the window's median: a flag does not change as much in a window."""
+_LEAST_HOIST = 5.0
+"""Length of the hoist in the picture [px] below which nothing is read."""
 _FEWEST = 10
 """Frames of a window below which nothing is read."""
 
@@ -138,16 +141,13 @@ def _chunk(
     nothing: list[FilmWindow | None] = [None] * count
     if film.found is None or not held:
         return nothing
-    outliner = Outliner.of([frame for _, frame in held[:: -(-len(held) // SAMPLE)]], film.found)
-    if outliner is None:
+    outliner = Outliner.of([frame for _, frame in held[:: -(-len(held) // SAMPLE)]])
+    if outliner is None or outliner.hoist[1, 1] - outliner.hoist[0, 1] < _LEAST_HOIST:
         return nothing
     times = np.array([time for time, _ in held])
     frames = np.stack([np.rint(halved(frame)).astype(np.uint8) for _, frame in held])
-    masks, clear = zip(*(outliner.mask(frame) for _, frame in held), strict=True)
-    cloth, clear = np.stack(masks), np.array(clear)
-    hoist = outliner.ends(cloth[clear >= _CLEAR]) if (clear >= _CLEAR).any() else None
-    if hoist is None or hoist[1, 1] - hoist[0, 1] < 5:
-        return nothing
+    cloth, expected = outliner.masks([frame for _, frame in held])
+    hoist = outliner.hoist
     found: list[FilmWindow | None] = []
     for k in range(count):
         own = (times >= begin + k * seconds - 1e-6) & (times < begin + (k + 1) * seconds - 1e-6)
@@ -158,9 +158,9 @@ def _chunk(
         usual = np.abs(area - np.median(area)) <= _STEADY * np.median(area)
         found.append(
             FilmWindow(
-                times=times[own], frames=frames[own], masks=cloth[own], shown=(clear[own] >= _CLEAR) & usual,
+                times=times[own], frames=frames[own], masks=cloth[own], shown=(expected[own] >= _EXPECTED) & usual,
                 scale=float(hoist[1, 1] - hoist[0, 1]) / size.height, hoist=hoist,
-                side=1.0 if outliner.hoist == "left" else -1.0, length=size.length, height=size.height,
+                side=outliner.side, length=size.length, height=size.height,
             )
         )  # fmt: skip
     return found

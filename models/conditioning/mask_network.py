@@ -1,0 +1,113 @@
+"""The network that finds the cloth in a picture of a film: a small U-Net.
+
+Ronneberger, Fischer and Brox, U-Net, MICCAI 2015, with fewer channels, batch normalisation, its first layer on pixels
+of 2×2 and its last one on the picture itself. It sees a picture beside what the film shows all the time
+(`models.conditioning.stills`), so that it need not know what cloth looks like: cloth is what changes, and what is
+joined to that and to the hoist where nothing changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+from torch.nn import functional
+
+from flagdata.errors import CorruptError
+from models.conditioning.stills import Stills
+from models.storage import WEIGHTS, check_model, read_card, read_tensors
+
+FOLDER = Path(__file__).parent / "cloth_mask"
+"""The network that comes with the package: card, weights and checksums."""
+_AGAIN = "install flagdata again"
+
+CHANNELS = 4
+"""The picture; the usual, the least and the greatest value of each place."""
+OUTPUTS = 3
+"""Logits of cloth, of the hoist's upper end and of its lower end."""
+_WIDTHS = (16, 24, 40, 64)
+_MULTIPLE = 2 ** len(_WIDTHS)
+_SCALE = 8.0
+"""Gray levels that are added to the deviation of the still picture, so that noise in a plain one stays small."""
+
+
+class MaskNetwork(nn.Module):
+    """(n, 4, rows, columns) → (n, 3, rows, columns): see `CHANNELS` and `OUTPUTS`."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        widths, inputs = _WIDTHS, 4 * CHANNELS
+        self.down = nn.ModuleList(_twice(a, b) for a, b in zip((inputs, *widths[:-1]), widths, strict=True))
+        self.up = nn.ModuleList(
+            _twice(below + own, own) for below, own in zip(widths[:0:-1], widths[-2::-1], strict=True)
+        )
+        self.fine = nn.Sequential(
+            nn.Conv2d(widths[0] // 4 + CHANNELS, 8, 3, padding=1), nn.ReLU(inplace=True), nn.Conv2d(8, OUTPUTS, 1)
+        )
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Logits. The picture is continued at its edges to a multiple of 16 pixels."""
+        rows, columns = x.shape[-2:]
+        padded = functional.pad(x, (0, -columns % _MULTIPLE, 0, -rows % _MULTIPLE), mode="replicate")
+        kept: list[Tensor] = []
+        y = functional.pixel_unshuffle(padded, 2)
+        for block in self.down:
+            y = block(functional.max_pool2d(y, 2) if kept else y)
+            kept.append(y)
+        for block, beside in zip(self.up, kept[-2::-1], strict=True):
+            y = block(torch.cat([functional.interpolate(y, scale_factor=2.0, mode="nearest"), beside], dim=1))
+        y = torch.cat([functional.pixel_shuffle(y, 2), padded], dim=1)
+        return self.fine(y)[..., :rows, :columns]
+
+
+def _twice(inputs: int, width: int) -> nn.Sequential:
+    layers: list[nn.Module] = []
+    for before in (inputs, width):
+        layers += [nn.Conv2d(before, width, 3, padding=1, bias=False), nn.BatchNorm2d(width), nn.ReLU(inplace=True)]
+    return nn.Sequential(*layers)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Levels:
+    """Gray levels of a film as the network takes them: the still picture has mean 0 and a deviation of about 1."""
+
+    middle: float
+    spread: float
+
+    @classmethod
+    def of(cls, stills: Stills) -> Levels:
+        """Of a film."""
+        return cls(middle=float(stills.usual.mean()), spread=float(stills.usual.std()) + _SCALE)
+
+    def of_pictures(self, pictures: NDArray[np.generic]) -> Tensor:
+        """float32 of the same shape."""
+        return (torch.from_numpy(pictures.astype(np.float32)) - self.middle) / self.spread
+
+
+def inputs_of(pictures: NDArray[np.generic], stills: Stills) -> Tensor:
+    """(n, 4, rows, columns) for pictures (n, rows, columns) of one film."""
+    levels = Levels.of(stills)
+    same = levels.of_pictures(np.stack([stills.usual, stills.least, stills.greatest]))
+    return torch.cat([levels.of_pictures(pictures)[:, None], same[None].expand(len(pictures), -1, -1, -1)], dim=1)
+
+
+@cache
+def shipped() -> MaskNetwork:
+    """The network that comes with the package.
+
+    Raises:
+        CorruptError: its files are not as they were written, or do not fit this code.
+    """
+    check_model(FOLDER)
+    read_card(FOLDER)
+    network = MaskNetwork()
+    try:
+        network.load_state_dict({name: tensor.float() for name, tensor in read_tensors(FOLDER / WEIGHTS).items()})
+    except RuntimeError as error:
+        raise CorruptError(f"the weights do not fit this code: {error}", where=str(FOLDER), fix=_AGAIN) from error
+    return network.eval().to(memory_format=torch.channels_last)

@@ -1,0 +1,53 @@
+"""What a film shows all the time: of each place the usual value, and the least and the greatest that it takes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+HALVED = 2
+"""By how much pictures are averaged down before cloth is sought in them."""
+SAMPLE = 120
+"""Pictures at most that are looked at."""
+_USUAL = 0.2
+"""Share of a pixel's values that the usual one is of."""
+_LEAST, _GREATEST = 0.03, 0.97
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stills:
+    """Of pictures of one film in one light.
+
+    Attributes:
+        usual: (rows, columns) middle of the narrowest fifth of a pixel's values: what is behind, where it is bare for
+            that long, and cloth where it never is.
+        least, greatest: (rows, columns) 3 % and 97 % quantiles of them.
+    """
+
+    usual: NDArray[np.uint8]
+    least: NDArray[np.uint8]
+    greatest: NDArray[np.uint8]
+
+    @classmethod
+    def of(cls, small: Sequence[NDArray[np.generic]] | NDArray[np.generic]) -> Stills:
+        """From pictures (n, rows, columns), of which `SAMPLE` spread over all are taken."""
+        ordered = np.sort(np.stack([np.asarray(one) for one in small[:: -(-len(small) // SAMPLE)]]), axis=0)
+        some = min(max(1, int(_USUAL * len(ordered))), len(ordered) - 1)
+        place = (ordered[some:].astype(np.float32) - ordered[: len(ordered) - some]).argmin(axis=0)[None]
+        middle = np.take_along_axis(ordered, place + some // 2, axis=0)[0]
+        low, high = np.quantile(ordered, (_LEAST, _GREATEST), axis=0)
+        return cls(usual=_bytes(middle), least=_bytes(low), greatest=_bytes(high))
+
+
+def halved(picture: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """A picture averaged down by `HALVED`."""
+    size = (picture.shape[1] // HALVED, picture.shape[0] // HALVED)
+    return cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+
+
+def _bytes(values: NDArray[np.generic]) -> NDArray[np.uint8]:
+    return np.rint(values.astype(np.float32)).astype(np.uint8)
