@@ -8,32 +8,31 @@ The silhouette is the projection of the mesh, brought into the picture by the sa
 
 from __future__ import annotations
 
-import io
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
-from typing import Any
 
-import av
 import cv2
 import numpy as np
 import torch
-from av.video.frame import VideoFrame
 from numpy.typing import NDArray
 
 from flagdata.lake.meshes import MeshSequence
+from flagdata.record.video import decode
 from flagdata.rng import child_seed, stream
 from models.conditioning import framing
 from models.conditioning.camera import STILL
 from models.conditioning.conditioning import Conditioning, conditioned
 from models.conditioning.stills import HALVED, Stills, halved
 from sim.assets import Assets
-from sim.datasets.picture import noisy
+from sim.datasets.picture import coded, settings
+from sim.datasets.reading import load
 from sim.render import Meshes, RenderParameters, prior
 from sim.render.raster import Raster
 from sim.render.stage import stage
 
+_CAMERA = "outdoor"
+"""Data set whose cameras' noise and coding films get."""
 PICTURES = 10
 """Of a film, that are kept."""
 _EVERY = 3
@@ -124,26 +123,11 @@ def _lit(colour: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint
 
 
 def _coded(colour: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
-    """(n, height, width) gray of frames (n, height, width, 3) after the noise and the coding of a camera."""
-    noise = {"camera.read_noise": float(rng.uniform(0.3, 1.5)), "camera.shot_noise": float(rng.uniform(0.5, 3.0))}
-    file = io.BytesIO()
-    with av.open(file, "w", format="mp4") as container:
-        options = {"preset": "veryfast", "crf": f"{rng.uniform(18, 32):.1f}"}
-        video = container.add_stream("libx264", rate=10, options=options)
-        video.width, video.height, video.pix_fmt = colour.shape[2], colour.shape[1], "yuv420p"
-        video.codec_context.time_base = Fraction(1, 10)
-        video.codec_context.thread_count = 1
-        for number, picture in enumerate(colour):
-            planes = VideoFrame.from_ndarray(picture, format="rgb24").reformat(format="yuv420p").to_ndarray()
-            planes[: colour.shape[1]] = noisy(planes[: colour.shape[1]], noise, rng)
-            frame = VideoFrame.from_ndarray(planes, format="yuv420p")
-            frame.pts = number
-            container.mux(video.encode(frame))
-        container.mux(video.encode())
-    file.seek(0)
-    with av.open(file) as container:
-        frames: list[Any] = [frame.to_ndarray(format="gray") for frame in container.decode(video=0)]
-    return np.stack(frames)
+    """(n, height, width) gray of frames (n, height, width, 3) after the noise and the coding of the data set's
+    cameras."""
+    camera = load(_CAMERA).camera
+    seed = int(rng.integers(2**31))
+    return np.stack(decode(coded(colour, settings(camera, seed=seed), camera, seed=seed), where="a simulated film"))
 
 
 def _places(meshes: Meshes, zeta: RenderParameters, picked: Sequence[int]) -> NDArray[np.float64]:

@@ -19,6 +19,8 @@ from torch import Tensor
 from models.conditioning.mask_network import MaskNetwork, inputs_of, shipped
 from models.conditioning.stills import SAMPLE, Stills, halved
 
+_CLOTH = 0.45
+"""Probability from which on a place is cloth: on films that were not learned from, the masks' area is then right."""
 _FEWEST = 10
 """Pictures below which a film shows nothing all the time."""
 _LOOKED_AT = 40
@@ -29,6 +31,10 @@ _NEAR = 4
 """Reach about its most likely place over which the place of an end is averaged [px]."""
 _CERTAIN = 0.5
 """Least probability that an end is within `_NEAR` of its most likely place."""
+_BESIDE = (0.05, 0.3)
+"""Part of the cloth, in lengths of the hoist from it, whose upper and lower edges are extended to the hoist."""
+_LEAST = 0.1
+"""Least area of the cloth over the square of its hoist."""
 _UPRIGHT = 0.35
 """Greatest offset of the hoist's ends along the picture's rows, over their distance along its columns."""
 
@@ -65,25 +71,38 @@ class Outliner:
         ends = [_end(one) for one in maps[:, 1:].mean(dim=0).double()]
         if any(end is None for end in ends):
             return None
-        hoist = np.stack([end for end in ends if end is not None])
-        across, down = hoist[1] - hoist[0]
-        cloth = (maps[:, 0] > 0).numpy().sum(axis=(0, 1))
-        if down <= 0 or abs(across) > _UPRIGHT * down or not cloth.any():
+        places = np.stack([end for end in ends if end is not None])
+        across, down = places[1] - places[0]
+        cloth = np.stack([_whole(one) for one in (maps[:, 0].sigmoid() > _CLOTH).numpy()])
+        if abs(across) > _UPRIGHT * down or cloth.sum(axis=(1, 2)).mean() < _LEAST * down**2:
             return None
-        beside = float(np.average(np.arange(len(cloth)) + 0.5, weights=cloth)) - float(hoist[:, 0].mean())
-        return cls(stills=stills, hoist=hoist, side=1.0 if beside >= 0 else -1.0, network=network)
+        usual = cloth.mean(axis=0)
+        side = 1.0 if usual.sum(axis=0) @ (np.arange(usual.shape[1]) + 0.5 - places[:, 0].mean()) >= 0 else -1.0
+        hoist = _extended(usual > 0.5, places, side)
+        return None if hoist is None else cls(stills=stills, hoist=hoist, side=side, network=network)
 
     def masks(self, pictures: Sequence[NDArray[np.uint8]] | NDArray[np.uint8]) -> tuple[Masks, NDArray[np.float64]]:
-        """The cloth in pictures (n, size, size) of the film, (n, size / 2, size / 2): the largest part that is cloth,
-        with its holes filled; and (n,) Dice's coefficient with the truth that the network expects."""
-        found, expected = [], []
-        for first in range(0, len(pictures), _TOGETHER):
-            small = np.stack([halved(picture) for picture in pictures[first : first + _TOGETHER]])
-            for shown in _maps(self.network, small, self.stills)[:, 0].sigmoid().numpy():
-                cloth = _whole(shown > 0.5)
-                found.append(cloth)
-                expected.append(2 * float(shown[cloth].sum()) / max(float(shown.sum() + cloth.sum()), 1.0))
-        return np.stack(found), np.array(expected)
+        """The cloth in pictures (n, size, size) that follow one another in the film, (n, size / 2, size / 2): the
+        largest part that is cloth, on its side of the hoist's line, with its holes filled; and (n,) Dice's coefficient
+        with the truth that the network expects.
+
+        A picture's probabilities count a half and its neighbours' a quarter each, so that an outline does not tremble
+        from picture to picture.
+        """
+        shown = np.concatenate(
+            [
+                _maps(self.network, np.stack([halved(one) for one in pictures[k : k + _TOGETHER]]), self.stills)[:, 0]
+                .sigmoid()
+                .numpy()
+                for k in range(0, len(pictures), _TOGETHER)
+            ]
+        )
+        ends = np.concatenate([shown[:1], shown, shown[-1:]])
+        shown = (ends[:-2] + 2 * ends[1:-1] + ends[2:]) / 4
+        shown *= _beside(self.hoist, self.side, self.stills.usual.shape)
+        cloth = np.stack([_whole(one > _CLOTH) for one in shown])
+        both = 2 * (shown * cloth).sum(axis=(1, 2))
+        return cloth, (both / np.maximum(shown.sum(axis=(1, 2)) + cloth.sum(axis=(1, 2)), 1.0)).astype(np.float64)
 
 
 def _maps(network: MaskNetwork, small: NDArray[np.float32], stills: Stills) -> Tensor:
@@ -109,6 +128,33 @@ def _end(logits: Tensor) -> NDArray[np.float64] | None:
     if total < _CERTAIN:
         return None
     return np.array([near.sum(axis=0) @ columns, near.sum(axis=1) @ rows]) / total + 0.5
+
+
+def _extended(usual: Masks, places: NDArray[np.float64], side: float) -> NDArray[np.float64] | None:
+    """(2, 2) the hoist's ends on its line, where the edges of the cloth beside it meet it: a pole's top is not the
+    cloth's corner. None where the cloth does not show both edges there.
+
+    Args:
+        usual: (rows, columns) where cloth is most of the time.
+        places: (2, 2) of the ends, as the network finds them.
+        side: at which the cloth is.
+    """
+    length = float(places[1, 1] - places[0, 1])
+    columns = np.unique(np.floor(places[:, 0].mean() + side * np.linspace(*_BESIDE, 16) * length).astype(int))
+    columns = columns[(columns >= 0) & (columns < usual.shape[1])]
+    shown = usual[:, columns]
+    if len(columns) < 3 or not shown.any(axis=0).all():
+        return None
+    edges = shown.argmax(axis=0), usual.shape[0] - shown[::-1].argmax(axis=0)
+    rows = [float(np.polyval(np.polyfit(columns + 0.5, at, 1), x)) for at, x in zip(edges, places[:, 0], strict=True)]
+    return np.stack([places[:, 0], rows], axis=1)
+
+
+def _beside(hoist: NDArray[np.float64], side: float, shape: tuple[int, ...]) -> Masks:
+    """Places on the cloth's side of the line through the hoist: a pole before the cloth is not cloth."""
+    (x, y), (across, down) = hoist[0], hoist[1] - hoist[0]
+    rows, columns = np.indices(shape) + 0.5
+    return side * (columns - x - (rows - y) * across / down) > 0
 
 
 def _whole(cloth: Masks) -> Masks:
