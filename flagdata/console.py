@@ -15,6 +15,7 @@ import click
 
 from flagdata.addresses import lake_place, local_path
 from flagdata.errors import FlagdataError, LimitError, UnforeseenError
+from flagdata.extras import missing
 from flagdata.storage import Place, StoreError
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -136,6 +137,8 @@ def foreseen(error: Exception) -> FlagdataError:
     """The report of any exception that reached the command line."""
     if isinstance(error, FlagdataError):
         return error
+    if isinstance(error, ImportError) and (lacking := missing(error)) is not None:
+        return lacking
     if isinstance(error, OSError):
         what = " ".join((error.strerror or str(error)).split())  # without strerror where a library of C++ raised it
         return FlagdataError(

@@ -96,6 +96,12 @@ class RefusedError(FlagdataError):
     exit_code = 3
 
 
+class MissingExtraError(FlagdataError):
+    """What was asked for needs a package that a plain installation leaves out."""
+
+    kind = "missing-extra"
+
+
 class UnforeseenError(FlagdataError):
     """A defect of flagdata: an exception that nothing turned into one of these."""
 

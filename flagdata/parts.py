@@ -5,8 +5,15 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
+from flagdata.extras import explained
 
-def attribute(place: str) -> Any:
-    """What "module:attribute" names."""
+
+def call(place: str, *arguments: Any, **options: Any) -> Any:
+    """What "module:attribute" names, called.
+
+    Raises:
+        MissingExtraError: it needs a package that is not installed.
+    """
     module, _, name = place.partition(":")
-    return getattr(import_module(module), name)
+    with explained():
+        return getattr(import_module(module), name)(*arguments, **options)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from flagdata.api.lakes import AnyLake, opened
 from flagdata.errors import UsageError
-from flagdata.parts import attribute
+from flagdata.parts import call
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -76,7 +76,7 @@ def simulate(
     whole = {"count": count, "seed": seed, "batch": batch, "precision": precision}
     given = {name: value for name, value in {**tables, **whole}.items() if value is not None}
     source = str(recipe) if isinstance(recipe, Path) else recipe
-    return attribute("sim.run.arrays:simulated")(source, given, device=device, workers=workers)
+    return call("sim.run.arrays:simulated", source, given, device=device, workers=workers)
 
 
 def render(
@@ -116,7 +116,8 @@ def render(
         InputError: a value that is not admissible, or cloth behind the camera.
     """
     own = {"width": width, "height": height, **(parameters or {})}
-    return attribute("sim.render.film:rendered")(
+    return call(
+        "sim.render.film:rendered",
         sequence, look=look, parameters=own, cloth=cloth, heading=heading, renderer=renderer,
         photos=None if photos is None else Path(photos), seed=seed,
     )  # fmt: skip
@@ -182,7 +183,8 @@ def measure(
             at and there is nothing to return.
         InputError: a file that is no film, or a film that is too short.
     """
-    return attribute("measure.estimate.run:measured")(
+    return call(
+        "measure.estimate.run:measured",
         source, flag_size=flag_size, area_weight=area_weight, material=material, step=step, crop=crop, flag=flag,
         start=start, end=end, true_fps=true_fps, sequence_fps=sequence_fps, level=level, seed=seed, model=model,
         false_alarm=false_alarm, lake=None if lake is None else opened(lake).lake, at=at, anyway=anyway,
@@ -250,7 +252,8 @@ def calibrate(
         UsageError: options that do not fit.
     """
     several = [recordings] if isinstance(recordings, Mapping | Path | str) else list(recordings)
-    return attribute("measure.calibrate.arrays:calibrated")(
+    return call(
+        "measure.calibrate.arrays:calibrated",
         several, flag_size=flag_size, attachment=attachment, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg,
         distance=distance, start=start, end=end, crop=crop, flag=flag, log=log, offset=offset,
         simulations=simulations, level=level, seed=seed, workers=workers,
@@ -308,7 +311,8 @@ def close_loop(
     """
     if (rest is None) != (rate is None):
         raise UsageError("rest= without rate=, or the other way round", where="recordings", fix="give both")
-    return attribute("measure.closing.arrays:closed")(
+    return call(
+        "measure.closing.arrays:closed",
         recordings, wind=wind, rest=rest, rate=rate, material=material, pins=pins, size=size,
         density_uncertainty=density_uncertainty, noise=noise, level=level, nulls=nulls, seed=seed, workers=workers,
     )  # fmt: skip

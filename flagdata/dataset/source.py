@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from flagdata.errors import UsageError
+from flagdata.extras import explained
 from flagdata.html import table
 from flagdata.lake import Lake
 from flagdata.rows import Rows
@@ -81,13 +82,15 @@ class Source:
             cache: where decoded clips are kept; `None` decodes each time.
 
         Raises:
+            MissingExtraError: torch is not installed.
             NotFoundError: no such ref, or no clip matches.
             RefusedError: an explicit split leaks, the side is empty, or no pair is within the tolerance.
             UnknownNameError: no such column or side.
             UsageError: a filter that is not SQL, a window that is no length of time, clips of several windows where
                 none is named, or a seed that is no whole number.
         """
-        from flagdata.dataset.pairs import Pairs
+        with explained():
+            from flagdata.dataset.pairs import Pairs
         from flagdata.dataset.resolve import resolve
         from flagdata.dataset.splits import HashedSplit
         from flagdata.dataset.tolerance import Tolerance

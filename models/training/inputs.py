@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import psutil
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
@@ -110,6 +109,8 @@ class Prepared:
         Raises:
             CorruptError: a file that is cut off or gone.
         """
+        import psutil
+
         if not isinstance(self.maps, Files):
             return self
         count, variants, *shape = self.maps.shape
