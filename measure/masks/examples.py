@@ -64,7 +64,7 @@ def _one(lake: str, batch: Sequence[str], folder: Path, number: int, seed: int) 
     rng = stream(seed, "masks", "runs", number)
     some = rng.choice(len(batch), size=min(len(batch), 1 + int(rng.integers(_MOST_RUNS))), replace=False)
     opened = Lake.open(lake)
-    runs = [read_meshes(opened.whole_object(batch[k])) for k in some]
+    runs = [read_meshes(opened.whole_object(batch[int(k)])) for k in some]
     flags = [run for run in runs if isinstance(run, MeshSequence)]
     made = example(flags, seed=child_seed(seed, "masks", number), assets=Assets())
     path = folder / f"{number:05}.npz"

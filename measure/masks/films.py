@@ -118,7 +118,8 @@ def _lit(colour: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint
     """Frames in a light that stays, or in one that changes evenly."""
     if rng.random() >= _DRIFTING:
         return colour
-    gain = 1 + np.linspace(*rng.uniform(-_DRIFT, _DRIFT, 2), len(colour))[:, None, None, None]
+    begin, end = rng.uniform(-_DRIFT, _DRIFT, 2).tolist()
+    gain = 1 + np.linspace(begin, end, len(colour))[:, None, None, None]
     return np.clip(np.rint(colour * gain), 0, 255).astype(np.uint8)
 
 

@@ -58,7 +58,7 @@ def train(
     """
     rng = stream(seed, "masks", "training")
     torch.manual_seed(int(rng.integers(2**31)))
-    network = MaskNetwork().to(memory_format=torch.channels_last)
+    network = MaskNetwork()
     optimiser = torch.optim.AdamW(network.parameters(), lr=_RATE, weight_decay=1e-4)
     steps = epochs * -(-len(examples) * _PICTURES // _BATCH)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, _RATE, total_steps=steps, pct_start=0.1)
@@ -69,7 +69,8 @@ def train(
         total = 0.0
         for first in range(0, len(order), _BATCH):
             some = [_drawn(examples[k], rng) for k in order[first : first + _BATCH]]
-            loss = _loss(network, *(torch.cat(parts) for parts in zip(*some, strict=True)), rng)
+            x, cloth, ends = (torch.cat(parts) for parts in zip(*some, strict=True))
+            loss = _loss(network, x, cloth, ends, rng)
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()

@@ -110,4 +110,4 @@ def shipped() -> MaskNetwork:
         network.load_state_dict({name: tensor.float() for name, tensor in read_tensors(FOLDER / WEIGHTS).items()})
     except RuntimeError as error:
         raise CorruptError(f"the weights do not fit this code: {error}", where=str(FOLDER), fix=_AGAIN) from error
-    return network.eval().to(memory_format=torch.channels_last)
+    return network.eval()

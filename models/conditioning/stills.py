@@ -35,9 +35,9 @@ class Stills:
     @classmethod
     def of(cls, small: Sequence[NDArray[np.generic]] | NDArray[np.generic]) -> Stills:
         """From pictures (n, rows, columns), of which `SAMPLE` spread over all are taken."""
-        ordered = np.sort(np.stack([np.asarray(one) for one in small[:: -(-len(small) // SAMPLE)]]), axis=0)
+        ordered = np.sort(np.stack([np.asarray(one, np.float32) for one in small[:: -(-len(small) // SAMPLE)]]), axis=0)
         some = min(max(1, int(_USUAL * len(ordered))), len(ordered) - 1)
-        place = (ordered[some:].astype(np.float32) - ordered[: len(ordered) - some]).argmin(axis=0)[None]
+        place = (ordered[some:] - ordered[: len(ordered) - some]).argmin(axis=0)[None]
         middle = np.take_along_axis(ordered, place + some // 2, axis=0)[0]
         low, high = np.quantile(ordered, (_LEAST, _GREATEST), axis=0)
         return cls(usual=_bytes(middle), least=_bytes(low), greatest=_bytes(high))
@@ -50,4 +50,4 @@ def halved(picture: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def _bytes(values: NDArray[np.generic]) -> NDArray[np.uint8]:
-    return np.rint(values.astype(np.float32)).astype(np.uint8)
+    return np.rint(np.asarray(values, np.float32)).astype(np.uint8)

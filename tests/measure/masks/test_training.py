@@ -51,7 +51,7 @@ def test_training_learns_and_repeats() -> None:
     found = train(examples, judged, epochs=30, seed=3, advance=lambda epoch, loss, reached: losses.append(loss))
     assert losses[-1] < 0.85 * losses[0]
     torch.manual_seed(0)
-    untrained = MaskNetwork().to(memory_format=torch.channels_last)
+    untrained = MaskNetwork()
     assert scores(found, judged).dice > scores(untrained, judged).dice + 0.2
     again = train(examples[:2], judged[:1], epochs=1, seed=5, advance=lambda *given: None)
     same = train(examples[:2], judged[:1], epochs=1, seed=5, advance=lambda *given: None)
