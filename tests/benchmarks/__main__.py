@@ -7,6 +7,7 @@ from tests.evidence import run_all
 BENCHMARKS = {
     "catalog": "tests.benchmarks.bench_catalog",
     "effects": "tests.benchmarks.bench_effects",
+    "first-batch": "tests.benchmarks.bench_first_batch",
     "lake": "tests.benchmarks.bench_lake",
     "logs": "tests.benchmarks.bench_logs",
     "measure": "tests.benchmarks.bench_measure",

@@ -59,10 +59,16 @@ def pictures(seed: int, count: int) -> Iterator[np.ndarray]:
 
 
 def make_lake(folder: Path, seed: int) -> Lake:
-    """A lake of one recording of `CLIPS` clips, with a minute of wind before it."""
+    """A lake of one recording of `CLIPS` clips."""
     lake = Lake.create(folder / "lake")
+    make_recording(lake, seed, clips=CLIPS)
+    return lake
+
+
+def make_recording(lake: Lake, seed: int, *, clips: int) -> None:
+    """Commit a recording of so many clips, with a minute of wind before it, and the clips."""
     period = round(NANOSECONDS / FRAME_RATE)
-    seconds = 61 + int(CLIPS * CLIP_FRAMES / FRAME_RATE)
+    seconds = 61 + int(clips * CLIP_FRAMES / FRAME_RATE)
     wind = WindSeries(
         time=START - 60 * NANOSECONDS + np.arange(seconds, dtype=np.int64) * NANOSECONDS,
         channels={"wind_speed": np.full(seconds, 5.0)},
@@ -73,7 +79,7 @@ def make_lake(folder: Path, seed: int) -> Lake:
         path = transaction.staging(".mcap")
         with RecordWriter(path, metadata={}) as writer:
             writer.wind(wind)
-            for index, image in enumerate(pictures(seed, CLIPS * CLIP_FRAMES)):
+            for index, image in enumerate(pictures(seed, clips * CLIP_FRAMES)):
                 instant = START + index * period
                 writer.frame(log_time=instant, publish_time=instant, timestamp=instant, image=image)
         recording = Artifact(
@@ -82,7 +88,6 @@ def make_lake(folder: Path, seed: int) -> Lake:
         transaction.add(recording)
         for clip in clip_rows(Record.open(lake.object_path(str(recording.object))), recording):
             transaction.add(clip)
-    return lake
 
 
 def make_shards(folder: Path, lake: Lake, pairs: Pairs) -> list[str]:
