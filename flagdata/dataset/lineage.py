@@ -58,8 +58,11 @@ def _ancestors(artifact: str, parents: Mapping[str, list[str]]) -> set[str]:
 
 def superseded(catalog: pa.Table, recordings: set[str]) -> dict[str, str]:
     """Recordings that another of `recordings` replaces → that one, a later alignment of the same camera and wind."""
-    rows = catalog.filter(pc.field("artifact").isin(pa.array(sorted(recordings), pa.string())))
-    cameras = set(catalog.filter(pc.field("kind") == Kind.CAMERA.value)["artifact"].to_pylist())
+    rows = catalog.select(["artifact", "parents", "created"]).filter(
+        pc.field("artifact").isin(pa.array(sorted(recordings), pa.string()))
+    )
+    of_cameras = catalog.select(["artifact", "kind"]).filter(pc.field("kind") == Kind.CAMERA.value)
+    cameras = set(of_cameras["artifact"].to_pylist())
     alignments: dict[tuple[str, ...], list[tuple[object, str]]] = defaultdict(list)
     for artifact, parents, created in zip(
         rows["artifact"].to_pylist(), rows["parents"].to_pylist(), rows["created"].to_pylist(), strict=True

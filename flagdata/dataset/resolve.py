@@ -19,12 +19,14 @@ from flagdata.documents import column_json
 from flagdata.errors import NotFoundError, RefusedError, UsageError
 from flagdata.lake import Lake
 from flagdata.lake.matching import Where
+from flagdata.lake.rowfiles import Scan
 from flagdata.lake.tabled import labels_of
 from flagdata.record import Record
 from flagdata.schema import TRUTH_WINDOW, Kind
 from flagdata.selection import Request, Selection
 
 _ORIGIN = ("artifact", "recording", "session", "seed", "day")
+_LINEAGE = ("artifact", "kind", "parents", "created", "source_hash", "object", "session")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,9 +50,9 @@ def side_sizes(
     lake: Lake, *, where: str | None, at: str | None, split_by: HashedSplit | ExplicitSplit
 ) -> dict[str, SideSize]:
     """Sizes of all sides; arguments as in `Source.sides`, which see for what it raises."""
-    catalog = lake.table(lake.view(at))
+    catalog = lake.scan(lake.view(at))
     everything = _clips(catalog, None, _ORIGIN)
-    origins = origins_of(catalog, everything)
+    origins = origins_of(_lineage(catalog), everything)
     labels = dict(zip([origin.recording for origin in origins], groups(origins).tolist(), strict=True))
     chosen = _clips(catalog, where, _ORIGIN)
     recording_of = dict(zip(chosen["artifact"].to_pylist(), chosen["recording"].to_pylist(), strict=True))
@@ -79,18 +81,18 @@ def resolve(
     """Pairs of `lake` at one version; arguments as in `Source.pairs`, which see for what it raises."""
     if window is not None and not (math.isfinite(window) and window > 0):
         raise UsageError(f"a window of {window} s", fix="give a length above zero")
-    catalog = lake.table(lake.view(at))
+    catalog = lake.scan(lake.view(at))
     clips = _clips(catalog, where, COLUMNS)
     if not clips.num_rows:
         raise NotFoundError(
             "no clips match", where=where, fix="align recordings first, or widen the filter; flagdata query shows rows"
         )
-    table = PairTable.of(clips, labels=labels_of(catalog))
+    table = PairTable.of(clips, labels={} if isinstance(catalog, Scan) else labels_of(catalog))
     if split is not None:
         wanted = clips_on_side(catalog, split, split_by)
         table = table.take(np.isin(table.artifact, np.array(sorted(wanted), dtype=np.str_)))
         if not len(table):
-            count = len(set(groups(origins_of(catalog, _clips(catalog, None, _ORIGIN))).tolist()))
+            count = len(set(groups(origins_of(_lineage(catalog), _clips(catalog, None, _ORIGIN))).tolist()))
             raise RefusedError(
                 f"split {split!r} holds none of the clips; the catalog has {count} independent groups",
                 where=where,
@@ -98,7 +100,7 @@ def resolve(
             )
     windows = _windows(clips, table)
     table = _with_window(lake, table, windows, _common(windows) if window is None else window)
-    refused = judge(table, tolerance, superseded=superseded(catalog, set(table.recording.tolist())))
+    refused = judge(table, tolerance, superseded=superseded(_lineage(catalog), set(table.recording.tolist())))
     kept = np.array([k not in refused for k in range(len(table))], dtype=np.bool_)
     if not kept.any():
         first = next(iter(refused.values()))
@@ -110,12 +112,18 @@ def resolve(
     return Resolved(table=table.take(kept), refused=tuple(refused.values()))
 
 
-def _clips(catalog: pa.Table, where: Where | None, columns: tuple[str, ...]) -> pa.Table:
-    clips = catalog.filter(pc.field("kind") == Kind.CLIP.value)  # not a part of the filter, which could undo it
+def _lineage(catalog: pa.Table | Scan) -> pa.Table:
+    """What tells where clips come from."""
+    return catalog.table(_LINEAGE) if isinstance(catalog, Scan) else catalog
+
+
+def _clips(catalog: pa.Table | Scan, where: Where | None, columns: tuple[str, ...]) -> pa.Table:
+    of_clips = pc.field("kind") == Kind.CLIP.value  # not a part of the filter, which could undo it
+    clips = catalog.matching(of_clips) if isinstance(catalog, Scan) else catalog.filter(of_clips)
     return Selection(clips, Request(where=where, columns=columns)).table()
 
 
-def clips_on_side(catalog: pa.Table, split: str, split_by: HashedSplit | ExplicitSplit) -> set[str]:
+def clips_on_side(catalog: pa.Table | Scan, split: str, split_by: HashedSplit | ExplicitSplit) -> set[str]:
     """Artifacts of all clips of a catalog that are on one side of the split.
 
     Raises:
@@ -128,38 +136,39 @@ def clips_on_side(catalog: pa.Table, split: str, split_by: HashedSplit | Explici
     return _hashed_side(catalog, split_by, split)
 
 
-def _hashed_side(catalog: pa.Table, split_by: HashedSplit, split: str) -> set[str]:
+def _hashed_side(catalog: pa.Table | Scan, split_by: HashedSplit, split: str) -> set[str]:
     """Clips of the side. Every clip of the catalog takes part, so that two filters never disagree about a group."""
     clips = _clips(catalog, None, _ORIGIN)
-    origins = origins_of(catalog, clips)
+    origins = origins_of(_lineage(catalog), clips)
     sides = zip(origins, split_by.assign(origins), strict=True)
     recordings = pa.array([origin.recording for origin, side in sides if side == split], pa.string())
     return set(clips.filter(pc.field("recording").isin(recordings))["artifact"].to_pylist())
 
 
-def explicit_sides(catalog: pa.Table, split_by: ExplicitSplit) -> dict[str, pa.Table]:
+def explicit_sides(catalog: pa.Table | Scan, split_by: ExplicitSplit) -> dict[str, pa.Table]:
     """Side → its clips: what `Origin` is made of. All sides are resolved and compared, whichever is wanted.
 
     Raises:
         RefusedError: two of them share a recording, a film, a mesh sequence, a seed, a session or a day.
     """
     taken = {side: _clips(catalog, where, _ORIGIN) for side, where in split_by.where.items()}
-    refuse_leaks({side: origins_of(catalog, clips) for side, clips in taken.items()})
+    lineage = _lineage(catalog)
+    refuse_leaks({side: origins_of(lineage, clips) for side, clips in taken.items()})
     return taken
 
 
 def _windows(clips: pa.Table, table: PairTable) -> NDArray[np.float64]:
     """Window (n,) of the catalog's ground truth of each pair [s], NaN where its recipe has none."""
-    owners = dict(zip(clips["recipe"].to_pylist(), clips["artifact"].to_pylist(), strict=True))
-    stated = {
-        text: column_json(text, "recipe", artifact=artifact).get("window", math.nan)
-        for text, artifact in owners.items() if text
-    }  # fmt: skip
-    by_artifact = {
-        artifact: stated.get(text, math.nan)
-        for artifact, text in zip(clips["artifact"].to_pylist(), clips["recipe"].to_pylist(), strict=True)
-    }
-    return np.array([by_artifact[str(artifact)] for artifact in table.artifact], dtype=np.float64)
+    recipe = clips["recipe"].combine_chunks().dictionary_encode()
+    first = np.unique(recipe.indices.fill_null(-1).to_numpy(zero_copy_only=False), return_index=True)
+    owner = {int(number): clips["artifact"][int(row)].as_py() for number, row in zip(*first, strict=True)}
+    stated = [
+        column_json(text, "recipe", artifact=owner[number]).get("window", math.nan) if text else math.nan
+        for number, text in enumerate(recipe.dictionary.to_pylist())
+    ]
+    windows = np.array([*stated, math.nan], dtype=np.float64)[recipe.indices.fill_null(-1).to_numpy()]
+    place = pc.index_in(pa.array(table.artifact), value_set=clips["artifact"])  # type: ignore[attr-defined]
+    return windows[place.to_numpy()]
 
 
 def _common(windows: NDArray[np.float64]) -> float:

@@ -34,8 +34,7 @@ def lap(what):
     found[what] = {"wall_s": time.perf_counter() - wall, "cpu_s": time.process_time() - cpu}
     wall, cpu = time.perf_counter(), time.process_time()
 import torch
-import flagdata
-from flagdata.dataset.loader import PairLoader
+import flagdata, flagdata.dataset.resolve, flagdata.dataset.loader, flagdata.dataset.pairs
 lap("import")
 pairs = flagdata.open(sys.argv[1]).pairs()
 lap("open and resolve")
