@@ -12,6 +12,8 @@ from flagdata.commands.durations import written_seconds
 from flagdata.errors import TimeError, UsageError
 
 if TYPE_CHECKING:
+    from datetime import tzinfo
+
     from flagdata.commands.confirm import OnCommandLine
     from flagdata.ingest.markers import MarkerOptions
     from flagdata.ingest.meshes.store import MeshIngest
@@ -89,10 +91,7 @@ def camera_options(
 
     try:
         place = timebase.zone(zone_name, where="--zone") if zone_name is not None else None
-        instant = None
-        if start is not None:
-            unknown = start.strip().lower() == "unknown"
-            instant = UNKNOWN if unknown else timebase.parse(start, default=place, where="--start")
+        instant = UNKNOWN if _unknown(start) else _instant(start, place)
     except TimeError as error:
         raise UsageError(error.what, where=error.where, fix=error.fix) from None
     options = CameraOptions(
@@ -109,6 +108,17 @@ def camera_options(
         chapters=chapters,
     )
     return CameraIngest(camera=options, coding=Coding(archive))
+
+
+def _unknown(start: str | None) -> bool:
+    """Whether a film's start is stated not to be known; what a log's stamps then count from is not stated either."""
+    return start is not None and start.strip().lower() == "unknown"
+
+
+def _instant(start: str | None, place: tzinfo | None) -> int | None:
+    from flagdata import timebase
+
+    return None if start is None else timebase.parse(start, default=place, where="--start")
 
 
 def wind_options(
@@ -149,7 +159,7 @@ def wind_options(
 
     try:
         place = timebase.zone(zone_name, where="--zone") if zone_name is not None else None
-        instant = timebase.parse(start, default=place, where="--start") if start is not None else None
+        instant = None if _unknown(start) else _instant(start, place)
     except TimeError as error:
         raise UsageError(error.what, where=error.where, fix=error.fix) from None
     try:

@@ -195,6 +195,12 @@ def test_a_start_without_a_zone_is_refused_and_the_zone_option_settles_it(run, l
     assert lake.rows().to_pylist()[0]["start"] == 1_777_629_600_000_000_000  # 10:00 UTC, summer time
 
 
+def test_a_film_whose_start_nobody_knows_is_ingested_with_that_stated(run, lake: Lake, video: Path) -> None:
+    code, out, _ = run(video, "--start", "unknown", "--json")
+    assert code == 0
+    assert "start-unknown" in json.loads(out)["results"][0]["quality"]
+
+
 def test_each_option_goes_to_the_sources_of_its_kind(
     run, lake: Lake, video: Path, wind_log: Path, tmp_path: Path
 ) -> None:
