@@ -86,6 +86,7 @@ lint: $(STAMP)
 
 docs: $(STAMP)
 	$(BIN)/python -m docs.generate_cli
+	$(BIN)/python -m docs.generate_glossary
 	$(BIN)/python -m docs.generate_effects
 	$(BIN)/python -m mkdocs build --strict
 

@@ -19,11 +19,10 @@ _HEAD = """\
 This page is generated from the commands; `flagdata help VERB` prints the same. `flagdata catalog` lists the names of
 scenes, effects, materials, sensors, data sets and models that commands and recipes take.
 
-Results go to stdout and everything else to stderr. With `--json`, before or after the
-command's name, the result is one JSON document. The exit code is 0
-when the command is done, 1 when it failed, 2 when it was called wrongly, and 3 when a gate was not met: an alignment
-that cannot be trusted, a lake that does not verify. The environment variable `FLAGDATA_LAKE` names the lake where
-`--lake` is not given.
+Results go to stdout and everything else to stderr. With `--json`, before or after the command's name, the
+result is one JSON document. The exit code is 0 when the command is done, 1 when it failed, 2 when it was called
+wrongly, and 3 when the data fail a quality check: an alignment that is not certain, a lake that does not verify. The
+environment variable `FLAGDATA_LAKE` names the lake where `--lake` is not given.
 """
 
 

@@ -167,7 +167,7 @@ def _show_traceback() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit: 0 done, 1 failed, 2 usage, 3 a gate not met."""
+    """Run the command line and exit: 0 done, 1 failed, 2 usage, 3 refused: the data fail a quality check."""
     given = sys.argv[1:] if arguments is None else arguments
     try:
         outcome = root.main(args=given, prog_name="flagdata", standalone_mode=False)

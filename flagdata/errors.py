@@ -65,7 +65,7 @@ class NothingMeasuredError(InputError):
 
 
 class ZoneMissingError(TimeError):
-    """Stamps of a wall clock whose zone nobody named: a question to the user, as a gate that is not met."""
+    """Stamps of a wall clock whose zone nobody named: a question to the user, with the exit code of a refusal."""
 
     kind = "zone-missing"
     exit_code = 3
@@ -90,7 +90,7 @@ class CorruptError(FlagdataError):
 
 
 class RefusedError(FlagdataError):
-    """A gate was not met: a low-confidence alignment, a pair outside tolerance."""
+    """The data fail a quality check: an alignment that is not certain, a pair outside tolerance."""
 
     kind = "refused"
     exit_code = 3

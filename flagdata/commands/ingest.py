@@ -35,7 +35,9 @@ from flagdata.errors import UsageError
     metavar="FORMAT",
     help="camera, meshes, markers, or an anemometer format; by content if not given.",
 )
-@click.option("--session", metavar="NAME", help="One set-up at one place; splits never cut through it.")
+@click.option(
+    "--session", metavar="NAME", help="One set-up at one place; its clips are always on the same side of a split."
+)
 @click.option("--name", help="What people call the artifact; the file's name by default.")
 @click.option(
     "--topic",
@@ -91,8 +93,8 @@ from flagdata.errors import UsageError
 )
 @click.option(
     "--clock", type=click.Choice(["first", "last", "sort"]),
-    help="Wind: where the log's clock was set back or on, whose stamps are right: those before it, or those after. "
-    "With sort no clock was set: the rows are out of order.",
+    help="Wind: the clock was changed during the log: first = the time before the change is right, last = the time "
+    "after it; sort = the clock is right, only sort the rows.",
 )  # fmt: skip
 @click.option("--zero-offset", metavar="M/S", help="Wind: speed to subtract; report, or estimate from idle stretches.")
 @click.option("--encoding", metavar="CODEC", help="Wind: encoding of the text, where the file does not show it.")

@@ -49,7 +49,7 @@ class Labels:
 
     Attributes:
         name: of the artifact; `None` takes the file's name without its suffix.
-        session: one set-up at one place; splits never cut through it.
+        session: one set-up at one place; its clips are always on the same side of a split.
     """
 
     name: str | None = None

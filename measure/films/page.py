@@ -19,7 +19,7 @@ from measure.films.side_by_side import side_by_side
 from measure.films.weigh import hypothesis
 from measure.films.words import level_of
 from measure.report import figures, sentences
-from measure.report.page import FILTERS, TONES
+from measure.report.page import FILTERS, TONES, opening
 from measure.verdict import quantity
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Verdict
@@ -32,10 +32,9 @@ def page(verdict: Verdict, outcome: Outcome) -> str:
     """The page, HTML."""
     after = sentences.after_label(verdict) if verdict.named else ""
     values = {
-        "verdict": verdict, "tone": TONES[verdict.conclusion], "heading": sentences.heading(verdict),
+        "verdict": verdict, "tone": TONES[verdict.conclusion], **opening(verdict),
         "test_sentence": sentences.test_sentence(verdict.test), "remark": sentences.test_remark(verdict.test),
         "named": sentences.named_candidates(verdict), "after_label": after, "level": level_of(verdict),
-        "has_after": any(quantity.known(c.after) for c in verdict.comparisons),
         "has_control": any(quantity.known(c.control) for c in verdict.comparisons),
         "null": figures.null_distribution(verdict.test), "parts": outcome.judged.parts,
         "title": lambda c: sentences.candidate_title(verdict, c),

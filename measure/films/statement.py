@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from measure.calibrate.observed import Observed, constant_wind
-from measure.films.judge import CONFIDENCE
-from measure.nulls.conformal import kinds_needed
 from measure.observables import OBSERVABLES
-from measure.report.sentences import listed, readable, titles
-from measure.verdict.quantity import number, probability, with_level
+from measure.report.lead import lead
+from measure.report.sentences import listed
+from measure.verdict.quantity import number
 from measure.verdict.record import Conclusion, Verdict
 
 _NOTHING_MISSING = (Conclusion.SUFFICIENT, Conclusion.UNTESTED)
@@ -46,36 +45,10 @@ def stated(
         departing: what departs from the base model.
     """
     return replace(
-        verdict, words=sentence(verdict), assumptions=assumptions(recordings, weighed=weighed, unseen=unseen),
+        verdict, words=lead(verdict), assumptions=assumptions(recordings, weighed=weighed, unseen=unseen),
         proposal=missing(departing) if verdict.conclusion not in _NOTHING_MISSING else "",
         separating=separating(verdict),
     )  # fmt: skip
-
-
-def sentence(verdict: Verdict) -> str:
-    """The verdict in words."""
-    test = f"p = {probability(verdict.test.p_value.value)} against nulls of {verdict.test.kinds} kinds of numerics"
-    if verdict.conclusion is Conclusion.UNTESTED:
-        return (
-            f"The base model cannot be tested at a level of {verdict.test.level:g} by nulls of {verdict.test.kinds} "
-            f"kinds of numerics; {kinds_needed(verdict.test.level)} are needed."
-        )
-    if verdict.conclusion is Conclusion.SUFFICIENT:
-        return f"The base model is not rejected ({test}): no effect is needed to explain what the film shows."
-    rejected = f"The base model is rejected ({test})."
-    if verdict.conclusion is Conclusion.OUTSIDE:
-        return f"{rejected} No effect of the library explains what it lacks."
-    found = " and ".join(
-        f"{c.effect}, {readable(c.parameter)} {with_level(c.strength)}" for c in verdict.ranking if not c.why_not
-    )  # fmt: skip
-    if verdict.conclusion is Conclusion.PARTLY:
-        return f"{rejected} It is partly explained by {found}; what remains is more than null experiments leave."
-    if verdict.conclusion is Conclusion.ONE_OF:
-        return (
-            f"{rejected} One of {listed(titles(verdict))} explains it, with {number(100 * CONFIDENCE)} % of the "
-            f"probability; the film does not decide which. They would be: {found}."
-        )
-    return f"{rejected} It lacks {found}. With that added, what remains is no more than null experiments leave."
 
 
 def separating(verdict: Verdict) -> str:

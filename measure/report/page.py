@@ -11,8 +11,11 @@ from typing import Any
 from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup, escape
 
+from flagdata.pages.glossary import GLOSSARY
 from flagdata.pages.render import render
 from measure.report import cloth, figures, motion, rows, sentences
+from measure.report.lead import lead
+from measure.report.overview import overview
 from measure.report.sentences import readable
 from measure.verdict import quantity
 from measure.verdict.record import Conclusion, Estimate, Residual, Verdict
@@ -47,15 +50,12 @@ def page(verdict: Verdict) -> str:
     values = {
         "verdict": verdict,
         "tone": TONES[verdict.conclusion],
-        "heading": sentences.heading(verdict),
+        **opening(verdict),
         "test_sentence": sentences.test_sentence(verdict.test),
         "remark": sentences.test_remark(verdict.test),
         "named": named,
         "rejected": sentences.rejected(verdict),
         "control_summary": sentences.control_summary(verdict),
-        "warnings": sentences.control_warnings(verdict) + sentences.reduction_warnings(verdict),
-        "after_label": sentences.after_label(verdict),
-        "has_after": any(quantity.known(c.after) for c in verdict.comparisons),
         "has_control": any(quantity.known(c.control) for c in verdict.comparisons),
         "has_shift": any(quantity.known(p.after) for p in verdict.parameters),
         "residual_after": any(r.in_time_after for r in verdict.residuals),
@@ -75,6 +75,20 @@ def page(verdict: Verdict) -> str:
         "provenance": list(_flattened(verdict.provenance)),
     }
     return render("measure.report", "page.html.j2", values, filters=FILTERS)
+
+
+def opening(verdict: Verdict) -> dict[str, Any]:
+    """What the top of a page of markers or films shows: sentence, chart and what speaks against them."""
+    first = lead(verdict)
+    after = sentences.after_label(verdict)
+    return {
+        "lead": first, "rest": verdict.words.removeprefix(first).strip(),
+        "overview": overview(verdict.comparisons, after=after), "after_label": after,
+        "has_after": any(quantity.known(c.after) for c in verdict.comparisons),
+        "against": [*sentences.control_warnings(verdict), *sentences.reduction_warnings(verdict),
+                    *(text for _, text in verdict.findings)],
+        "glossary": GLOSSARY,
+    }  # fmt: skip
 
 
 def _lengths(verdict: Verdict) -> quantity.Display:

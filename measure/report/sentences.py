@@ -59,10 +59,10 @@ def test_sentence(test: NullTest) -> str:
         says = "cannot be tested"
     interval = f"[{probability(p.low)}, {probability(p.high)}] {level_text(p.level)}"
     return (
-        f"The base model {says}: p = {probability(p.value)} {interval} at level {test.level:g}. {as_large(test)} of "
-        f"{len(null)} groups of nulls reach the observed statistic {number(test.statistic)}. p counts the "
-        f"{test.kinds} kinds of numerics that the nulls are of, each by the share of its groups, and the data as one "
-        "more; the interval is that of the share of all kinds, by how many were simulated."
+        f"The base model {says}: p = {probability(p.value)} {interval}, level {test.level:g}. {as_large(test)} of "
+        f"{len(null)} groups of simulations deviate as much as the recordings (statistic {number(test.statistic)}). "
+        f"p = (1 + number of the {test.kinds} numerical set-ups whose simulations deviate as much) / "
+        f"{1 + test.kinds}, a set-up counting by the share of its groups; the interval is its sampling error."
     )
 
 
@@ -112,8 +112,8 @@ def control_summary(verdict: Verdict) -> str:
     control = next((c.control_name for c in verdict.comparisons if c.control_name), "the best wrong effect")
     line = "the named effect does better" if apart.low > 0 else "the two fit equally well"
     return (
-        f"With {control} instead, the misfit of the recordings left out is larger by {estimate_text(apart)} nat per "
-        f"segment ({level_text(apart.level)}): {line}."
+        f"On recordings left out, {control} instead predicts worse by {estimate_text(apart)} nat per segment "
+        f"({level_text(apart.level)}): {line}."
     )
 
 

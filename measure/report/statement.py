@@ -12,14 +12,15 @@ from measure.forecasting.regressors import FieldColumn, library
 from measure.forecasting.segments import Cut
 from measure.loop.corrective_field import Mode
 from measure.loop.run import Outcome
-from measure.loop.selection import heterogeneous
-from measure.nulls.conformal import MOST_KINDS, kinds_needed
+from measure.nulls import bank as banks
+from measure.nulls.conformal import MOST_KINDS
 from measure.observe.trajectory import Experiment, Specimen
 from measure.probes.course import ALONG, LEFT, Variation
 from measure.probes.lines import STROUHAL, Line
-from measure.report.sentences import listed, readable, titles
+from measure.report.lead import lead
+from measure.report.sentences import listed
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.quantity import level_text, number, probability, with_error, with_level
+from measure.verdict.quantity import number, with_error
 from measure.verdict.record import Conclusion, NullTest, Verdict
 
 _SEPARATES: dict[frozenset[str], str] = {
@@ -44,7 +45,7 @@ _AXES = ("along the wind", "across the wind", "up")
 def stated(outcome: Outcome) -> Verdict:
     """The verdict of an outcome, with all that it says in sentences."""
     verdict, experiment = outcome.verdict, outcome.experiment
-    said = [sentence(verdict), *by_draw(verdict.test), *bounds(outcome.at_bounds), *ratios(experiment)]
+    said = [lead(verdict), *by_draw(verdict.test), *bounds(outcome.at_bounds), *ratios(experiment)]
     return replace(
         verdict, words=" ".join(said), separating=separating(verdict), proposal=_lacking(outcome),
         assumptions=(*assumptions(experiment), *unweighed(verdict), *clocks(experiment, outcome.lags)),
@@ -61,68 +62,14 @@ def _lacking(outcome: Outcome) -> str:
     return " ".join([*sentences, proposal(outcome.field, whole=outcome.whole)])
 
 
-def sentence(verdict: Verdict) -> str:
-    """The verdict in words."""
-    test = f"p = {probability(verdict.test.p_value.value)} against nulls of {verdict.test.kinds} kinds of numerics"
-    if verdict.conclusion is Conclusion.UNTESTED:
-        return (
-            f"The base model cannot be tested at a level of {verdict.test.level:g}: by nulls of {verdict.test.kinds} "
-            f"kinds of numerics no p is below {probability(1 / (1 + verdict.test.kinds))}. At least "
-            f"{kinds_needed(verdict.test.level)} kinds are needed."
-        )
-    if verdict.conclusion is Conclusion.SUFFICIENT:
-        return f"The base model is not rejected ({test}): no effect is needed to explain these recordings."
-    rejected = f"The base model is rejected ({test})."
-    if verdict.test.p_value.value > verdict.test.level:
-        rejected = (
-            f"The recordings show another set-up than the declared one; what is left of it is not rejected ({test})."
-        )
-    if verdict.conclusion is Conclusion.OUTSIDE:
-        return f"{rejected} No effect of the library explains what it lacks."
-    found = " and ".join(
-        f"{c.effect}, {readable(c.parameter)} {with_level(c.strength)}" for c in verdict.ranking if not c.why_not
-    )  # fmt: skip
-    if verdict.conclusion is Conclusion.ONE_OF:
-        return (
-            f"{rejected} One of {', '.join(titles(verdict))} explains it; they predict unseen recordings equally well. "
-            f"They would be: {found}."
-        )
-    if verdict.conclusion is Conclusion.PARTLY:
-        return f"{rejected} It is partly explained by {found}; {_incomplete(verdict)}."
-    return (
-        f"{rejected} It lacks {found}. With that added, the remaining errors are no larger than those of "
-        "simulated nulls."
-    )
-
-
-def _incomplete(verdict: Verdict) -> str:
-    """Why what is named is not enough."""
-    for candidate in verdict.ranking:
-        if not candidate.why_not and heterogeneous(candidate, verdict.test.level):
-            each = ", ".join(number(s.value, digits=2) for s in candidate.by_recording)
-            unit = "" if candidate.strength.unit == "1" else f" {candidate.strength.unit}"
-            return (
-                f"fitted to each recording alone it is {each}{unit}, which differs by more than chance "
-                f"(p = {probability(candidate.heterogeneity)}): another dependence on the wind would fit better"
-            )
-    return "the errors that remain are larger than those of simulated nulls"
-
-
 def by_draw(test: NullTest) -> tuple[str, ...]:
     """That other nulls could decide otherwise, and how many would settle it; nothing where they hardly could."""
     if not test.open:
         return ()
-    p = test.p_value
-    more = (
-        f"more than {MOST_KINDS} kinds of numerics would be needed to settle it"
-        if test.settling is None
-        else f"{test.settling} kinds of numerics would settle it, if the same share of them is as far"
-    )
-    sentence = (
-        f"Another draw of nulls could decide otherwise: the interval of p, [{probability(p.low)}, "
-        f"{probability(p.high)}] {level_text(p.level)}, includes the level of {test.level:g}; {more}."
-    )
-    return (sentence,)
+    if test.settling is None:
+        return (f"The evidence is borderline; more than {MOST_KINDS} numerical set-ups would be needed to decide.",)
+    nulls = banks.WINDS * test.settling
+    return (f"The evidence is borderline; rerun with --nulls {nulls} ({test.settling} numerical set-ups) to decide.",)
 
 
 def bounds(ended: Sequence[str]) -> tuple[str, ...]:

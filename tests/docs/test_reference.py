@@ -7,7 +7,7 @@ from dataclasses import fields
 import click
 import pytest
 
-from docs import generate_cli, generate_effects
+from docs import generate_cli, generate_effects, generate_glossary
 from flagdata.ingest.anemometer.recipe import (
     MATCH,
     ChannelLayout,
@@ -23,7 +23,9 @@ from tests.docs.pages import DOCS
 from tests.flagdata.ingest.anemometer.test_silent_errors import KINDS
 
 
-@pytest.mark.parametrize("module", [generate_cli, generate_effects], ids=["cli", "effects"])
+@pytest.mark.parametrize(
+    "module", [generate_cli, generate_effects, generate_glossary], ids=["cli", "effects", "glossary"]
+)
 def test_a_generated_page_is_that_of_the_code(module: object) -> None:
     name = module.__name__  # type: ignore[attr-defined]
     fresh = module.reference() == module.PAGE.read_text(encoding="utf-8")  # type: ignore[attr-defined]

@@ -113,10 +113,10 @@ class Reading:
 
 
 def described(by: str) -> Finding:
-    """The finding that a reader follows a description alone."""
+    """The finding that a reader follows a description and was never tested on a real file."""
     return Finding(
         kind="read-by-description", severity=Severity.NOTE,
-        what=f"read by {by}; the reader was tried on made files only", fix="compare the first rows with the file",
+        what=f"read as {by} describes it; never tested on a real file", fix="compare the first rows with the file",
     )  # fmt: skip
 
 

@@ -302,7 +302,7 @@ def _timing(
     if options.sequence_fps is not None:
         raise UsageError(
             "sequence_fps is for image sequences and raw streams; this file has time stamps of its own",
-            where=str(path), fix="drop it, or give true_fps if the container lies about a high-speed camera",
+            where=str(path), fix="drop it, or give true_fps if a high-speed camera stored a wrong rate",
         )  # fmt: skip
     rate = stream.average_rate or stream.guessed_rate
     stamps = np.frombuffer(tally.stamps, dtype=np.int64)

@@ -45,7 +45,7 @@ class CropProposal:
     Attributes:
         box: of the upright image; square, unless the motion is longer than the image's shorter side.
         moving: the part of the upright image that moves, without the padding.
-        share: part of the motion's energy that lies in the region the box was drawn around, 0 to 1.
+        share: part of the motion's energy that lies in the region within the box, 0 to 1.
         runs: runs of frames it rests on.
         picture: PNG of the whole upright image, the motion in red, the box in yellow.
     """

@@ -130,7 +130,7 @@ class CameraStream:
         if self._options.exposure > interval * (1 + _EXPOSURE_SLACK):
             raise UsageError(
                 f"an exposure of {self._options.exposure:g} s is longer than the {interval:.4g} s from frame to frame",
-                where=where, fix="give it in seconds (1/500 s is 0.002), or true_fps if the container lies",
+                where=where, fix="give it in seconds (1/500 s is 0.002), or true_fps if the file states a wrong rate",
             )  # fmt: skip
 
     @property
@@ -250,8 +250,7 @@ class CameraStream:
 def _proposed(proposal: CropProposal) -> Finding:
     return Finding(
         kind="crop-proposed", severity=Severity.NOTE,
-        what=f"the crop {proposal.box} was drawn around {proposal.share:.0%} of the motion in {proposal.runs} runs of "
-        "frames; look at its picture",
+        what=f"automatic crop {proposal.box}, with {proposal.share:.0%} of the motion; check it by --crop-picture",
         value=proposal.share,
     )  # fmt: skip
 
@@ -290,8 +289,8 @@ def _grid_findings(report: GridReport, rate: float) -> list[Finding]:
         found.append(
             Finding(
                 kind="frames-dropped", severity=Severity.NOTE,
-                what=f"{report.unused} of {report.sources} source frames fall between the instants and are not used; "
-                "the native rate keeps them",
+                what=f"{report.unused} of {report.sources} source frames are left out at this rate; "
+                "--rate native keeps all",
                 count=report.unused,
             )
         )  # fmt: skip

@@ -28,8 +28,8 @@ def test_the_test_is_reported_with_its_interval_and_the_nulls_that_reach_it() ->
     reached = sum(v >= whole.test.statistic for v in whole.test.null)
     sentence = sentences.test_sentence(whole.test)
     assert sentence.startswith("The base model is not rejected: p = ")
-    assert f" {reached} of 199 groups of nulls reach the observed statistic 1.13" in sentence
-    assert "90 % at level 0.01" in sentence
+    assert f" {reached} of 199 groups of simulations deviate as much as the recordings (statistic 1.13)" in sentence
+    assert "90 %, level 0.01" in sentence
     assert sentences.test_remark(verdict(Conclusion.EFFECT).test) == ""
 
 
@@ -80,7 +80,7 @@ def test_a_control_that_fits_as_well_as_the_named_effect_is_reported() -> None:
 def test_the_control_over_all_that_was_left_out_is_summed_up(half: float, comparison: str) -> None:
     whole = replace(verdict(Conclusion.EFFECT), apart=about(0.3, half, unit="1"))
     summary = sentences.control_summary(whole)
-    assert summary.startswith("With tangential-linear-drag instead")
+    assert summary.startswith("On recordings left out, tangential-linear-drag instead predicts worse by 0.3")
     assert comparison in summary
     assert summary in page(whole)
     assert summary in " ".join(words(whole).replace("\n    ", " ").split())

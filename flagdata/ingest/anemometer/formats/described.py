@@ -4,7 +4,7 @@ Such a recipe leaves open what differs from one export to the next: where the he
 column has, in which unit it is. The formats of catalogs/sensors/formats are recipes of this kind that recognise their
 files; a user's own is read by `--sensor FILE.toml`. Beside the keys of every recipe (see recipe.py) they have
 
-    described-by        whose description it follows, where it was tried on made files only
+    described-by        whose description it follows, of a format that was never tested on a real file
     [match]             see recipe.MATCH
     [facts]             name → pattern with one group, looked for down to the first row; "{name}" in texts stands for it
     [time] columns      names (those but one may be absent; a group "zone" of the pattern states the zone), or numbers

@@ -49,7 +49,7 @@ class TextFile:
 
     @property
     def counted(self) -> bool:
-        """Whether the stamps of its lines are none of its own: counted at a rate that the user gave."""
+        """Whether its timestamps were generated from --start and --rate."""
         return any(finding.kind == RATE_GIVEN for finding in self.findings)
 
     def blocks(self, size: int = 200_000) -> Iterator[tuple[int, list[str]]]:

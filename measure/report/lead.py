@@ -1,0 +1,98 @@
+"""The verdict's first sentence, of markers and of films: what was found, how large it is, how strong the evidence."""
+
+from __future__ import annotations
+
+import math
+from statistics import median
+
+from measure.loop.selection import heterogeneous
+from measure.nulls.conformal import kinds_needed
+from measure.report.sentences import candidate_title, listed, named_candidates, readable
+from measure.verdict.quantity import known, number, probability, with_level
+from measure.verdict.record import Candidate, Conclusion, NullTest, Verdict
+
+_EVIDENCE = ((0.001, "very strong"), (0.01, "strong"), (0.05, "moderate"), (0.1, "weak"))
+"""Largest p → the word for the evidence (Muff, Nilsen, O'Hara and Nater, Trends in Ecology & Evolution 37, 2022)."""
+_NONE = "little or no"
+
+
+def lead(verdict: Verdict) -> str:
+    """The sentence."""
+    if verdict.conclusion is Conclusion.UNTESTED:
+        kinds = verdict.test.kinds
+        return (
+            f"The base model cannot be tested at level {verdict.test.level:g}: with {kinds} numerical set-ups no p is "
+            f"below {probability(1 / (1 + kinds))}; at least {kinds_needed(verdict.test.level)} are needed."
+        )
+    if verdict.conclusion is Conclusion.SUFFICIENT:
+        return (
+            "The base model explains these recordings, no effect is needed; "
+            f"{evidence(verdict.test)} that anything is missing, p = {probability(verdict.test.p_value.value)}."
+        )
+    return f"{_found(verdict)}; {_strength(verdict)}."
+
+
+def evidence(test: NullTest) -> str:
+    """ "moderate evidence": the words for a p."""
+    word = next((word for most, word in _EVIDENCE if test.p_value.value <= most), _NONE)
+    return f"{word} evidence"
+
+
+def p_text(test: NullTest) -> str:
+    """ "p = 0.024, could be up to 0.07": with the upper end of the interval that the number of nulls leaves."""
+    p = test.p_value
+    text = f"p = {probability(p.value)}"
+    return f"{text}, could be up to {probability(p.high)}" if p.high > p.value else text
+
+
+def explained(verdict: Verdict) -> str:
+    """ "33 % of the error that a better model could remove", on data that neither model was fitted to; empty where no
+    error after is known."""
+    shares = [c.share for c in verdict.comparisons if c.share is not None and not math.isnan(c.share)]
+    if shares:
+        return f"{number(100 * median(shares), digits=2)} % of the error that a better model could remove"
+    removed = [1 - c.after.value / c.before.value for c in verdict.comparisons if known(c.after) and known(c.before)]
+    return f"{number(100 * median(removed), digits=2)} % of the error" if removed else ""
+
+
+def _found(verdict: Verdict) -> str:
+    """What was found, without the evidence."""
+    if verdict.conclusion is Conclusion.OUTSIDE or not verdict.named:
+        return "The base model lacks something that no effect of the library explains"
+    named = named_candidates(verdict) or [c for c in verdict.ranking if not c.why_not]
+    whole = explained(verdict)
+    if verdict.conclusion is Conclusion.ONE_OF:
+        either = " or ".join(_sized(verdict, one) for one in named)
+        does = f"explains {whole}" if whole else "explains what the base model lacks"
+        return f"Adding one of {either} {does}; these recordings do not decide which"
+    added = listed([_sized(verdict, one) for one in named])
+    if verdict.conclusion is Conclusion.PARTLY:
+        does = f"explains {whole}, not all that is missing" if whole else "explains a part of what is missing"
+        return f"Adding {added} {does}: {_incomplete(verdict)}"
+    return f"Adding {added} explains {whole or 'what the base model lacks'}"
+
+
+def _sized(verdict: Verdict, candidate: Candidate) -> str:
+    several = sum(c.effect == candidate.effect for c in verdict.ranking) > 1
+    what = "" if several else f"{readable(candidate.parameter)} "
+    return f"{candidate_title(verdict, candidate)} ({what}{with_level(candidate.strength)})"
+
+
+def _strength(verdict: Verdict) -> str:
+    test = verdict.test
+    if test.p_value.value > test.level:
+        return f"the set-up is not as declared, and what is left of it is not rejected, {p_text(test)}"
+    return f"{evidence(test)} that something was missing, {p_text(test)}"
+
+
+def _incomplete(verdict: Verdict) -> str:
+    """Why what is named is not enough."""
+    for candidate in verdict.ranking:
+        if not candidate.why_not and heterogeneous(candidate, verdict.test.level):
+            each = ", ".join(number(s.value, digits=2) for s in candidate.by_recording)
+            unit = "" if candidate.strength.unit == "1" else f" {candidate.strength.unit}"
+            return (
+                f"fitted to each recording alone it is {each}{unit}, which differs by more than chance, so that "
+                "another dependence on the wind would fit better"
+            )
+    return "the errors that remain are larger than those of simulations"

@@ -1,0 +1,71 @@
+"""The first sentence: what was found, how large, how sure; each once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from measure.report.lead import evidence, explained, lead, p_text
+from measure.report.page import page
+from measure.verdict.record import Conclusion
+from tests.measure.report.pages import parsed
+from tests.measure.report.verdicts import about, verdict
+
+
+@pytest.mark.parametrize(
+    ("p", "word"),
+    [(0.0004, "very strong"), (0.001, "very strong"), (0.004, "strong"), (0.024, "moderate"), (0.08, "weak"),
+     (0.4, "little or no")],
+)  # fmt: skip
+def test_the_evidence_has_the_words_of_its_source(p: float, word: str) -> None:
+    test = verdict(Conclusion.EFFECT).test
+    assert evidence(replace(test, p_value=replace(test.p_value, value=p))) == f"{word} evidence"
+
+
+def test_an_effect_is_named_with_its_size_its_share_of_the_error_and_one_p() -> None:
+    whole = verdict(Conclusion.EFFECT)
+    whole = replace(whole, test=replace(whole.test, level=0.05, p_value=about(0.024, 0.0, unit="1")))
+    whole = replace(whole, test=replace(whole.test, p_value=replace(whole.test.p_value, low=0.0, high=0.07)))
+    said = lead(whole)
+    strength = next(c.strength for c in whole.ranking if c.effect == "lift")
+    assert said.startswith(f"Adding lift (coefficient {strength.value:.2f} [")
+    assert " explains 94 % of the error that a better model could remove; " in said  # a share of 0.94 each
+    assert said.endswith("moderate evidence that something was missing, p = 0.024, could be up to 0.070.")
+    assert said.count("p = ") == 1
+
+
+def test_without_a_share_the_error_itself_is_compared() -> None:
+    whole = verdict(Conclusion.EFFECT)
+    halved = tuple(
+        replace(c, share=None, before=about(2.0, 0.1), after=about(1.0, 0.1)) for c in whole.comparisons
+    )  # fmt: skip
+    assert explained(replace(whole, comparisons=halved)) == "50 % of the error"
+    assert explained(replace(whole, comparisons=())) == ""
+
+
+def test_an_upper_end_that_is_the_value_is_not_repeated() -> None:
+    test = verdict(Conclusion.EFFECT).test
+    assert p_text(replace(test, p_value=replace(test.p_value, value=0.024, high=0.024))) == "p = 0.024"
+
+
+@pytest.mark.parametrize("conclusion", list(Conclusion))
+def test_the_page_begins_with_the_sentence_and_what_is_folded_comes_last(conclusion: Conclusion) -> None:
+    whole = replace(verdict(conclusion), words="")
+    whole = replace(whole, words=f"{lead(whole)} More.")
+    html = page(whole)
+    read = parsed(html)
+    assert read.all("h1")[0].text == lead(whole)
+    open_part = html[html.index("<main>") : html.index("<details")]
+    assert "What speaks against it" in open_part
+    assert "p = " not in open_part
+    assert "<table" not in open_part
+    assert {e.text for e in read.all("dt")} >= {"null", "floor", "E_red", "p"}
+
+
+def test_the_chart_is_in_per_cent_of_the_base_models_error() -> None:
+    whole = verdict(Conclusion.EFFECT)
+    first = whole.comparisons[0]
+    svg = next(e for e in parsed(page(whole)).all("svg") if "per cent" in e.attributes.get("aria-label", ""))
+    share = 100 * first.after.value / first.before.value
+    assert f"{first.what}: {share:.0f} % with lift" in svg.attributes["aria-label"]
