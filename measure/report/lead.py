@@ -7,7 +7,7 @@ from statistics import median
 
 from measure.loop.selection import heterogeneous
 from measure.nulls.conformal import kinds_needed
-from measure.report.sentences import candidate_title, listed, named_candidates, readable
+from measure.report.sentences import candidate_title, contradicted, heading, listed, named_candidates, readable
 from measure.verdict.quantity import known, number, probability, with_level
 from measure.verdict.record import Candidate, Conclusion, NullTest, Verdict
 
@@ -24,6 +24,8 @@ def lead(verdict: Verdict) -> str:
             f"The base model cannot be tested at level {verdict.test.level:g}: with {kinds} numerical set-ups no p is "
             f"below {probability(1 / (1 + kinds))}; at least {kinds_needed(verdict.test.level)} are needed."
         )
+    if verdict.conclusion is Conclusion.SUFFICIENT and contradicted(verdict):
+        return f"{heading(verdict)}."
     if verdict.conclusion is Conclusion.SUFFICIENT:
         return (
             "The base model explains these recordings, no effect is needed; "

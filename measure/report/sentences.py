@@ -19,7 +19,7 @@ _FACTORS = ("of nominal", "s")
 
 def heading(verdict: Verdict) -> str:
     """The conclusion in one line; what contradicts it in the set-up, if anything does, before it."""
-    contradicting = [text for kind, text in verdict.findings if kind in CONTRADICTING]
+    contradicting = contradicted(verdict)
     if verdict.conclusion is Conclusion.SUFFICIENT and contradicting:
         return f"The set-up is not as declared, so that this verdict does not count: {contradicting[0]}"
     named = listed(titles(verdict))
@@ -32,6 +32,11 @@ def heading(verdict: Verdict) -> str:
         Conclusion.PARTLY: f"Partly explained: {partly}",
         Conclusion.OUTSIDE: "The base model lacks something that no effect of the library explains",
     }[verdict.conclusion]
+
+
+def contradicted(verdict: Verdict) -> list[str]:
+    """The findings by which the recordings contradict what was declared."""
+    return [text for kind, text in verdict.findings if kind in CONTRADICTING]
 
 
 def listed(names: Sequence[str]) -> str:

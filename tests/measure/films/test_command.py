@@ -59,7 +59,7 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
     assert 0 < verdict["seconds"] < 300
     assert {path.name for path in out.iterdir()} == {"report.html", "verdict.json", "base.toml", "model.toml"}
     text = (out / "report.html").read_text()
-    assert "The base model lacked tangential-linear-drag" in text
+    assert "Adding tangential-linear-drag (coefficient " in text
     assert "droop, recordings left out" in text
     model = load(str(out / "model.toml"))
     assert list(model.effects) == ["tangential-linear-drag"]
@@ -71,7 +71,7 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
     assert again["artifacts"]["existing"]
     assert again["artifacts"]["measurement"] == verdict["artifacts"]["measurement"]
     words = run(*given, "--out", tmp_path / "third").stdout
-    assert "It lacks tangential-linear-drag, coefficient" in " ".join(words.split())
+    assert "Adding tangential-linear-drag (coefficient " in " ".join(words.split())
     assert max(map(len, words.splitlines())) <= 100
 
 
