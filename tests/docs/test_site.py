@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +13,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +28,12 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert done.returncode == 0, done.stderr
     assert "WARNING" not in done.stderr
     return folder
+
+
+def dumped(address: str, profile: Path) -> str:
+    """A page's elements after its scripts ran."""
+    options = ("--headless", "--no-sandbox", f"--user-data-dir={profile}", "--virtual-time-budget=8000", "--dump-dom")
+    return subprocess.run([str(BROWSER), *options, address], capture_output=True, text=True, check=False).stdout
 
 
 def test_every_page_is_built_and_the_search_knows_it(site: Path) -> None:
@@ -45,3 +54,36 @@ def test_a_page_loads_nothing_from_elsewhere(site: Path) -> None:
 def test_the_results_and_cases_stay_reachable(site: Path) -> None:
     assert (site / "results" / "validate-datasets.json").is_file()
     assert (site / "cases" / "paper-flag.html").is_file()
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on the path")
+def test_the_search_works_in_pages_that_are_opened_as_files(site: Path, tmp_path: Path) -> None:
+    shown = dumped(f"{(site / 'index.html').as_uri()}?q=replicates", tmp_path)
+    assert re.search(r"[1-9]\d* matching documents?<", shown)
+    assert "glossary.html" in shown
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium on the path")
+def test_the_copy_button_copies_the_command_without_prompt_and_output(site: Path, tmp_path: Path) -> None:
+    """As the theme does it: the block is marked while its visible text is taken."""
+    page = (site / "versions-and-recovery.html").read_text(encoding="utf-8")
+    probe = """<script>addEventListener("load", () => {
+      const block = document.querySelector(".gp").closest("code");
+      block.setAttribute("data-md-copying", "");
+      const copied = document.createElement("pre");
+      copied.id = "copied"; copied.textContent = block.innerText;
+      document.body.append(copied);
+    });</script>"""
+    probed = site / "probed.html"
+    probed.write_text(page.replace("</body>", f"{probe}</body>"), encoding="utf-8")
+    shown = dumped(probed.as_uri(), tmp_path)
+    copied = re.findall(r'<pre id="copied">(.*?)</pre>', shown, flags=re.DOTALL)
+    assert copied
+    assert copied[0].strip().startswith("flagdata ")
+    assert "$" not in copied[0].split()[0]
+
+
+def test_decisions_are_reachable_and_not_in_the_navigation(site: Path) -> None:
+    text = (site / "gallery.html").read_text(encoding="utf-8")
+    assert "decisions/" not in text
+    assert 'href="decisions/index.html"' in (site / "index.html").read_text(encoding="utf-8")
