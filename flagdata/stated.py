@@ -87,4 +87,6 @@ def parse(text: str) -> Stated:
         return Stated(low=float(match[1]), high=float(match[1]), sigma=float(match[2]))
     if (match := _RANGE.fullmatch(text)) and float(match[1]) < float(match[2]):
         return Stated(low=float(match[1]), high=float(match[2]))
-    raise UsageError(f"{text!r} is no statement of a number", fix=f"give {FORMS}, the lower end of a range first")
+    raise UsageError(
+        f"{text!r} cannot be read as a number with its uncertainty", fix=f"give {FORMS}, the lower end of a range first"
+    )

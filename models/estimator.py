@@ -241,7 +241,7 @@ def load(folder: Path) -> Estimator:
         crops = card["cropping"]
         cropping = Cropping(**{**crops, "scales": tuple(crops["scales"])})
         if (cropping.frames, cropping.size) != (front_end.frames, front_end.size):
-            raise InputError("its crops are not the clips that its front end takes", fix=_FIX)
+            raise InputError("its crops have another size or number of frames than its front end takes", fix=_FIX)
         loss, network = recipe["loss"], recipe["network"]
         learners = []
         for place in range(int(card.get("members", 1))):

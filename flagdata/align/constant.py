@@ -60,7 +60,7 @@ class ConstantWind:
             raise UsageError(f"a wind of {self.speed} m/s", where="--speed", fix="give a speed of 0 or more in m/s")
         if not (math.isfinite(self.sigma) and self.sigma > 0):
             raise UsageError(
-                f"a wind known to {self.sigma} m/s", where="--sigma",
+                f"an uncertainty of the wind of {self.sigma} m/s", where="--sigma",
                 fix="state how well the speed is known, in m/s (one standard deviation)",
             )  # fmt: skip
 

@@ -59,9 +59,9 @@ from flagdata.errors import UsageError
 @click.option("--sequence-fps", type=float, metavar="HZ", help="Camera: rate of pictures that carry no time stamps.")
 @click.option(
     "--rate", default="25", show_default=True, metavar="HZ|STEP|native",
-    help="Camera: frames a second to keep. Meshes, markers: frames a second there are, by default as the source says. "
-    "Wind: readings a second of a log whose rows carry no time, from --start on. A length of time, e.g. 10min, is that "
-    "from one to the next.",
+    help="Camera: frames per second to keep; native keeps all. Meshes, markers: frames per second of a source that "
+    "does not state them. Wind: readings per second of a log without timestamps, counted from --start. Also the time "
+    "from one to the next, as in 10min.",
 )  # fmt: skip
 @click.option(
     "--crop", default="whole", show_default=True, metavar="BOX",

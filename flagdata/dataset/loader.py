@@ -241,7 +241,7 @@ class PairLoader:
         if different:
             named = "; ".join(f"{name} was {state[name]!r}, is {own[name]!r}" for name in different)
             raise RefusedError(
-                f"the state is of other batches: {named}",
+                f"the saved state belongs to other batches: {named}",
                 where=f"data at {state['at'] or 'the head of main'}",
                 fix="resolve the query at the same tag, with the same options",
             )

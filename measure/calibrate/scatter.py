@@ -28,8 +28,8 @@ HEAVY = 10.0
 _MISSED = 1.0
 TAKEN_APART = Finding(
     kind="recordings-taken-apart", severity=Severity.WARNING,
-    what="the recordings are too many for the simulations: what is unknown of the cloth was taken as another one in "
-    "each, so that intervals are too narrow and probabilities too sure",
+    what="too few simulations for so many recordings: the cloth was taken as a different one in each, so that "
+    "intervals are too narrow and probabilities too sure",
     fix="give fewer recordings, or more simulations with --simulations",
 )  # fmt: skip
 

@@ -268,7 +268,9 @@ def _numerics(table: Table) -> Numerics:
         raise InputError("the implicit integrator without a step", where=table.where, fix="give step in seconds")
     if found.integrator is Method.SYMPLECTIC and found.step:
         raise InputError(
-            "a step for the symplectic integrator", where=table.where, fix="leave it out: the stable one is taken"
+            "a step beside the symplectic integrator, which finds its own",
+            where=table.where,
+            fix="leave it out",
         )
     return found
 

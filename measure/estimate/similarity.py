@@ -193,9 +193,9 @@ class Sizes:
             return self
         finding = Finding(
             kind="sizes-left-out", severity=Severity.WARNING, count=len(left_out),
-            what=f"{len(left_out)} of {len(self.scale)} sizes of flag were left out of the answer: as that of a flag "
-            + " or ".join(f"{self.scale[place]:.2f}" for place in left_out)
-            + " times as long as those of the training the film is unlike what the network was trained on",
+            what=f"{len(left_out)} of {len(self.scale)} sizes of flag were left out of the answer: at "
+            + " and ".join(f"{self.scale[place]:.2f}" for place in left_out)
+            + " times the size of the training's flags the film is unlike what the network was trained on",
             fix="give --flag-size LENGTHxHEIGHT",
         )  # fmt: skip
         return replace(self, scale=self.scale[chosen], draws=self.draws[chosen], findings=(*self.findings, finding))

@@ -63,7 +63,7 @@ class Stepper:
     def __post_init__(self) -> None:
         if self.steps > STEPS_LIMIT:
             raise LimitError(
-                f"{self.steps:.3g} steps a frame", where="recipe [integrator]",
+                f"a stable simulation needs {self.steps:.3g} steps a frame", where="recipe [integrator]",
                 fix=f"at most {STEPS_LIMIT} are taken: let the cells be larger, or the cloth softer or heavier",
             )  # fmt: skip
 

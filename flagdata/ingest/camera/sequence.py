@@ -182,7 +182,7 @@ def _places(paths: Sequence[Path]) -> tuple[list[int], list[Finding]]:
     if len(numbers) < len(paths) or len(set(numbers)) < len(numbers):
         note = Finding(
             kind="order-by-name", severity=Severity.WARNING,
-            what="the file names have no numbers of their own, so the images follow each other by name, none missing",
+            what="the file names have no numbers: the images are taken in the order of their names, none as missing",
         )  # fmt: skip
         return list(range(len(paths))), [note]
     first = min(numbers)

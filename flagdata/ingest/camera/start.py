@@ -33,7 +33,7 @@ UNKNOWN = 946_684_800 * NANOSECONDS
 """2000-01-01T00:00:00Z: the start of a recording whose start time is unknown, given by --start unknown."""
 _RECORDED = "recording time in the video"
 _WHOLE_SECOND = 1 / 12**0.5  # σ of an instant cut to whole seconds
-_EARLIEST = 315_532_800 * NANOSECONDS  # 1980: before it a stamp is an unset clock (epochs of 1904, 1970 and 1980)
+_EARLIEST = 315_532_800 * NANOSECONDS  # 1980: before it a stamp is an unset clock's (epochs of 1904, 1970 and 1980)
 
 
 def find_start(
@@ -129,5 +129,5 @@ def _from_creation_time(
 
 def _checked(instant: int, key: str, sigma: float | None) -> Start:
     if instant < _EARLIEST:
-        raise TimeError(f"{iso(instant)} is an unset clock", fix="give --start")
+        raise TimeError(f"{iso(instant)} looks like a clock that was never set", fix="give --start")
     return Start(instant=instant, source=f"metadata: {key}", sigma=sigma)

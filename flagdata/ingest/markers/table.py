@@ -259,7 +259,8 @@ def _seats(
         strange = int(np.flatnonzero(moved)[0])
         raise InputError(
             f"marker {names[strange]!r} has {axis} from {low[strange]:.6g} to {high[strange]:.6g}", where=where,
-            fix="u and v are where it is on the flat cloth, and stay; is a column recording missing?",
+            fix="u and v, its place on the flat cloth, are the same in all frames; several recordings need a column "
+            "recording",
         )  # fmt: skip
     return low
 
