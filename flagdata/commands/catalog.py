@@ -12,8 +12,9 @@ from pathlib import Path
 
 import click
 
-from flagdata.console import document, json_option, table
-from flagdata.errors import UnknownNameError
+from flagdata.console import document, json_option, say, table
+from flagdata.errors import MissingExtraError, UnknownNameError
+from flagdata.extras import explained
 from flagdata.recipes import Shelf
 
 
@@ -30,7 +31,15 @@ def catalog(kind: str | None, as_json: bool) -> None:
     if kind is not None and kind not in NAMES:
         raise UnknownNameError.of("kind of name", kind, NAMES)
     kinds = NAMES if kind is None else {kind: NAMES[kind]}
-    found = {name: titles(target) for name, (target, _) in kinds.items()}
+    found: dict[str, Mapping[str, str]] = {}
+    for name, (target, _) in kinds.items():
+        try:
+            with explained():
+                found[name] = titles(target)
+        except MissingExtraError as error:
+            if kind is not None:
+                raise
+            say(f"{name} are left out: {error.what}; {error.fix}", mark="note")
     if as_json:
         listed = [{"kind": name, "taken_by": kinds[name][1], "names": names} for name, names in found.items()]
         document("catalog", {"kinds": listed})

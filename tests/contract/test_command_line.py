@@ -102,6 +102,23 @@ def test_every_name_of_the_catalog_has_a_line(capsys: pytest.CaptureFixture[str]
     assert json.loads(invoke(capsys, "--json", "catalog", "scene").out)["fix"] == "did you mean 'scenes'?"
 
 
+def test_names_whose_library_is_not_installed_are_left_out_with_the_extra_that_brings_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def absent(target: str) -> dict[str, str]:
+        if target.startswith("flagdata."):
+            return {"one": "it"}
+        raise ModuleNotFoundError("No module named 'torch'", name="torch")
+
+    monkeypatch.setattr("flagdata.commands.catalog.titles", absent)
+    ended = invoke(capsys, "catalog")
+    assert ended.code == 0
+    assert ended.out.count("  one") == 3
+    assert "effects are left out" in ended.err
+    assert "flagdata[physics]" in ended.err
+    assert invoke(capsys, "catalog", "effects").code == 1
+
+
 def test_a_warning_is_coloured_on_a_terminal_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     printed: list[str] = []
     monkeypatch.setattr(click, "echo", lambda text, **_: printed.append(text))
