@@ -202,7 +202,7 @@ def test_a_level_that_the_bank_cannot_test_is_reported(pulled: Experiment, bank:
     assert verdict.conclusion is Conclusion.UNTESTED
     assert verdict.test.p_value.value >= 1 / 10
     assert "cannot be tested at level 0.05" in verdict.words
-    assert "At least 19 kinds" in verdict.words  # K + 1 ≥ 1/0.05
+    assert "at least 19 are needed" in verdict.words  # K + 1 ≥ 1/0.05
     assert not verdict.test.open
     assert "borderline" not in verdict.words
     assert [p.name.split()[0] for p in verdict.parameters] == ["density", "bending", "damping", "direction"]
