@@ -22,7 +22,8 @@ from measure.calibrate.posterior import Posterior, Sight, posterior, weighed
 from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Floats, Uncertain
 from measure.calibrate.scatter import TAKEN_APART
 from measure.calibrate.simulation import OBSERVED, Flag
-from measure.calibrate.summary import shown
+from measure.calibrate.summary import LEAST_IN_ALL, shown
+from measure.observables.observable import WINDOW
 
 ANSWER = 3
 """Raised when the same recordings and options get another answer."""
@@ -257,8 +258,14 @@ def designs_of(recordings: Sequence[Observed], options: Options) -> list[Design]
     """What is simulated for each of several recordings of one cloth.
 
     Raises:
-        InputError: a recording that is given twice.
+        InputError: a recording that is given twice, or too few windows in all.
     """
+    windows = sum(len(one.readings) for one in recordings)
+    if windows < LEAST_IN_ALL:
+        raise InputError(
+            f"{windows * WINDOW:g} s of film with a log beside them", where=", ".join(one.name for one in recordings),
+            fix=f"give {LEAST_IN_ALL * WINDOW:g} s or more in all; two minutes are better",
+        )  # fmt: skip
     names = [f"{one.source} {one.name} {one.first:g}" for one in recordings]
     twice = [one.name for place, one in enumerate(recordings) if names[place] in names[:place]]
     if twice:

@@ -17,8 +17,10 @@ from measure.calibrate.prior import Floats
 
 SHOWN = 0.6
 """Share of the windows that are to show an observable."""
-LEAST_WINDOWS = 8
-"""Fewest windows of a recording: 20 s."""
+LEAST_WINDOWS = 4
+"""Fewest windows of a recording: 10 s."""
+LEAST_IN_ALL = 8
+"""Fewest windows of all recordings of a cloth together: 20 s."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

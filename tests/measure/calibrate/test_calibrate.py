@@ -169,3 +169,11 @@ def test_rows_of_one_place_share_the_anemometers_gain() -> None:
     assert _found(*apart).weight.sigma / 0.17 == pytest.approx(_sigma(3), rel=0.2)
     assert len({place[0].value for place in shared.places}) == 1
     assert "constant-wind" not in {finding.kind for finding in shared.findings}
+
+
+def test_ten_seconds_are_enough_beside_ten_others_and_not_alone() -> None:
+    """As three winds of a tunnel, each filmed for ten seconds."""
+    short = [replace(one, readings=one.readings[:4]) for one in (_observed(0.17), _observed(0.17, seed=10))]
+    assert [design.duration for design in module.designs_of(short, _OPTIONS)] == [10.0, 10.0]
+    with pytest.raises(InputError, match="10 s of film with a log"):
+        module.designs_of(short[:1], _OPTIONS)
