@@ -133,6 +133,7 @@ def calibrate(
     from measure.calibrate.page import page
     from measure.calibrate.prior import AZIMUTH, ELEVATION
     from measure.calibrate.simulation import Flag
+    from measure.calibrate.workload import announced
     from measure.estimate.similarity import parse_size
     from measure.estimate.source import Reading, box_of
 
@@ -163,6 +164,7 @@ def calibrate(
             sources, size, reading, lake=lake, at=branch, first=first, last=last, log=log, offset=offset,
             advance=advance,
         )  # fmt: skip
+    say(announced(simulations * sum(one.duration for one in observed), workers=workers))
     with progress(simulations * len(observed), label="calibrate", unit="flag") as advance:
         found = calibrated(
             observed, options, folder=(cache or user_cache() / "calibrate"), workers=workers, advance=advance

@@ -9,15 +9,17 @@ from dataclasses import replace
 from pathlib import Path
 
 from flagdata.caches import user_cache
-from flagdata.console import progress
+from flagdata.console import progress, say
 from flagdata.errors import UsageError
 from flagdata.lake import Lake
 from flagdata.stated import Stated
 from measure.calibrate.calibrate import Options as Calibrating
 from measure.calibrate.filmed import of_sources
 from measure.calibrate.known import known
+from measure.calibrate.observed import Observed
 from measure.calibrate.prior import AZIMUTH, ELEVATION
 from measure.calibrate.simulation import Flag
+from measure.calibrate.workload import announced
 from measure.closing.command_line import stage_bars
 from measure.closing.output import deliver
 from measure.closing.sources import distinct
@@ -25,6 +27,8 @@ from measure.estimate.similarity import parse_size
 from measure.estimate.source import Reading, box_of
 from measure.films.artifacts import answer_of
 from measure.films.command_line import Given
+from measure.films.design import PAIRS, TOGETHER, lasting
+from measure.films.library import weighable
 from measure.films.models import models
 from measure.films.run import Options, solve, verdict_of
 from measure.films.words import words
@@ -81,9 +85,10 @@ def close_films(
             offset=given.clock_offset, advance=advance,
         )  # fmt: skip
     recordings = distinct(read)
+    processes = workers or len(os.sched_getaffinity(0))
+    say(announced(workload(recordings, options), workers=processes))
     outcome = solve(
-        recordings, options, folder=given.cache or user_cache() / "calibrate",
-        workers=workers or len(os.sched_getaffinity(0)), stage=stage_bars(),
+        recordings, options, folder=given.cache or user_cache() / "calibrate", workers=processes, stage=stage_bars(),
     )  # fmt: skip
     verdict = replace(verdict_of(outcome), seconds=time.monotonic() - begun)
     called = name or recordings[0].name
@@ -92,6 +97,14 @@ def close_films(
         parents=parents,
     )  # fmt: skip
     deliver(answer, words(verdict), out=out, lake=lake, branch=branch, as_json=as_json)
+
+
+def workload(recordings: Sequence[Observed], options: Options) -> float:
+    """Seconds of all flags that are simulated: of the base model, with each effect, and of the null experiments."""
+    each = options.calibration.simulations + TOGETHER * options.kinds
+    whole = each * sum(one.duration for one in recordings)
+    paired = PAIRS * len(weighable(options.calibration.flag)) * len(recordings)
+    return whole + paired * lasting(len(recordings))
 
 
 def weight(stated: Stated) -> tuple[float, float]:

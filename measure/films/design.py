@@ -34,9 +34,9 @@ FEWEST_WINDOWS = 8
 _DAMPING = next(one for one in CLOTH if one.name == "damping")
 
 
-def lasting(designs: Sequence[Design]) -> float:
-    """s of each recording in which flags with an effect are simulated: a whole number of windows."""
-    most = min(MINUTE, LONGEST_PAIRS / len(designs))
+def lasting(recordings: int) -> float:
+    """s of each of so many recordings in which flags with an effect are simulated: a whole number of windows."""
+    most = min(MINUTE, LONGEST_PAIRS / recordings)
     return WINDOW * max(FEWEST_WINDOWS, int(most / WINDOW + 1e-9))
 
 

@@ -67,7 +67,7 @@ def gathered(
         CorruptError: a kept batch that cannot be read.
     """
     designs = designs_of(recordings, options)
-    until = lasting(designs)
+    until = lasting(len(designs))
     made = [[pairs(design, effect, until=until) for effect in effects] for design in designs]
     null = nulls(designs, first_of([one.place for one in recordings]), kinds=kinds, seed=options.seed)
 

@@ -114,7 +114,7 @@ def simulations(folder: Path) -> Simulations:
     def seen(batches: Sequence[Batch]) -> Floats:
         return read(batches, folder=folder, workers=workers)[:, 0]
 
-    made = [[pairs(design, effect, until=lasting(own)) for effect in effects()] for design in own]
+    made = [[pairs(design, effect, until=lasting(len(own))) for effect in effects()] for design in own]
     return Simulations(
         designs=tuple(own[place] for place in chosen()), base=tuple(seen(own[place].batches()) for place in chosen()),
         pairs=tuple(tuple((pair, seen(pair.batches)) for pair in made[place]) for place in chosen()),
