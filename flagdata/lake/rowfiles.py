@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 
 from flagdata.errors import CorruptError
@@ -21,6 +21,9 @@ from flagdata.files import open_regular
 from flagdata.lake.older_rows import SINCE, with_data_sets
 from flagdata.schema import catalog_schema
 from flagdata.storage import Place
+
+if TYPE_CHECKING:
+    import pyarrow.dataset as ds
 
 ROW_ORDER = ("created", "start", "frame_first", "artifact")
 _NUMBERS = ROW_ORDER[:-1]
@@ -54,6 +57,8 @@ class RowFiles:
         Raises:
             CorruptError: a file cannot be read.
         """
+        import pyarrow.dataset as ds  # loads pandas where that is installed
+
         self._contents = {name: self._content(name) for name in names}
         form = ds.ParquetFileFormat()
         found: list[tuple[int, ds.Fragment]] = []
