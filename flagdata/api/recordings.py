@@ -39,7 +39,7 @@ def wind(
     """The wind of a log, of an example, or of a recording of a lake.
 
     ```python
-    blown = flagdata.wind("anemometer.csv", sensor="cup-logger.toml", zone="+02:00")
+    blown = flagdata.wind("anemometer.csv")
     blown.time, blown.speed  # (n,) s, (n,) m/s
     ```
 

@@ -71,6 +71,12 @@ def names() -> tuple[str, ...]:
 def example(name: str = "flag") -> Example:
     """An example that comes with the package: a film of a simulated flag, the log beside it, and the truth.
 
+    ```python
+    flag = flagdata.example("flag")
+    found = flagdata.measure(flag.film, flag_size=flag.flag_size)
+    found.wind.interval, flag.truth["wind_speed"]  # m/s
+    ```
+
     Args:
         name: of the example.
 

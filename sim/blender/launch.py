@@ -28,6 +28,10 @@ def expose(name: str, root: Path) -> None:
 
 
 if __name__ == "__main__":
-    for package in PACKAGES:
-        expose(package, Path(__file__).resolve().parents[2])
+    beside = Path(__file__).resolve().parents[2]
+    if beside.parent.name == "flagdata":  # installed: the packages lie inside it
+        expose("flagdata", beside.parents[1])
+    else:
+        for package in PACKAGES:
+            expose(package, beside)
     import_module("sim.blender.worker").main()

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from dataclasses import is_dataclass
 from pathlib import Path
+from types import ModuleType
 
 from flagdata.addresses import local_path
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.files import check_input
+from flagdata.installed_names import installed, renamed
 from flagdata.provenance import file_hash
 from sim.effects.effect import Effect
 
@@ -42,13 +43,14 @@ def _module(path: Path) -> object:
     name = f"flagdata_effect_file_{file_hash(path)}"
     if name in sys.modules:
         return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise UsageError("not a Python file", where=str(path), fix="give FILE.py:Class")
-    module = importlib.util.module_from_spec(spec)
+    module = ModuleType(name)
+    module.__file__ = str(path)
     sys.modules[name] = module
     try:
-        spec.loader.exec_module(module)
+        source = path.read_text(encoding="utf-8")
+        if installed():  # the file imports sim as in a checkout
+            source = renamed(source, path.parent)
+        exec(compile(source, str(path), "exec"), vars(module))
     except Exception as error:
         del sys.modules[name]
         raise UsageError(f"it cannot be run: {error}", where=str(path), fix="correct the file") from error

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 import shutil
 import subprocess
 import sys
@@ -15,7 +17,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 SUPERSEDED = ("models/shipped/flow/", "models/shipped/wave/")
 """Networks that others took the place of."""
-LARGEST = 6e6  # B
+LARGEST = 6 << 20  # B
 PACKAGES = ("flagdata", "sim", "models", "measure", "catalogs")
 
 
@@ -47,7 +49,9 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
 def test_the_wheel_holds_the_tracked_files_of_the_packages_and_no_others(wheel: zipfile.ZipFile) -> None:
     held = {name for name in wheel.namelist() if ".dist-info/" not in name}
     models = {f"models/trained/{name}" for name in ("weights.safetensors", "card.json", "recipe.toml")}
-    assert held == {name for name in tracked(*PACKAGES) if not name.startswith(SUPERSEDED)} | models
+    wanted = {name for name in tracked(*PACKAGES) if not name.startswith(SUPERSEDED)} | models
+    inside = {name if name.startswith("flagdata/") else f"flagdata/_packages/{name}" for name in wanted}
+    assert held == inside | {"flagdata/_packages/__init__.py"}
 
 
 def test_the_wheel_is_small(wheel: zipfile.ZipFile) -> None:
@@ -78,3 +82,68 @@ def plain(requirement: str) -> str:
     for end in "[<>=; ":
         name = name.partition(end)[0]
     return name.lower().replace("_", "-")
+
+
+MINE = "VALUE = 'mine'\n"
+SCRIPT = """
+import json
+from importlib import import_module
+import catalogs, measure, models, sim
+import flagdata
+from flagdata.cli import main
+flags = flagdata.simulate(
+    scene={"columns": 4}, wind={"speed": 3.0}, time={"settle": 0.0, "frames": 2},
+    effects={"lift": {"coefficient": 1.0}},
+)
+own = import_module("flagdata._packages.sim.effects.files").load("own.py:Denser")
+film = flagdata.render(flags[0], width=32, height=32, parameters={"raster_samples": 1})
+try:
+    flagdata.measure(film)
+except flagdata.errors.FlagdataError as error:
+    kind = error.kind
+try:
+    main(["calibrate", "--help"])
+except SystemExit as end:
+    code = end.code
+print(json.dumps({
+    "mine": [module.VALUE for module in (catalogs, measure, models, sim)], "frames": flags.positions.shape[1],
+    "film": len(film), "kind": kind, "code": code, "own": list(own.strengths()), "from": flagdata.__file__,
+}))
+"""
+OWN_EFFECT = """
+from dataclasses import dataclass
+from typing import Annotated
+
+from sim.effects.effect import PressureEffect
+from sim.effects.parameter import Value, strength
+
+
+@dataclass(frozen=True, kw_only=True)
+class Denser(PressureEffect):
+    change: Annotated[Value, strength(unit="1", prior=(-0.2, 0.3), admissible=(-1.0, 9.0), source="made")] = 0.0
+
+    def factor(self, density, across):
+        return across.new_tensor(1.0) + self.change
+"""
+
+
+def test_a_users_own_files_of_the_packages_names_neither_break_the_wheel_nor_are_shadowed(
+    wheel: zipfile.ZipFile, tmp_path: Path
+) -> None:
+    site, home = tmp_path / "site", tmp_path / "home"
+    wheel.extractall(site)
+    for name in ("catalogs.py", "measure.py", "sim.py", "models/__init__.py"):
+        (home / name).parent.mkdir(parents=True, exist_ok=True)
+        (home / name).write_text(MINE)
+    (home / "script.py").write_text(SCRIPT)
+    (home / "own.py").write_text(OWN_EFFECT)
+    done = subprocess.run(
+        [sys.executable, "script.py"], cwd=home, env={**os.environ, "PYTHONPATH": str(site)}, capture_output=True,
+        text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout.splitlines()[-1])
+    assert found["mine"] == ["mine"] * 4
+    assert Path(found["from"]).is_relative_to(site)
+    assert (found["frames"], found["film"], found["kind"], found["code"]) == (2, 2, "bad-input", 0)
+    assert found["own"] == ["change"]

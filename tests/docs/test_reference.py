@@ -7,7 +7,8 @@ from dataclasses import fields
 import click
 import pytest
 
-from docs import generate_cli, generate_effects, generate_glossary
+import flagdata
+from docs import generate_api, generate_cli, generate_effects, generate_glossary
 from flagdata.ingest.anemometer.recipe import (
     MATCH,
     ChannelLayout,
@@ -24,12 +25,20 @@ from tests.flagdata.ingest.anemometer.test_silent_errors import KINDS
 
 
 @pytest.mark.parametrize(
-    "module", [generate_cli, generate_effects, generate_glossary], ids=["cli", "effects", "glossary"]
+    "module",
+    [generate_api, generate_cli, generate_effects, generate_glossary],
+    ids=["api", "cli", "effects", "glossary"],
 )
 def test_a_generated_page_is_that_of_the_code(module: object) -> None:
     name = module.__name__  # type: ignore[attr-defined]
     fresh = module.reference() == module.PAGE.read_text(encoding="utf-8")  # type: ignore[attr-defined]
     assert fresh, f"write the page anew: python -m {name}"
+
+
+def test_every_call_has_an_example_of_ten_lines_at_most_and_words_for_every_argument() -> None:
+    assert set(generate_api.TASKS) == set(flagdata.__all__)
+    assert [(name, found) for name in flagdata.__all__ if (found := generate_api.undocumented(name))] == []
+    assert [name for name in flagdata.__all__ if not 2 <= generate_api.lines(name) <= 10] == []
 
 
 def test_every_command_and_every_option_has_a_sentence() -> None:

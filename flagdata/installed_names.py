@@ -1,0 +1,103 @@
+"""Where the packages beside flagdata are once it is installed: inside it, so that no file of a user meets their names.
+
+In a checkout `sim`, `models`, `measure` and `catalogs` lie beside `flagdata` and are imported so. In a wheel they are
+`flagdata._packages.sim` and so on: `BuildPackages` moves them there and renames them in import statements, and in texts
+that name one of their modules, as tables of lazily imported attributes do. A checkout that is installed to be edited
+stays as it is.
+
+The building of a wheel loads this file by itself, so it imports nothing of flagdata.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    BuildPy: Any = object
+else:
+    try:
+        from setuptools.command.build_py import build_py as BuildPy  # noqa: N812
+    except ModuleNotFoundError:  # where it is installed and nothing is built
+        BuildPy = object
+
+BESIDE = ("catalogs", "measure", "models", "sim")
+"""Packages that are beside flagdata in a checkout."""
+FOLDER = "_packages"
+PREFIX = f"flagdata.{FOLDER}."
+_ABOUT = '"""The packages that lie beside flagdata in a checkout."""\n'
+_HERE = Path(__file__).parent
+_NAME = re.compile(rf"(?P<module>(?:{'|'.join(BESIDE)})(?:\.\w+)*)(?::\w+)?")
+
+
+def installed() -> bool:
+    """Whether this is an installation, not a checkout."""
+    return (_HERE / FOLDER).is_dir()
+
+
+def renamed(source: str, root: Path) -> str:
+    """Python source with the packages' names as they are in an installation.
+
+    Args:
+        root: folder in which the packages lie: a text is a name where there is such a module.
+    """
+    lines = source.splitlines(keepends=True)
+    for line, column in sorted(_places(ast.parse(source), root), reverse=True):
+        row = lines[line - 1].encode()  # the parser counts bytes
+        lines[line - 1] = (row[:column] + PREFIX.encode() + row[column:]).decode()
+    return "".join(lines)
+
+
+def _places(tree: ast.Module, root: Path) -> Iterator[tuple[int, int]]:
+    """(line, column [B]) where a name of the packages begins."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.level == 0 and (node.module or "").partition(".")[0] in BESIDE:
+            yield node.lineno, node.col_offset + len("from ")
+        elif isinstance(node, ast.Import):
+            if any(one.name.partition(".")[0] in BESIDE for one in node.names):
+                raise ValueError(f"line {node.lineno}: write `from package import module`, which can be renamed")
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and _is_name(node.value, root):
+            yield node.lineno, node.col_offset + 1
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "files":
+            yield from ((one.lineno, one.col_offset + 1) for one in node.args if _is_package(one))
+
+
+def _is_name(text: str, root: Path) -> bool:
+    """Whether a text names a module within a package, perhaps with an attribute of it."""
+    found = _NAME.fullmatch(text)
+    if found is None or "." not in found["module"]:
+        return False
+    path = root.joinpath(*found["module"].split("."))
+    return path.is_dir() or path.with_suffix(".py").is_file()
+
+
+def _is_package(node: ast.expr) -> bool:
+    return isinstance(node, ast.Constant) and node.value in BESIDE
+
+
+class BuildPackages(BuildPy):
+    """Builds the packages of a wheel, those beside flagdata within it."""
+
+    def run(self) -> None:
+        super().run()
+        if self.editable_mode:
+            return
+        root = Path(self.build_lib)
+        inside = root / "flagdata" / FOLDER
+        shutil.rmtree(inside, ignore_errors=True)
+        for path in sorted(root.rglob("*.py")):
+            path.write_text(renamed(path.read_text(encoding="utf-8"), root), encoding="utf-8")
+        inside.mkdir()
+        (inside / "__init__.py").write_text(_ABOUT, encoding="utf-8")
+        for name in BESIDE:
+            shutil.move(root / name, inside / name)
+
+    def get_outputs(self, include_bytecode: bool = True) -> list[str]:
+        """The files that are there after the move."""
+        if self.editable_mode:
+            return super().get_outputs(include_bytecode)
+        return [str(path) for path in sorted(Path(self.build_lib).rglob("*")) if path.is_file()]

@@ -1,0 +1,36 @@
+"""The examples in the docstrings of the calls run, those that need minutes left out: these have tests of their own."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+import flagdata
+from docs.generate_api import TASKS, example
+from flagdata.lake import Lake
+from sim.run import simulate
+from sim.run.arrays import recipe_of
+
+ELSEWHERE = {"measure", "example", "calibrate", "close_loop"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, field_lake: Lake) -> Path:
+    """With the files and lakes that the examples name."""
+    made = tmp_path_factory.mktemp("examples")
+    flag = flagdata.example()
+    shutil.copy(flag.film, made)
+    shutil.copy(flag.log, made)
+    (made / "field.lake").symlink_to(field_lake.path)
+    (made / "flag.toml").write_text("[scene]\ncolumns = 4\n[wind]\nspeed = 3\n[time]\nsettle = 0\nframes = 2\n")
+    recipe = recipe_of(str(made / "flag.toml"), {"material": {"name": "camel-ponte-roma"}})
+    simulate(Lake.create(made / "sim.lake"), recipe)
+    return made
+
+
+@pytest.mark.parametrize("name", sorted(set(TASKS) - ELSEWHERE))
+def test_the_example_of_a_call_runs(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    exec(compile(example(name), name, "exec"), {"flagdata": flagdata})
