@@ -43,6 +43,7 @@ ALLOWED = {
     "measure/demo/page.py": INSIDE, "measure/demo/example.py": INSIDE, "measure/demo/tracked.py": INSIDE,
     "sim/blender/worker.py": SCRATCH,
     "sim/datasets/record.py": SCRATCH, "sim/datasets/plan.py": SCRATCH,
+    "flagdata/installed_names.py": "the building of a wheel, in the folder that it builds in",
     "flagdata/dataset/cache.py": "a cache: files named by 64 hex digits and its own two, whichever folder it is in",
     "measure/nulls/bank.py": "makes the folder of a bank that `challenge bank` has claimed; batches by put_if_absent",
     "measure/calibrate/artifact.py": LAKE, "measure/anemometer/storage.py": LAKE,
