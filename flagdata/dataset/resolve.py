@@ -113,7 +113,7 @@ def resolve(
 
 
 def _lineage(catalog: pa.Table | Scan) -> pa.Table:
-    """What tells where clips come from."""
+    """The columns that state where clips come from."""
     return catalog.table(_LINEAGE) if isinstance(catalog, Scan) else catalog
 
 

@@ -13,6 +13,7 @@ BENCHMARKS = {
     "measure": "tests.benchmarks.bench_measure",
     "models": "tests.benchmarks.bench_models",
     "pairs": "tests.benchmarks.bench_pairs",
+    "peers": "tests.benchmarks.bench_peers",
     "records": "tests.benchmarks.bench_records",
     "render": "tests.benchmarks.bench_render",
     "sim": "tests.benchmarks.bench_sim",

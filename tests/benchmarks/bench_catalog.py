@@ -22,6 +22,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
+from urllib.parse import quote
 
 import duckdb
 import numpy as np
@@ -32,9 +33,13 @@ from deltalake import DeltaTable, write_deltalake
 from flagdata.lake import Artifact, Lake
 from flagdata.rng import stream
 from flagdata.schema import Kind, catalog_schema
+from flagdata.view.media import Media
+from flagdata.view.pages import Site
+from flagdata.view.routes import answer
 
 ROWS = int(os.environ.get("FLAGDATA_BENCH_ROWS", "1_000_000"))
 BATCHES = 10
+VIEWED = 10_000  # artifacts
 VERSIONS = tuple(n for n in (10, 100, 1_000, 10_000) if n <= int(os.environ.get("FLAGDATA_BENCH_VERSIONS", "10_000")))
 TIDY = 32  # versions; as commits do it
 COMMITS = 20
@@ -77,6 +82,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             "rows": ROWS, "load_average": round(os.getloadavg()[0], 1),
             "fresh process": _million(folder, seed),
             "commits as versions add up": _growth(folder / "versions"),
+            "pages of view [ms]": _view(folder / "viewed", seed),
         }  # fmt: skip
 
 
@@ -215,3 +221,29 @@ def _commit_up_to(lake: Lake, versions: int) -> None:
         rows = pa.Table.from_pylist([artifact.row()], schema=catalog_schema())
         info = {"commit": f"c{secrets.token_hex(8)}", "message": "one row", "branch": "main", "rows": "1"}
         head = catalog.append(rows, base=head, info=info)
+
+
+def _view(path: Path, seed: int) -> dict[str, float]:
+    """Pages over a catalog of `VIEWED` artifacts, by the first request and later ones."""
+    lake = Lake.create(path)
+    fill(lake, VIEWED, seed)
+    site = Site(lake=Lake.open(path), media=Media(lake), base="/key/")
+    known = _one_measurement(lake)
+    addresses = {
+        "overview, first": "", "overview": "", "last page": f"?page={VIEWED // 60}&kind=clip",
+        "search": "?name=clip%2077",
+        "artifact": f"artifact/{known}", "SQL": f"query?sql={quote(SQL)}",
+    }  # fmt: skip
+    found: dict[str, float] = {}
+    for name, address in addresses.items():
+        began = time.perf_counter()
+        page = answer(site, f"/key/{address}")
+        found[name] = (time.perf_counter() - began) * 1e3
+        assert page.status == 200, page.content
+    return found
+
+
+def _one_measurement(lake: Lake) -> str:
+    with lake.transaction("one row") as tx:
+        tx.add(Artifact(kind=Kind.MEASUREMENT, name="m", recipe={}))
+    return tx.result.added[0]

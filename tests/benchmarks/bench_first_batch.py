@@ -82,7 +82,7 @@ def fill(lake: Lake, seed: int) -> None:
 
 
 def _fresh(lake: str, environment: dict[str, str]) -> dict[str, Any]:
-    return json.loads(_python(_FRESH, environment, lake, str(BATCH)))
+    return json.loads(_python(_FRESH, environment, lake, str(BATCH)).splitlines()[-1])
 
 
 def _python(program: str, environment: dict[str, str], *arguments: str) -> str:

@@ -83,7 +83,12 @@ def make_recording(lake: Lake, seed: int, *, clips: int) -> None:
                 instant = START + index * period
                 writer.frame(log_time=instant, publish_time=instant, timestamp=instant, image=image)
         recording = Artifact(
-            kind=Kind.RECORDING, name="bench", object=transaction.put(path), session="bench", clock_sigma=0.1
+            kind=Kind.RECORDING,
+            name="bench",
+            object=transaction.put(path),
+            session="bench",
+            clock_sigma=0.1,
+            rate=FRAME_RATE,
         )
         transaction.add(recording)
         for clip in clip_rows(Record.open(lake.object_path(str(recording.object))), recording):

@@ -20,7 +20,7 @@ ALLOWED = {
     "flagdata/lake/durable.py": LAKE, "flagdata/lake/leases.py": LAKE, "flagdata/lake/lake.py": LAKE,
     "flagdata/lake/log.py": LAKE, "flagdata/lake/markers.py": LAKE, "flagdata/lake/meshes.py": LAKE,
     "flagdata/lake/objects.py": LAKE, "flagdata/lake/refs.py": LAKE, "flagdata/lake/catalog.py": LAKE,
-    "flagdata/lake/probe.py": LAKE, "flagdata/lake/remote_leases.py": LAKE, "flagdata/lake/remote_objects.py": LAKE,
+    "flagdata/lake/summaries.py": LAKE, "flagdata/lake/probe.py": LAKE, "flagdata/lake/remote_leases.py": LAKE, "flagdata/lake/remote_objects.py": LAKE,
     "flagdata/storage/path.py": "writes, removes and renames what its callers name, as pathlib does for folders",
     "flagdata/storage/cache.py": "a cache of a lake's objects by their hash",
     "sim/datasets/card.py": LAKE + "; a path that the user gives goes through flagdata.outputs",

@@ -5,8 +5,8 @@ the only one that is implicit for a flex, appeared in 4.0 and is announced to ch
 stiffness changed with 4.0. Pictures by VTK change a little with its version.
 
 `python -m tests.validation.environments NAME [FOLDER]` makes one (`make mujoco`, `make vtk`, `make lerobot`,
-`make datasets`). The last two hold other programs' readers, by which tests read what `flagdata export` writes; without
-them these tests skip, with the reason.
+`make datasets`, `make pylance`). The last three hold other programs' readers: by those of the first two, tests read
+what `flagdata export` writes, and by all the benchmark `peers` reads clips; without them these skip, with the reason.
 """
 
 from __future__ import annotations
@@ -123,7 +123,11 @@ DATASETS = Environment(
     probe="import datasets; print(datasets.__version__)",
     others=("pillow", "xarray", "zarr", "netCDF4", "rerun-sdk", "pandas"),
 )  # fmt: skip
-ENVIRONMENTS = {one.package: one for one in (MUJOCO, VTK, LEROBOT, DATASETS)}
+LANCE = Environment(
+    title="Lance", package="pylance", version="14.0.2", probe="import lance; print(lance.__version__)",
+    others=("numpy>=2,<3", "simplejpeg"),
+)  # fmt: skip
+ENVIRONMENTS = {one.package: one for one in (MUJOCO, VTK, LEROBOT, DATASETS, LANCE)}
 
 if __name__ == "__main__":
     chosen = ENVIRONMENTS[sys.argv[1]]
