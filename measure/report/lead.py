@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from statistics import median
 
 from measure.loop.selection import heterogeneous
 from measure.nulls.conformal import kinds_needed
@@ -48,13 +47,20 @@ def p_text(test: NullTest) -> str:
 
 
 def explained(verdict: Verdict) -> str:
-    """ "33 % of the error that a better model could remove", on data that neither model was fitted to; empty where no
-    error after is known."""
-    shares = [c.share for c in verdict.comparisons if c.share is not None and not math.isnan(c.share)]
-    if shares:
-        return f"{number(100 * median(shares), digits=2)} % of the error that a better model could remove"
-    removed = [1 - c.after.value / c.before.value for c in verdict.comparisons if known(c.after) and known(c.before)]
-    return f"{number(100 * median(removed), digits=2)} % of the error" if removed else ""
+    """ "33 % of the error that a better model could remove", on data that neither model was fitted to.
+
+    Of squared errors, each comparison in units of the base model's, those of all that lie above the floor together.
+    Where none does, of the whole error. Empty where no error after is known.
+    """
+    there = [c for c in verdict.comparisons if known(c.after) and known(c.before) and c.before.value > 0]
+    above = [c for c in there if c.share is not None and not math.isnan(c.share) and known(c.floor)]
+    removed = sum(1 - (c.after.value / c.before.value) ** 2 for c in above or there)
+    if there and removed <= 0:
+        return "none of the error on unseen data"
+    if above:
+        most = sum(1 - (c.floor.value / c.before.value) ** 2 for c in above)
+        return f"{number(100 * removed / most, digits=2)} % of the error that a better model could remove"
+    return f"{number(100 * removed / len(there), digits=2)} % of the squared error" if there else ""
 
 
 def _found(verdict: Verdict) -> str:

@@ -11,6 +11,8 @@ from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, 
 CONTRADICTING = ("still-away-from-pins",)
 """Kinds of findings by which the recordings contradict what was declared: they lead a verdict that names nothing."""
 
+_LISTED = 3
+"""Parts of the data that a sentence names."""
 _DETERMINED = 5.0
 """A factor to either side beyond which a quantity counts as not determined: cloths of all kinds lie within some ten."""
 _FACTORS = ("of nominal", "s")
@@ -104,8 +106,9 @@ def control_warnings(verdict: Verdict) -> list[str]:
 
 
 def _parts(some: Sequence[Comparison], verdict: Verdict) -> str:
-    """Which parts of the data, and of how many."""
-    which = _begun(listed([c.what for c in some]))
+    """Which parts of the data, the first few by name, and of how many."""
+    names = [c.what for c in some]
+    which = _begun(listed([*names[:_LISTED], f"{len(names) - _LISTED} more"] if len(names) > _LISTED + 1 else names))
     return which if len(verdict.comparisons) == 1 else f"{which}, {len(some)} of {len(verdict.comparisons)} parts"
 
 

@@ -153,3 +153,11 @@ def test_a_pressure_is_named_by_what_its_causes_have_in_common() -> None:
         ranking = (replace(whole.ranking[0], effect="air-density"), *whole.ranking[1:])
         heading = sentences.heading(replace(whole, named=effects, ranking=ranking))
         assert heading == f"The base model lacked another dynamic pressure ({said})"
+
+
+def test_of_many_parts_a_warning_names_the_first_and_counts_the_others() -> None:
+    whole = verdict(Conclusion.EFFECT)
+    weak = replace(whole.comparisons[0], reduction=about(0.1, 0.5))
+    many = tuple(replace(weak, what=f"part {n}") for n in range(16))
+    (warning,) = sentences.reduction_warnings(replace(whole, comparisons=many))
+    assert warning.startswith("Part 0, part 1, part 2 and 13 more, 16 of 16 parts: ")
