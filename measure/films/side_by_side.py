@@ -44,7 +44,7 @@ class Moving:
     Attributes:
         label: what they show.
         url: of all of them.
-        first: of the first, for whoever asked for less motion.
+        first: of the first, for a reader who asks for less motion.
     """
 
     label: str
