@@ -57,7 +57,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # The demonstration needs the physics alone, not what tests and docs do; where those are installed it takes them.
 demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO_STAMP))
-	$(BIN)/flagdata demo --out $(OUT)/demo
+	$(BIN)/flagdata demo --full --out $(OUT)/demo
 
 test: lint $(BLENDER_STAMP) $(MUJOCO_STAMP)
 	FLAGDATA_BLENDER=$(BLENDER) FLAGDATA_MUJOCO=$(MUJOCO) $(ONE_THREAD) $(BIN)/python -m pytest $(IN_TWO)

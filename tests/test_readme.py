@@ -13,7 +13,7 @@ import pytest
 
 import flagdata
 from flagdata.outputs import check_folder
-from measure.demo.command import SCHEMA, SHORTEST
+from measure.demo.command import SCHEMA
 from measure.demo.recording import RecordingRecipe
 from tests.docs.pages import Shell
 
@@ -36,7 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         small = partial(RecordingRecipe, rate=25, columns=10, step=4e-3, width=240, rows=180, samples=1)
         patch.setattr("measure.demo.story.RecordingRecipe", small)
-        Shell(patch=patch).run(f"flagdata demo --out {out} --minutes {SHORTEST} --part field")
+        Shell(patch=patch).run(f"flagdata demo --out {out}")
     return out
 
 

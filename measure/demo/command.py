@@ -12,20 +12,23 @@ from flagdata.console import LocalPath, document, json_option, say
 from measure.demo.cards import Truth
 from measure.demo.transcript import Transcript
 
-SHORTEST = 3.0
-"""Length of the shortest film [min]: an alignment needs two minutes beside the log, and loses some to the log's gap."""
 SCHEMA = "flagdata.demo/1"
 """Of its folder's manifest."""
 
 
-class Part(StrEnum):
+class Story(StrEnum):
     """What is shown."""
 
-    ALL = "all"
-    FIELD = "field"
+    SHORT = "short"
     """A film and a log, put on one clock, and the wind that is read off the film."""
-    LOOP = "loop"
+    FULL = "full"
+    """The same, then the cloth weighed, and what its model lacks found, from that film."""
+    MARKERS = "markers"
     """A tracked flag, and what the model of it lacks."""
+
+
+MINUTES = {Story.SHORT: 3, Story.FULL: 10, Story.MARKERS: 3}
+"""That each takes at most on two idle cores."""
 
 
 @click.command()
@@ -40,52 +43,52 @@ class Part(StrEnum):
 )
 @click.option("--seed", type=click.IntRange(min=0), default=2026, show_default=True, help="Seed of all that is random.")
 @click.option(
-    "--minutes",
-    type=click.FloatRange(SHORTEST, 120),
-    default=4.0,
-    show_default=True,
-    help="Length of the film it makes.",
+    "--short",
+    "story",
+    flag_value=Story.SHORT.value,
+    default=True,
+    help="Film, log, clocks and the wind; 3 minutes at most on two idle cores. What is done by default.",
 )
 @click.option(
-    "--part",
-    type=click.Choice([p.value for p in Part]),
-    default=Part.ALL.value,
-    show_default=True,
-    help="What to show.",
+    "--full",
+    "story",
+    flag_value=Story.FULL.value,
+    help="Then weigh the cloth and find what its model lacks, from the same film; 10 minutes at most.",
+)
+@click.option(
+    "--markers",
+    "story",
+    flag_value=Story.MARKERS.value,
+    help="Instead find what the model of another flag lacks, from tracked markers; 3 minutes at most.",
 )
 @json_option
-def demo(out: Path, seed: int, minutes: float, part: str, as_json: bool) -> None:
+def demo(out: Path, seed: int, story: str, as_json: bool) -> None:
     """Film a simulated flag beside an anemometer, on which something acts that no file states, and take the two files
-    through every step, to pages to open.
+    through the steps of a recording of one's own, to pages to open.
 
     The folder appears with the last of its files; its manifest.json lists them all. Running the demonstration again
     removes exactly what is listed there and is as it was written.
     """
     from flagdata.outputs import fresh_folder
     from measure.demo.index import write_index
-    from measure.demo.story import field_steps, loop_step, weighing_step
+    from measure.demo.story import field_steps, loop_step, markers_step, weighing_step
 
-    parts = (Part.FIELD, Part.LOOP) if part == Part.ALL else (Part(part),)
+    chosen = Story(story)
     began = time.monotonic()
-    say(f"This takes about {_expected(minutes, part):.0f} minutes on two idle cores.")
+    say(f"This takes up to {MINUTES[chosen]} minutes on two idle cores.")
     truths: list[Truth] = []
     with fresh_folder(out, schema=SCHEMA) as scratch:
         shell = Transcript(folder=scratch, aside=as_json)
         shell.show("init", "lake")
-        if Part.FIELD in parts:
-            recording = field_steps(shell, seed, minutes * 60, truths)
-            if part == Part.ALL:
+        if chosen is Story.MARKERS:
+            markers_step(shell, seed, truths)
+        else:
+            recording = field_steps(shell, seed, truths)
+            if chosen is Story.FULL:
                 weighing_step(shell, recording, truths)
-        if Part.LOOP in parts:
-            loop_step(shell, seed, truths)
+                loop_step(shell, recording, truths)
         write_index(scratch, shell.cards, truths, seconds=time.monotonic() - began)
     if as_json:
         document("demo", {"page": str(out / "index.html")})
     else:
         say(f"\nOpen {out / 'index.html'}")
-
-
-def _expected(minutes: float, part: str) -> float:
-    """Minutes that it takes on two idle cores, as measured."""
-    field, weighing, loop = 1.0 + 0.5 * minutes, 1.5, 2.5
-    return {Part.ALL: field + weighing + loop, Part.FIELD: field, Part.LOOP: loop}[Part(part)]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
+import re
 import time
 from dataclasses import replace
+from itertools import takewhile
 from pathlib import Path
 
 import av
@@ -25,7 +28,9 @@ SIZE = "1.5x1.0"
 SIMULATIONS = 64
 """Flags that are simulated to weigh the cloth: the fewest that the command takes."""
 WEIGHED = 40.0
-"""s of the film that the cloth is weighed on."""
+"""s of the film that the cloth is weighed on, and the loop closed."""
+KINDS = 20
+"""Kinds of numerics among the null experiments: the fewest that a level of 0.05 can be tested by, and one more."""
 _REFUSED = (
     "The estimate from motion and gusts was refused, for the reason above the picture.\n"
     "So the difference was given that somebody read off the two displays:\n"
@@ -34,9 +39,9 @@ _SHOWN = 50  # frames of the film's moving picture
 _CLIPS = 2.4  # s from one window of the wind series to the next
 
 
-def field_steps(shell: Transcript, seed: int, duration: float, truths: list[Truth]) -> Recording:
+def field_steps(shell: Transcript, seed: int, truths: list[Truth]) -> Recording:
     """From nothing to a film and a log on one clock, pairs of them, and the wind that is read off the film."""
-    made = _film(shell, RecordingRecipe(seed=seed, duration=duration))
+    made = _film(shell, RecordingRecipe(seed=seed))
     began = time.monotonic()
     done = "Each file was identified, with the reason; for the log a sensor recipe was drafted."
     with _Step(shell, "What are these files?", done) as step:
@@ -76,24 +81,56 @@ def weighing_step(shell: Transcript, made: Recording, truths: list[Truth]) -> No
         f"{math.degrees(noted.azimuth):.0f}° from the wind's direction and {noted.distance:.1f} m away."
     )
     with _Step(shell, "What the cloth weighs", done, page="weighed.html") as step:
-        printed = shell.attempt(
-            "calibrate", "flag", "--flag-size", SIZE, "--azimuth", f"{math.degrees(noted.azimuth):.0f}±3",
-            "--elevation", f"{math.degrees(noted.elevation):.0f}±2", "--distance", f"{noted.distance:.1f}",
-            "--end", f"{WEIGHED:g}s", "--simulations", str(SIMULATIONS), "--workers", str(_cores()),
-            "--cache", "simulations", "--report", "weighed.html", "--lake", "lake",
-        )  # fmt: skip
-        step.took(printed)
-    truths.append(Truth(what="area weight", true=f"{made.area_weight:.3f} kg/m²", found=_first(step.found), right=None))
-    if made.acting is not None:
+        step.took(shell.attempt("calibrate", "flag", *_filmed(made), "--report", "weighed.html"))
+    truths.append(
+        Truth(
+            what="area weight, by the model without it", true=f"{made.area_weight:.3f} kg/m²",
+            found=_first(step.found), right=_holds(step.found, made.area_weight),
+        )
+    )  # fmt: skip
+
+
+def loop_step(shell: Transcript, made: Recording, truths: list[Truth]) -> None:
+    """What the model of the filmed flag lacks."""
+    done = (
+        f"The same {WEIGHED:g} s were compared with flags on which each of the library's effects acts, and with flags "
+        f"of {KINDS} other meshes and time steps on which nothing undeclared does."
+    )
+    with _Step(shell, "What the model of the flag lacks", done, page="loop/report.html") as step:
+        printed = shell.attempt("close-loop", "flag", *_filmed(made), "--nulls", str(KINDS), "--out", "loop")
+        step.took(None if printed is None else _verdict(printed))
+    if printed is None or made.acting is None:
+        return
+    verdict = json.loads((shell.folder / "loop" / "verdict.json").read_text(encoding="utf-8"))
+    truths.append(
+        Truth(
+            what="what acts on the flag beside the model", true=made.acting.sentence, found=_first(step.found),
+            right=made.acting.effect in verdict["named"],
+        )
+    )  # fmt: skip
+    weight = next(one["after"] for one in verdict["parameters"] if one["name"] == "area_weight")
+    if weight is not None:
         truths.append(
             Truth(
-                what="what acts on the filmed flag beside the model", true=made.acting.sentence,
-                found="not sought here: flagdata close-loop seeks it on films as well, in more time", right=None,
+                what="area weight, by the model with it", true=f"{made.area_weight:.3f} kg/m²",
+                found=f"{weight['value']:.3f} kg/m² [{weight['low']:.3f}, {weight['high']:.3f}] 90 %",
+                right=weight["low"] <= made.area_weight <= weight["high"],
             )
         )  # fmt: skip
 
 
-def loop_step(shell: Transcript, seed: int, truths: list[Truth]) -> None:
+def _filmed(made: Recording) -> tuple[str, ...]:
+    """Options of the film that weighing and the loop have in common, so that they share simulations."""
+    noted = made.noted
+    return (
+        "--flag-size", SIZE, "--azimuth", f"{math.degrees(noted.azimuth):.0f}±3",
+        "--elevation", f"{math.degrees(noted.elevation):.0f}±2", "--distance", f"{noted.distance:.1f}",
+        "--end", f"{WEIGHED:g}s", "--simulations", str(SIMULATIONS), "--workers", str(_cores()),
+        "--cache", "simulations", "--lake", "lake",
+    )  # fmt: skip
+
+
+def markers_step(shell: Transcript, seed: int, truths: list[Truth]) -> None:
     """What the model of a tracked flag lacks."""
     from measure.demo.tracked import TrackedRecipe, make_tracks
 
@@ -194,7 +231,8 @@ def _measured(shell: Transcript, made: Recording, truths: list[Truth]) -> None:
         if printed is not None:
             step.picture = _series(shell.folder / "lake", made)
     true = f"{_during(made).mean():.2f} m/s"
-    truths.append(Truth(what="mean wind at the flag", true=true, found=_first(step.found), right=None))
+    right = _holds(step.found, float(_during(made).mean()))
+    truths.append(Truth(what="mean wind at the flag", true=true, found=_first(step.found), right=right))
 
 
 def _during(made: Recording) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
@@ -236,6 +274,17 @@ def _moving(video: Path, rate: int) -> str:
 
 def _cores() -> int:
     return len(os.sched_getaffinity(0))
+
+
+def _holds(found: str, true: float) -> bool | None:
+    """Whether the first interval of a text holds a value; None where it has none."""
+    ends = re.search(r"\[([\d.]+), ([\d.]+)\]", found)
+    return None if ends is None else float(ends[1]) <= true <= float(ends[2])
+
+
+def _verdict(text: str) -> str:
+    """What a verdict's words say before their list."""
+    return "\n".join(takewhile(lambda line: not line.startswith(" "), text.splitlines()))
 
 
 def _first(text: str) -> str:

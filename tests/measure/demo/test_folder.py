@@ -10,14 +10,13 @@ import pytest
 
 from flagdata.cli import main
 from measure.demo import story
-from measure.demo.command import SHORTEST
+from measure.demo.command import MINUTES, Story
 from measure.demo.transcript import Transcript
 
 
 @pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """A demonstration whose steps only write a file each; the lengths of the films asked for [s]."""
-    lengths: list[float] = []
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A demonstration whose steps only write a file each."""
 
     def init(shell: Transcript, *arguments: str) -> str:
         (shell.folder / arguments[1]).mkdir()
@@ -26,16 +25,14 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
     def part(name: str) -> Any:
         def write(shell: Transcript, seed: int, *others: Any) -> None:
-            lengths.extend(length for length in others if isinstance(length, float))
             (shell.folder / name).write_text(f"seed {seed}")
 
         return write
 
     monkeypatch.setattr(Transcript, "show", init)
     monkeypatch.setattr(story, "field_steps", part("recording.html"))
-    monkeypatch.setattr(story, "weighing_step", lambda *given: None)
-    monkeypatch.setattr(story, "loop_step", part("report.html"))
-    return lengths
+    for step, name in (("weighing_step", "weighed.html"), ("loop_step", "loop.html"), ("markers_step", "tracked.html")):
+        monkeypatch.setattr(story, step, part(name))
 
 
 def demo(out: Path, *arguments: str) -> int:
@@ -50,12 +47,12 @@ def names(folder: Path) -> list[str]:
 
 
 def test_it_replaces_what_it_wrote_and_lists_it(
-    quick: list[float], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    quick: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out" / "demo"
-    assert demo(out) == 0
+    assert demo(out, "--full") == 0
     assert f"Open {out}/index.html" in capsys.readouterr().err
-    assert demo(out, "--part", "field", "--seed", "7") == 0
+    assert demo(out, "--short", "--seed", "7") == 0
     assert names(out) == ["index.html", "lake/lake.json", "manifest.json", "recording.html"]
     assert (out / "recording.html").read_text() == "seed 7"
     listed = [entry["path"] for entry in json.loads((out / "manifest.json").read_text())["files"]]
@@ -64,7 +61,7 @@ def test_it_replaces_what_it_wrote_and_lists_it(
 
 
 def test_a_lake_that_a_user_made_in_it_is_named_and_kept(
-    quick: list[float], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    quick: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "demo"
     assert demo(out) == 0
@@ -77,7 +74,7 @@ def test_a_lake_that_a_user_made_in_it_is_named_and_kept(
     assert (out / "field.lake" / "lake.json").read_text() == "mine"
 
 
-def test_a_lake_of_the_demonstration_that_a_user_went_on_with_is_kept(quick: list[float], tmp_path: Path) -> None:
+def test_a_lake_of_the_demonstration_that_a_user_went_on_with_is_kept(quick: None, tmp_path: Path) -> None:
     out = tmp_path / "demo"
     assert demo(out) == 0
     (out / "lake" / "mcap").mkdir()
@@ -86,7 +83,7 @@ def test_a_lake_of_the_demonstration_that_a_user_went_on_with_is_kept(quick: lis
     assert (out / "lake" / "mcap" / "film.mcap").read_text() == "mine"
 
 
-def test_a_demonstration_without_a_list_is_kept(quick: list[float], tmp_path: Path) -> None:
+def test_a_demonstration_without_a_list_is_kept(quick: None, tmp_path: Path) -> None:
     """As versions before left it: a mark, and no list of what is theirs."""
     (tmp_path / ".flagdata-demo").touch()
     (tmp_path / "mine").write_text("mine")
@@ -94,23 +91,45 @@ def test_a_demonstration_without_a_list_is_kept(quick: list[float], tmp_path: Pa
     assert names(tmp_path) == [".flagdata-demo", "mine"]
 
 
-def test_one_that_fails_leaves_the_earlier_one(
-    quick: list[float], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_that_fails_leaves_the_earlier_one(quick: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "demo"
-    assert demo(out) == 0
+    assert demo(out, "--full") == 0
 
     def interrupted(*given: Any) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(story, "loop_step", interrupted)
-    assert demo(out) == 1
+    assert demo(out, "--full") == 1
     assert names(tmp_path) == [
-        f"demo/{name}" for name in ("index.html", "lake/lake.json", "manifest.json", "recording.html", "report.html")
+        f"demo/{name}"
+        for name in (
+            "index.html",
+            "lake/lake.json",
+            "loop.html",
+            "manifest.json",
+            "recording.html",
+            "weighed.html",
+        )
     ]
 
 
-def test_a_film_too_short_to_align_is_a_usage_error(quick: list[float], tmp_path: Path) -> None:
-    assert demo(tmp_path / "demo", "--minutes", "2") == 2
-    assert demo(tmp_path / "demo", "--part", "field", "--minutes", str(SHORTEST)) == 0
-    assert quick == [60 * SHORTEST]
+@pytest.mark.parametrize(
+    ("given", "story", "pages"),
+    [
+        ((), Story.SHORT, ["recording.html"]),
+        (("--full",), Story.FULL, ["loop.html", "recording.html", "weighed.html"]),
+        (("--markers",), Story.MARKERS, ["tracked.html"]),
+    ],
+)
+def test_each_story_has_its_pages_and_says_beforehand_how_long_it_takes(
+    quick: None, tmp_path: Path, capsys: pytest.CaptureFixture[str], given: tuple[str, ...], story: Story,
+    pages: list[str],
+) -> None:  # fmt: skip
+    out = tmp_path / "demo"
+    assert demo(out, *given) == 0
+    assert [name for name in names(out) if name.endswith(".html") and name != "index.html"] == pages
+    assert capsys.readouterr().err.startswith(f"This takes up to {MINUTES[story]} minutes on two idle cores.")
+
+
+def test_the_two_lengths_are_those_that_were_promised() -> None:
+    assert (MINUTES[Story.SHORT], MINUTES[Story.FULL]) == (3, 10)

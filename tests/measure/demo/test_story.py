@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import subprocess
 from pathlib import Path
@@ -57,7 +58,39 @@ def test_the_cloth_is_weighed_with_what_a_person_noted_and_the_truth_stands_besi
     (command,) = shell.cards[-1].commands
     for words in ("--azimuth 90±3", "--elevation 20±2", "--distance 8.2", "--flag-size 1.5x1.0"):
         assert words in command.replace("'", "")
-    assert [truth.true for truth in truths] == ["0.175 kg/m²", "tangential-linear-drag, coefficient 0.2 kg/(m² s)"]
+    assert [truth.true for truth in truths] == ["0.175 kg/m²"]
+
+
+def test_the_loop_is_closed_on_what_was_weighed_and_its_findings_are_judged_by_the_truth(
+    codes: dict[str, int], tmp_path: Path
+) -> None:
+    acting = Acting(effect="tangential-linear-drag", parameter="coefficient", strength=0.8)
+    noted = SimpleNamespace(azimuth=math.pi / 2, elevation=math.radians(20.2), distance=8.24)
+    made = cast(Any, SimpleNamespace(noted=noted, area_weight=0.1754, acting=acting))
+    (tmp_path / "loop").mkdir()
+    for named, after, right in (
+        (["tangential-linear-drag"], {"value": 0.17, "low": 0.15, "high": 0.2}, [True, True]),
+        (["lift", "shear"], {"value": 0.1, "low": 0.08, "high": 0.12}, [False, False]),
+        ([], None, [False]),
+    ):
+        parameters = [{"name": "bending", "after": None}, {"name": "area_weight", "after": after}]
+        verdict = {"named": named, "parameters": parameters}
+        (tmp_path / "loop" / "verdict.json").write_text(json.dumps(verdict))
+        shell, truths = Transcript(folder=tmp_path), list[Truth]()
+        story.weighing_step(shell, made, [])
+        story.loop_step(shell, made, truths)
+        weighed, closed = (card.commands[0].split() for card in shell.cards)
+        assert weighed[2:-2] == closed[2:-4]
+        assert [truth.right for truth in truths] == right
+        assert truths[0].true == "tangential-linear-drag, coefficient 0.8 kg/(m² s)"
+
+
+@pytest.mark.parametrize(("found", "true", "right"), [
+    ("wind 3.5 m/s [2.3, 5.0] 90 %; bending [9, 10]", 2.4, True), ("wind 3.5 m/s [2.3, 5.0] 90 %", 5.1, False),
+    ("Refused: no flag", 3.0, None),
+])  # fmt: skip
+def test_a_finding_is_right_if_its_interval_holds_the_truth(found: str, true: float, right: bool | None) -> None:
+    assert story._holds(found, true) is right
 
 
 def test_a_cloth_that_cannot_be_weighed_is_no_failure_of_the_demonstration(
