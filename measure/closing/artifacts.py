@@ -26,6 +26,7 @@ from measure.observe import Experiment
 from measure.observe.trajectory import described
 from measure.report.document import as_document, from_document
 from measure.report.page import page
+from measure.report.words import words
 from measure.verdict.record import Candidate, Verdict
 
 _FORMAT = 1
@@ -52,6 +53,7 @@ class Answer:
         effects: whose strengths are kept beside the cloth that was fitted.
         findings: on the recordings.
         page: the report, HTML.
+        words: the verdict's, for a terminal.
         recipe: all that went in, JSON values.
         parents: artifacts that the recordings were read from.
         seed: of the verdict.
@@ -63,6 +65,7 @@ class Answer:
     effects: tuple[Candidate, ...]
     findings: tuple[Finding, ...]
     page: str
+    words: str
     recipe: Mapping[str, Any]
     parents: tuple[str, ...]
     seed: int
@@ -88,7 +91,8 @@ def answer_of(
     }  # fmt: skip
     return Answer(
         name=name, verdict=verdict, models=models, effects=acting(verdict), findings=findings, page=page(verdict),
-        recipe=recipe, parents=tuple(dict.fromkeys(r.source for r in experiment.recordings if r.source)),
+        words=words(verdict), recipe=recipe,
+        parents=tuple(dict.fromkeys(r.source for r in experiment.recordings if r.source)),
         seed=options.seed,
     )  # fmt: skip
 

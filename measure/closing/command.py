@@ -21,8 +21,10 @@ from measure.closing.findings import with_warnings
 from measure.films.command_line import Given, film_options, refuse_of_others
 
 if TYPE_CHECKING:
+    from measure.closing.artifacts import Answer
     from measure.observe import Setup, Up
     from measure.observe.recipe import ExperimentRecipe
+    from sim.material import Material
 
 _OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "accept", "rate", "unit", "noise", "up")
 """Options that say how sources of the command line are read."""
@@ -136,7 +138,8 @@ def close_loop(
     artifacts; `flagdata simulate` runs a model by its name.
 
     Or SOURCE is a film with its log, a recording of --lake by its name or id, or a table of observables as `flagdata
-    calibrate` takes it: then what a flag shows in windows of 2.5 s is compared, and --flag-size is needed.
+    calibrate` takes it: then what a flag shows in windows of 2.5 s is compared, and --flag-size is needed. Films beside
+    markers of the same cloth are judged together: each kind at half of the level, with one joint answer.
 
     \b
       flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8
@@ -149,56 +152,95 @@ def close_loop(
     from measure.closing.artifacts import answer_of
     from measure.closing.close import close_loop as close
     from measure.closing.models import models
-    from measure.closing.output import FILES, deliver
+    from measure.closing.output import FILES, JOINT, KINDS, deliver, deliver_joint
     from measure.closing.sources import Reading, read
-    from measure.films.sources import all_films
+    from measure.films.sources import films_among
     from measure.loop.run import Options
     from measure.observe import Setup, observe
     from measure.observe import recipe as recipes
-    from measure.report.words import words
 
     recipe = None if recipe_path is None else recipes.parse(recipe_path)
-    if recipe is not None and recipe.recordings:
-        _refuse_beside(context, sources)
-    elif not sources:
+    in_recipe = recipe is not None and bool(recipe.recordings)
+    if not in_recipe and not sources:
         raise UsageError("no recordings", where="SOURCE", fix="name them, or a recipe that does")
-    check_files(out, *FILES, command="close-loop")
     lake = None if lake_path is None else Lake.open(lake_path)
     if lake is not None:
         lake.check_writable()
-    films = all_films(sources, lake=lake, at=branch, sized=film.flag_size is not None)
-    refuse_of_others(context, films=films)
-    if films:
+    films = films_among(sources, lake=lake, at=branch, sized=film.flag_size is not None, tracked=in_recipe)
+    tracked = tuple(source for source in sources if source not in films)
+    if in_recipe:
+        _refuse_beside(context, tracked)
+    both = bool(films) and (in_recipe or bool(tracked))
+    names = {kind: name if name is None or not both else f"{name}-{kind}" for kind in KINDS}
+    if both:
+        for kind in KINDS:
+            check_files(out / kind, *FILES, command="close-loop")
+        if nulls is not None:
+            raise UsageError(
+                "films count kinds of numerics, and markers recordings", where="--nulls",
+                fix="leave it out: 40 kinds are simulated for each",
+            )  # fmt: skip
+    else:
+        refuse_of_others(context, films=bool(films))
+    check_files(out, *(JOINT if both else FILES), command="close-loop")
+
+    def of_markers(level: float | None) -> tuple[Answer, Material]:
+        """The answer by markers, and the cloth's nominal material."""
+        said = nulls_given(recipe, level=level, nulls=nulls, bank=bank)
+        options = Options(
+            seed=seed, bank=bank, most_nulls=most_nulls, workers=workers or len(os.sched_getaffinity(0)), **said,
+        )  # fmt: skip
+        setup = _setup(Setup() if recipe is None else recipe.setup, material, density_uncertainty, size, pins)
+        if recipe is not None and in_recipe:
+            observed = recipes.read(replace(recipe, setup=setup), lake)
+        else:
+            reading = Reading(
+                rate=rate, unit=unit, noise=noise, offset=offset, up=_up(context, up, recipe),
+                sensor=sensor, zone=zone, axis=_axis(context, axis, north),
+                confirm=on_command_line(accept, as_json=as_json), north=None if north is None else math.radians(north),
+            )  # fmt: skip
+            observed = observe(read(tracked, winds, reading, lake), setup)
+        refuse(observed.findings)
+        verdict = close(observed.experiment, options, stage=stage_bars())
+        verdict = with_warnings(verdict, observed.findings)
+        called = names["markers"] or _name(observed.experiment.recordings[0].name, tracked, recipe)
+        answer = answer_of(
+            verdict, observed.experiment, options, name=called, findings=observed.findings,
+            models=models(verdict, observed.experiment, name=called, seed=seed),
+        )  # fmt: skip
+        return answer, observed.experiment.specimen.material
+
+    def of_films(level: float | None) -> Answer:
         from measure.films.command import close_films
 
-        close_films(
-            sources, film, lake=lake, branch=branch, name=name, out=out, level=level, nulls=nulls, seed=seed,
-            workers=workers, as_json=as_json,
-        )  # fmt: skip
+        return close_films(
+            films,
+            film,
+            lake=lake,
+            branch=branch,
+            name=names["films"],
+            level=level,
+            nulls=nulls,
+            seed=seed,
+            workers=workers,
+        )
+
+    if not both:
+        answer = of_films(level) if films else of_markers(level)[0]
+        deliver(answer, out=out, lake=lake, branch=branch, as_json=as_json)
         return
-    said = nulls_given(recipe, level=level, nulls=nulls, bank=bank)
-    options = Options(
-        seed=seed, bank=bank, most_nulls=most_nulls, workers=workers or len(os.sched_getaffinity(0)), **said,
+    from measure.calibrate.simulation import mean_bending
+    from measure.closing.joint import joined
+    from measure.verdict.criteria import CRITERIA
+
+    whole = level or (None if recipe is None else recipe.level) or CRITERIA.level
+    by_films = of_films(whole / 2)
+    by_markers, nominal = of_markers(whole / 2)
+    joint = joined(
+        by_markers.verdict, by_films.verdict, level=whole,
+        nominal={"area_weight": nominal.density, "bending": mean_bending(nominal)},
     )  # fmt: skip
-    setup = _setup(Setup() if recipe is None else recipe.setup, material, density_uncertainty, size, pins)
-    if recipe is not None and recipe.recordings:
-        observed = recipes.read(replace(recipe, setup=setup), lake)
-    else:
-        reading = Reading(
-            rate=rate, unit=unit, noise=noise, offset=offset, up=_up(context, up, recipe),
-            sensor=sensor, zone=zone, axis=_axis(context, axis, north),
-            confirm=on_command_line(accept, as_json=as_json), north=None if north is None else math.radians(north),
-        )  # fmt: skip
-        observed = observe(read(sources, winds, reading, lake), setup)
-    refuse(observed.findings)
-    verdict = close(observed.experiment, options, stage=stage_bars())
-    verdict = with_warnings(verdict, observed.findings)
-    called = name or _name(observed.experiment.recordings[0].name, sources, recipe)
-    answer = answer_of(
-        verdict, observed.experiment, options, name=called, findings=observed.findings,
-        models=models(verdict, observed.experiment, name=called, seed=seed),
-    )  # fmt: skip
-    deliver(answer, words(verdict), out=out, lake=lake, branch=branch, as_json=as_json)
+    deliver_joint(joint, (by_markers, by_films), out=out, lake=lake, branch=branch, as_json=as_json)
 
 
 def _refuse_beside(context: click.Context, sources: tuple[str, ...]) -> None:

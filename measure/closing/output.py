@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import textwrap
+from collections.abc import Sequence
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -13,36 +16,72 @@ from flagdata.lake import Lake
 from flagdata.outputs import write_files
 from measure.closing import toml
 from measure.closing.artifacts import Answer, keep
-from measure.report.document import as_document
+from measure.closing.joint import Joint
+from measure.closing.joint_page import joint_page
+from measure.report.document import as_document, plain
 
 FILES = ("report.html", "verdict.json", "base.toml", "model.toml")
 """What is written; the last one only where an effect was found."""
 
 
-def deliver(answer: Answer, words: str, *, out: Path, lake: Lake | None, branch: str, as_json: bool) -> None:
-    """Write an answer's files, keep it in the lake, and print it.
+JOINT = ("report.html", "verdict.json")
+"""What is written of a joint answer, beside a folder a kind."""
+KINDS = ("markers", "films")
 
-    Args:
-        words: of the verdict, for a terminal.
+
+def deliver(answer: Answer, *, out: Path, lake: Lake | None, branch: str, as_json: bool) -> None:
+    """Write an answer's files, keep it in the lake, and print it.
 
     Raises:
         FlagdataError: a file or the lake that cannot be written.
     """
+    written = _written(answer, out=out, lake=lake, branch=branch)
+    if as_json:
+        written.pop("schema")
+        document("verdict", written)
+    else:
+        click.echo(answer.words)
+
+
+def deliver_joint(
+    joint: Joint, answers: Sequence[Answer], *, out: Path, lake: Lake | None, branch: str, as_json: bool
+) -> None:
+    """The same of an answer by markers and films, each of which has its folder and its artifacts.
+
+    Args:
+        answers: by markers and by films.
+
+    Raises:
+        FlagdataError: a file or the lake that cannot be written.
+    """
+    each = {
+        kind: _written(answer, out=out / kind, lake=lake, branch=branch)
+        for kind, answer in zip(KINDS, answers, strict=True)
+    }
+    content = {**plain(joint.as_dict()), **each}
+    text = json.dumps({"schema": "flagdata.joint-verdict/1", **content}, indent=1, allow_nan=False, ensure_ascii=False)
+    write_files(out, dict(zip(JOINT, (joint_page(joint), text + "\n"), strict=True)), command="close-loop")
+    say(f"wrote {', '.join(str(out / file) for file in JOINT)}")
+    if as_json:
+        document("joint-verdict", content)
+    else:
+        click.echo(textwrap.fill(joint.words, 100))
+        for kind, answer in zip(KINDS, answers, strict=True):
+            click.echo(f"\nBy {kind}:\n{answer.words}")
+
+
+def _written(answer: Answer, *, out: Path, lake: Lake | None, branch: str) -> dict[str, Any]:
+    """The document of an answer that was written and kept."""
     as_written = as_document(answer.verdict)
     content = json.dumps(as_written, indent=1, allow_nan=False)
     texts = [answer.page, content + "\n", *(toml.dumps(model.content) for model in answer.models)]
     write_files(out, dict(zip_longest(FILES, texts)), command="close-loop")
     with in_steps(lambda: f"the report and the models in {out}"):
         kept = None if lake is None else keep(lake, answer, branch=branch)
-    if as_json:
-        as_written.pop("schema")
-        if kept is not None:
-            as_written["artifacts"] = {
-                "measurement": kept.measurement, "models": list(kept.models), "existing": kept.existing
-            }  # fmt: skip
-        document("verdict", as_written)
-    else:
-        click.echo(words)
+    if kept is not None:
+        as_written["artifacts"] = {
+            "measurement": kept.measurement, "models": list(kept.models), "existing": kept.existing
+        }  # fmt: skip
     if kept is not None and kept.existing:
         say(f"the lake has this measurement already: {kept.measurement}")
     elif kept is not None:
@@ -50,3 +89,4 @@ def deliver(answer: Answer, words: str, *, out: Path, lake: Lake | None, branch:
         for model, identity in zip(answer.models, kept.models, strict=True):
             say(f"model {identity} {model.name}")
     say(f"wrote {', '.join(str(out / file) for file in FILES[: 2 + len(answer.models)])}")
+    return as_written

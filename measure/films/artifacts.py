@@ -10,6 +10,7 @@ from measure.closing.artifacts import Answer
 from measure.closing.models import NamedModel, acting
 from measure.films.page import page
 from measure.films.run import Outcome
+from measure.films.words import words
 from measure.verdict.record import Verdict
 
 ANSWER = 2
@@ -35,5 +36,6 @@ def answer_of(
     }  # fmt: skip
     return Answer(
         name=name, verdict=verdict, models=models, effects=acting(verdict)[:1], findings=outcome.findings,
-        page=page(verdict, outcome), recipe=recipe, parents=parents, seed=outcome.options.calibration.seed,
+        page=page(verdict, outcome), words=words(verdict), recipe=recipe, parents=parents,
+        seed=outcome.options.calibration.seed,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""`flagdata close-loop` on films with logs and on tables of observables: read, judged, written."""
+"""`flagdata close-loop` on films with logs and on tables of observables: read and judged."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import os
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from flagdata.caches import user_cache
 from flagdata.console import progress, say
@@ -20,8 +19,8 @@ from measure.calibrate.observed import Observed
 from measure.calibrate.prior import AZIMUTH, ELEVATION
 from measure.calibrate.simulation import Flag
 from measure.calibrate.workload import announced
+from measure.closing.artifacts import Answer
 from measure.closing.command_line import stage_bars
-from measure.closing.output import deliver
 from measure.closing.sources import distinct
 from measure.estimate.similarity import parse_size
 from measure.estimate.source import Reading, box_of
@@ -31,7 +30,6 @@ from measure.films.design import PAIRS, TOGETHER, lasting
 from measure.films.library import weighable
 from measure.films.models import models
 from measure.films.run import Options, solve, verdict_of
-from measure.films.words import words
 from measure.verdict.criteria import CRITERIA
 
 _RELATIVE = 0.01
@@ -45,18 +43,15 @@ def close_films(
     lake: Lake | None,
     branch: str,
     name: str | None,
-    out: Path,
     level: float | None,
     nulls: int | None,
     seed: int,
     workers: int | None,
-    as_json: bool,
-) -> None:
-    """Judge recordings of one flag, and write what came out.
+) -> Answer:
+    """Judge recordings of one flag.
 
     Args:
         nulls: kinds of numerics.
-        out: folder that the answer goes to, which was found to be free.
 
     Raises:
         FlagdataError: sources that cannot be judged; nothing is written then.
@@ -92,11 +87,10 @@ def close_films(
     )  # fmt: skip
     verdict = replace(verdict_of(outcome), seconds=time.monotonic() - begun)
     called = name or recordings[0].name
-    answer = answer_of(
+    return answer_of(
         verdict, outcome, name=called, models=models(verdict, outcome, name=called), reading=reading.recipe(),
         parents=parents,
     )  # fmt: skip
-    deliver(answer, words(verdict), out=out, lake=lake, branch=branch, as_json=as_json)
 
 
 def workload(recordings: Sequence[Observed], options: Options) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from flagdata.addresses import local_path
-from flagdata.errors import UsageError
 from flagdata.lake import Lake
 from flagdata.lake.naming import COLUMNS, meant
 from flagdata.sources import FILMED
@@ -16,23 +15,23 @@ from measure.observables import OBSERVABLES
 _DESCRIPTIONS = (".toml", ".json")
 
 
-def all_films(sources: Sequence[str], *, lake: Lake | None, at: str, sized: bool = False) -> bool:
-    """Whether they are films or tables of observables, not markers and meshes.
+def films_among(
+    sources: Sequence[str], *, lake: Lake | None, at: str, sized: bool = False, tracked: bool = False
+) -> tuple[str, ...]:
+    """Those that are films or tables of observables, not markers and meshes.
 
     Args:
-        sized: whether a flag's size is given, which films need: then what cannot be found was meant as one.
+        sized: whether a flag's size is given, which films need: then what cannot be found was meant as one, if nothing
+            else was.
+        tracked: whether there are recordings of markers beside the sources.
 
     Raises:
-        UsageError: some are and some are not.
         FlagdataError: a table that cannot be read.
     """
-    found = {source: is_film(source, lake=lake, at=at, otherwise=sized) for source in sources}
-    if len(set(found.values())) > 1:
-        films = ", ".join(source for source, own in found.items() if own)
-        raise UsageError(
-            f"{films} beside recordings of markers", where="SOURCE", fix="judge films and markers each by themselves"
-        )
-    return any(found.values())
+    found = {source: is_film(source, lake=lake, at=at) for source in sources}
+    if sized and not tracked and not any(found.values()):
+        found = {source: is_film(source, lake=lake, at=at, otherwise=True) for source in sources}
+    return tuple(source for source, own in found.items() if own)
 
 
 def is_film(source: str, *, lake: Lake | None, at: str, otherwise: bool = False) -> bool:

@@ -32,9 +32,9 @@ _INFINITE = {"Infinity": math.inf, "-Infinity": -math.inf}
 
 def as_document(verdict: Verdict) -> dict[str, Any]:
     """The verdict as JSON values, with its schema tag."""
-    content = _plain({**verdict.as_dict(), "residuals": ()})
+    content = plain({**verdict.as_dict(), "residuals": ()})
     content["residuals"] = [
-        {**_plain({**own, **dict.fromkeys(_MOVING)}), **{name: _packed(own[name]) for name in _MOVING}}
+        {**plain({**own, **dict.fromkeys(_MOVING)}), **{name: _packed(own[name]) for name in _MOVING}}
         for own in map(dataclasses.asdict, verdict.residuals)
     ]
     return content
@@ -62,7 +62,8 @@ def _current(candidate: Any) -> Any:
     return {"heterogeneity" if name == "steady" else name: value for name, value in candidate.items()}
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Values as JSON has them."""
     if isinstance(value, StrEnum):
         return value.value
     if isinstance(value, float):
@@ -70,8 +71,8 @@ def _plain(value: Any) -> Any:
             return None
         return value if math.isfinite(value) else ("Infinity" if value > 0 else "-Infinity")
     if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
-    return [_plain(v) for v in value] if isinstance(value, list | tuple) else value
+        return {str(k): plain(v) for k, v in value.items()}
+    return [plain(v) for v in value] if isinstance(value, list | tuple) else value
 
 
 def _packed(frames: _Moving) -> dict[str, Any]:

@@ -23,22 +23,14 @@ from measure.closing.command import with_warnings
 from measure.closing.sources import Reading, read
 from measure.observe import Setup, Up
 from measure.verdict.record import Conclusion
-from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, flag
+from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, write_tracks
 from tests.measure.report.verdicts import Size, verdict
 
 
 @pytest.fixture(scope="module")
 def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two recordings of 40 frames in one table, z up, in metres."""
-    path = tmp_path_factory.mktemp("tracks") / "tracks.csv"
-    seen = flag(noise=0.5e-3, seed=1, seconds=2.2)
-    lines = ["recording,frame,marker,u,v,x,y,z"]
-    for name in ("calm", "brisk"):
-        for frame, at in enumerate(seen.positions[:40]):
-            for marker, ((u, v), (x, y, z)) in enumerate(zip(seen.markers, at, strict=True)):
-                lines.append(f"{name},{frame},m{marker},{u:.6f},{v:.6f},{x:.6f},{y:.6f},{z:.6f}")
-    path.write_text("\n".join(lines) + "\n")
-    return path
+    return write_tracks(tmp_path_factory.mktemp("tracks") / "tracks.csv", "calm", "brisk")
 
 
 def said(arguments: Sequence[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, dict]:

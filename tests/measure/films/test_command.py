@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,10 +16,15 @@ from flagdata.schema import Kind
 from measure.calibrate.simulation import OBSERVED
 from measure.closing.command import close_loop
 from measure.films import library
-from measure.films.sources import all_films
+from measure.films.sources import films_among
+from measure.loop.run import Options as LoopOptions
 from measure.observables.observable import WINDOW
+from measure.observe.trajectory import Experiment
+from measure.verdict.record import Conclusion, Estimate, Parameter, Verdict
 from sim.run.reading import load
 from tests.measure.films.conftest import EFFECTS, recording
+from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, write_tracks
+from tests.measure.report.verdicts import verdict
 
 
 def table(path: Path, *, mean: float, effects: Mapping[str, float] | None = None) -> Path:
@@ -106,18 +112,57 @@ def test_options_of_films_are_refused_beside_markers(tmp_path: Path) -> None:
     assert done.exception.where == "--flag-size"
 
 
-def test_films_and_markers_are_not_judged_together(tmp_path: Path) -> None:
-    markers = tmp_path / "tracks.csv"
-    markers.write_text("frame,marker,u,v,x,y,z\n0,a,0,0,0,0,0\n")
-    with pytest.raises(UsageError, match="beside recordings of markers"):
-        all_films([str(markers), str(table(tmp_path / "t.csv", mean=5.0))], lake=None, at="main")
+def test_films_and_markers_of_a_cloth_are_judged_together(
+    tmp_path: Path, cheap: list[int], few: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each at half of the level; one answer, and each kind's own beside it."""
+    levels: list[float] = []
+
+    def closed(experiment: Experiment, options: LoopOptions, *, stage: object) -> Verdict:
+        levels.append(options.level)
+        one = Estimate(value=1.0, low=0.8, high=1.2, unit="of nominal")
+        fitted = [Parameter(name=name, before=one, after=one, shift=0.0) for name in ("density", "bending", "damping")]
+        return replace(verdict(Conclusion.EFFECT), parameters=tuple(fitted))
+
+    monkeypatch.setattr("measure.closing.close.close_loop", closed)
+    effects = {"lift.coefficient": 6.0}
+    tables = [table(tmp_path / f"{mean}.csv", mean=mean, effects=effects) for mean in (4.0, 6.5)]
+    tracks = write_tracks(tmp_path / "tracks.csv", "calm", frames=110)
+    lake, out = tmp_path / "lake", tmp_path / "out"
+    Lake.create(lake)
+    done = run(
+        *tables, tracks, "--rate", str(RATE), "--wind", "5", "--size", f"{WIDTH}x{HEIGHT}",
+        "--material", "white-dots-on-blk", "--pins", "hoist",
+        "--flag-size", "1.5x1.0", "--azimuth", "70±7", "--simulations", "64", "--lake", lake, "--out", out, "--json",
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    joint = json.loads(done.stdout)
+    assert joint["schema"] == "flagdata.joint-verdict/1"
+    assert levels == [0.025]
+    assert joint["films"]["test"]["level"] == 0.025
+    assert joint["named"] == ["lift"]
+    smaller = min(joint[kind]["test"]["p_value"]["value"] for kind in ("markers", "films"))
+    assert joint["p_value"] == pytest.approx(2 * smaller)
+    assert {path.name for path in out.iterdir()} == {"report.html", "verdict.json", "markers", "films"}
+    for kind in ("markers", "films"):
+        assert (out / kind / "report.html").exists()
+        assert f'href="{kind}/report.html"' in (out / "report.html").read_text()
+    kept = Lake.open(lake).rows({"kind": "measurement"}).num_rows
+    assert kept == 2
+
+
+def test_a_number_of_nulls_is_refused_beside_both_kinds(tmp_path: Path) -> None:
+    tracks = write_tracks(tmp_path / "tracks.csv", "calm")
+    done = run(tracks, table(tmp_path / "t.csv", mean=5.0), "--nulls", "200", "--out", tmp_path / "out")
+    assert isinstance(done.exception, UsageError)
+    assert done.exception.where == "--nulls"
 
 
 def test_a_video_counts_as_a_film_and_a_recipe_does_not(tmp_path: Path) -> None:
     for name in ("flag.mp4", "flag.toml"):
         (tmp_path / name).write_bytes(b"no film")
-    assert all_films([str(tmp_path / "flag.mp4")], lake=None, at="main")
-    assert not all_films([str(tmp_path / "flag.toml")], lake=None, at="main")
+    both = [str(tmp_path / name) for name in ("flag.mp4", "flag.toml")]
+    assert films_among(both, lake=None, at="main") == (both[0],)
 
 
 def test_recordings_of_a_lake_are_films_and_its_markers_are_not(tmp_path: Path) -> None:
@@ -125,10 +170,9 @@ def test_recordings_of_a_lake_are_films_and_its_markers_are_not(tmp_path: Path) 
     with lake.transaction("three") as transaction:
         for name, kind in (("calm", Kind.RECORDING), ("tracked", Kind.MARKERS)):
             transaction.add(Artifact(kind=kind, name=name, parents=(), recipe={"name": name}, seed=0))
-    assert all_films(["calm"], lake=lake, at="main")
-    assert not all_films(["tracked"], lake=lake, at="main", sized=True)
-    with pytest.raises(UsageError, match="calm beside recordings of markers"):
-        all_films(["calm", "tracked"], lake=lake, at="main")
+    assert films_among(["calm", "tracked"], lake=lake, at="main") == ("calm",)
+    assert films_among(["tracked"], lake=lake, at="main", sized=True) == ()
+    assert films_among(["absent"], lake=lake, at="main", sized=True) == ("absent",)
 
 
 def test_a_recording_that_is_not_there_is_named(tmp_path: Path) -> None:

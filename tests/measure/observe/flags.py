@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,3 +50,15 @@ def flag(*, seconds: float = 4.0, noise: float = 0.0, seed: int = 0, name: str =
     positions = flutter(rest, times)
     positions = positions + noise * np.random.default_rng(seed).standard_normal(positions.shape)
     return Observation(name=name, markers=rest, positions=positions, times=times, known=Known(wind=WIND))
+
+
+def write_tracks(path: Path, *names: str, frames: int = 40) -> Path:
+    """A table of recordings of so many frames, z up, in metres."""
+    seen = flag(noise=0.5e-3, seed=1, seconds=2.2)
+    lines = ["recording,frame,marker,u,v,x,y,z"]
+    for name in names:
+        for frame, at in enumerate(seen.positions[:frames]):
+            for marker, ((u, v), (x, y, z)) in enumerate(zip(seen.markers, at, strict=True)):
+                lines.append(f"{name},{frame},m{marker},{u:.6f},{v:.6f},{x:.6f},{y:.6f},{z:.6f}")
+    path.write_text("\n".join(lines) + "\n")
+    return path
