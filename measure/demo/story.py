@@ -85,7 +85,7 @@ def weighing_step(shell: Transcript, made: Recording, truths: list[Truth]) -> No
     truths.append(
         Truth(
             what="area weight, by the model without it", true=f"{made.area_weight:.3f} kg/m²",
-            found=_first(step.found), right=_holds(step.found, made.area_weight),
+            found=_first(step.found), right=_contained(step.found, made.area_weight),
         )
     )  # fmt: skip
 
@@ -231,7 +231,7 @@ def _measured(shell: Transcript, made: Recording, truths: list[Truth]) -> None:
         if printed is not None:
             step.picture = _series(shell.folder / "lake", made)
     true = f"{_during(made).mean():.2f} m/s"
-    right = _holds(step.found, float(_during(made).mean()))
+    right = _contained(step.found, float(_during(made).mean()))
     truths.append(Truth(what="mean wind at the flag", true=true, found=_first(step.found), right=right))
 
 
@@ -276,8 +276,8 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def _holds(found: str, true: float) -> bool | None:
-    """Whether the first interval of a text holds a value; None where it has none."""
+def _contained(found: str, true: float) -> bool | None:
+    """Whether the first interval of a text contains a value; None where it has none."""
     ends = re.search(r"\[([\d.]+), ([\d.]+)\]", found)
     return None if ends is None else float(ends[1]) <= true <= float(ends[2])
 

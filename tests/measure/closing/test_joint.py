@@ -76,7 +76,7 @@ def test_likelihoods_are_multiplied() -> None:
 
 
 def test_an_error_that_both_share_is_not_averaged_out() -> None:
-    """Intervals of 90 % of both together hold the truth in as many of 4,000 draws."""
+    """Intervals of 90 % of both together contain the truth in as many of 4,000 draws."""
     rng, shared, own = np.random.default_rng(1), CRITERIA.strength_factor, (0.3, 0.6)
     held = 0
     for _ in range(4000):

@@ -89,8 +89,8 @@ def test_the_loop_is_closed_on_what_was_weighed_and_its_findings_are_judged_by_t
     ("wind 3.5 m/s [2.3, 5.0] 90 %; bending [9, 10]", 2.4, True), ("wind 3.5 m/s [2.3, 5.0] 90 %", 5.1, False),
     ("Refused: no flag", 3.0, None),
 ])  # fmt: skip
-def test_a_finding_is_right_if_its_interval_holds_the_truth(found: str, true: float, right: bool | None) -> None:
-    assert story._holds(found, true) is right
+def test_a_finding_is_right_if_its_interval_contains_the_truth(found: str, true: float, right: bool | None) -> None:
+    assert story._contained(found, true) is right
 
 
 def test_a_cloth_that_cannot_be_weighed_is_no_failure_of_the_demonstration(
