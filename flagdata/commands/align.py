@@ -49,9 +49,13 @@ def _clock_options(command: F) -> F:
             ),
             click.option(
                 "--response", type=float, metavar="S",
-                help="By how much the flag's motion follows the wind at the anemometer; 0.3 by default.",
+                help="By how much the flag's motion follows the wind at the anemometer; by default 3 m over the mean "
+                "wind, 0.3 to 1 s.",
             ),
-            click.option("--response-sigma", type=float, metavar="S", help="Its uncertainty; 0.15 by default."),
+            click.option(
+                "--response-sigma", type=float, metavar="S",
+                help="Its uncertainty; by default half of it, 0.4 at most, or 0.15 beside --response.",
+            ),
             click.option(
                 "--max-sigma", type=float, metavar="S", help="Refuse an estimate less certain; 0.5 by default."
             ),
@@ -172,13 +176,12 @@ def _options(
     search = LagSearch(
         centre=usual.centre if centre is None else centre,
         window=usual.window if window is None else window,
-        response=usual.response if response is None else response,
-        response_sigma=usual.response_sigma if response_sigma is None else response_sigma,
         sigma=usual.sigma if max_sigma is None else max_sigma,
     )
     return ClockOptions(
-        by=Method(by), offset=offset, offset_sigma=offset_sigma, search=None if search == usual else search
-    )
+        by=Method(by), offset=offset, offset_sigma=offset_sigma, search=None if search == usual else search,
+        response=response, response_sigma=response_sigma,
+    )  # fmt: skip
 
 
 def _run(
