@@ -103,7 +103,7 @@ class RecordingRecipe:
     """
 
     seed: int
-    duration: float = 150.0
+    duration: float = 180.0
     rate: int = 30
     columns: int = 20
     step: float = 2.5e-3
