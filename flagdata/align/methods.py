@@ -28,7 +28,7 @@ from flagdata.timebase import NANOSECONDS
 Progress = Callable[[int], object]
 _PASSED = 3.0  # m of air, about twice the length of the flags that people film
 _QUICKEST, _SLOWEST = 0.3, 1.0  # s
-_UNCERTAIN = 0.4  # s; beyond it no estimate would be certain enough
+_UNCERTAIN = 0.3  # s; beyond it few estimates would be certain enough
 
 
 class Method(StrEnum):

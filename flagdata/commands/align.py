@@ -54,7 +54,7 @@ def _clock_options(command: F) -> F:
             ),
             click.option(
                 "--response-sigma", type=float, metavar="S",
-                help="Its uncertainty; by default half of it, 0.4 at most, or 0.15 beside --response.",
+                help="Its uncertainty; by default half of it, 0.3 at most, or 0.15 beside --response.",
             ),
             click.option(
                 "--max-sigma", type=float, metavar="S", help="Refuse an estimate less certain; 0.5 by default."

@@ -76,9 +76,10 @@ class Acting:
 
 
 HIDDEN = (
-    Acting(effect="tangential-linear-drag", parameter="coefficient", strength=0.2),
+    Acting(effect="hem-mass", parameter="line_density", strength=0.06),
 )  # fmt: skip
-"""Of which the seed draws one."""
+"""Of which the seed draws one: a rope in the hem weighs as much as the cloth. The flag moves more in stronger wind
+all the same, so that its motion shows how the clocks differ."""
 
 
 @dataclass(frozen=True, kw_only=True)
