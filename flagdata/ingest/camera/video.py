@@ -39,6 +39,7 @@ from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import Timing
 
+_GOPRO = "GoPro MET"  # handler of the track with GPMF, as GoPro's cameras name it
 _FARTHEST = 1000  # frames decoded in vain to reach a place between key frames
 
 
@@ -134,6 +135,15 @@ class VideoSource:
                     kind="more-video-streams", severity=Severity.NOTE,
                     what=f"stream {self._stream.index} was taken, {others} other video streams were not", count=others,
                     fix="choose another with --stream",
+                )
+            )  # fmt: skip
+        if any(stream.metadata.get("handler_name", "").strip() == _GOPRO for stream in self._container.streams.data):
+            found.append(
+                Finding(
+                    kind="telemetry-not-read", severity=Severity.NOTE,
+                    what="the file has a track of GoPro's telemetry (GPMF), whose GPS time is not read: no library that"
+                    " reads it is maintained; the start is the camera's own clock",
+                    fix="if that clock was not set, give --start, read from the track by the camera's own software",
                 )
             )  # fmt: skip
         return found
