@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from sim.cloth import Cloth
-from sim.effects.effect import ForceEffect
+from sim.effects.effect import ForceEffect, InapplicableError
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 from sim.effects.quantities import AIR_DENSITY, AirDensity
 from sim.effects.reactive_loading import momentum_rates
@@ -91,6 +91,11 @@ class FiniteSpanLoading(ForceEffect):
         return -size.unsqueeze(1) * mean_normals(cloth, position)
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
+        if not (np.abs(2 * angles(system.cloth.mesh)[1] / np.pi - 1) < 0.99).any():
+            raise InapplicableError(
+                "the cloth has no vertex between its two free edges, over which the load falls to nothing",
+                where="effects.finite-span-loading", fix="give a mesh of two or more rows of cells",
+            )  # fmt: skip
         return super().apply(replace(system, loads=(*system.loads, self)), state)
 
     def given(self, cloth: Cloth) -> Given:

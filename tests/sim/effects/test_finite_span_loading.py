@@ -9,8 +9,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import k0, k1
 
-from sim.effects.finite_span_loading import cosines, profile_over_height, relative_masses, strip_mass
+from sim.effects import apply
+from sim.effects.effect import InapplicableError
+from sim.effects.finite_span_loading import FiniteSpanLoading, cosines, profile_over_height, relative_masses, strip_mass
+from sim.material import named
 from sim.mesh import grid
+from sim.scene import assemble, flag
 
 
 def potential_flow(wavenumber: float, *, panels: int = 80) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
@@ -61,3 +65,9 @@ def test_a_wave_that_the_cells_resolve_has_its_own_mass_and_one_that_they_do_not
     coarse = relative_masses(grid(width=1.5, height=1.0, columns=6, rows=4))
     assert coarse[11] == 0
     assert coarse[1] > 0
+
+
+def test_a_strip_of_one_row_of_cells_is_refused() -> None:
+    system, state = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4.0, height=0.05, columns=30)])
+    with pytest.raises(InapplicableError, match="no vertex between"):
+        apply([FiniteSpanLoading(share=0.5)], system, state)
