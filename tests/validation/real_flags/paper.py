@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -32,7 +33,9 @@ from sim.material import isotropic
 from sim.mesh import grid
 from sim.scene import Scene, assemble
 from tests.validation.flags_runs import one_core
+from tests.validation.paper_flag.cached import cached
 from tests.validation.paper_flag.recipe import Case, Group
+from tests.validation.real_flags import waves as waves_module
 from tests.validation.real_flags.waves import waves
 
 _MEASURED = Path(__file__).parents[3] / "docs" / "results" / "validate-paper-flag.json"
@@ -60,6 +63,13 @@ class Sheet:
     rows: int = 10
     stretching: float = 100.0
     safety: float = 0.7
+
+
+VARIANTS = {
+    "12 × 8 cells": Sheet(columns=12, rows=8),
+    "27 × 14 cells": Sheet(columns=27, rows=14),
+    "steps × 0.71": Sheet(safety=0.5),
+}
 
 
 def frequencies(case: Case, shares: Sequence[float], speeds: Sequence[float], how: Sheet) -> NDArray[np.float64]:
@@ -146,9 +156,15 @@ def fitted(table: NDArray[np.float64], shares: Sequence[float]) -> Model:
                 best = (badness, share, float(factor))
     if best is None:
         return Model(share=shares[0], factor=math.nan, errors={n: (math.nan, c[2]) for n, c in clips.items()})
-    _, share, factor = best
+    return predicted(table, *best[1:])
+
+
+def predicted(table: NDArray[np.float64], share: float, factor: float) -> Model:
+    """A model's errors at all clips, of a table as `fitted` takes it."""
     row = _at(table, share)
-    errors = {name: (math.expm1(_miss(row, factor, speed, hz)), group) for name, (speed, hz, group) in clips.items()}
+    errors = {
+        name: (math.expm1(_miss(row, factor, speed, hz)), group) for name, (speed, hz, group) in measured().items()
+    }
     return Model(share=share, factor=factor, errors=errors)
 
 
@@ -161,12 +177,46 @@ def _miss(row: NDArray[np.float64], factor: float, speed: float, hz: float) -> f
     return math.log(float(np.interp(factor * speed, SPEEDS, row, left=math.nan, right=math.nan)) / hz)
 
 
-def inputs(case: Case, how: Sheet) -> dict[str, object]:
-    """What shapes the table."""
-    return {
-        "sheet": asdict(case.sheet),
-        "density": case.density,
-        "how": asdict(how),
-        "shares": SHARES,
-        "speeds": SPEEDS,
-    }
+@dataclass(frozen=True, kw_only=True)
+class Paper:
+    """What the page says of the paper flag.
+
+    Attributes:
+        base: errors of the model without the effect at half the tunnel's speed, clip → (error, group).
+        found, free: see the module's head.
+        numerics: variant → largest relative change of the free model's frequencies at the clips held out.
+    """
+
+    base: Model
+    found: Model
+    free: Model
+    numerics: dict[str, float]
+
+
+def study(case: Case, share: float, keep: Path | None) -> Paper:
+    """Both models and their numerics.
+
+    Args:
+        case: the sheet and its clips.
+        share: of real flags.
+        keep: folder of intermediate results.
+    """
+
+    def simulated(shares: Sequence[float], speeds: Sequence[float], how: Sheet) -> NDArray[np.float64]:
+        given = {
+            "sheet": asdict(case.sheet), "density": case.density, "run": asdict(case.run), "how": asdict(how),
+            "shares": list(shares), "speeds": list(speeds), "aspect": ASPECT,
+        }  # fmt: skip
+        method = (sys.modules[__name__], waves_module)
+        return cached(keep, given, method, lambda: {"hz": frequencies(case, shares, speeds, how)})["hz"]
+
+    pairs = [(one, speed) for one in SHARES for speed in SPEEDS]
+    table = simulated([one for one, _ in pairs], [speed for _, speed in pairs], Sheet()).reshape(len(SHARES), -1)
+    free = fitted(table, np.linspace(SHARES[1], SHARES[-1], 81).tolist())
+    speeds = [free.factor * speed for speed, _, group in measured().values() if group == Group.HELD_OUT.value]
+    shares = [free.share] * len(speeds)
+    reference, *others = (simulated(shares, speeds, how) for how in (Sheet(), *VARIANTS.values()))
+    return Paper(
+        base=predicted(table, 0.0, 0.5), found=fitted(table, [share]), free=free,
+        numerics={name: float(np.abs(hz / reference - 1).max()) for name, hz in zip(VARIANTS, others, strict=True)},
+    )  # fmt: skip

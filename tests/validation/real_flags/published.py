@@ -81,13 +81,13 @@ def _of(flags: tuple[Flag, ...], band: Callable[[Flag], tuple[float, float]]) ->
 
 
 def _speed_of_droop(values: NDArray[np.float64]) -> list[float]:
-    """The wind [m/s] at which the droop is 45°, by density, linear in its logarithm; NaN beyond those simulated."""
+    """The wind [m/s] at which the droop is 45°, by density; the slowest simulated where it is less there."""
     column = READINGS.index("droop")
     found = []
     for density in DENSITIES:
         rows = [i for i, flag in enumerate(FLAGS) if flag.density == density]
         droops, winds = values[rows, column], np.log(SPEEDS)
-        found.append(float(np.exp(np.interp(-math.pi / 4, -droops, winds, left=np.nan, right=np.nan))))
+        found.append(float(np.exp(np.interp(-math.pi / 4, -droops, winds))))
     return found
 
 
@@ -168,7 +168,8 @@ PUBLISHED = (
         predicted=_amplitude_exponents, bands={f"{u:g} m/s": (0.3, 0.7) for u in (6.0, 10.0)},
     ),
     Published(
-        name="droop-45", quantity="wind at 45° droop", unit="m/s", role=Role.JUDGE, predicted=_speed_of_droop,
+        name="droop-45", quantity="wind at 45° droop, 2.5 or less at 2.5", unit="m/s", role=Role.JUDGE,
+        predicted=_speed_of_droop,
         condition="a light flag, weight unknown", source="meteorologists' rules and Beaufort 3; soldiers say 5.0 m/s",
         sure="lay rules", bands=dict.fromkeys(_BY_DENSITY, (3.6, 5.4)),
     ),

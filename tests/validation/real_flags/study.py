@@ -1,7 +1,7 @@
 """The base model and candidates beside the published numbers: readings, their errors, a fit on some, the others judged.
 
 The error of a prediction is made of two parts, added in squares: the standard error over starts, and the largest change
-by another mesh (12 or 27 cells along the length for 18), another step (0.9 or 0.5 of the stability limit for 0.7), each
+by another mesh (18 or 42 cells along the length for 30), another step (0.9 or 0.5 of the stability limit for 0.7), each
 less what starts alone would change. Numerics are varied at `PROBED`, and a reading's largest relative change there
 counts for all flags.
 """
@@ -33,12 +33,12 @@ CANDIDATES: Mapping[str, tuple[str, tuple[float, ...]]] = {
 }
 """Effect → its strength, and the values at which it is simulated beside 0, the base model. The first is the one that
 the waves ask for; the others are wrong-effect controls with the same freedom."""
-TWO, _FOUR = Numerics(starts=2), Numerics(starts=4)
+TWO, _FOUR = Numerics(columns=30, starts=2), Numerics(columns=30, starts=4)
 PROBED = tuple(flag for flag in STREAMING if flag.speed == 10)
 VARIANTS: Mapping[str, Numerics] = {
     "as in the table": _FOUR,
-    "12 cells along": replace(_FOUR, columns=12),
-    "27 cells along": replace(_FOUR, columns=27),
+    "18 cells along": replace(_FOUR, columns=18),
+    "42 cells along": replace(_FOUR, columns=42),
     "steps × 1.29": replace(_FOUR, safety=0.9),
     "steps × 0.71": replace(_FOUR, safety=0.5),
 }
@@ -126,8 +126,8 @@ def on_all(values: Values) -> Values:
 
 
 def scatter(values: Values) -> Values:
-    """(reading,) relative standard deviation between starts, of all flags (flag, start, reading) together."""
-    return np.sqrt((values.var(1, ddof=1) / values.mean(1) ** 2).mean(0))
+    """(reading,) relative standard deviation between starts, of all flags (flag, start, reading) that show it."""
+    return np.sqrt(np.nanmean(values.var(1, ddof=1) / values.mean(1) ** 2, axis=0))
 
 
 def numerical_error(probed: Sequence[Values]) -> Values:
@@ -145,14 +145,16 @@ def numerical_error(probed: Sequence[Values]) -> Values:
     return largest
 
 
+def misfit(one: Published, values: Values) -> Values:
+    """(band,) what predictions are off the middle of their bands by, in halves of the width."""
+    low, high = np.array(list(one.bands.values())).T
+    predicted = [] if one.predicted is None else one.predicted(values)
+    return (np.array(predicted) - (low + high) / 2) / ((high - low) / 2)
+
+
 def misfits(values: Values, role: Role) -> Values:
-    """What predictions are off the middle of their bands by, in halves of the width: all bands of a role."""
-    found = []
-    for one in PUBLISHED:
-        if one.role is role and one.predicted is not None:
-            for prediction, (low, high) in zip(one.predicted(values), one.bands.values(), strict=True):
-                found.append((prediction - (low + high) / 2) / ((high - low) / 2))
-    return np.array(found)
+    """The same of all numbers of a role that are comparable, one after the other."""
+    return np.concatenate([misfit(one, values) for one in PUBLISHED if one.role is role and one.predicted is not None])
 
 
 def fitted(name: str, grid: Values, tables: Values) -> Fit:
@@ -204,9 +206,9 @@ def with_errors(one: Published, predictions: Predictions) -> list[tuple[float, f
         return []
     middle = np.array(one.predicted(predictions.mean))
     variance = np.zeros(len(middle))
-    for flag, reading in np.ndindex(predictions.mean.shape):
+    for flag, reading in np.argwhere(np.isfinite(predictions.mean)):
         moved = predictions.mean.copy()
         moved[flag, reading] += predictions.error[flag, reading]
         change = np.array(one.predicted(moved)) - middle
-        variance += np.where(np.isfinite(change), change, 0.0) ** 2
+        variance += change**2
     return list(zip(middle.tolist(), np.sqrt(variance).tolist(), strict=True))

@@ -7,6 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from tests.validation.paper_flag.recipe import Group
+from tests.validation.real_flags import paper
 from tests.validation.real_flags.published import FLAGS, PUBLISHED, Role, code_drag
 from tests.validation.real_flags.runs import READINGS, Flag, read
 from tests.validation.real_flags.study import (
@@ -101,3 +103,21 @@ def test_the_error_of_a_derived_number_is_that_of_its_readings() -> None:
     (first, error), _ = with_errors(one, Predictions(mean=values, error=0.03 * values, changes={}))
     assert first == pytest.approx(2)
     assert error == pytest.approx(0.03 * math.sqrt(2) / math.log(10 / 6), rel=0.03)
+
+
+def test_the_paper_flags_share_and_factor_are_those_of_made_frequencies(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Frequencies of 2 (1 + share) Hz for each m/s at the sheet, measured at a factor of 0.55 with a share of 0.5."""
+    clips = {f"clip-{u}": (u, 3.0 * 0.55 * u, "fit" if u < 10 else "held-out") for u in (7.0, 8.0, 9.0, 11.0, 12.0)}
+    monkeypatch.setattr(paper, "measured", lambda: clips)
+    rows = np.array([[2 * (1 + share) * speed for speed in paper.SPEEDS] for share in paper.SHARES])
+    known = paper.fitted(rows, [0.5])
+    assert known.factor == pytest.approx(0.55, abs=0.002)
+    assert known.within(Group.HELD_OUT, 0.01) == (2, 2)
+    assert paper.predicted(rows, 0.0, 0.55).errors["clip-12.0"][0] == pytest.approx(-1 / 3, abs=1e-6)
+
+
+def test_a_paper_flag_that_does_not_flutter_has_no_factor(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(paper, "measured", lambda: {"clip": (8.0, 12.0, "fit")})
+    still = paper.fitted(np.full((len(paper.SHARES), len(paper.SPEEDS)), np.nan), [0.3])
+    assert math.isnan(still.factor)
+    assert still.within(Group.FIT, 0.07) == (0, 1)

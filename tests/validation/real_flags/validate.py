@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
+from tests.validation.paper_flag.recipe import load_case
 from tests.validation.real_flags.page import page, picture
+from tests.validation.real_flags.paper import study
 from tests.validation.real_flags.published import PUBLISHED, STREAMING
 from tests.validation.real_flags.study import CANDIDATES, NAMED, TWO, Bench, judged, on_all, with_errors
 
 KEEP = Path(__file__).parents[3] / "out" / "real-flags"
+
+
+def known(value: float) -> float | None:
+    """As JSON has it: None where there is none."""
+    return value if math.isfinite(value) else None
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
@@ -19,15 +27,16 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     controls = [bench.fit(name) for name in CANDIDATES if name != NAMED]
     base, after = bench.predictions({}), bench.predictions(fit.effects)
     unfitted = on_all(bench.run(STREAMING, {}, TWO).mean(1))
+    paper = study(load_case(), fit.strength, KEEP)
     folder = out.parent / "cases"
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "real-flags.md").write_text(page(base, after, fit, controls, unfitted), encoding="utf-8")
+    (folder / "real-flags.md").write_text(page(base, after, fit, controls, unfitted, paper), encoding="utf-8")
     picture(base, after, folder / "real-flags.png")
     numbers = [
         {
             "name": one.name, "of": name, "band": list(band), "role": one.role.value,
-            "base": first[0], "base_error": first[1], "base_verdict": judged(*first, band),
-            "after": second[0], "after_error": second[1], "after_verdict": judged(*second, band),
+            "base": known(first[0]), "base_error": known(first[1]), "base_verdict": judged(*first, band),
+            "after": known(second[0]), "after_error": known(second[1]), "after_verdict": judged(*second, band),
         }
         for one in PUBLISHED
         for (name, band), first, second in zip(
@@ -38,4 +47,13 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     return {
         "fits": [{"effect": one.name, "strength": one.strength, "refits": list(one.interval)} for one in fits],
         "numbers": numbers,
+        "paper_flag": {
+            name: {
+                "share": model.share,
+                "factor": known(model.factor),
+                "errors": {n: known(e) for n, (e, _) in model.errors.items()},
+            }
+            for name, model in (("base", paper.base), ("found", paper.found), ("free", paper.free))
+        }
+        | {"numerics": paper.numerics},
     }
