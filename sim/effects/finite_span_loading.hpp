@@ -1,7 +1,7 @@
 #include "effect.hpp"
 
 struct FiniteSpanLoading {
-  static constexpr int ALONG = 12, ACROSS = 5;  // modes, as in finite_span_loading.py
+  static constexpr int ALONG = 10, ACROSS = 4;  // modes, as in finite_span_loading.py
 
   // What the modes of a vertex are: cosines by Chebyshev's recurrence.
   template <typename V, int N>

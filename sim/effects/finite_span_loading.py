@@ -46,7 +46,7 @@ from sim.mesh import Mesh
 from sim.state import State
 from sim.system import System
 
-_ALONG, _ACROSS = 12, 5
+_ALONG, _ACROSS = 10, 4
 """Modes along the cloth and over its height, at most; as in the C++."""
 
 

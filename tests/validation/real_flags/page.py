@@ -139,8 +139,9 @@ def _paper(paper: Paper) -> list[str]:
     ]
     about = (
         "The paper flag of the tunnel (`python -m tests.validation paper-flag`), as a sheet of 138.5 × 97 mm clamped "
-        "along its hoist; the height is 0.7 of the length, by a figure of the authors. The speed at the sheet is a factor "
-        "s of the tunnel's, a nuisance between 0.4 and 0.7. Frequencies, predicted over measured less 1, of the base "
+        "along its hoist; the height is 0.7 of the length, by a figure of the authors. The speed at the sheet is a "
+        "factor s of the tunnel's, a nuisance between 0.4 and 0.7. Frequencies, predicted over measured less 1, of the "
+        "base "
         f"model at s = 0.5; with the share of real flags, {paper.found.share:.2f}, and s = {paper.found.factor:.2f} "
         f'fitted to the group "fit"; and with both fitted to it, {paper.free.share:.2f} and {paper.free.factor:.2f}.\n'
     )
