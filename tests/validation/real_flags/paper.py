@@ -17,7 +17,7 @@ import json
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,17 +32,22 @@ from sim.integrate.symplectic import Symplectic
 from sim.material import isotropic
 from sim.mesh import grid
 from sim.scene import Scene, assemble
+from tests.evidence import REFERENCE
 from tests.validation.flags_runs import one_core
 from tests.validation.paper_flag.cached import cached
 from tests.validation.paper_flag.recipe import Case, Group
+from tests.validation.paper_flag.thresholds import speeds_by_length
 from tests.validation.real_flags import waves as waves_module
 from tests.validation.real_flags.waves import waves
 
 _MEASURED = Path(__file__).parents[3] / "docs" / "results" / "validate-paper-flag.json"
-ASPECT = 0.7
+HEIGHT = 0.7 * 0.1385
+"""Of the sheets [m]."""
 SHARES = (0.0, 0.2, 0.3, 0.5, 0.75, 1.0)
 SPEEDS = (3.0, 3.5, 4.0, 4.5, 5.0, 5.5, 6.0, 6.5, 7.0, 8.0, 9.0)
 FACTORS = np.linspace(0.4, 0.7, 121)
+STOPS = np.array([0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.3])
+"""Shares of the measured stop speed at which sheets of other lengths are simulated."""
 _RATE = 500.0
 _SETTLE, _KEPT = 0.8, 0.6
 _STILL = 0.01
@@ -74,7 +79,7 @@ VARIANTS = {
 
 def frequencies(case: Case, shares: Sequence[float], speeds: Sequence[float], how: Sheet) -> NDArray[np.float64]:
     """(member,) [Hz] of a share and a speed at the sheet [m/s] each; NaN without flutter or after divergence."""
-    length, height = case.sheet.length, ASPECT * case.sheet.length
+    length, height = case.sheet.length, HEIGHT
     cell = length / (how.columns - 0.5)
     mesh = grid(width=cell * how.columns, height=height, columns=how.columns, rows=how.rows)
     x = mesh.rest[:, 0] - cell / 2
@@ -132,6 +137,13 @@ class Model:
         return sum(abs(error) < bound for error in errors), len(errors)
 
 
+def stop(hz: NDArray[np.float64]) -> float:
+    """Share of the measured stop speed, of `STOPS`, midway below the least from which on all flutter; NaN for none."""
+    still = np.flatnonzero(~np.isfinite(hz))
+    first = int(still[-1]) + 1 if len(still) else 0
+    return float(STOPS[first - 1 : first + 1].mean()) if 0 < first < len(STOPS) else math.nan
+
+
 def measured() -> dict[str, tuple[float, float, str]]:
     """Clip → (tunnel speed [m/s], frequency [Hz], group)."""
     clips = json.loads(_MEASURED.read_text(encoding="utf-8"))["result"]["clips"]
@@ -185,12 +197,15 @@ class Paper:
         base: errors of the model without the effect at half the tunnel's speed, clip → (error, group).
         found, free: see the module's head.
         numerics: variant → largest relative change of the free model's frequencies at the clips held out.
+        stops: length [m] → (measured, predicted by the free model) tunnel speed at which flutter stops [m/s]; empty
+            where the tables are absent. No length was fitted to.
     """
 
     base: Model
     found: Model
     free: Model
     numerics: dict[str, float]
+    stops: dict[float, tuple[float, float]]
 
 
 def study(case: Case, share: float, keep: Path | None) -> Paper:
@@ -202,13 +217,13 @@ def study(case: Case, share: float, keep: Path | None) -> Paper:
         keep: folder of intermediate results.
     """
 
-    def simulated(shares: Sequence[float], speeds: Sequence[float], how: Sheet) -> NDArray[np.float64]:
+    def simulated(shares: Sequence[float], speeds: Sequence[float], how: Sheet, of: Case = case) -> NDArray[np.float64]:
         given = {
-            "sheet": asdict(case.sheet), "density": case.density, "run": asdict(case.run), "how": asdict(how),
-            "shares": list(shares), "speeds": list(speeds), "aspect": ASPECT,
+            "sheet": asdict(of.sheet), "density": of.density, "run": asdict(of.run), "how": asdict(how),
+            "shares": list(shares), "speeds": list(speeds), "height": HEIGHT,
         }  # fmt: skip
         method = (sys.modules[__name__], waves_module)
-        return cached(keep, given, method, lambda: {"hz": frequencies(case, shares, speeds, how)})["hz"]
+        return cached(keep, given, method, lambda: {"hz": frequencies(of, shares, speeds, how)})["hz"]
 
     pairs = [(one, speed) for one in SHARES for speed in SPEEDS]
     table = simulated([one for one, _ in pairs], [speed for _, speed in pairs], Sheet()).reshape(len(SHARES), -1)
@@ -216,7 +231,12 @@ def study(case: Case, share: float, keep: Path | None) -> Paper:
     speeds = [free.factor * speed for speed, _, group in measured().values() if group == Group.HELD_OUT.value]
     shares = [free.share] * len(speeds)
     reference, *others = (simulated(shares, speeds, how) for how in (Sheet(), *VARIANTS.values()))
+    stops = {}
+    for one in speeds_by_length(REFERENCE / case.tables["stop"], column="Ustop") if REFERENCE.is_dir() else ():
+        sheet = replace(case, sheet=replace(case.sheet, length=one.length))
+        hz = simulated([free.share] * len(STOPS), (STOPS * free.factor * one.speed).tolist(), Sheet(), sheet)
+        stops[one.length] = one.speed, one.speed * stop(hz)
     return Paper(
-        base=predicted(table, 0.0, 0.5), found=fitted(table, [share]), free=free,
+        stops=stops, base=predicted(table, 0.0, 0.5), found=fitted(table, [share]), free=free,
         numerics={name: float(np.abs(hz / reference - 1).max()) for name, hz in zip(VARIANTS, others, strict=True)},
     )  # fmt: skip

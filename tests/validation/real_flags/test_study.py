@@ -121,3 +121,14 @@ def test_a_paper_flag_that_does_not_flutter_has_no_factor(monkeypatch: pytest.Mo
     still = paper.fitted(np.full((len(paper.SHARES), len(paper.SPEEDS)), np.nan), [0.3])
     assert math.isnan(still.factor)
     assert still.within(Group.FIT, 0.07) == (0, 1)
+
+
+@pytest.mark.parametrize(
+    ("fluttering", "share"),
+    [([0, 0, 0, 1, 1, 1, 1, 1], 0.75), ([0, 1, 0, 0, 1, 1, 1, 1], 0.85), ([1] * 8, math.nan), ([0] * 8, math.nan)],
+)
+def test_flutter_stops_midway_below_the_least_speed_from_which_on_all_flutter(
+    fluttering: list[int], share: float
+) -> None:
+    found = paper.stop(np.where(np.array(fluttering) == 1, 12.0, np.nan))
+    assert found == pytest.approx(share, nan_ok=True)

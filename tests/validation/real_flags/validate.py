@@ -55,5 +55,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             }
             for name, model in (("base", paper.base), ("found", paper.found), ("free", paper.free))
         }
-        | {"numerics": paper.numerics},
+        | {
+            "numerics": paper.numerics,
+            "stops": [[length, seen, known(found)] for length, (seen, found) in paper.stops.items()],
+        },
     }
