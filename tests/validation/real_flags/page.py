@@ -95,7 +95,9 @@ def _verdict(base: Predictions, after: Predictions, fit: Fit, controls: Sequence
         f"Fitted to the drag of AS 1170.2 and the wavelength, **{NAMED}** has the {parameter} {fit.strength:.2f} "
         f"[{low:.2f}, {high:.2f}]. The interval is that of fits that leave one flag of one number out. Of "
         f"the predictions that judge, {counts['after'][0]} of {counts['after'][1]} are held with it and "
-        f"{counts['base'][0]} of {counts['base'][1]} without.\n"
+        f"{counts['base'][0]} of {counts['base'][1]} without. "
+        "[Decision 048](../decisions/048-the-inertia-of-the-air-beside-a-flag.md) "
+        "says what follows.\n"
     )
     about = (
         "Controls have the same freedom, one strength, and are fitted to the same numbers. The misfit is the root mean "
@@ -155,7 +157,8 @@ def _paper(paper: Paper) -> list[str]:
     )
     head = ["clip", "group", "tunnel [m/s]", "measured [Hz]", "base", "share of real flags", "share and s fitted"]
     lengths = [
-        [f"{1e3 * length:.0f}", f"{seen:.1f}", f"{found:.1f}", f"{found / seen - 1:+.0%}"]
+        [f"{1e3 * length:.0f}", f"{seen:.1f}"]
+        + ([f"{found:.1f}", f"{found / seen - 1:+.0%}"] if math.isfinite(found) else ["none found", ""])
         for length, (seen, found) in paper.stops.items()
     ]
     other = (
