@@ -96,7 +96,7 @@ def _verdict(base: Predictions, after: Predictions, fit: Fit, controls: Sequence
         f"[{low:.2f}, {high:.2f}]. The interval is that of fits that leave one flag of one number out. Of "
         f"the predictions that judge, {counts['after'][0]} of {counts['after'][1]} are held with it and "
         f"{counts['base'][0]} of {counts['base'][1]} without. "
-        "[Decision 050](../decisions/050-the-inertia-of-the-air-beside-a-flag.md) "
+        "[Decision 052](../decisions/052-the-inertia-of-the-air-beside-a-flag.md) "
         "says what follows.\n"
     )
     about = (
