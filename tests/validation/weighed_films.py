@@ -27,7 +27,7 @@ from sim.render.meshes import Meshes
 from sim.render.parameters import RenderParameters
 from sim.render.raster import Raster
 
-RATE, SECONDS = 25.0, 60.0  # Hz, s
+RATE, SECONDS = 25.0, 120.0  # Hz, s
 SIGMA = np.array([OBSERVABLES[name].sigma for name in OBSERVED])
 _SIZE = FlagSize(length=1.5, height=1.0)
 _WIDE = 0.62
