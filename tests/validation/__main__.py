@@ -22,6 +22,7 @@ VALIDATIONS = {
     "lake-in-a-bucket": "tests.validation.lake_in_a_bucket",
     "loop-on-films": "tests.validation.loop_on_films",
     "measure-windows": "tests.validation.measure_windows",
+    "numerics": "tests.validation.numerics",
     "object-storage": "tests.validation.object_storage",
     "observables": "tests.validation.observables",
     "paper-flag": "tests.validation.paper_flag.validate",
