@@ -14,6 +14,7 @@ from PIL import Image
 
 from measure.calibrate.observed import Excerpt, Observed
 from measure.calibrate.simulation import RATE
+from measure.calibrate.summary import LEAST_WINDOWS
 from measure.films.page import page
 from measure.films.run import solve, verdict_of
 from measure.films.side_by_side import drawn, side_by_side
@@ -109,5 +110,7 @@ def test_the_page_has_the_film_where_there_is_one(cheap: list[int], tmp_path: Pa
 
 def test_a_recording_without_halves_is_not_shown(cheap: list[int], tmp_path: Path) -> None:
     one = recording(mean=4.0, seed=5)
-    short = replace(with_film(one), readings=one.readings[:12], excerpt=Excerpt(number=9, window=film()))
-    assert side_by_side(solve([short], options(), folder=tmp_path), 0, after="") is None
+    count = 2 * LEAST_WINDOWS - 1
+    short = replace(with_film(one), readings=one.readings[:count], excerpt=Excerpt(number=count - 2, window=film()))
+    recordings = [short, recording(mean=6.5, seed=5)]  # one so short is not judged by itself
+    assert side_by_side(solve(recordings, options(), folder=tmp_path), 0, after="") is None
