@@ -51,7 +51,7 @@ SETTLE = 4.0
 """s before the film's first frame that are simulated and not looked at: two swings of a flag of 1.5 m."""
 BATCH = 16
 """Flags that are simulated together: what a vector register holds in single precision."""
-VERSION = 4
+VERSION = 5
 """Raised where the same batch gives other numbers."""
 OBSERVED = (
     "droop", "extension", "middle-speed", "frequency", "bandwidth", "amplitude-up", "amplitude-across", "area",
@@ -60,8 +60,8 @@ OBSERVED = (
 _STEPS = (1e-3, 2e-3, 4e-3)
 """Steps of backward Euler [s], which damps as much by itself; the least damping of a batch allows the step. Cloths that
 all damp less than the shortest are simulated by leapfrog, whose steps may be the longer the less they damp."""
-_TOLERANCE = 1e-3
-"""Relative residual of a step's solve."""
+_TOLERANCE = 1e-2
+"""Relative residual of a step's solve; a tenth of it costs a third more and shows the same (decision 042)."""
 _ROUGH = 1e-3
 """Standard deviation of the free vertices' start [m]."""
 _AHEAD = 0.3
