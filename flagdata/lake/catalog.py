@@ -322,6 +322,8 @@ class Catalog:
         table = self._open(head)
         with self._log_errors():
             found = table.history()
+        if not found:  # the library lists nothing in a folder whose name has a # or a ?
+            found = [{**self._entries.info(version), "version": version} for version in range(head, -1, -1)]
         # The Delta library lists the log as it is by now, and counts its versions down from the table's.
         later = max(0, len(found) - (head + 1))
         return [self._stated({**entry, "version": entry["version"] + later}) for entry in found[later:]]
