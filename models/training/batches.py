@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import CorruptError, RefusedError, UsageError
+from flagdata.provenance import array_hash
 from flagdata.rng import stream
 from models.training.inputs import Prepared
 
@@ -68,7 +69,7 @@ class Batches:
 
     def __iter__(self) -> Iterator[Batch]:
         """What is left of the epoch."""
-        order, variant = self._order()
+        order, variant = self._order(self.epoch)
         part = self.size // self.share[1]
         while True:
             begin = self.cursor * self.size + self.share[0] * part
@@ -85,16 +86,22 @@ class Batches:
             if ended:
                 return
 
-    def _order(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def order_hash(self, epoch: int) -> str:
+        """SHA-256 of the entries, their variants and their order in an epoch, in hexadecimal: equal for any share."""
+        order, variant = self._order(epoch)
+        content = {name: value for name, value in self.state().items() if name not in ("epoch", "cursor")}
+        return array_hash(content, [order.astype("<i8"), variant[order].astype("<i8")])
+
+    def _order(self, epoch: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Entries in the epoch's order, and which variant of each entry it takes."""
-        rng = stream(self.seed, "batches", self.epoch)
+        rng = stream(self.seed, "batches", epoch)
         if self.together:
             sequences, place = np.unique(self.prepared.sequence, return_inverse=True)
             order = np.argsort(rng.permutation(len(sequences))[place], kind="stable")
         else:
             order = rng.permutation(len(self.prepared))
         start = stream(self.seed, "variants").integers(self._variants, size=len(self.prepared))
-        return order, (start + self.epoch) % self._variants
+        return order, (start + epoch) % self._variants
 
     def state(self) -> dict[str, Any]:
         """All that determines the batches to come."""

@@ -166,6 +166,8 @@ def trained(
             recipe=recipe, train=train_inputs.held(), validation=validation_inputs.held(), identity=identity,
             run=folder, device=torch.device(device), bars=bars,
         )  # fmt: skip
+        if first:
+            say(f"order of the first epoch: {training.batches.order_hash(0)}")
         done = training.complete()
         if several:
             ranks.barrier()  # no rank leaves while another still talks to it

@@ -13,6 +13,7 @@ import pytest
 
 from flagdata.errors import UsageError
 from flagdata.lake import Artifact, Lake
+from tests.flagdata.lake.conftest import LINKS
 from tests.program import invoke
 
 NOBODY = 65534
@@ -64,6 +65,7 @@ def as_nobody(commands: Sequence[list[str]]) -> dict[str, tuple[int, str]]:
     return found
 
 
+@pytest.mark.disk(LINKS)
 @pytest.mark.parametrize("part", ["lake.json", "catalog/_delta_log", "refs/tags", "mcap"])
 def test_each_command_says_what_may_not_be_read(forbidden: Path, part: str) -> None:
     closed = forbidden / part

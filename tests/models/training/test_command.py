@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -50,8 +51,14 @@ def lake(lake_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(lake_path, path)
     recipe = path.parent / "small.toml"
     recipe.write_text(TRAINING)
+    orders = set()
     for seed in (1, 2):
-        run("train", str(recipe), "--at", "v1", "--seed", str(seed), "--lake", str(path), "--workers", "1")
+        done = CliRunner().invoke(
+            root, ["train", str(recipe), "--at", "v1", "--seed", str(seed), "--lake", str(path), "--workers", "1"],
+            catch_exceptions=False,
+        )  # fmt: skip
+        orders |= set(re.findall(r"^order of the first epoch: ([0-9a-f]{64})$", done.stderr, re.MULTILINE))
+    assert len(orders) == 2
     return path
 
 

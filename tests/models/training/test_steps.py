@@ -320,6 +320,19 @@ class TestBatches:
         ]
         assert whole == [one + other for one, other in zip(*parts, strict=True)]
 
+    def test_the_hash_of_the_order_is_that_of_all_ranks_and_differs_with_epoch_seed_and_data(self) -> None:
+        data, other = prepared(40, seed=1), prepared(40, seed=2)
+        batches = Batches(prepared=data, size=8, seed=5)
+        before = batches.order_hash(1)
+        assert list(batches)  # an epoch on
+        assert before == batches.order_hash(1)
+        assert before == Batches(prepared=data, size=8, seed=5, share=(1, 2)).order_hash(1)
+        different = [
+            before, batches.order_hash(0), Batches(prepared=data, size=8, seed=6).order_hash(1),
+            Batches(prepared=other, size=8, seed=5).order_hash(1),
+        ]  # fmt: skip
+        assert len(set(different)) == 4
+
     def test_sizes_that_ranks_cannot_share_are_refused(self) -> None:
         with pytest.raises(UsageError, match="multiple"):
             Batches(prepared=prepared(40, seed=1), size=9, seed=5, share=(0, 2))
