@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from flagdata.errors import NotFoundError
 from flagdata.lake import Lake
 from flagdata.lake.meshes import MeshSequence, read_meshes
+from flagdata.outputs import rewrite
 from flagdata.rng import child_seed, stream
 from flagdata.schema import Kind
 from measure.masks.films import Example, example
@@ -48,7 +50,6 @@ def batches(lake: Lake, datasets: Sequence[str], *, side: str) -> list[list[str]
 
 def make(lake: Lake, chosen: Sequence[Sequence[str]], folder: Path, *, count: int, seed: int, workers: int) -> None:
     """Make `count` examples as `NNNNN.npz` in a folder; an empty file stands for a film that shows no region."""
-    folder.mkdir(parents=True, exist_ok=True)
     wanted = [k for k in range(count) if not (folder / f"{k:05}.npz").exists()]
     jobs = [(str(lake.path), list(chosen[k % len(chosen)]), folder, k, seed) for k in wanted]
     if workers == 1:
@@ -67,13 +68,11 @@ def _one(lake: str, batch: Sequence[str], folder: Path, number: int, seed: int) 
     runs = [read_meshes(opened.whole_object(batch[int(k)])) for k in some]
     flags = [run for run in runs if isinstance(run, MeshSequence)]
     made = example(flags, seed=child_seed(seed, "masks", number), assets=Assets())
-    path = folder / f"{number:05}.npz"
-    partial = path.with_suffix(".partial")
-    with partial.open("wb") as file:
-        if made is not None:
-            stills = {name: getattr(made.stills, name) for name in _STILLS}
-            np.savez_compressed(file, pictures=made.pictures, cloth=made.cloth, hoist=made.hoist, **stills)
-    partial.replace(path)
+    content = io.BytesIO()
+    if made is not None:
+        stills = {name: getattr(made.stills, name) for name in _STILLS}
+        np.savez_compressed(content, pictures=made.pictures, cloth=made.cloth, hoist=made.hoist, **stills)
+    rewrite(folder / f"{number:05}.npz", content.getvalue())
 
 
 def read(folder: Path) -> Iterator[Example]:
