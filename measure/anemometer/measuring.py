@@ -141,7 +141,8 @@ def _verdict(
     faults += [*_size_reason(options.size, model), *compared.reasons()]
     p = model.familiar.p_value(used[shown], winds[shown])
     return Familiarity(
-        false_alarm=options.false_alarm, level=0.0, refusing=len(p), sizes=(0,), size=0, p=float(np.median(p)),
+        false_alarm=options.false_alarm, level=0.0, refusing=len(p), sizes=(0,), considered=1, size=0,
+        p=float(np.median(p)),
         window_p=tuple(p.tolist()), blank=(False,) * len(p), faults=tuple(Reason.counted(one) for one in faults),
         window_reasons=(
             Reason(kind="familiar", what=f"the median p of its windows is {np.median(p):.2f}", p=float(np.median(p))),

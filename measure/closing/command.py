@@ -163,6 +163,7 @@ def close_loop(
     in_recipe = recipe is not None and bool(recipe.recordings)
     if not in_recipe and not sources:
         raise UsageError("no recordings", where="SOURCE", fix="name them, or a recipe that does")
+    check_files(out, *dict.fromkeys((*FILES, *JOINT)), command="close-loop")
     lake = None if lake_path is None else Lake.open(lake_path)
     if lake is not None:
         lake.check_writable()
@@ -182,7 +183,6 @@ def close_loop(
             )  # fmt: skip
     else:
         refuse_of_others(context, films=bool(films))
-    check_files(out, *(JOINT if both else FILES), command="close-loop")
 
     def of_markers(level: float | None) -> tuple[Answer, Material]:
         """The answer by markers, and the cloth's nominal material."""
