@@ -1,7 +1,8 @@
 """Which effects of the library are weighed on a film, and how strong they may be.
 
 The strengths are a prior: log-uniform where an effect has one sign, from what a minute of film hardly shows to beyond
-what is expected in the field; uniform where it has two. They were fixed before any verdict on a film was made.
+what is expected in the field; uniform where it has two. They were fixed before any verdict on a film was made,
+that of `finite-span-loading` later, from its prior, before any was made with it.
 Not weighed: a wind that is turned from its log, which a film cannot separate from the view's azimuth; internal damping,
 which is calibrated; gusts, since turbulence beyond the log is drawn for all simulations.
 """
@@ -66,6 +67,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "tilted-pole.sway": (-0.25, 0.25),
     "wet-mass.uptake": (0.05, 1.0),
     "slack.length": (0.01, 0.15),
+    "finite-span-loading.share": (0.05, 1.2),
 }
 _SLACK = EffectColumn(effect="slack", parameter="length", step=0.02)
 _HOIST = "full-hoist.stiffness"

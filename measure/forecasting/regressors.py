@@ -268,6 +268,7 @@ _STEPS: tuple[tuple[str, str, float], ...] = (
     ("lift", "coefficient", 0.3),
     ("added-mass", "mass", 0.05),
     ("reactive-loading", "mass", 0.03),
+    ("finite-span-loading", "share", 0.05),
     ("air-density", "change", 0.1),
     ("permeability", "permeability", 0.005),
     ("hem-mass", "line_density", 0.005),

@@ -29,6 +29,9 @@ _SEPARATES: dict[frozenset[str], str] = {
     frozenset(
         {"added-mass", "reactive-loading"}
     ): "the cloth released in still air, where only its own motion loads it",
+    frozenset(
+        {"reactive-loading", "finite-span-loading"}
+    ): "a flag of another height: the mass of air of finite-span-loading changes with it",
     frozenset({"air-density", "porosity"}): "the air's temperature and pressure: they give its density",
     frozenset({"air-density", "power-law-drag"}): "a second wind speed, twice as fast: a power law changes its scale",
     frozenset({"lift", "power-law-drag"}): "a stiff plate of the same cloth at a few angles to the wind",

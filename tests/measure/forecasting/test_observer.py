@@ -65,7 +65,12 @@ def test_errors_are_observed_less_predicted(forecaster: Forecaster, own_recordin
 
 @pytest.mark.parametrize(
     ("effect", "parameter", "step"),
-    [("lift", "coefficient", 0.3), ("added-mass", "mass", 0.02), ("shear", "exponent", 0.2)],
+    [
+        ("lift", "coefficient", 0.3),
+        ("added-mass", "mass", 0.02),
+        ("shear", "exponent", 0.2),
+        ("finite-span-loading", "share", 0.05),
+    ],
 )
 def test_what_a_model_lacks_returns_along_its_sensitivity(
     forecaster: Forecaster, own_recording: Trajectory, effect: str, parameter: str, step: float

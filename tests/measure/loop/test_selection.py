@@ -196,7 +196,14 @@ def test_what_is_not_rejected_needs_no_effect(null: NullModel, reference: Refere
 
 
 @pytest.mark.parametrize(
-    "name", ["hem-mass.line_density", "lift.coefficient", "vertical-wind.inclination", "reactive-loading.mass"]
+    "name",
+    [
+        "hem-mass.line_density",
+        "lift.coefficient",
+        "vertical-wind.inclination",
+        "reactive-loading.mass",
+        "finite-span-loading.share",
+    ],
 )
 def test_an_effect_alone_is_named_alone(null: NullModel, reference: Reference, name: str) -> None:
     found = judged(null, reference, {name: 1.0})
