@@ -219,10 +219,11 @@ def test_two_effects_are_both_named(null: NullModel, reference: Reference) -> No
 
 
 def test_a_pressure_that_fluctuates_is_called_gusts(null: NullModel, reference: Reference) -> None:
-    found = judged(null, reference, {}, gusts=0.5)
-    assert named(found) == ["gusts"]
+    """In five of six draws or more: in one, other columns may be large by chance."""
+    found = [judged(null, reference, {}, gusts=0.5, seed=seed) for seed in range(2, 8)]
+    assert sum(named(one) == ["gusts"] for one in found) >= 5
     # Half a relative deviation of the pressure is a quarter of the speed's; of twelve segments, known to a fifth.
-    assert found.ranking[0].candidate.strength.value == pytest.approx(0.25, rel=0.6)
+    assert [one.ranking[0].candidate.strength.value for one in found] == pytest.approx([0.25] * 6, rel=0.6)
 
 
 def test_a_pressure_that_differs_by_a_constant_is_not(null: NullModel, reference: Reference) -> None:

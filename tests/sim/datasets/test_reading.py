@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+import torch
 
 from flagdata.errors import InputError, NotFoundError, UnknownNameError, UsageError
 from flagdata.tables import Range, ends
 from sim.datasets.cast import casts
 from sim.datasets.reading import DATASETS, load, parse, with_renderer
 from sim.datasets.recipe import DatasetRecipe, Truth
+from sim.effects.finite_span_loading import FiniteSpanLoading
+from sim.run.members import Crew
 from tests.refusals import unrefused
 
 Make = Callable[..., DatasetRecipe]
@@ -93,6 +96,19 @@ def test_what_makes_no_data_set_is_refused(make: Make) -> None:
         ("[camera]", "[sessions]\n[groups]\n[camera]", UsageError, "both sessions and groups"),
     ]  # fmt: skip
     assert not unrefused(lambda old, new: make({old: new}), cases)
+
+
+def test_the_scene_of_a_data_set_may_name_the_airs_inertia(make: Make) -> None:
+    shared = make(scene={"[time]": "[effects.finite-span-loading]\nshare = { low = 0.1, high = 0.3 }\n[time]"})
+    assert shared.hash != make().hash
+    crew = Crew(next(casts(shared)).simulation)
+    members = [crew.member(0), crew.member(1)]
+    shares = [member.parameters["finite-span-loading.share"] for member in members]
+    assert 0.1 <= min(shares) < max(shares) <= 0.3
+    system, _ = crew.assemble(members)
+    (load,) = system.loads
+    assert isinstance(load, FiniteSpanLoading)
+    assert torch.as_tensor(load.share).tolist() == pytest.approx(shares)
 
 
 def test_gusts_whose_minute_before_is_not_simulated_cannot_be_measured(make: Make) -> None:

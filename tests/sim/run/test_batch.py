@@ -37,9 +37,9 @@ def all_bits(outcomes: Sequence[Outcome]) -> list[bytes | None]:
     [
         {}, {"more": '[integrator]\nname = "implicit"'}, {"more": "[contact]\nthickness = 0.02"},
         {"more": "[effects.gusts]\nintensity = 0.2\n[effects.hysteresis]\ncouple = 1e-3"},
-        {"more": '[integrator]\nbackend = "warp"'},
+        {"more": "[effects.finite-span-loading]\nshare = 0.2"}, {"more": '[integrator]\nbackend = "warp"'},
     ],
-    ids=["explicit", "implicit", "contact", "effects", "warp"],
+    ids=["explicit", "implicit", "contact", "effects", "air", "warp"],
 )  # fmt: skip
 def test_a_member_is_the_same_to_the_bit_whatever_it_is_simulated_with(make_recipe: Callable, additions: dict) -> None:
     crew = Crew(make_recipe(**additions))
