@@ -33,7 +33,7 @@ def page(verdict: Verdict, outcome: Outcome) -> str:
     after = sentences.after_label(verdict) if verdict.named else ""
     values = {
         "verdict": verdict, "tone": TONES[verdict.conclusion], **opening(verdict),
-        "test_sentence": sentences.test_sentence(verdict.test), "remark": sentences.test_remark(verdict.test),
+        "test_sentence": sentences.test_sentence(verdict), "remark": sentences.test_remark(verdict.test),
         "named": sentences.named_candidates(verdict), "after_label": after, "level": level_of(verdict),
         "has_control": any(quantity.known(c.control) for c in verdict.comparisons),
         "null": figures.null_distribution(verdict.test), "parts": outcome.judged.parts,

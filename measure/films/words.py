@@ -42,7 +42,7 @@ def error_text(comparison: Comparison, after: str) -> str:
 def _items(verdict: Verdict) -> Iterator[tuple[str, str]]:
     yield "", sentences.heading(verdict)
     yield "", verdict.words
-    yield "test", " ".join([sentences.test_sentence(verdict.test), sentences.test_remark(verdict.test)]).strip()
+    yield "test", " ".join([sentences.test_sentence(verdict), sentences.test_remark(verdict.test)]).strip()
     for candidate in sentences.named_candidates(verdict):
         yield (
             sentences.candidate_title(verdict, candidate),

@@ -51,7 +51,7 @@ def page(verdict: Verdict) -> str:
         "verdict": verdict,
         "tone": TONES[verdict.conclusion],
         **opening(verdict),
-        "test_sentence": sentences.test_sentence(verdict.test),
+        "test_sentence": sentences.test_sentence(verdict),
         "remark": sentences.test_remark(verdict.test),
         "named": named,
         "rejected": sentences.rejected(verdict),

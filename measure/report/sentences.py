@@ -57,19 +57,31 @@ def after_label(verdict: Verdict) -> str:
     return f"with {listed(titles(verdict))}"
 
 
-def test_sentence(test: NullTest) -> str:
-    """The global test with its p-value, the interval that the number of nulls leaves it, and what it says."""
+def leads_with_p(verdict: Verdict) -> bool:
+    """Whether the verdict's first sentence states the p-value of the global test: not where the base model could not be
+    tested, nor where the recordings contradict the declared set-up."""
+    if verdict.conclusion is Conclusion.UNTESTED:
+        return False
+    return verdict.conclusion is not Conclusion.SUFFICIENT or not contradicted(verdict)
+
+
+def test_sentence(verdict: Verdict) -> str:
+    """The global test: what it says, how its p-value is counted and the interval that the number of nulls leaves it.
+
+    The value itself stands here only where the verdict's first sentence has none.
+    """
+    test = verdict.test
     null = [v for v in test.null if math.isfinite(v)]
     p = test.p_value
     says = "is rejected" if p.value <= test.level else "is not rejected"
     if test.critical is None:
         says = "cannot be tested"
-    interval = f"[{probability(p.low)}, {probability(p.high)}] {level_text(p.level)}"
+    value = "p" if leads_with_p(verdict) else f"p = {probability(p.value)}"
     return (
-        f"The base model {says}: p = {probability(p.value)} {interval}, level {test.level:g}. {as_large(test)} of "
-        f"{len(null)} groups of simulations deviate as much as the recordings (statistic {number(test.statistic)}). "
-        f"p = (1 + number of the {test.kinds} numerical set-ups whose simulations deviate as much) / "
-        f"{1 + test.kinds}, a set-up counting by the share of its groups; the interval is its sampling error."
+        f"The base model {says} at level {test.level:g}: {as_large(test)} of {len(null)} groups of simulations deviate "
+        f"as much as the recordings (statistic {number(test.statistic)}). {value} is (1 + number of the {test.kinds} "
+        f"numerical set-ups whose simulations deviate as much) / {1 + test.kinds}, a set-up counting by the share of "
+        f"its groups; its sampling interval is [{probability(p.low)}, {probability(p.high)}] {level_text(p.level)}."
     )
 
 

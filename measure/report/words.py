@@ -37,7 +37,7 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
     yield [sentences.heading(verdict)]
     yield [*_wrapped(verdict.words), ""]
     remark = sentences.test_remark(verdict.test)
-    yield _item("test", " ".join([sentences.test_sentence(verdict.test), remark]).strip())
+    yield _item("test", " ".join([sentences.test_sentence(verdict), remark]).strip())
     for candidate in sentences.named_candidates(verdict):
         yield _item(sentences.candidate_title(verdict, candidate), _weighed(candidate))
     for comparison in verdict.comparisons:

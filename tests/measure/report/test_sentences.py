@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from measure.report import sentences
+from measure.report.lead import lead
 from measure.report.page import page
 from measure.report.sentences import titles
 from measure.report.words import words
@@ -20,17 +21,31 @@ def test_too_few_nulls_for_the_level_are_called_so() -> None:
         statistic=5.0, null=[1.0] * 38, p_value=about(0.05, 0.01), kinds=19, level=0.01, critical=None, nulls="few"
     )  # fmt: skip
     assert "With 19 kinds of numerics no p-value below 0.05" in sentences.test_remark(test)
-    assert sentences.test_sentence(test).startswith("The base model cannot be tested: p = 0.05")
+    whole = replace(verdict(Conclusion.UNTESTED), test=test)
+    sentence = sentences.test_sentence(whole)
+    assert sentence.startswith("The base model cannot be tested at level 0.01: 0 of 38 groups")
+    assert "p = 0.050 is (1 + number of the 19 numerical set-ups" in sentence
 
 
 def test_the_test_is_reported_with_its_interval_and_the_nulls_that_reach_it() -> None:
     whole = verdict(Conclusion.SUFFICIENT)
     reached = sum(v >= whole.test.statistic for v in whole.test.null)
-    sentence = sentences.test_sentence(whole.test)
-    assert sentence.startswith("The base model is not rejected: p = ")
+    sentence = sentences.test_sentence(whole)
+    assert sentence.startswith("The base model is not rejected at level 0.01: ")
     assert f" {reached} of 199 groups of simulations deviate as much as the recordings (statistic 1.13)" in sentence
-    assert "90 %, level 0.01" in sentence
+    p = whole.test.p_value
+    assert f"its sampling interval is [{p.low:.2g}, {p.high:.2g}] 90 %" in sentence
     assert sentences.test_remark(verdict(Conclusion.EFFECT).test) == ""
+
+
+@pytest.mark.parametrize("conclusion", list(Conclusion))
+@pytest.mark.parametrize("findings", [(), (("still-away-from-pins", "A marker between the pins is still."),)])
+def test_the_p_of_the_global_test_is_stated_once(conclusion: Conclusion, findings: tuple[tuple[str, str], ...]) -> None:
+    whole = replace(verdict(conclusion), findings=findings, ranking=(), comparisons=(), parameters=())
+    whole = replace(whole, test=replace(whole.test, p_value=about(0.0437, 0.01)))
+    whole = replace(whole, words=lead(whole))
+    stated = " ".join(words(whole).split())
+    assert stated.count("p = 0.044") == 1
 
 
 def test_of_two_strengths_of_one_effect_the_one_that_acts_is_named() -> None:
