@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
-import os
+import json
 import re
 import subprocess
-import sys
+import tomllib
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
+from click.testing import CliRunner
+from PIL import Image, ImageSequence
 
-import flagdata
+from docs.generate_example_picture import MOST_BYTES
 from flagdata.outputs import check_folder
-from measure.demo.command import SCHEMA
+from measure.demo.command import MINUTES, SCHEMA, Story
 from measure.demo.recording import RecordingRecipe
+from measure.estimate.command import measure
 from tests.docs.pages import Shell
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+MEASURED = "flagdata measure example:flag"
+"""Of the first minute, which has a test of its own."""
 
 
 def blocks(language: str) -> list[str]:
@@ -74,7 +82,7 @@ def test_the_demonstration_recovers_the_offset_it_hid(folder: Path) -> None:
 
 def test_every_command_of_the_readme_runs(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bash takes them as they are. They run in this process: a start of the program takes longer than its work."""
-    given = [command for command in commands() if not command.startswith("make ")]
+    given = [command for command in commands() if not command.startswith("make ") and command != MEASURED]
     subprocess.run(["bash", "-n", "-c", "\n".join(given)], check=True)
     monkeypatch.chdir(folder.parents[1])
     shell = Shell(patch=monkeypatch)
@@ -88,17 +96,121 @@ def test_a_user_who_followed_the_readme_can_run_the_demonstration_again(folder: 
     check_folder(folder, schema=SCHEMA)
 
 
-def test_the_python_of_the_readme_runs(folder: Path) -> None:
-    """After the commands: it opens the lake that they made."""
+def test_the_first_minute_prints_what_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    """The command line and the Python of the first screen, each with the block below it."""
+    assert MEASURED in commands()
+    shown, printed = blocks("text")
+    done = CliRunner().invoke(measure, MEASURED.split()[2:])
+    assert done.exit_code == 0
+    assert done.output == shown
     (program,) = blocks("python")
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=folder.with_name("field"), env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("torch.Size([16, 1, 30, 300, 300])")
-    pairs = flagdata.open(folder.with_name("field") / "field.lake").pairs(at="v1")
-    assert f"{len(pairs)} pairs; {len(pairs.refused)} refused" in done.stdout
+    exec(compile(program, "README.md", "exec"), {})
+    assert capsys.readouterr().out == printed
+
+
+def sheet(name: str) -> Mapping[str, Any]:
+    return json.loads((ROOT / "docs" / "results" / f"{name}.json").read_text(encoding="utf-8"))["result"]
+
+
+def rows() -> dict[str, tuple[str, str]]:
+    """What was measured → what it was tested on and what was found, of the table of the first screen."""
+    table = re.findall(r"^\| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", README, flags=re.MULTILINE)
+    return {what: (tested, found) for what, tested, found in table}
+
+
+@pytest.mark.parametrize(("what", "weight"), [("wind from a film", "open"), ("the same, area weight given", "stated")])
+def test_the_accuracy_on_films_is_that_of_the_sheet(what: str, weight: str) -> None:
+    result = sheet("validate-films")
+    films = [film for film in result["films"] if film["part"] == "coverage"]
+    errors = result["errors"]["coverage"][weight]
+    tested, found = rows()[what]
+    if weight == "open":
+        winds = [film["wind"] for film in films]
+        assert tested.startswith(f"[{len(films)} films]")
+        assert tested.endswith(f"{min(winds):g} to {max(winds):g} m/s")
+        assert errors["bias"] < 0  # "the answer tends to be low"
+    covered = errors["covered"]
+    assert result["refused"]["coverage"]["hits"] == 0
+    assert found.startswith(
+        f"median error {errors['median_error']:.2f} m/s, {covered['hits']} of {covered['count']} in"
+    )
+
+
+def test_the_accuracy_of_a_calibrated_flag_is_that_of_the_sheet() -> None:
+    first = sheet("validate-anemometer")["networks"]["flow-outdoor"]["films"][0]
+    assert rows()["wind from a calibrated flag"][1] == f"RMSE {first['read']['cup']['rmse']:.2f} m/s against the cup"
+
+
+def test_the_accuracy_of_a_weight_is_that_of_the_sheet() -> None:
+    result = sheet("validate-weighed-briefly")
+    films = result["films"]
+    answered = len(films["flags"]) - films["withheld"]
+    assert rows()["area weight, wind known"] == (
+        f"[{len(films['flags'])} films](docs/results/validate-weighed-briefly.md) of {result['seconds']:g} s",
+        (
+            f"median error {100 * films['median_error']:.0f} %, {films['held']} of {answered} in their intervals, "
+            f"{films['withheld']} withheld"
+        ),
+    )
+
+
+def test_the_refusals_counted_are_those_of_the_sheet() -> None:
+    result = sheet("validate-gate-films")
+    judging = result["halves"]["judging"]
+    refused, right = judging["refused"], judging["right_first"]
+    tested, found = rows()["films with a defect"]
+    assert tested.startswith(f"[{refused['count']} films]")
+    assert tested.endswith(f"{len({film['kind'] for film in result['films']})} kinds")
+    assert found == f"{refused['hits']} of {refused['count']} refused, {right['hits']} with the true reason first"
+    assert not any(film["refused"] for film in result["films"] if film["kind"] == "overlapping flags")
+
+
+def test_the_forces_counted_are_those_of_the_sheet() -> None:
+    score = (ROOT / "docs" / "results" / "challenge-registered" / "challenge-score.md").read_text(encoding="utf-8")
+    share = dict(re.findall(r"^\| ([^|]+) \| (\d+/\d+) \|", score, flags=re.MULTILINE))
+    (nulls, of_nulls), (found, single), (named, _) = (
+        share[name].split("/")
+        for name in ("false positives on nulls", "detected: one effect", "top-1, all of one effect")
+    )
+    tested, stated = rows()["forces that a model lacks"]
+    (sets,) = re.findall(r"^(\d+) sets:", score, flags=re.MULTILINE)
+    assert tested.startswith(f"[{sets} sealed sets]")
+    assert stated == (
+        f"{nulls} of {of_nulls} rejected where nothing was missing; of {single} with one force {found} detected, "
+        f"{named} named right"
+    )
+
+
+def test_what_it_takes_is_what_the_pages_and_the_program_state() -> None:
+    install = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+    (light,) = re.findall(r"^\| `pip install flagdata` .* \| ([\d.]+ GB) \|$", install, flags=re.MULTILINE)
+    (full,) = re.findall(r"^\| `pip install 'flagdata\[physics\]'` .* \| ([\d.]+ GB) \|$", install, flags=re.MULTILINE)
+    said = " ".join(README.split())
+    assert f"{full} of disk and no graphics card; {light} without the physics" in said
+    assert (
+        f"takes up to {MINUTES[Story.FULL]} minutes on two idle cores, its short form up to {MINUTES[Story.SHORT]}"
+        in said
+    )
+
+
+def test_the_moving_picture_is_of_the_whole_example_and_light() -> None:
+    path = ROOT / "docs" / "pictures" / "example.webp"
+    assert README.index("docs/pictures/example.webp") < README.index("## ")
+    assert path.stat().st_size < MOST_BYTES
+    with Image.open(path) as picture:
+        lasting = 0
+        for frame in ImageSequence.Iterator(picture):
+            frame.load()
+            lasting += frame.info["duration"]
+    assert lasting == pytest.approx(12_000, rel=0.02)  # ms of the film
+
+
+def test_the_citation_is_of_this_version() -> None:
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\ntitle: {stated['name']}\n" in citation
+    assert f"\nversion: {stated['version']}\n" in citation
+    assert f"\nlicense: {stated['license']}\n" in citation
 
 
 def test_pictures_and_pages_that_the_readme_links_to_exist() -> None:
