@@ -108,6 +108,11 @@ def test_the_first_minute_prints_what_is_shown(capsys: pytest.CaptureFixture[str
     assert capsys.readouterr().out == printed
 
 
+def test_the_start_shows_the_same_answer() -> None:
+    start = (ROOT / "docs" / "start.md").read_text(encoding="utf-8")
+    assert f"```sh\n{MEASURED}\n```\n\n```text\n{blocks('text')[0]}```" in start
+
+
 def sheet(name: str) -> Mapping[str, Any]:
     return json.loads((ROOT / "docs" / "results" / f"{name}.json").read_text(encoding="utf-8"))["result"]
 
