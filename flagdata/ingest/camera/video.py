@@ -141,8 +141,8 @@ class VideoSource:
             found.append(
                 Finding(
                     kind="telemetry-not-read", severity=Severity.NOTE,
-                    what="the file has a track of GoPro's telemetry (GPMF), whose GPS time is not read: no library that"
-                    " reads it is maintained; the start is the camera's own clock",
+                    what="the file has a track of GoPro's telemetry (GPMF), whose GPS time is not read; the start is"
+                    " the camera's own clock",
                     fix="if that clock was not set, give --start, read from the track by the camera's own software",
                 )
             )  # fmt: skip

@@ -146,6 +146,7 @@ def test_a_damaged_object_is_not_moved(lake: Lake, put_text: Put, tmp_path: Path
     assert Lake.open(tmp_path / "copy").rows().num_rows == 0
 
 
+@pytest.mark.disk("it clones a lake on a disk to a bucket")
 def test_a_lake_is_cloned_to_a_bucket_and_back(
     lake: Lake, put_text: Put, bucket_folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
