@@ -177,6 +177,8 @@ def test_the_forces_counted_are_those_of_the_sheet() -> None:
         share[name].split("/")
         for name in ("false positives on nulls", "detected: one effect", "top-1, all of one effect")
     )
+    wrong, claims = share["false discoveries among claims"].split("/")
+    assert f"{wrong} of {claims} claims named a force that had not acted" in " ".join(README.split())
     tested, stated = rows()["forces that a model lacks"]
     (sets,) = re.findall(r"^(\d+) sets:", score, flags=re.MULTILINE)
     assert tested.startswith(f"[{sets} sealed sets]")
