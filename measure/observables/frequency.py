@@ -35,5 +35,5 @@ FREQUENCY = Observable(
     name="frequency", unit="Hz",
     meaning="centroid of the power spectrum, 0.4 to 8 Hz, of the motion of the middle of the free edge in the picture",
     blind="slower changes of the wind; which of size, tension and damping sets it",
-    pixels=frequency, geometry=frequency, bias=0.212, sigma=0.207,
+    pixels=frequency, geometry=frequency, bias=0.212, sigma=0.209,
 )  # fmt: skip

@@ -16,6 +16,6 @@ MIDDLE_SPEED = Observable(
     name="middle-speed", unit="1/s",
     meaning="root mean square speed, in flag lengths, of the centroid of the middle third of the silhouette",
     blind="motion along the line of sight",
-    pixels=middle_speed, geometry=middle_speed, bias=-0.005, sigma=0.050,
+    pixels=middle_speed, geometry=middle_speed, bias=-0.004, sigma=0.048,
     counted_in="length", quadratic=True,
 )  # fmt: skip

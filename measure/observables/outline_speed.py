@@ -31,6 +31,6 @@ OUTLINE_SPEED = Observable(
     meaning="mean speed across itself, in flag lengths, of the outline of the free part: the area that it sweeps a "
     "second, over the free edges' length (twice 85 % of the flag's length and its height)",
     blind="motion inside the outline and along the line of sight",
-    pixels=outline_speed, geometry=outline_speed, bias=-0.055, sigma=0.039,
+    pixels=outline_speed, geometry=outline_speed, bias=-0.053, sigma=0.038,
     counted_in="length",
 )  # fmt: skip

@@ -19,6 +19,6 @@ WAVE_LENGTH = Observable(
     name="wave-length", unit="1",
     meaning="length, in flag lengths along the picture, of the wave that travels along the silhouette's middle line",
     blind="waves whose crests are along the line of sight's direction of motion, and standing waves",
-    pixels=wave_length, geometry=wave_length, bias=0.281, sigma=0.412,
+    pixels=wave_length, geometry=wave_length, bias=0.278, sigma=0.388,
     counted_in="length",
 )  # fmt: skip

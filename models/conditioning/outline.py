@@ -32,9 +32,13 @@ _NEAR = 4
 _CERTAIN = 0.5
 """Least probability that an end is within `_NEAR` of its most likely place."""
 _BESIDE = (0.05, 0.3)
-"""Part of the cloth, in lengths of the hoist from it, whose upper and lower edges are extended to the hoist."""
+"""Part of the cloth, in lengths of the hoist from it, whose upper edge is extended to the hoist."""
+_APART = 0.1
+"""Greatest distance of where that edge leads from the network's place, in lengths of the hoist."""
 _LEAST = 0.1
 """Least area of the cloth over the square of its hoist."""
+_MOVES = 5.0
+"""Gray levels over which the twentieth part of the cloth that changes most changes at least."""
 _UPRIGHT = 0.35
 """Greatest offset of the hoist's ends along the picture's rows, over their distance along its columns."""
 
@@ -77,9 +81,10 @@ class Outliner:
         if abs(across) > _UPRIGHT * down or cloth.sum(axis=(1, 2)).mean() < _LEAST * down**2:
             return None
         usual = cloth.mean(axis=0)
+        if np.quantile(stills.greatest[usual > 0].astype(int) - stills.least[usual > 0], 0.95) < _MOVES:
+            return None
         side = 1.0 if usual.sum(axis=0) @ (np.arange(usual.shape[1]) + 0.5 - places[:, 0].mean()) >= 0 else -1.0
-        hoist = _extended(usual > 0.5, places, side)
-        return None if hoist is None else cls(stills=stills, hoist=hoist, side=side, network=network)
+        return cls(stills=stills, hoist=_lowered(usual > 0.5, places, side), side=side, network=network)
 
     def masks(self, pictures: Sequence[NDArray[np.uint8]] | NDArray[np.uint8]) -> tuple[Masks, NDArray[np.float64]]:
         """The cloth in pictures (n, size, size) that follow one another in the film, (n, size / 2, size / 2): the
@@ -130,9 +135,10 @@ def _end(logits: Tensor) -> NDArray[np.float64] | None:
     return np.array([near.sum(axis=0) @ columns, near.sum(axis=1) @ rows]) / total + 0.5
 
 
-def _extended(usual: Masks, places: NDArray[np.float64], side: float) -> NDArray[np.float64] | None:
-    """(2, 2) the hoist's ends on its line, where the edges of the cloth beside it meet it: a pole's top is not the
-    cloth's corner. None where the cloth does not show both edges there.
+def _lowered(usual: Masks, places: NDArray[np.float64], side: float) -> NDArray[np.float64]:
+    """(2, 2) the hoist's ends, the upper one where the cloth's upper edge beside it meets the hoist's line: a pole's
+    top is not the cloth's corner. The network's place is kept where the cloth does not show the edge, or shows one that
+    does not lead there.
 
     Args:
         usual: (rows, columns) where cloth is most of the time.
@@ -144,10 +150,11 @@ def _extended(usual: Masks, places: NDArray[np.float64], side: float) -> NDArray
     columns = columns[(columns >= 0) & (columns < usual.shape[1])]
     shown = usual[:, columns]
     if len(columns) < 3 or not shown.any(axis=0).all():
-        return None
-    edges = shown.argmax(axis=0), usual.shape[0] - shown[::-1].argmax(axis=0)
-    rows = [float(np.polyval(np.polyfit(columns + 0.5, at, 1), x)) for at, x in zip(edges, places[:, 0], strict=True)]
-    return np.stack([places[:, 0], rows], axis=1)
+        return places
+    row = float(np.polyval(np.polyfit(columns + 0.5, shown.argmax(axis=0), 1), places[0, 0]))
+    if abs(row - places[0, 1]) > _APART * length:
+        return places
+    return np.stack([np.array([places[0, 0], row]), places[1]])
 
 
 def _beside(hoist: NDArray[np.float64], side: float, shape: tuple[int, ...]) -> Masks:
