@@ -204,7 +204,8 @@ def _lines_of(folder: Place) -> tuple[list[str], bool]:
 
 def unleased(staging: Place) -> list[Place]:
     """Entries of staging without a lease: folders without one, and files, by name."""
-    own = (_COLLECT, _TURN, remote_leases.COLLECT, remote_leases.MADE)
+    # The shared locks' folder in a bucket is gone with the last of them, which may be between two requests.
+    own = (_COLLECT, _TURN, remote_leases.COLLECT, remote_leases.MADE, remote_leases.SHARED)
     folders = [state.folder for state in leases(staging) if not state.leased]
     files = [path for path in _entries(staging) if not _is_folder(path) and path.name not in own]
     return sorted([*folders, *files])  # type: ignore[type-var]

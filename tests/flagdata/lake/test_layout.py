@@ -184,6 +184,13 @@ def test_a_lease_that_is_no_file_proves_nothing_and_ends_nothing(lake: Lake, tmp
     assert (tmp_path / "lease").read_text() == "{}\n"
 
 
+def test_what_is_left_of_the_shared_locks_is_nobodys_leftover(lake: Lake) -> None:
+    """In a bucket their folder is listed, and gone with the last of them before anything about it can be asked."""
+    (lake.staging / "shared").write_text("")
+    assert not doctor(lake, grace=NOW)
+    assert collect(lake, grace=NOW).leftovers == ()
+
+
 _MAKE: dict[str, Callable[[Path], object]] = {
     "folder": Path.mkdir, "pipe": os.mkfifo, "link to nothing": lambda path: path.symlink_to("/nonexistent"),
     "no UTF-8": lambda path: path.write_bytes(b"\xff\xfe"),
