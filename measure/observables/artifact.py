@@ -13,7 +13,7 @@ from measure.estimate.source import Subject
 from measure.observables.table import Table
 from models.conditioning.conditioning import VERSION as CONDITIONED
 
-VERSION = 4
+VERSION = 5
 """Raised whenever the same film gives other readings."""
 
 

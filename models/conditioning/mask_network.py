@@ -8,7 +8,6 @@ joined to that and to the hoist where nothing changes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -32,6 +31,8 @@ OUTPUTS = 3
 """Logits of cloth, of the hoist's upper end and of its lower end."""
 _WIDTHS = (16, 24, 40, 64)
 _MULTIPLE = 2 ** len(_WIDTHS)
+_BLACK = 16
+"""Gray level up to which a place is black, in full-range and in video levels."""
 _SCALE = 8.0
 """Gray levels that are added to the deviation of the still picture, so that noise in a plain one stays small."""
 
@@ -72,28 +73,24 @@ def _twice(inputs: int, width: int) -> nn.Sequential:
     return nn.Sequential(*layers)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Levels:
-    """Gray levels of a film as the network takes them: the still picture has mean 0 and a deviation of about 1."""
-
-    middle: float
-    spread: float
-
-    @classmethod
-    def of(cls, stills: Stills) -> Levels:
-        """Of a film."""
-        return cls(middle=float(stills.usual.mean()), spread=float(stills.usual.std()) + _SCALE)
-
-    def of_pictures(self, pictures: NDArray[np.generic]) -> Tensor:
-        """float32 of the same shape."""
-        return (torch.from_numpy(pictures.astype(np.float32)) - self.middle) / self.spread
-
-
 def inputs_of(pictures: NDArray[np.generic], stills: Stills) -> Tensor:
-    """(n, 4, rows, columns) for pictures (n, rows, columns) of one film."""
-    levels = Levels.of(stills)
-    same = levels.of_pictures(np.stack([stills.usual, stills.least, stills.greatest]))
-    return torch.cat([levels.of_pictures(pictures)[:, None], same[None].expand(len(pictures), -1, -1, -1)], dim=1)
+    """(n, 4, rows, columns) for pictures (n, rows, columns) of one film: its gray levels less the mean of the usual
+    picture, over its deviation. Black bars at the edges, as an ingested film may have them, do not count and are 0."""
+    shown = _shown(stills)
+    usual = stills.usual[shown]
+    middle, spread = float(usual.mean()), float(usual.std()) + _SCALE
+    same = (
+        np.stack([stills.usual, stills.least, stills.greatest]).astype(np.float32)[None].repeat(len(pictures), axis=0)
+    )
+    both = np.concatenate([np.asarray(pictures, np.float32)[:, None], same], axis=1)
+    return torch.from_numpy((both - middle) / spread * shown)
+
+
+def _shown(stills: Stills) -> NDArray[np.bool_]:
+    """(rows, columns) all but rows and columns that are black all the time; everything where all of it is."""
+    brightest = stills.greatest
+    shown = np.logical_and.outer(brightest.max(axis=1) > _BLACK, brightest.max(axis=0) > _BLACK)
+    return shown if shown.any() else ~shown
 
 
 @cache

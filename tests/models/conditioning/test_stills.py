@@ -43,6 +43,15 @@ def test_gain_and_offset_of_the_light_change_no_input() -> None:
     assert float((other / one).median()) == pytest.approx(1.0, abs=0.15)
 
 
+def test_black_bars_count_for_nothing() -> None:
+    """The picture between them is as it is without them; they are 0."""
+    pictures = np.random.default_rng(2).uniform(40, 120, (12, 8, 8))
+    padded = np.pad(pictures, ((0, 0), (3, 3), (0, 0)))
+    inputs = inputs_of(padded, Stills.of(padded))
+    torch.testing.assert_close(inputs[:, :, 3:-3], inputs_of(pictures, Stills.of(pictures)))
+    assert not inputs[:, :, :3].any()
+
+
 def test_weights_that_do_not_fit_are_refused(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     from flagdata.checksums import write_sums
     from models.storage import WEIGHTS, write_card, write_tensors
