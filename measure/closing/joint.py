@@ -22,8 +22,6 @@ from measure.verdict.criteria import CRITERIA
 from measure.verdict.quantity import estimate_text, known, number, probability, with_level
 from measure.verdict.record import Conclusion, Estimate, Verdict
 
-APART = 2.0
-"""Standard errors by which what two kinds give differs clearly."""
 _CERTAIN = 0.02
 """Least standard error of a logarithm: no kind knows more."""
 
@@ -211,7 +209,7 @@ def _sentences(joint: Joint) -> list[str]:
     for one in joint.strengths:
         if one.together is not None:
             said.append(f"Strength of {one.name} by both: {with_level(one.together)}.")
-        if one.apart is not None and one.apart > APART:
+        if one.apart is not None and one.apart > CRITERIA.lead:
             said.append(
                 f"The two kinds disagree about it: {estimate_text(one.markers)} by markers and "
                 f"{estimate_text(one.films)} by films, {number(one.apart, digits=2)} standard errors apart."

@@ -50,5 +50,6 @@ def is_film(source: str, *, lake: Lake | None, at: str, otherwise: bool = False)
         return "marker" not in columns and bool(columns & set(OBSERVABLES))
     if lake is None:
         return otherwise
-    kinds = {row["kind"] for row in meant(lake.rows({}, at=at, columns=COLUMNS).to_pylist(), source)}
+    rows = lake.rows({}, at=at, columns=COLUMNS).to_pylist()
+    kinds = {row["kind"] for row in meant(rows, source, kinds=FILMED)}
     return bool(kinds & set(FILMED)) if kinds else otherwise

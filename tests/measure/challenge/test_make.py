@@ -209,5 +209,5 @@ def test_strengths_that_are_fixed_beforehand_are_dealt_out_evenly() -> None:
 
 
 def test_the_catalogs_recipes_parse() -> None:
-    assert CHALLENGES.names() == ("films", "registered", "standard", "strong")
-    assert [load(name).count for name in CHALLENGES.names()] == [3, 3, 3, 3]
+    assert CHALLENGES.names() == ("films", "inertia", "registered", "standard", "strong")
+    assert [load(name).count for name in CHALLENGES.names()] == [3] * 5

@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -206,7 +207,7 @@ def test_a_weight_that_is_open_is_answered_with_the_winds_of_a_light_and_a_heavy
     film = even(FRAMES)
     found = measured(film, ambiguous)
     (finding,) = [one for one in found.bounds if one.kind == "weight-open"]
-    nowhere: Any = None
+    nowhere: Any = SimpleNamespace(known=None)
     series = beside(found, start=None, wind=None)
     _report(_Done(measured=found, series=series, artifact=None, subject=nowhere, refinement=None), series=False)
     assert f"  {finding.what}; weigh the cloth and give --area-weight\n" in capsys.readouterr().err

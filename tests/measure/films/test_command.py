@@ -166,10 +166,16 @@ def test_a_video_counts_as_a_film_and_a_recipe_does_not(tmp_path: Path) -> None:
 
 
 def test_recordings_of_a_lake_are_films_and_its_markers_are_not(tmp_path: Path) -> None:
+    """Also a recording that was measured, and whose measurement has its name."""
     lake = Lake.create(tmp_path / "lake")
+    calm, tracked = (
+        Artifact(kind=kind, name=name, parents=(), recipe={"name": name}, seed=0)
+        for name, kind in (("calm", Kind.RECORDING), ("tracked", Kind.MARKERS))
+    )
+    measured = Artifact(kind=Kind.MEASUREMENT, name="calm", parents=(calm.id,), recipe={"wind": 5}, seed=0)
     with lake.transaction("three") as transaction:
-        for name, kind in (("calm", Kind.RECORDING), ("tracked", Kind.MARKERS)):
-            transaction.add(Artifact(kind=kind, name=name, parents=(), recipe={"name": name}, seed=0))
+        for artifact in (calm, tracked, measured):
+            transaction.add(artifact)
     assert films_among(["calm", "tracked"], lake=lake, at="main") == ("calm",)
     assert films_among(["tracked"], lake=lake, at="main", sized=True) == ()
     assert films_among(["absent"], lake=lake, at="main", sized=True) == ("absent",)

@@ -15,6 +15,7 @@ MEASURE = Path(__file__).resolve().parents[3] / "measure"
 STAGES = ("verdict", "forecasting", "probes", "inference", "nulls", "loop", "closing")
 
 METHOD = {
+    "closing/joint": {"_CERTAIN"},
     "forecasting/alignment": {"_CALM"},
     "forecasting/calibration": {"_DENSITY", "_BENDING", "_DAMPING", "PRIOR", "PRIOR_WITHOUT_MASS"},
     "forecasting/model": {"_SHARE"},
