@@ -15,7 +15,7 @@ from measure.estimate.similarity import FlagSize
 from measure.observables.film import FilmWindow
 from measure.observables.observable import WINDOW
 from models.conditioning.outline import Outliner
-from models.conditioning.stills import SAMPLE, halved
+from models.conditioning.stills import halved
 
 CHUNK = 30.0
 """Length of film [s] that one still picture is of: light and shade change over longer ones."""
@@ -141,12 +141,13 @@ def _chunk(
     nothing: list[FilmWindow | None] = [None] * count
     if film.found is None or not held:
         return nothing
-    outliner = Outliner.of([frame for _, frame in held[:: -(-len(held) // SAMPLE)]])
+    shown = [frame for _, frame in held]
+    outliner = Outliner.of(shown)
     if outliner is None or outliner.hoist[1, 1] - outliner.hoist[0, 1] < _LEAST_HOIST:
         return nothing
     times = np.array([time for time, _ in held])
-    frames = np.stack([np.rint(halved(frame)).astype(np.uint8) for _, frame in held])
-    cloth, expected = outliner.masks([frame for _, frame in held])
+    frames = np.stack([np.rint(halved(frame)).astype(np.uint8) for frame in shown])
+    cloth, expected = outliner.masks(shown)
     hoist = outliner.hoist
     found: list[FilmWindow | None] = []
     for k in range(count):
