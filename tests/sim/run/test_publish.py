@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -123,20 +123,20 @@ def test_an_interrupted_run_keeps_what_was_committed(lake: Lake, make_recipe: Ca
 
 def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, small: Callable[..., str]) -> None:
     recipe = tmp_path / "small.toml"
-    recipe.write_text(small().replace("count = 6", "count = 24").replace("batch = 4", "batch = 2"))
+    recipe.write_text(small().replace("count = 6", "count = 8").replace("batch = 4", "batch = 2"))
     killed = Lake.create(tmp_path / "killed")
-    process = subprocess.Popen([sys.executable, str(WORKER), str(killed.path), str(recipe)])
-    deadline = time.monotonic() + 60
-    while len(killed.rows()) < 4 and time.monotonic() < deadline and process.poll() is None:
-        time.sleep(0.02)
-    process.kill()
-    process.wait()
+    command = [sys.executable, str(WORKER), str(killed.path), str(recipe)]
+    with subprocess.Popen([*command, "4"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "paused\n"
+        process.kill()
+    assert process.returncode == -signal.SIGKILL
     before = objects(killed)
-    assert 4 <= len(before) < 24
-    subprocess.run([sys.executable, str(WORKER), str(killed.path), str(recipe)], check=True)
-    assert len(objects(killed)) == 24
+    assert 4 <= len(before) < 8  # it paused in the third batch of four, or in the fourth while the third was committed
+    subprocess.run(command, check=True)
+    assert len(objects(killed)) == 8
     assert {seed: stored for seed, stored in objects(killed).items() if seed in before} == before
-    assert len(killed.rows()) == 24
+    assert len(killed.rows()) == 8
 
 
 def test_what_fails_is_reported_and_not_stored(lake: Lake, make_recipe: Callable) -> None:
