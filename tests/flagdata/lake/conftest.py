@@ -72,10 +72,14 @@ class Worker:
         assert "failed" not in self.lines()  # its traceback is among what was captured
         os.kill(int(self.lines()[0]), signal.SIGKILL)
         with self.said.open("a") as file:
-            file.write("\nkilled\n")
+            file.write("killed\n")
 
     def is_running(self) -> bool:
         return _ENDS.isdisjoint(self.lines())
+
+    def was_interrupted(self) -> bool:
+        """Whether it was killed between the begin of an ingest and its acknowledgement."""
+        return self.lines()[-2:] == ["begun", "killed"]
 
     def acknowledged(self) -> set[str]:
         """Ids of the artifacts whose with-block it had left."""

@@ -3,8 +3,8 @@
     python ingest_worker.py LAKE
 
 It imports what is needed once, then forks a worker for each line "PREFIX COUNT SHARED FILE" it is given; nothing of the
-lake has been used before the fork. A worker writes to FILE its process id and "ready", then an artifact's id after each
-with-block it has left: what is there was acknowledged. The first SHARED sources are the same for all workers, the next
+lake has been used before the fork. A worker writes to FILE its process id and "ready", then "begun" before each
+with-block and an artifact's id after it was left: what is there was acknowledged. The first SHARED sources are the same for all workers, the next
 COUNT are its own. Records and folders take turns.
 """
 
@@ -39,6 +39,7 @@ def ingest(lake: Lake, prefix: str, count: int, shared: int, said: int) -> None:
     os.write(said, f"{os.getpid()}\nready\n".encode())
     sources = [f"shared-{i}" for i in range(shared)] + [f"{prefix}-{i}" for i in range(count)]
     for i, source in enumerate(sources):
+        os.write(said, b"begun\n")
         with lake.transaction(f"ingest {source}") as tx:
             name = put(tx, source, folder=i % 2 == 1)
             artifact = Artifact(
