@@ -5,8 +5,8 @@
 Kinds of findings, by severity:
 
 - notes: resampled, frames-dropped, true-rate, variable-rate, exposure-unknown, crop-proposed, letterboxed (a chosen
-  crop), enlarged (up to twice), mirrored, more-video-streams, telemetry-not-read, numbered-by-steps,
-  start-passed-over, chapter-placed, chapters-joined;
+  crop), enlarged (up to twice), mirrored, more-video-streams, telemetry-without-time, numbered-by-steps,
+  start-by-gps, start-passed-over, chapter-placed, chapters-joined;
 - warnings: crop-cuts-motion, letterboxed (no crop chosen), enlarged, frames-missing, frames-repeated,
   frames-not-shown, frames-undecoded, stamps-missing, stamps-duplicate, stamps-disordered, stamps-synthetic (of LeRobot
   data sets), true-rate-of-variable, start-unsure, start-unknown, chapter-not-placed, chapters-unproven, interlaced,

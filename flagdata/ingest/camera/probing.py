@@ -73,7 +73,8 @@ def probe(path: Path | str, options: CameraOptions | None = None) -> CameraProbe
         try:
             start = find_start(
                 options.start, facts.metadata, recorded=facts.recorded, place=options.zone, duration=timing.duration,
-                where=str(path), chapter=chapter_of(path),
+                where=str(path), chapter=chapter_of(path), stamped=facts.stamped,
+                gps=facts.gps.start(1.0) if facts.gps is not None else None,
             )  # fmt: skip
         except TimeError:
             start = None

@@ -9,6 +9,7 @@ from typing import Protocol
 
 from flagdata.findings import Finding
 from flagdata.ingest.camera.geometry import Orientation
+from flagdata.ingest.camera.gpmf import GpsTimes
 from flagdata.ingest.camera.luma import Luma
 from flagdata.ingest.camera.stamps import Timing
 
@@ -27,6 +28,7 @@ class SourceFacts:
         sequence: whether the stamps were made from `sequence_fps`.
         findings: what opening it found.
         stamped: instant of the first frame [UTC ns], where stamps state the day and the time; else `None`.
+        gps: times that the camera's telemetry states by GPS, if it does.
     """
 
     container: str
@@ -43,6 +45,7 @@ class SourceFacts:
     sequence: bool
     findings: tuple[Finding, ...]
     stamped: int | None = None
+    gps: GpsTimes | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import tzinfo
 
@@ -18,7 +19,7 @@ class Start:
 
     Attributes:
         instant: [UTC ns].
-        source: "option", "unknown", or "metadata: <key>".
+        source: "option", "unknown", "telemetry: GPS", or "metadata: <key>".
         sigma: standard uncertainty of reading it off the file [s], the camera's clock error not included; `None` for
             the user's own figure.
     """
@@ -46,12 +47,13 @@ def find_start(
     where: str,
     chapter: Chapter | None = None,
     stamped: int | None = None,
+    gps: tuple[int, float] | None = None,
 ) -> Start:
     """The start of a recording.
 
-    In order: `option`; `stamped`; `com.apple.quicktime.creationdate`, which names its zone and means the start; the
-    wall-clock time that AVCHD cameras write into the video itself, with their zone or `place`; `creation_time`, which
-    should be UTC (ISO/IEC 14496-12, 8.2.2) and the start, but some cameras write local time and some phones the
+    In order: `option`; `stamped`; `gps`; `com.apple.quicktime.creationdate`, which names its zone and means the start;
+    the wall-clock time that AVCHD cameras write into the video itself, with their zone or `place`; `creation_time`,
+    which should be UTC (ISO/IEC 14496-12, 8.2.2) and the start, but some cameras write local time and some phones the
     recording's end, and cameras that split a recording into chapters stamp them all with its creation time.
     Neither the file's name nor its modification time is used.
 
@@ -60,6 +62,7 @@ def find_start(
         place: zone of the camera's clock, for times without one.
         duration: of the file [s].
         stamped: instant of the first frame, where the frames' own stamps state the day and the time [UTC ns].
+        gps: instant of the first frame by the GPS in the camera's telemetry [UTC ns], and its standard uncertainty [s].
         chapter: where the file begins within the recording whose creation time it states; None where it is the whole.
 
     Raises:
@@ -80,6 +83,8 @@ def find_start(
         except TimeError as error:
             raise TimeError(f"the frames' stamps begin at {error.what}", where=where, fix=error.fix) from None
     default = zone(place, where="zone") if place else None
+    if gps is not None:
+        return _from_gps(*gps, created=metadata.get("creation_time"), default=default)
     passed_over: list[Finding] = []
     for key, text in (
         ("com.apple.quicktime.creationdate", metadata.get("com.apple.quicktime.creationdate")),
@@ -105,6 +110,17 @@ def find_start(
         fix="give --start with a zone, e.g. --start 2026-05-01T12:00:00+02:00"
         + (", or --zone, the zone of the camera's clock" if recorded and place is None else ""),
     )
+
+
+def _from_gps(instant: int, sigma: float, *, created: str | None, default: tzinfo | None) -> Start:
+    what = "the start is by the GPS time in the camera's telemetry"
+    if created:
+        with suppress(TimeError):  # it is not used
+            beside = (parse(created, default=default) - instant) / NANOSECONDS
+            what += f"; the camera's own clock, creation_time {created}, is {abs(beside):.1f} s "
+            what += "ahead" if beside > 0 else "behind"
+    finding = Finding(kind="start-by-gps", severity=Severity.NOTE, what=what, value=sigma)
+    return Start(instant=instant, source="telemetry: GPS", sigma=sigma, findings=(finding,))
 
 
 def _from_creation_time(

@@ -64,6 +64,7 @@ class CameraStream:
         start = find_start(
             options.start, facts.metadata, recorded=facts.recorded, place=options.zone, duration=duration,
             where=str(path), chapter=chapter, stamped=facts.stamped,
+            gps=facts.gps.start(float(self._scale)) if facts.gps is not None else None,
         )  # fmt: skip
         self._opening += start.findings
         width, height = upright_size(facts.width, facts.height, facts.aspect, facts.orientation)

@@ -34,12 +34,12 @@ from flagdata.ingest.camera.container import (
 )
 from flagdata.ingest.camera.damage import Damage
 from flagdata.ingest.camera.geometry import Orientation
+from flagdata.ingest.camera.gpmf import GpsTimes, gps_times, telemetry_of
 from flagdata.ingest.camera.luma import luma_of_frame
 from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import Timing
 
-_GOPRO = "GoPro MET"  # handler of the track with GPMF, as GoPro's cameras name it
 _FARTHEST = 1000  # frames decoded in vain to reach a place between key frames
 
 
@@ -60,6 +60,7 @@ class VideoSource:
         check_file(path, options.limits)
         timing, surveyed = survey_file(path, options)
         self._timing = timing
+        self._gps = self._gps_times()
         self._container, self._stream = self._open()
         try:
             self._decoded = self._decode()
@@ -79,6 +80,14 @@ class VideoSource:
         options = self._options
         return open_container(self._path, options.limits, threads=options.threads, wanted=options.stream)
 
+    def _gps_times(self) -> GpsTimes | None:
+        container, _ = self._open()
+        with container:
+            telemetry = telemetry_of(container)
+            if telemetry is None:
+                return None
+            return gps_times(container, telemetry, origin=self._timing.origin * self._timing.tick)
+
     def _describe(self, first: av.VideoFrame, findings: list[Finding]) -> SourceFacts:
         context = self._stream.codec_context
         metadata = {k.lower(): v for k, v in {**self._container.metadata, **self._stream.metadata}.items()}
@@ -96,6 +105,7 @@ class VideoSource:
             recorded=_recorded(first),
             sequence=self._container.format.name in UNTIMED,
             findings=tuple(findings),
+            gps=self._gps,
         )
 
     def _stream_findings(self, first: av.VideoFrame) -> list[Finding]:
@@ -137,13 +147,13 @@ class VideoSource:
                     fix="choose another with --stream",
                 )
             )  # fmt: skip
-        if any(stream.metadata.get("handler_name", "").strip() == _GOPRO for stream in self._container.streams.data):
+        if telemetry_of(self._container) is not None and self._gps is None:
             found.append(
                 Finding(
-                    kind="telemetry-not-read", severity=Severity.NOTE,
-                    what="the file has a track of GoPro's telemetry (GPMF), whose GPS time is not read; the start is"
-                    " the camera's own clock",
-                    fix="if that clock was not set, give --start, read from the track by the camera's own software",
+                    kind="telemetry-without-time", severity=Severity.NOTE,
+                    what="the telemetry in the file (GPMF) states no GPS time with a fix; the start is the camera's own"
+                    " clock",
+                    fix="if that clock was not set, give --start",
                 )
             )  # fmt: skip
         return found

@@ -4,8 +4,8 @@
 
 It imports what is needed once, then forks a worker for each line "PREFIX COUNT SHARED FILE" it is given; nothing of the
 lake has been used before the fork. A worker writes to FILE its process id and "ready", then "begun" before each
-with-block and an artifact's id after it was left: what is there was acknowledged. The first SHARED sources are the same for all workers, the next
-COUNT are its own. Records and folders take turns.
+with-block and an artifact's id after it was left: what is there was acknowledged. The first SHARED sources are the same
+for all workers, the next COUNT are its own. Records and folders take turns.
 """
 
 import os

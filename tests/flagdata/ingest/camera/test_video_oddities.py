@@ -253,25 +253,3 @@ def test_a_video_stream_is_chosen_by_its_number(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="stream 2 is no video") as refused:
         open_camera(path, CameraOptions(start=0, stream=2))
     assert refused.value.fix == "give --stream 0 or 1"
-
-
-def test_a_track_of_telemetry_is_reported_as_not_read(tmp_path: Path) -> None:
-    kinds = {}
-    for name in ("plain.mp4", "gopro.mp4"):
-        path = tmp_path / name
-        with av.open(str(path), "w") as out:
-            video = out.add_stream("mpeg4", rate=25)
-            video.width, video.height, video.pix_fmt = 64, 48, "yuv420p"
-            if name == "gopro.mp4":  # FFmpeg names the handler of such a track as the cameras do
-                telemetry = out.add_data_stream("bin_data")
-            for k in range(5):
-                shown = np.full((72, 64), 90, dtype=np.uint8)
-                out.mux(video.encode(av.VideoFrame.from_ndarray(shown, format="yuv420p")))
-                if name == "gopro.mp4" and k == 0:
-                    packet = av.Packet(b"DEVC\x00\x01\x00\x00")
-                    packet.stream, packet.pts, packet.dts, packet.time_base = telemetry, 0, 0, Fraction(1, 25)
-                    out.mux(packet)
-            out.mux(video.encode(None))
-        with open_camera(path, CameraOptions(start=0)) as film:
-            kinds[name] = {finding.kind for finding in film.findings}
-    assert kinds["gopro.mp4"] - kinds["plain.mp4"] == {"telemetry-not-read"}
