@@ -59,6 +59,7 @@ _INFO_PREFIX = "flagdata."
 _TIDY_EVERY = 32
 _SMALL = 4 << 20  # B
 _PATIENCE = 120.0  # s, how long a commit competes with other writers before it gives up
+_LEAST_TRIES = 20  # whatever time these take: an attempt may have waited for a collection
 _FIRST_WAIT = 0.01  # s
 _LONGEST_WAIT = 0.5  # s
 _LATEST = 253_402_300_800_000  # ms since 1970: the year 10000
@@ -86,15 +87,16 @@ def persist(attempt: Callable[[], T], *, where: Place) -> T:
     """Run `attempt` until it does not raise `Moved`, with random waits that grow.
 
     Raises:
-        ConflictError: after two minutes of others always being faster.
+        ConflictError: after two minutes and at least twenty attempts in which others were faster.
     """
     deadline = time.monotonic() + _PATIENCE
-    wait = _FIRST_WAIT
+    wait, tries = _FIRST_WAIT, 0
     while True:
+        tries += 1
         try:
             return attempt()
         except Moved:
-            if time.monotonic() > deadline:
+            if time.monotonic() > deadline and tries >= _LEAST_TRIES:
                 raise ConflictError(
                     f"other processes kept committing for {_PATIENCE:.0f} s", where=str(where), fix="try again"
                 ) from None

@@ -62,11 +62,24 @@ class Worker:
         return self.said.read_text().split("\n")[:-1] if self.said.exists() else []
 
     def await_line(self, line: str) -> None:
+        self._await(lambda: line in self.lines())
+
+    def _await(self, there: Callable[[], bool]) -> None:
         deadline = time.monotonic() + 500
-        while line not in self.lines():
+        while not there():
             assert "failed" not in self.lines()
             assert time.monotonic() < deadline
             time.sleep(0.005)
+
+    def await_acknowledged(self, count: int) -> None:
+        """Until it has acknowledged so many more artifacts."""
+        wanted = len(self.acknowledged()) + count
+        self._await(lambda: len(self.acknowledged()) >= wanted)
+
+    def stop(self) -> None:
+        """Let it end after what it ingests now."""
+        Path(f"{self.said}-stop").touch()
+        self.await_line("done")
 
     def kill(self) -> None:
         assert "failed" not in self.lines()  # its traceback is among what was captured

@@ -5,7 +5,8 @@
 It imports what is needed once, then forks a worker for each line "PREFIX COUNT SHARED FILE" it is given; nothing of the
 lake has been used before the fork. A worker writes to FILE its process id and "ready", then "begun" before each
 with-block and an artifact's id after it was left: what is there was acknowledged. The first SHARED sources are the same
-for all workers, the next COUNT are its own. Records and folders take turns.
+for all workers, the next COUNT are its own, fewer where a file FILE-stop is made meanwhile. Records and folders take
+turns.
 """
 
 import os
@@ -13,6 +14,7 @@ import signal
 import sys
 import traceback
 from hashlib import sha256
+from pathlib import Path
 
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.transaction import Transaction
@@ -33,12 +35,14 @@ def put(tx: Transaction, source: str, *, folder: bool) -> str:
     return tx.put(path)
 
 
-def ingest(lake: Lake, prefix: str, count: int, shared: int, said: int) -> None:
+def ingest(lake: Lake, prefix: str, count: int, shared: int, said: int, stop: Path) -> None:
     with lake.transaction("warm up: libraries load on first use"):
         pass
     os.write(said, f"{os.getpid()}\nready\n".encode())
     sources = [f"shared-{i}" for i in range(shared)] + [f"{prefix}-{i}" for i in range(count)]
     for i, source in enumerate(sources):
+        if stop.exists():
+            break
         os.write(said, b"begun\n")
         with lake.transaction(f"ingest {source}") as tx:
             name = put(tx, source, folder=i % 2 == 1)
@@ -59,7 +63,7 @@ def serve(address: str) -> None:
             status = 1
             try:
                 signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-                ingest(Lake.open(address), prefix, int(count), int(shared), said)
+                ingest(Lake.open(address), prefix, int(count), int(shared), said, Path(f"{file}-stop"))
                 status = 0
             except BaseException:  # noqa: BLE001 — the worker ends here whatever happened
                 traceback.print_exc()  # os._exit says nothing of what ended the worker
