@@ -55,17 +55,17 @@ def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
     """List artifacts, clips counted only (--kind clip lists them); filters and SQL are `flagdata query`'s."""
     from flagdata.errors import UnknownNameError
     from flagdata.lake import Lake
+    from flagdata.lake.matching import matching
     from flagdata.lake.removals import lost
     from flagdata.schema import Kind
 
     if kind is not None and kind not in list(Kind):
         raise UnknownNameError.of("kind", kind, [k.value for k in Kind])
     lake = Lake.open(lake_path)
-    selected = lake.rows(None if kind is None else {"kind": kind}, at=at)
-    gone = lost(lake, selected)
-    found = selected.to_pylist()
-    rows = [row for row in found if kind is not None or row["kind"] != Kind.CLIP]
-    clips = len(found) - len(rows)
+    found = lake.rows(None if kind is None else {"kind": kind}, at=at, columns=["name", "object"])
+    rows = lake.rows("kind <> 'clip'" if kind is None else {"kind": kind}, at=at).to_pylist()
+    gone = lost(lake, found)
+    clips = found.num_rows - len(rows)
     if as_json:
         listed = [{**_plain(row), "data": "lost" if row["object"] in gone else "there"} for row in rows]
         document("ls", {"at": at, "artifacts": listed, "clips_not_listed": clips})
@@ -74,9 +74,9 @@ def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
     if rows:
         table(header, [_line(row, lost=row["object"] in gone) for row in rows])
     more = f" and {counted(clips, 'clip')} (--kind clip lists them)" if clips else ""
-    say(f"{counted(len(rows), 'artifact')}{more}" if found else "no artifacts")
+    say(f"{counted(len(rows), 'artifact')}{more}" if found.num_rows else "no artifacts")
     for name, why in gone.items():
-        names = sorted({row["name"] for row in found if row["object"] == name})
+        names = sorted(matching(found, {"object": name})["name"].unique().to_pylist())
         say(f"without data: {', '.join(names)}: {why.what}")
 
 

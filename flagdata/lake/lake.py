@@ -328,7 +328,7 @@ class Lake(Store):
 
     def descendants(self, artifacts: Collection[str], *, at: str | None = None) -> frozenset[str]:
         """Ids of all rows at a ref that were made from `artifacts` (full ids), directly or not; without these."""
-        return descendants(self.table(self.view(at)), artifacts)
+        return descendants(self.columns(self.view(at), ["artifact", "parents"]), artifacts)
 
     def unpublished_files(self) -> list[Place]:
         """Files that a process left which died while it wrote to the catalog or the refs, or made the lake."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import reduce
 from operator import and_
 from typing import Any, TypeAlias
@@ -37,6 +37,13 @@ def condition(values: Values) -> pc.Expression:
         UnknownNameError, UsageError: as `matching`.
     """
     return reduce(and_, (_condition(column, value) for column, value in values.items()))
+
+
+def made_from(rows: pa.Table, artifacts: Collection[str]) -> pa.Table:
+    """The rows of which some of `artifacts` are parents, in their order."""
+    parents = rows["parents"].combine_chunks()
+    found = pc.is_in(pc.list_flatten(parents), value_set=pa.array(sorted(artifacts), pa.string()))  # type: ignore[attr-defined]
+    return rows.take(pc.list_parent_indices(parents).filter(found).unique())  # type: ignore[attr-defined]
 
 
 def _condition(column: str, value: object) -> pc.Expression:

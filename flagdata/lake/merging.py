@@ -9,7 +9,6 @@ the other withdrew it comes back, and is named.
 from __future__ import annotations
 
 import secrets
-from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -19,13 +18,15 @@ from flagdata.errors import ConflictError, NotFoundError, UsageError
 from flagdata.lake.catalog import persist
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.leases import keeping_collectors_out
-from flagdata.lake.matching import matching
+from flagdata.lake.matching import made_from, matching
 from flagdata.lake.refs import Slice
 from flagdata.lake.removals import removals
 from flagdata.lake.store import Store
 from flagdata.lake.withdrawal import take_off
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
+
+_COLUMNS = ["artifact", "kind", "name", "parents"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,18 +65,19 @@ def merge(lake: Store, branch: str, message: str, *, into: str) -> MergeResult:
 
 def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:
     head = lake.catalog.head()
-    mine, other = (lake.table(lake.refs.view(name, head)) for name in (into, branch))
+    views = {name: lake.refs.view(name, head) for name in (into, branch)}
+    mine, other = (lake.columns(views[name], _COLUMNS) for name in (into, branch))
     ours, theirs = Slice(branch=into, version=head), Slice(branch=branch, version=head)
     lineage = lake.lineage()
     if lineage.knows(ours, theirs):
         return MergeResult(version=head, commit=None, left_out={}, brought_back={})
     base = lineage.merge_base(ours, theirs)
-    before = _ids(lake.table(lineage.view(base))) if base is not None else frozenset()
+    before = frozenset(lake.identities(lineage.view(base)).to_pylist()) if base is not None else frozenset()
     here, there = _ids(mine), _ids(other)
     new = there - before
     left_out, brought_back = _decided(lake, ours, theirs, new - here, since=-1 if base is None else base.version)
     added, withdrawn = new - here - left_out.keys(), (before - there) & here
-    fresh = _rows(other, added)
+    fresh = lake.matching(views[branch], {"artifact": sorted(added)})
     _check_objects(lake, fresh)
     _check_parents(mine, other, added=added, withdrawn=withdrawn, branch=branch, into=into)
 
@@ -96,10 +98,6 @@ def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:
 
 def _ids(table: pa.Table) -> frozenset[str]:
     return frozenset(table["artifact"].to_pylist())
-
-
-def _rows(table: pa.Table, artifacts: Collection[str]) -> pa.Table:
-    return matching(table, {"artifact": sorted(artifacts)})
 
 
 def _published(rows: pa.Table, branch: str) -> pa.Table:
@@ -124,7 +122,7 @@ def _decided(
     for removal in reversed(list(removals(lake, since=first, branch=ours.branch) if candidates else ())):
         if found := removal.artifacts & candidates:
             then = Slice(branch=theirs.branch, version=max(removal.version, lineage.life(theirs)[1]))
-            had = found & _ids(lake.table(lineage.view(then)))
+            had = found & frozenset(lake.identities(lineage.view(then)).to_pylist())
             for artifact in found:
                 left_out.pop(artifact, None)
                 brought_back.pop(artifact, None)
@@ -148,13 +146,11 @@ def _check_parents(
         ConflictError: one would lack a parent that was withdrawn on the other side.
         NotFoundError: one lacks a parent on its own branch already.
     """
-    columns = ["artifact", "kind", "name", "parents"]
-    here, there = (table.select(columns).to_pylist() for table in (mine, other))
     after = (_ids(mine) - withdrawn) | added
     known = _ids(other)
-    for row in there:
+    for row in matching(other, {"artifact": list(added)}).to_pylist():
         for parent in row["parents"]:
-            if row["artifact"] in added and parent not in after:
+            if parent not in after:
                 what = f"{row['kind']} {row['name']!r} ({row['artifact']}) was made from {parent}"
                 if parent not in known:
                     raise NotFoundError(
@@ -166,7 +162,7 @@ def _check_parents(
                     fix=f"flagdata withdraw {parent} --with-descendants --branch {branch}, or ingest its source again"
                     f" with --branch {into}",
                 )
-    for row in here:
+    for row in made_from(mine, withdrawn).to_pylist():
         for parent in row["parents"]:
             if parent in withdrawn and row["artifact"] in after:
                 raise ConflictError(

@@ -114,7 +114,7 @@ def explained(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
 def lost(lake: Store, rows: pa.Table) -> dict[str, NotFoundError]:
     """Object of some of the rows that is not in the lake → why."""
     found: dict[str, NotFoundError] = {}
-    for name in sorted(set(rows["object"].drop_null().to_pylist())):
+    for name in sorted(rows["object"].drop_null().unique().to_pylist()):
         if not lake.objects.has(name):
             found[name] = explained(lake, name, lake.objects.missing(name))
     return found

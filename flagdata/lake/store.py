@@ -71,19 +71,19 @@ class Store:
             NotFoundError: no such ref.
             UnknownNameError: no such column.
         """
-        view = self.view(at)
-        if where is None or where == {}:
-            table = self.table(view)
-        elif isinstance(where, str):
-            table = _filter(self.scan(view), where)
-        else:
-            table = self.matching(view, where)
-        if columns is None:
-            return table
-        for column in columns:
+        for column in columns or ():
             if column not in CATALOG:
                 raise UnknownNameError.of("column", column, CATALOG)
-        return table.select(list(columns))
+        view = self.view(at)
+        if isinstance(where, str):
+            table = _filter(self.scan(view), where)
+        elif where:
+            table = self.matching(view, where, columns)
+        elif columns is not None:
+            table = in_order(self.columns(view, list(dict.fromkeys([*columns, *ROW_ORDER]))))
+        else:
+            table = self.table(view)
+        return table if columns is None else table.select(list(columns))
 
     def artifact(self, artifact: str, *, at: str | None = None, kinds: Collection[Kind] = ()) -> Artifact:
         """The artifact that `artifact` means, as in `flagdata.lake.naming`, or NAME@REF at that tag or branch.
@@ -150,21 +150,44 @@ class Store:
                 return found.matching(pc.field("branch") == view[0].branch)
         return self.table(view)
 
-    def matching(self, view: View, values: Values) -> pa.Table:
-        """Rows of a view with these values, see `flagdata.lake.matching`.
+    def matching(self, view: View, values: Values, columns: Sequence[str] | None = None) -> pa.Table:
+        """Rows of a view with these values, see `flagdata.lake.matching`, with at least some columns; all if `None`.
 
         Raises:
             UnknownNameError, UsageError: as there.
         """
-        rows = self.scan(view)
-        if isinstance(rows, Scan):
-            return in_order(rows.matching(condition(values)).table(CATALOG))
-        return matching(rows, values)
+        scans = None if self.lineage().labelled(view[0]) else self._scans(view)
+        if scans is None:
+            return matching(self.table(view), values)
+        wanted = CATALOG if columns is None else dict.fromkeys([*columns, *ROW_ORDER])
+        return pa.concat_tables(in_order(scan.matching(condition(values)).table(wanted)) for scan in scans)
+
+    def columns(self, view: View, names: Sequence[str]) -> pa.Table:
+        """Some columns of all rows of a view, its base first, by commit; no others are decoded where that can be."""
+        scans = self._scans(view)
+        if scans is None:
+            return self.table(view).select(names)
+        return pa.concat_tables(scan.table(names) for scan in scans)
+
+    def _scans(self, view: View) -> list[Scan] | None:
+        """The rows of a view by branch, its base first, without labels; `None` where files cannot be scanned."""
+        found: list[Scan] = []
+        hidden: frozenset[str] = frozenset()
+        for part in view:
+            rows = self.catalog.scan(part.version)
+            if rows is None:
+                return None
+            shown = pc.field("branch") == part.branch
+            if hidden:
+                shown &= ~pc.field("artifact").isin(sorted(hidden))
+            found.append(rows.matching(shown))
+            if len(view) > 1:
+                hidden |= self.lineage().hidden(part)
+        return found[::-1]
 
     def identities(self, view: View) -> pa.ChunkedArray:
         """The ids of all rows of a view."""
-        rows = self.scan(view)
-        return rows.table(["artifact"])["artifact"] if isinstance(rows, Scan) else rows["artifact"]
+        return self.columns(view, ["artifact"])["artifact"]
 
     def lineage(self) -> Lineage:
         """How branches came to be, as known at the head."""

@@ -17,6 +17,8 @@ from flagdata.errors import ConflictError, NotFoundError
 from flagdata.lake.catalog import persist
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.leases import keeping_collectors_out
+from flagdata.lake.matching import made_from, matching
+from flagdata.lake.refs import Slice
 from flagdata.lake.store import Store
 from flagdata.schema import Kind, catalog_schema
 
@@ -44,7 +46,7 @@ def withdraw(lake: Store, artifacts: Collection[str], message: str, *, branch: s
 
     def attempt() -> Withdrawal:
         head = lake.catalog.head()
-        shown = lake.table(lake.refs.view(branch, head))
+        shown = lake.columns(lake.refs.view(branch, head), _COLUMNS)
         clips = clips_of(shown, asked)
         leaving = asked | clips
         check_leaving(shown, leaving, branch=branch, where=str(lake.path))
@@ -74,39 +76,37 @@ def take_off(
     Raises:
         Moved: `base` is no longer the newest version; nothing was published.
     """
-    rows = lake.catalog.rows(base)
-    going = (pc.field("branch") == branch) & pc.field("artifact").isin(pa.array(sorted(leaving), pa.string()))
-    own = rows.filter(going)["artifact"].to_pylist()
-    hidden = sorted(set(leaving) - set(own))
+    own: set[str] = set()
+    if leaving:
+        own = set(leaving).intersection(lake.identities((Slice(branch=branch, version=base),)).to_pylist())
+    hidden = sorted(set(leaving) - own)
     fresh = catalog_schema().empty_table() if fresh is None else fresh
     noted = {**info, "hidden": json.dumps(hidden)} if hidden else info
     if not own:
         return lake.catalog.append(fresh, base=base, info=noted)
+    rows = lake.catalog.rows(base)
+    going = (pc.field("branch") == branch) & pc.field("artifact").isin(pa.array(sorted(own), pa.string()))
     return lake.catalog.replace(pa.concat_tables([rows.filter(~going), fresh]), base=base, info=noted)
 
 
 def clips_of(shown: pa.Table, artifacts: Collection[str]) -> frozenset[str]:
     """Ids of the clips that are slices of the objects of `artifacts` themselves, so that they mean nothing without."""
-    rows = shown.select(_COLUMNS).to_pylist()
-    objects = {row["artifact"]: row["object"] for row in rows if row["artifact"] in artifacts}
+    named = matching(shown, {"artifact": list(artifacts)}).select(_COLUMNS).to_pylist()
+    objects = {row["artifact"]: row["object"] for row in named}
+    made = matching(made_from(shown, objects), {"kind": Kind.CLIP}).select(_COLUMNS).to_pylist()
     return frozenset(
         row["artifact"]
-        for row in rows
-        if row["kind"] == Kind.CLIP
-        and row["object"] is not None
-        and any(objects.get(parent) == row["object"] for parent in row["parents"])
+        for row in made
+        if row["object"] is not None and any(objects.get(parent) == row["object"] for parent in row["parents"])
     ) - frozenset(artifacts)
 
 
 def descendants(shown: pa.Table, artifacts: Collection[str]) -> frozenset[str]:
     """Ids of all rows that were made from `artifacts`, or from what was made from them; without `artifacts`."""
-    rows = shown.select(["artifact", "parents"]).to_pylist()
-    found = set(artifacts)
-    grown = True
-    while grown:
-        more = {row["artifact"] for row in rows if found.intersection(row["parents"])} - found
-        found |= more
-        grown = bool(more)
+    found, newest = set(artifacts), set(artifacts)
+    while newest:
+        newest = set(made_from(shown, newest)["artifact"].to_pylist()) - found
+        found |= newest
     return frozenset(found - set(artifacts))
 
 
@@ -117,15 +117,15 @@ def check_leaving(shown: pa.Table, leaving: Collection[str], *, branch: str, whe
         NotFoundError: one that the branch does not show.
         ConflictError: a row that stays on the branch was made from one of them.
     """
-    rows = shown.select(_COLUMNS).to_pylist()
-    foreign = set(leaving) - {row["artifact"] for row in rows}
-    if foreign:
+    there = matching(shown, {"artifact": list(leaving)})["artifact"].to_pylist()
+    if foreign := set(leaving) - set(there):
         raise NotFoundError(
             f"{', '.join(sorted(foreign))} is not on branch {branch!r}",
             where=where,
             fix=f"give ids of rows that flagdata ls --at {branch} shows",
         )
-    staying = [r for r in rows if r["artifact"] not in leaving and set(leaving).intersection(r["parents"])]
+    made = made_from(shown, leaving).select(_COLUMNS).to_pylist()
+    staying = [row for row in made if row["artifact"] not in leaving]
     if staying:
         first = f"{staying[0]['kind']} {staying[0]['name']!r} ({staying[0]['artifact']})"
         more = f", and {len(staying) - 1} more," if len(staying) > 1 else ""

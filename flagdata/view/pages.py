@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import urlencode
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 from markupsafe import Markup
@@ -33,6 +34,7 @@ from flagdata.view.films import DRAWN
 from flagdata.view.media import Media
 
 _VIEWS = 3
+_ORDER = {"created": "descending", "start": "ascending", "artifact": "ascending"}
 CARDS = 60
 """Artifacts on one page."""
 CLIPS = 24
@@ -148,13 +150,15 @@ def overview(site: Site, *, kind: str | None, name: str | None, page: int) -> st
     chosen = pc.field("kind") != Kind.CLIP.value if kind is None else pc.field("kind") == kind
     if name:
         chosen &= pc.match_substring(pc.field("name"), name, ignore_case=True)  # type: ignore[attr-defined]
-    found = rows.filter(chosen).sort_by([("created", "descending"), ("start", "ascending"), ("artifact", "ascending")])
-    last = max(0, (found.num_rows - 1) // CARDS)
+    # Of a large catalog a filter or sort of whole rows would copy them all.
+    listed = rows.select([*_ORDER, "kind", "name"]).append_column("row", pa.array(np.arange(rows.num_rows)))
+    found = listed.filter(chosen).sort_by(list(_ORDER.items()))["row"]
+    last = max(0, (len(found) - 1) // CARDS)
     page = min(page, last)
-    cards = [_card(site, row) for row in found.slice(page * CARDS, CARDS).to_pylist()]
+    cards = [_card(site, row) for row in rows.take(found.slice(page * CARDS, CARDS)).to_pylist()]
     return _page(
         site, "overview.html.j2", cards=cards, counts=counts, kind=kind, name=name or "", page=page, last=last,
-        total=found.num_rows, everything=rows.num_rows - counts.get(Kind.CLIP.value, 0),
+        total=len(found), everything=rows.num_rows - counts.get(Kind.CLIP.value, 0),
     )  # fmt: skip
 
 

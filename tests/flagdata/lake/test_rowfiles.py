@@ -14,12 +14,13 @@ from flagdata.lake.rowfiles import ROW_ORDER, RowFiles, Scan, in_order
 from flagdata.schema import Kind, catalog_schema
 from flagdata.selection import select
 from tests.flagdata.lake.conftest import overwrite
+from tests.program import invoke
 
 Put = Callable[..., Artifact]
 
 
 def test_queries_look_ups_and_commits_do_not_decode_whole_rows(
-    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     identities = [put_text(lake, name).id for name in ("one", "two", "three")]
 
@@ -38,6 +39,15 @@ def test_queries_look_ups_and_commits_do_not_decode_whole_rows(
         transaction.add(Artifact(kind=Kind.MEASUREMENT, name="fifth", parents=(identities[0],)))
         assert not transaction.add(lake.artifact("one"))
     assert transaction.result.existing == (identities[0],)
+    for branch in ("side", "other"):
+        lake.branch(branch)
+    with lake.transaction("aside", branch="side") as transaction:
+        transaction.add(Artifact(kind=Kind.CLIP, name="clip", parents=(identities[0],), recipe={}))
+    lake.withdraw([identities[1]], "not on the side", branch="side")
+    assert lake.merge("side", "what was done aside", into="other").added == transaction.result.added
+    assert lake.rows(columns=["name"], at="other")["name"].to_pylist() == ["one", "three", "four", "fifth", "clip"]
+    listed = invoke(capsys, "ls", "--lake", lake.path)
+    assert ("two" in listed.out, "5 artifacts" in listed.err) == (True, True)
 
 
 def test_a_scan_is_the_table_of_every_view(lake: Lake, put_text: Put) -> None:
@@ -51,7 +61,12 @@ def test_a_scan_is_the_table_of_every_view(lake: Lake, put_text: Put) -> None:
         view = lake.view(at)
         scanned = lake.scan(view)
         rows = scanned.table(catalog_schema().names) if isinstance(scanned, Scan) else scanned
-        assert rows.to_pylist() == lake.table(view).to_pylist()
+        whole = lake.table(view)
+        assert rows.to_pylist() == whole.to_pylist()
+        assert lake.columns(view, ["name", "object"]).equals(whole.select(["name", "object"]))
+        assert lake.matching(view, {"name": ["aside", "kept"]}).to_pylist() == [
+            row for row in whole.to_pylist() if row["name"] in ("aside", "kept")
+        ]
     assert select(lake, "label_good", columns=["name"]).to_pylist() == [{"name": "kept"}]
 
 
