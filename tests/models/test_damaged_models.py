@@ -61,10 +61,10 @@ def test_a_card_with_another_value_is_read_or_refused(
     content = {"format": "flagdata.network/1", **changed(WORDS, path, value)}
     (copy / CARD).write_text(json.dumps(content))  # numbers that are not finite, as Python's JSON writes them
     write_sums(copy)
-    began = time.perf_counter()
+    began = time.process_time()
     with suppress(CorruptError):
         estimator.load(copy)
-    assert time.perf_counter() - began < SECONDS
+    assert time.process_time() - began < SECONDS
 
 
 def test_absurd_numbers_of_a_training_recipe_are_refused_before_any_work() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import threading
@@ -273,27 +274,38 @@ def test_a_transaction_ends_only_when_no_collector_can_see_it_half_gone(lake: La
 
 
 @pytest.mark.disk(LOCKS)
-def test_a_collector_is_let_in_though_writers_never_pause(lake: Lake) -> None:
-    stop = threading.Event()
+def test_a_collector_that_waits_is_let_in_before_the_writers_that_come_after_it(lake: Lake) -> None:
+    entered: list[str] = []
 
-    def write() -> None:
-        while not stop.is_set():
-            with keeping_collectors_out(lake.staging):
-                time.sleep(0.02)
-
-    # Four holders that overlap: without a turnstile there is hardly an instant at which nobody holds the lock.
-    writers = [threading.Thread(target=write) for _ in range(4)]
-    for writer in writers:
-        writer.start()
-    began = time.monotonic()
-    for _ in range(20):
+    def collector() -> None:
         with collecting(lake.staging):
-            pass
-    took = time.monotonic() - began
-    stop.set()
-    for writer in writers:
-        writer.join(60)
-    assert took < 10  # 20 times what is left of the holders' 0.02 s, with room for a busy machine
+            entered.append("collector")
+
+    def writer() -> None:
+        with keeping_collectors_out(lake.staging):
+            entered.append("writer")
+
+    first, second = threading.Thread(target=collector), threading.Thread(target=writer)
+    with keeping_collectors_out(lake.staging):
+        first.start()
+        while is_free(lake.staging / ".turn"):
+            time.sleep(0.001)
+        second.start()  # without the turnstile it would enter at once, beside this writer
+        second.join(0.3)
+        assert entered == []
+    for thread in (first, second):
+        thread.join()
+    assert entered == ["collector", "writer"]
+
+
+def is_free(lock: Path) -> bool:
+    """Whether nobody holds the lock."""
+    with lock.open("a") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+    return True
 
 
 @pytest.mark.disk(AGES)

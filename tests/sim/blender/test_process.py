@@ -3,7 +3,6 @@
 import io
 import os
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -125,13 +124,12 @@ def test_closing_ends_the_process_and_asking_again_starts_another(tmp_path):
     process.close()
 
 
-def test_a_hung_worker_is_killed_when_it_is_given_up(tmp_path):
+def test_a_hung_worker_is_killed_when_it_is_given_up(tmp_path, monkeypatch):
+    monkeypatch.setattr("sim.blender.process.EXIT_TIMEOUT", 3600.0)  # a hung worker's end is not waited for
     process = worker(tmp_path, "hang", "2", attempts=1)
     process.request(frames(1), timeout=30)
     pid = process.pid
     assert pid is not None
-    begun = time.monotonic()
     with pytest.raises(RenderError, match=r"did not answer for 0\.3 s"):
         process.request(frames(1), timeout=0.3)
     assert not alive(pid)
-    assert time.monotonic() - begun < 10

@@ -19,6 +19,7 @@ from flagdata.cli import root
 from flagdata.lake import Lake
 from sim.datasets.reading import parse
 from sim.datasets.recipe import DatasetRecipe
+from tests import pausing
 from tests.small import DATA_SET, SIMULATION
 
 WORKER = Path(__file__).with_name("build_worker.py")
@@ -111,39 +112,37 @@ class Builds:
         self._cluster = cluster
         self._said = said
 
-    def start(self, recipe: Path, lake: Path) -> subprocess.Popen[bytes]:
-        """`flagdata build`, which commits every two films."""
-        command = [sys.executable, str(WORKER), "build", str(recipe), "--lake", str(lake)]
+    def start(self, recipe: Path, lake: Path, *, pause: int) -> subprocess.Popen[str]:
+        """`flagdata build`, which commits every two films; it waits in the first commit from `pause` artifacts on."""
+        command = ["build", recipe, "--lake", lake, "--scheduler", self._cluster.address]
         # What it says goes to a file: nobody reads a pipe while it runs.
         with self._said.open("wb") as said:
-            command = [*command, "--scheduler", self._cluster.address]
-            return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=said)
+            process = pausing.start(WORKER, pause, *command, stderr=said)
+        pausing.await_pause(process)
+        return process
 
-    def finish(self, process: subprocess.Popen[bytes]) -> None:
-        assert process.wait(timeout=300) == 0
+    def finish(self, process: subprocess.Popen[str]) -> None:
+        assert self._ended(process) == 0
 
     def build(self, recipe: Path, lake: Path | str) -> Result:
         """`flagdata build`, to its end."""
         command = ["build", str(recipe), "--lake", str(lake), "--scheduler", self._cluster.address]
         return CliRunner().invoke(root, command)
 
-    def wait_for(self, process: subprocess.Popen[bytes], lake: Path, artifacts: int) -> None:
-        """Until the lake shows that many artifacts."""
-        while True:
-            assert process.poll() is None, "it ended too early"
-            with suppress(Exception):
-                if Lake.open(lake).rows(columns=["artifact"]).num_rows >= artifacts:
-                    return
-            time.sleep(0.1)
-
-    def refused(self, process: subprocess.Popen[bytes]) -> str:
-        """What a build says that ends without success."""
-        assert process.wait(timeout=300) == 1
+    def refused(self, process: subprocess.Popen[str]) -> str:
+        """What a build says that goes on and ends without success."""
+        assert self._ended(process) == 1
         return self._said.read_text()
 
-    def kill(self, process: subprocess.Popen[bytes]) -> None:
-        process.send_signal(signal.SIGKILL)
-        process.wait()
+    def _ended(self, process: subprocess.Popen[str]) -> int:
+        with process:
+            pausing.go_on(process)
+            return process.wait(timeout=300)
+
+    def kill(self, process: subprocess.Popen[str]) -> None:
+        with process:
+            process.kill()
+        assert process.returncode == -signal.SIGKILL
 
     def rows(self, lake: Path | str) -> Rows:
         """Artifact → all of its row that does not say when it was committed, and by which code."""

@@ -2,25 +2,24 @@
 
     python simulate_worker.py LAKE RECIPE [MEMBERS]
 
-Once the lake has that many members it writes "paused" from within the simulation of another batch, and does not go on.
+Once the lake has that many members it pauses within the simulation of another batch.
 """
 
 import sys
 
 from flagdata.lake import Lake
 from sim.run import load, simulate
+from tests.pausing import pause
 
 
 def work(address: str, recipe: str, members: str | None = None) -> None:
     lake = Lake.open(address)
 
-    def pause(count: int) -> None:
+    def progress(count: int) -> None:
         if members is not None and lake.rows(columns=["artifact"]).num_rows >= int(members):
-            sys.stdout.write("paused\n")
-            sys.stdout.flush()
-            sys.stdin.read()
+            pause()
 
-    simulate(lake, load(recipe), progress=pause)
+    simulate(lake, load(recipe), progress=progress)
 
 
 if __name__ == "__main__":

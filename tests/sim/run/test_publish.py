@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import signal
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,9 +14,10 @@ import pytest
 from flagdata.errors import UsageError
 from flagdata.lake import Lake
 from flagdata.lake.meshes import MeshSequence, read_meshes
-from sim.run import Recipe, simulate
+from sim.run import Recipe, load, simulate
 from sim.run.members import Crew
 from sim.run.reading import parse
+from tests import pausing
 
 WORKER = Path(__file__).with_name("simulate_worker.py")
 
@@ -125,15 +124,13 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, small: Callable[..., 
     recipe = tmp_path / "small.toml"
     recipe.write_text(small().replace("count = 6", "count = 8").replace("batch = 4", "batch = 2"))
     killed = Lake.create(tmp_path / "killed")
-    command = [sys.executable, str(WORKER), str(killed.path), str(recipe)]
-    with subprocess.Popen([*command, "4"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "paused\n"
+    with pausing.start(WORKER, killed.path, recipe, 4) as process:
+        pausing.await_pause(process)
         process.kill()
     assert process.returncode == -signal.SIGKILL
     before = objects(killed)
     assert 4 <= len(before) < 8  # it paused in the third batch of four, or in the fourth while the third was committed
-    subprocess.run(command, check=True)
+    simulate(killed, load(recipe))
     assert len(objects(killed)) == 8
     assert {seed: stored for seed, stored in objects(killed).items() if seed in before} == before
     assert len(killed.rows()) == 8

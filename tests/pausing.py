@@ -1,0 +1,38 @@
+"""Processes that wait at a known place of their work until they are killed or let go on.
+
+A test that kills a process after some time, or once something is there, kills it where the load of the machine decides,
+and on a busy machine after its end. The process says where it is instead, and waits.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import IO
+
+_PAUSED = "paused\n"
+
+
+def pause() -> None:
+    """In the process: report that it waits, and wait until `go_on`."""
+    sys.stdout.write(_PAUSED)
+    sys.stdout.flush()
+    sys.stdin.readline()
+
+
+def start(*arguments: object, stderr: IO[bytes] | None = None) -> subprocess.Popen[str]:
+    """Start a Python script that pauses."""
+    command = [sys.executable, *map(str, arguments)]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr, text=True)
+
+
+def await_pause(process: subprocess.Popen[str]) -> None:
+    """Until the process waits; it must not have ended."""
+    assert process.stdout is not None
+    assert process.stdout.readline() == _PAUSED
+
+
+def go_on(process: subprocess.Popen[str]) -> None:
+    assert process.stdin is not None
+    process.stdin.write("\n")
+    process.stdin.flush()
