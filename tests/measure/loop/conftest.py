@@ -1,0 +1,24 @@
+"""A null bank that is drawn, and what judges by it."""
+
+from __future__ import annotations
+
+import pytest
+
+from measure.inference.random_effect import NullModel
+from measure.nulls.reference import NullBank, Reference
+from tests.measure.loop.drawn_statistics import made
+
+
+@pytest.fixture(scope="session")
+def bank() -> NullBank:
+    return made(seed=1)
+
+
+@pytest.fixture(scope="session")
+def null(bank: NullBank) -> NullModel:
+    return bank.model(bank.nulls.design)
+
+
+@pytest.fixture(scope="session")
+def reference(bank: NullBank) -> Reference:
+    return bank.reference(12, noise=0.0, seed=1)

@@ -1,0 +1,129 @@
+"""What is looked at beside the columns: moments, spectra, the course of the wind, where recordings settle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flagdata.errors import UsageError
+from measure.inference.random_effect import NullModel
+from measure.loop.selection import (
+    GUST_COLUMN,
+    Judgement,
+    judge,
+)
+from measure.nulls.reference import NullBank, Reference
+from measure.verdict.record import Conclusion
+from tests.measure.loop.drawn_statistics import SEGMENTS, SHED, Acting, judged, made, named, pulses, seen, slow
+
+
+def test_what_moments_alone_show_rejects_and_counts_in_what_an_effect_leaves() -> None:
+    bank = made(seed=7, moments=True)
+    null, reference = bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
+    drag, lift = {"tangential-quadratic-drag.coefficient": 1.0}, {"lift.coefficient": 1.0}
+
+    def found(acting: Acting, moments: Acting) -> Judgement:
+        return judge(seen(null, acting, moments=moments), reference, level=0.02)
+
+    assert found({}, {}).conclusion is Conclusion.SUFFICIENT
+    assert found({}, drag).conclusion is not Conclusion.SUFFICIENT
+    assert (found(lift, lift).conclusion, named(found(lift, lift))) == (Conclusion.EFFECT, list(lift))
+    assert (found(lift, lift | drag).conclusion, named(found(lift, lift | drag))) == (Conclusion.PARTLY, list(lift))
+
+
+def test_beside_gusts_moments_are_not_looked_at() -> None:
+    """Two true gusts of a challenge left 3.1 and 3.4 by the columns, of 3.9 that nulls leave, and 6.6 and 8.2 by the
+    moments: a pressure that swings within a segment moves them however it is set free from one to the next."""
+    bank = made(seed=7, moments=True)
+    null, reference = bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
+    drag = {"tangential-quadratic-drag.coefficient": 1.0}
+    found = judge(seen(null, {}, gusts=1.0, moments=drag), reference, level=0.02)
+    assert (found.conclusion, named(found)) == (Conclusion.EFFECT, ["gusts"])
+
+
+def test_errors_that_swing_with_the_wind_are_none_of_the_library(null: NullModel, reference: Reference) -> None:
+    found = judged(null, reference, {}, line=10.0, seed=3)
+    assert (found.conclusion, named(found)) == (Conclusion.OUTSIDE, [])
+    assert found.line is not None
+    assert (found.line.reduced, found.line.axis) == (SHED, 1)
+    assert judged(null, reference, {}).line is None
+
+
+def test_an_effect_beside_a_line_explains_a_part(null: NullModel, reference: Reference) -> None:
+    # The lift is the farthest, and what it leaves still swings.
+    found = judged(null, reference, {"lift.coefficient": 1.5}, line=4.0)
+    assert (found.conclusion, named(found)) == (Conclusion.PARTLY, ["lift.coefficient"])
+    assert found.line is not None
+
+
+def test_spectra_of_the_data_alone_are_refused(bank: NullBank, null: NullModel) -> None:
+    blind = replace(bank.nulls, statistics=replace(bank.nulls.statistics, lines=None))
+    with pytest.raises(UsageError, match="spectra"):
+        judged(null, replace(bank, nulls=blind).reference(12, noise=0.0, seed=1), {})
+
+
+@pytest.fixture(scope="module")
+def blowing() -> tuple[NullModel, Reference]:
+    """Of nulls whose wind's course is looked at."""
+    bank = made(seed=1, courses=True)
+    return bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
+
+
+def test_a_course_alone_rejects_the_base_model(blowing: tuple[NullModel, Reference]) -> None:
+    null, reference = blowing
+    calm, windy = (
+        judge(seen(null, {}, course=c), reference, level=0.02) for c in (np.zeros((3 * SEGMENTS, 10, 3)), pulses(0.3))
+    )
+    assert calm.conclusion is Conclusion.SUFFICIENT
+    assert windy.conclusion is not Conclusion.SUFFICIENT
+    assert windy.statistic > calm.statistic
+
+
+def test_gusts_are_named_where_the_course_is_turbulences(blowing: tuple[NullModel, Reference]) -> None:
+    null, reference = blowing
+    gusty = judge(seen(null, {}, gusts=1.0, course=slow(0.2)), reference, level=0.02)
+    assert named(gusty) == ["gusts"]
+    # The same pressure, in a wind that comes in pulses and turns a little, as behind obstacles that pass.
+    passing = judge(seen(null, {}, gusts=1.0, course=pulses(2.0, turned=0.2)), reference, level=0.02)
+    assert "gusts" not in named(passing)
+    assert "varies across its mean by" in next(w for w in passing.ranking if w.column == GUST_COLUMN).candidate.why_not
+
+
+def test_a_wind_that_varies_along_itself_alone_is_not_barred_from_gusts(blowing: tuple[NullModel, Reference]) -> None:
+    null, reference = blowing
+    slowly = judge(seen(null, {}, gusts=1.0, course=pulses(2.0)), reference, level=0.02)
+    assert named(slowly) == ["gusts"]
+    # Within segments alone: their mean pressure does not differ, and the course says how much it varies.
+    within = judge(seen(null, {}, course=pulses(2.0)), reference, level=0.02)
+    assert (within.conclusion, named(within)) == (Conclusion.EFFECT, ["gusts"])
+    found = next(w for w in within.ranking if w.column == GUST_COLUMN).candidate
+    # Weaker by 2 in three windows of nine, and in both of two neighbours in two of nine: a covariance of 4 (2/9 − 1/9).
+    assert found.strength.value == pytest.approx(2 / 3, rel=0.1)
+    assert not found.why_not
+
+
+def test_courses_of_the_data_alone_are_refused(null: NullModel, reference: Reference) -> None:
+    with pytest.raises(UsageError, match="courses"):
+        judge(seen(null, {}, course=pulses(0.1)), reference, level=0.02)
+
+
+def test_what_recordings_settle_at_rejects_alone_and_counts_in_what_is_left() -> None:
+    bank = made(seed=9, settled=True)
+    null, reference = bank.model(bank.nulls.design), bank.reference(12, noise=0.0, seed=1)
+
+    def found(off: float) -> Judgement:
+        evidence = seen(null, {})
+        return judge(replace(evidence, settled=np.full((12, 2), [0.0, off])), reference, level=0.02)
+
+    assert found(0.05).conclusion is Conclusion.SUFFICIENT
+    # The mean of three recordings is 0.06 in nulls.
+    assert found(-1.0).conclusion is Conclusion.OUTSIDE
+    plain = judge(seen(null, {}), reference, level=0.02)
+    assert found(-1.0).ranking[0].candidate.leftover < 0.05 < plain.ranking[0].candidate.leftover
+
+
+def test_settled_quantities_of_the_data_alone_are_refused(null: NullModel, reference: Reference) -> None:
+    with pytest.raises(UsageError, match="settled"):
+        judge(replace(seen(null, {}), settled=np.zeros((12, 2))), reference, level=0.02)
