@@ -130,7 +130,7 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path, small: Callable[..., 
     assert process.returncode == -signal.SIGKILL
     before = objects(killed)
     assert 4 <= len(before) < 8  # it paused in the third batch of four, or in the fourth while the third was committed
-    simulate(killed, load(recipe))
+    simulate(killed, load(str(recipe)))
     assert len(objects(killed)) == 8
     assert {seed: stored for seed, stored in objects(killed).items() if seed in before} == before
     assert len(killed.rows()) == 8
