@@ -128,6 +128,7 @@ def test_kills_during_ingest_lose_nothing_acknowledged(lake: Lake, start_worker:
         for worker in pair:
             worker.await_line("ready")
         for worker in pair:  # over the waves the kills fall on all steps of the first ingests
+            worker.await_acknowledged(moments.randrange(2))
             time.sleep(moments.uniform(0, one_ingest))
             worker.kill()
         killed += pair
