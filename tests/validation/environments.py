@@ -94,7 +94,16 @@ class Environment:
         wanted = (f"{self.package}=={self.version}", *self.others)
         for command in (
             (self.python, "-m", "venv", str(folder)),
-            (str(interpreter(folder)), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *wanted),
+            (
+                str(interpreter(folder)),
+                "-m",
+                "pip",
+                "install",
+                "--quiet",
+                "--no-compile",
+                "--disable-pip-version-check",
+                *wanted,
+            ),
         ):
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             if done.returncode:
