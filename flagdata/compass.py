@@ -157,17 +157,3 @@ def table_of(cells: Sequence[str], *, heading: str, share: float) -> str | None:
         return known[0]
     found = [unit for unit in known if any(word in heading.lower() for word in _HEADINGS.get(unit, ()))]
     return found[0] if found else None
-
-
-def in_letters(cell: str, unit: str) -> str:
-    """A point of the table `unit` in the letters of English; "" where it holds none."""
-    degrees = BY_UNIT[unit].get(cell.strip().upper())
-    return "" if degrees is None else _ROSE[round(degrees / _POINT)]
-
-
-def may_be_two(cells: Sequence[str], *, share: float) -> bool:
-    """Whether a column holds points of the compass whose letters mean one direction here and another there."""
-    filled = [cell.upper() for cell in cells if cell.lower() not in CALM]
-    return bool(filled) and any(
-        sum(cell in points for cell in filled) >= share * len(filled) for points in BY_UNIT.values()
-    )

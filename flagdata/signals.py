@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,18 +136,6 @@ class CameraInfo:
     """x, y, width, height in the upright source image."""
     start_sigma: float | None = None
     """Standard uncertainty of reading `start` off the file [s], clock error apart; `None` where the user gave it."""
-
-
-class FrameStream(Protocol):
-    """Resampled frames of one camera, read once, in order. `findings` is complete when iteration has ended."""
-
-    @property
-    def info(self) -> CameraInfo: ...
-
-    @property
-    def findings(self) -> tuple[Finding, ...]: ...
-
-    def __iter__(self) -> Iterator[Frame]: ...
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,8 +1,8 @@
 """Which part of a film a network sees: the paper's augmentation (supplement, "Data Augmentation") and the plain view.
 
 A random run of successive frames, a square of one of several sizes at a random place, resized to the network's, and a
-mirror image half of the time. A mirrored clip has the same wind speed and cloth; what has a side, such as the camera's
-angle to the wind, changes its sign (`SIDED`).
+mirror image half of the time. A mirrored clip has the same wind speed and cloth, and networks estimate nothing that has
+a side.
 """
 
 from __future__ import annotations
@@ -17,9 +17,6 @@ from torch import Tensor
 from torch.nn import functional
 
 from flagdata.errors import InputError
-
-SIDED = frozenset({"render.camera_angle", "render.sun_azimuth", "render.frame_offset_x", "wind_toward"})
-"""Parameters that change their sign in a mirror image."""
 
 LEAST_SCALE = 0.05
 """Least side of a crop, as a share of the picture's."""

@@ -233,11 +233,6 @@ class Solved:
         return None
 
 
-def fitted_base(setting: Setting, bank: NullBank) -> tuple[Setting, Fits]:
-    """The base model fitted by all directions: the setting at its calibration, and the models that begin there."""
-    return _calibrated(setting, _fits(setting, *_looked_at(setting), bank), bank)
-
-
 def _looked_at(setting: Setting) -> tuple[Statistics, Projection]:
     """Errors of the base model along all columns, and the directions."""
     starts = [setting.calibration] * len(setting.segments)

@@ -57,8 +57,8 @@ OPENED = 16.5
 """s after `ORIGIN` up to which the data had been looked at when all this was written."""
 CALM = 6.5
 """s before which the fan is off and the tracker undisturbed."""
-FRAMES, AXIS = 30, 30.0
-"""Frames of the tracker's root mean square; the rate [Hz] that its frequencies take for granted."""
+FRAMES = 30
+"""Frames of the tracker's root mean square."""
 TRACKER = 0.5
 """m/s of its estimate for each pixel."""
 EVERY = 0.25

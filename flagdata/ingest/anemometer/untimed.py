@@ -39,8 +39,6 @@ _TABLES = frozenset({"delimited", "host-stamped"})
 
 _CLOCK = "time (UTC), as given"
 """Heading of the instants that are counted."""
-ADVICE = "where nothing is a time, and the readings came at a steady rate that is known: "
-ADVICE += "add --start TIME --rate HZ"
 
 
 def timed(source: TextFile, *, rate: float, start: int | None, columns: str | None = None) -> TextFile:

@@ -34,7 +34,7 @@ _EXPOSURE_SLACK = 0.01
 
 
 class CameraStream:
-    """A `FrameStream`: opened by `open_camera`, read once, in constant memory, closed by its `with` block.
+    """Resampled frames of a camera, read once, in order, in constant memory: by `open_camera`, closed by its block.
 
     Attributes:
         info: the file after its options are settled.

@@ -39,11 +39,6 @@ class Flag:
     density: float
     speed: float
 
-    @property
-    def froude(self) -> float:
-        """ρ U² / (m g)."""
-        return AIR * self.speed**2 / (self.density * 9.81)
-
 
 @dataclass(frozen=True, kw_only=True)
 class Numerics:
