@@ -32,6 +32,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import deltalake
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from deltalake import CommitProperties, DeltaTable
 from deltalake.exceptions import CommitFailedError, DeltaError
@@ -201,15 +202,18 @@ class Catalog:
         return base + 1
 
     @_one_at_a_time
-    def replace(self, rows: pa.Table, *, base: int, info: Mapping[str, str]) -> int:
-        """Publish `rows` as all there is at version `base + 1`; earlier versions stay.
+    def drop(self, going: pc.Expression, *, fresh: pa.Table, base: int, info: Mapping[str, str]) -> int:
+        """Publish version `base + 1` without the rows that meet a condition on ids and branches, and with `fresh` ones.
+
+        The files that have such rows are written anew without them; earlier versions keep theirs.
 
         Raises:
             Moved: `base` is no longer the newest version; nothing was published.
         """
         table = self._writable(base)
-        files = self._names(base)
-        self._commit(table, rows, removed=files, rows_change=True, info=info)
+        files = self._files.holding(self._names(base), going)
+        staying = [self._files.read(name).filter(~going) for name in files]
+        self._commit(table, pa.concat_tables([*staying, fresh]), removed=files, rows_change=True, info=info)
         return base + 1
 
     def entry(self, version: int) -> tuple[bytes, dict[str, Place]]:

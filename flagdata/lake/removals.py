@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import timedelta
 
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from flagdata.errors import FlagdataError, NotFoundError
 from flagdata.lake.lineage import EXPIRED, noted_erased, noted_expired, noted_hidden
@@ -36,10 +37,9 @@ def removals(lake: Store, *, since: int = -1, branch: str | None = None) -> Iter
     """Those after the version `since`, of one branch or of all, newest first; each is read when it is asked for."""
     for entry in lake.catalog.history():
         if "withdrawn" in entry and entry["version"] > since and branch in (None, entry.get("branch")):
-            before, after = (lake.catalog.rows(v) for v in (entry["version"] - 1, entry["version"]))
-            stayed = set(zip(after["artifact"].to_pylist(), after["branch"].to_pylist(), strict=True))
-            rows = before.select(["artifact", "branch", "object"]).to_pylist()
-            left = {row["artifact"]: row["object"] for row in rows if (row["artifact"], row["branch"]) not in stayed}
+            before, after = (_stored(lake, version) for version in (entry["version"] - 1, entry["version"]))
+            gone = pc.invert(pc.is_in(_keys(before), value_set=_keys(after)))  # type: ignore[attr-defined]
+            left = {row["artifact"]: row["object"] for row in before.filter(gone).to_pylist()}
             yield Removal(
                 version=entry["version"],
                 branch=entry.get("branch", MAIN),
@@ -47,6 +47,17 @@ def removals(lake: Store, *, since: int = -1, branch: str | None = None) -> Iter
                 artifacts=frozenset(left) | noted_hidden(entry),
                 objects={artifact: name for artifact, name in left.items() if name is not None},
             )
+
+
+def _stored(lake: Store, version: int) -> pa.Table:
+    columns = ["artifact", "branch", "object"]
+    rows = lake.catalog.scan(version)
+    return lake.catalog.rows(version).select(columns) if rows is None else rows.table(columns)
+
+
+def _keys(rows: pa.Table) -> pa.ChunkedArray:
+    """What rows are told apart by."""
+    return pc.binary_join_element_wise(rows["artifact"], rows["branch"], "/")  # type: ignore[attr-defined]
 
 
 def erased(lake: Store) -> dict[str, tuple[int, str]]:

@@ -78,6 +78,23 @@ class RowFiles:
         dataset = ds.FileSystemDataset(fragments, catalog_schema(), form)
         return Scan(dataset=dataset, count=count, size=size, check=lambda: self.table(names))
 
+    def holding(self, names: Sequence[str], condition: pc.Expression) -> list[str]:
+        """Those of the files of which some rows meet a condition.
+
+        Raises:
+            CorruptError: a file cannot be read.
+        """
+        import pyarrow.dataset as ds
+
+        self._contents = {name: self._content(name) for name in names}
+        form, found = ds.ParquetFileFormat(), []
+        for name, content in self._contents.items():
+            with self._reading(name):
+                rows = ds.FileSystemDataset([form.make_fragment(content)], catalog_schema(), form)
+                if rows.count_rows(filter=condition):
+                    found.append(name)
+        return found
+
     def read(self, name: str) -> pa.Table:
         """The rows of one file, as they are in it.
 

@@ -84,9 +84,8 @@ def take_off(
     noted = {**info, "hidden": json.dumps(hidden)} if hidden else info
     if not own:
         return lake.catalog.append(fresh, base=base, info=noted)
-    rows = lake.catalog.rows(base)
     going = (pc.field("branch") == branch) & pc.field("artifact").isin(pa.array(sorted(own), pa.string()))
-    return lake.catalog.replace(pa.concat_tables([rows.filter(~going), fresh]), base=base, info=noted)
+    return lake.catalog.drop(going, fresh=fresh, base=base, info=noted)
 
 
 def clips_of(shown: pa.Table, artifacts: Collection[str]) -> frozenset[str]:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from deltalake import DeltaTable
 
 from flagdata.errors import CorruptError
 from flagdata.lake import Artifact, Lake
@@ -68,6 +69,19 @@ def test_a_scan_is_the_table_of_every_view(lake: Lake, put_text: Put) -> None:
             row for row in whole.to_pylist() if row["name"] in ("aside", "kept")
         ]
     assert select(lake, "label_good", columns=["name"]).to_pylist() == [{"name": "kept"}]
+
+
+@pytest.mark.disk("it opens the table by the Delta library, which takes options for a bucket")
+def test_a_withdrawal_writes_anew_only_the_files_that_have_its_rows(lake: Lake, put_text: Put) -> None:
+    put_text(lake, "one")
+    gone = put_text(lake, "two")
+    put_text(lake, "three")
+    before = {name for version in range(1, 4) for name in lake.catalog.entry(version)[1]}
+    lake.withdraw([gone.id], "wrong")
+    assert {path.name for path in lake.catalog.path.glob("*.parquet")} - before == set(lake.catalog.entry(4)[1])
+    kept = {file.rpartition("/")[2] for file in DeltaTable(str(lake.catalog.path)).file_uris()}
+    assert len(kept & before) == 2
+    assert lake.rows()["name"].to_pylist() == ["one", "three"]
 
 
 def test_rows_are_sorted_as_arrow_sorts_them() -> None:
