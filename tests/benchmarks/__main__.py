@@ -12,6 +12,7 @@ BENCHMARKS = {
     "logs": "tests.benchmarks.bench_logs",
     "measure": "tests.benchmarks.bench_measure",
     "models": "tests.benchmarks.bench_models",
+    "newcomer": "tests.benchmarks.bench_newcomer",
     "pairs": "tests.benchmarks.bench_pairs",
     "peers": "tests.benchmarks.bench_peers",
     "records": "tests.benchmarks.bench_records",

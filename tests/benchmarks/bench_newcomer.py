@@ -122,11 +122,5 @@ def _physics(python: str) -> dict[str, Any]:
         newcomer.install(".[physics]")
         found = json.loads(newcomer.step("flagdata", "measure", "example:flag", "--json"))
         low, high = found["quantities"]["wind_speed"]["interval"]
-        true = found["truth"]["wind_speed"] if "truth" in found else _true()
+        true = found["simulated_with"]["wind_speed"]
         return newcomer.done({"interval": [low, high], "true": true}, right=low <= true <= high)
-
-
-def _true() -> float:
-    from flagdata.examples import example
-
-    return example("flag").truth["wind_speed"]
