@@ -19,6 +19,7 @@ BENCHMARKS = {
     "render": "tests.benchmarks.bench_render",
     "sim": "tests.benchmarks.bench_sim",
     "sim-cost": "tests.benchmarks.bench_sim_cost",
+    "start": "tests.benchmarks.bench_start",
     "storage": "tests.benchmarks.bench_storage",
     "verdict": "tests.benchmarks.bench_verdict",
 }
