@@ -102,7 +102,8 @@ def test_the_first_minute_prints_what_is_shown(capsys: pytest.CaptureFixture[str
     shown, printed = blocks("text")
     done = CliRunner().invoke(measure, MEASURED.split()[2:])
     assert done.exit_code == 0
-    assert done.output == shown
+    without_bar = re.sub(r"\rmeasure:[^\r]*?window\]", "", done.output)  # which a slow machine shows
+    assert [line for line in without_bar.splitlines() if line] == shown.splitlines()
     (program,) = blocks("python")
     exec(compile(program, "README.md", "exec"), {})
     assert capsys.readouterr().out == printed

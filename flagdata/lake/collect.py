@@ -1,4 +1,4 @@
-"""Garbage collection: delete what nothing refers to, and what no running transaction holds.
+"""Garbage collection: delete unreferenced files that no running transaction holds.
 
 Kept are all objects that a branch or tag shows, that a row withdrawn less than the grace period ago points to, that a
 living transaction has put or looked up, and whatever is younger than the grace period. Staging folders go as soon as

@@ -23,7 +23,7 @@ from flagdata.schema import FORMAT_VERSION
 from flagdata.storage import Place
 
 GRACE = timedelta(hours=24)
-"""How long what nothing refers to is left alone."""
+"""How long unreferenced files are left alone."""
 
 
 def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:

@@ -1,6 +1,8 @@
-"""How long simulating will take, stated before it begins."""
+"""How long simulating flags beside films will take."""
 
 from __future__ import annotations
+
+from flagdata import workload
 
 _PACE = 25.0
 """Seconds of one flag that one core simulates in a second: 128 flags for two minutes took some ten minutes."""
@@ -13,10 +15,7 @@ def announced(flag_seconds: float, *, workers: int) -> str:
         flag_seconds: simulated seconds of all flags together.
         workers: processes that share them.
     """
-    minutes = flag_seconds / _PACE / workers / 60
-    length = f"about {minutes:.0f} minutes" if minutes >= 1.5 else "a minute or two"
-    cores = "one idle core" if workers == 1 else f"{workers} idle cores"
-    return (
-        f"simulating flags for {flag_seconds / 60:.0f} minutes in all takes {length} on {cores}; what was simulated "
-        "before is kept and taken up"
-    )
+    return workload.announced(
+        f"simulating flags for {flag_seconds / 60:.0f} minutes in all", flag_seconds / _PACE, workers=workers,
+        kept="what was simulated before is kept and taken up",
+    )  # fmt: skip

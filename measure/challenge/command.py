@@ -47,10 +47,13 @@ def challenge() -> None:
 @json_option
 def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json: bool) -> None:
     """Draw keys, simulate, and write sealed data sets into a new folder."""
+    from flagdata.workload import announced
     from measure.challenge.make import make as make_challenge
+    from measure.challenge.make import workload
     from measure.challenge.recipe import load
 
     loaded = load(recipe)
+    say(announced(f"simulating {count} sets", workload(loaded, count), workers=workers))
     with progress(count, label=loaded.title, unit="set") as advance:
         made = make_challenge(folder, loaded, seed=seed, count=count, workers=workers, progress=advance)
     if as_json:
@@ -92,10 +95,12 @@ def bank(
     from flagdata.lake import Lake
     from measure.challenge.nulls import claim, nulls_of
     from measure.nulls import bank as banks
+    from measure.nulls.workload import of_batches
 
     lake = None if lake_path is None else Lake.open(lake_path)
     origin, batches = nulls_of(recipe, seed=seed, kinds=kinds, lake=lake)
     claim(folder, origin, seed=seed)
+    say(of_batches(batches, workers=workers))
     with progress(kinds, label="null recordings", unit="kind") as advance:
         banks.build(folder, batches, workers=workers, progress=advance)
     if as_json:
@@ -123,14 +128,32 @@ def bank(
 def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path | None, as_json: bool) -> None:
     """Judge the sets that have no verdict yet, and file the verdicts with their hashes."""
     from flagdata.caches import user_cache
+    from measure.calibrate.workload import announced
     from measure.challenge.filing import filed
     from measure.challenge.fitter import ClosingTheLoop, ClosingTheLoopOnFilms
     from measure.challenge.folder import ChallengeFolder
     from measure.challenge.run import Fitter
     from measure.challenge.run import run as run_challenge
+    from measure.films.command import workload
+    from measure.loop.run import Options
+    from measure.nulls.workload import of_recordings
 
     target = ChallengeFolder(folder)
     waiting = [name for name in target.chosen(only) if not filed(target, name)]
+    fitter: Fitter = ClosingTheLoop(bank=bank)
+    if target.filmed:
+        # One after another: what the first one simulates, by all workers, is what the others take.
+        fitter = films = ClosingTheLoopOnFilms(folder=bank or user_cache() / "calibrate", workers=workers)
+        for name in waiting[:1]:
+            given = target.films(name)
+            lasting = [float(log.times[-1]) for _, log in given.recordings.values()]
+            say(announced(workload(lasting, films.options(given)), workers=workers))
+    elif waiting:
+        first = target.experiment(waiting[0])
+        options = Options(bank=bank)
+        say(of_recordings(
+            first.recordings, first.specimen.mesh.vertex_count, options, sets=len(waiting), workers=workers,
+        ))  # fmt: skip
     with progress(len(waiting), label="judging", unit="set") as advance:
 
         def report(filing: Filing) -> None:
@@ -138,10 +161,6 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
             # What it says stays in the file: who watches a run should not learn to read it.
             say(f"{filing.name} filed after {filing.seconds:.0f} s{' (refused)' if filing.verdict is None else ''}")
 
-        fitter: Fitter = ClosingTheLoop(bank=bank)
-        if target.filmed:
-            # One after another: what the first one simulates, by all workers, is what the others take.
-            fitter = ClosingTheLoopOnFilms(folder=bank or user_cache() / "calibrate", workers=workers)
         filings = run_challenge(
             target, fitter, seed=seed, only=only, workers=1 if target.filmed else workers, progress=report
         )

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from measure.challenge.films import Filmed
 from measure.observe.trajectory import Experiment
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Verdict
+
+if TYPE_CHECKING:
+    from measure.films.run import Options
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,12 +60,17 @@ class ClosingTheLoopOnFilms:
             FlagdataError: films that do not do.
         """
         del seed
+        from measure.films.run import close_loop
+
+        return close_loop(given.observed(), self.options(given), folder=self.folder, workers=self.workers)
+
+    def options(self, given: Filmed) -> Options:
+        """How a set is judged, by what is stated of it."""
         from measure.calibrate.calibrate import Options as Calibrating
-        from measure.films.run import Options, close_loop
+        from measure.films.run import Options
 
         calibration = Calibrating(
             flag=given.flag, azimuth=given.azimuth, elevation=given.elevation, distance=given.distance,
             simulations=self.simulations,
         )  # fmt: skip
-        options = Options(calibration=calibration, kinds=self.kinds, area_weight=given.area_weight)
-        return close_loop(given.observed(), options, folder=self.folder, workers=self.workers)
+        return Options(calibration=calibration, kinds=self.kinds, area_weight=given.area_weight)

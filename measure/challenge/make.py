@@ -26,8 +26,20 @@ from measure.workers import single_threaded
 from sim.handles import ARCSIM_STIFFNESS
 from sim.scene import GRAVITY
 
+_PACE = 1000.0
+"""Cells times seconds of a recording that one core simulates in a second: five sets of three recordings of 13 s on
+meshes of some 350 took 65 s."""
+_FILMED = 20.0
+"""Frames that one core films and encodes in a second."""
 _NAMES = "abcdefghijklmnopqrstuvwxyz"
 _AROUND = 2.0  # m: how far from the origin a pole stands
+
+
+def workload(recipe: ChallengeRecipe, count: int) -> float:
+    """Seconds that one core takes for so many sets."""
+    cells = sum(numerics.columns * numerics.rows for numerics in recipe.numerics.values()) / len(recipe.numerics)
+    films = 0.0 if recipe.films is None else recipe.duration * recipe.films.rate / _FILMED
+    return count * recipe.count * ((recipe.settle + recipe.duration) * cells / _PACE + films)
 
 
 def make(

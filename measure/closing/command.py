@@ -13,7 +13,7 @@ from click.core import ParameterSource
 
 from flagdata.commands.confirm import on_command_line
 from flagdata.commands.sections import LongCommand
-from flagdata.console import LakePlace, LocalPath, json_option
+from flagdata.console import LakePlace, LocalPath, json_option, say
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.storage import Place
 from measure.closing.command_line import null_options, nulls_given, refuse, stage_bars
@@ -156,6 +156,7 @@ def close_loop(
     from measure.closing.sources import Reading, read
     from measure.films.sources import films_among
     from measure.loop.run import Options
+    from measure.nulls.workload import of_recordings
     from measure.observe import Setup, observe
     from measure.observe import recipe as recipes
 
@@ -201,6 +202,8 @@ def close_loop(
             )  # fmt: skip
             observed = observe(read(tracked, winds, reading, lake), setup)
         refuse(observed.findings)
+        recordings, cloth = observed.experiment.recordings, observed.experiment.specimen
+        say(of_recordings(recordings, cloth.mesh.vertex_count, options, workers=options.workers))
         verdict = close(observed.experiment, options, stage=stage_bars())
         verdict = with_warnings(verdict, observed.findings)
         called = names["markers"] or _name(observed.experiment.recordings[0].name, tracked, recipe)
@@ -208,7 +211,7 @@ def close_loop(
             verdict, observed.experiment, options, name=called, findings=observed.findings,
             models=models(verdict, observed.experiment, name=called, seed=seed),
         )  # fmt: skip
-        return answer, observed.experiment.specimen.material
+        return answer, cloth.material
 
     def of_films(level: float | None) -> Answer:
         from measure.films.command import close_films

@@ -194,11 +194,11 @@ class Verdict:
     def sentence(self) -> str:
         """In words, with the level that is applied and the rate that it keeps to."""
         strange, count = int(self.strange.sum()), len(self.window_p)
-        rate = f"{self.false_alarm:.0%} of familiar recordings are refused at most"
+        rate = f"at most {self.false_alarm:.0%} of familiar films are refused"
         windows = (
-            f"p = {self.p:.2g}, refused at {self.level:.2g} or below"
+            f"p = {self.p:.2g}, {self.level:.2g} or below would refuse it"
             if count == 1
-            else f"windows with p at {self.level:.2g} or below: {strange} of {count}, refused from {self.refusing} on"
+            else f"{strange} of {count} windows look unfamiliar (p ≤ {self.level:.2g}), {self.refusing} would refuse it"
         )
         if not self.measurable:
             what = self.window_reasons[0].what

@@ -15,7 +15,6 @@ from flagdata.stated import Stated
 from measure.calibrate.calibrate import Options as Calibrating
 from measure.calibrate.filmed import of_sources
 from measure.calibrate.known import known
-from measure.calibrate.observed import Observed
 from measure.calibrate.prior import AZIMUTH, ELEVATION
 from measure.calibrate.simulation import Flag
 from measure.calibrate.workload import announced
@@ -81,7 +80,7 @@ def close_films(
         )  # fmt: skip
     recordings = distinct(read)
     processes = workers or len(os.sched_getaffinity(0))
-    say(announced(workload(recordings, options), workers=processes))
+    say(announced(workload([one.duration for one in recordings], options), workers=processes))
     outcome = solve(
         recordings, options, folder=given.cache or user_cache() / "calibrate", workers=processes, stage=stage_bars(),
     )  # fmt: skip
@@ -93,12 +92,15 @@ def close_films(
     )  # fmt: skip
 
 
-def workload(recordings: Sequence[Observed], options: Options) -> float:
-    """Seconds of all flags that are simulated: of the base model, with each effect, and of the null experiments."""
+def workload(durations: Sequence[float], options: Options) -> float:
+    """Seconds of all flags that are simulated: of the base model, with each effect, and of the null experiments.
+
+    Args:
+        durations: of the recordings [s].
+    """
     each = options.calibration.simulations + TOGETHER * options.kinds
-    whole = each * sum(one.duration for one in recordings)
-    paired = PAIRS * len(weighable(options.calibration.flag)) * len(recordings)
-    return whole + paired * lasting(len(recordings))
+    paired = PAIRS * len(weighable(options.calibration.flag)) * len(durations)
+    return each * sum(durations) + paired * lasting(len(durations))
 
 
 def weight(stated: Stated) -> tuple[float, float]:

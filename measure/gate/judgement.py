@@ -194,12 +194,12 @@ def _cause(gate: Gate, place: int, value: float, p: float) -> Cause:
     check = CHECKS.get(score.name)
     if check is None:
         shown, limit = value, gate.tails.start[place] + np.log(20) * gate.tails.excess[place]
-        usual = f"of simulated clips, 99 % have at most {limit:.3g}"
+        usual = f"normal up to {limit:.3g}, as 99 % of the simulated clips"
     else:
         column = gate.statistics[:, list(CHECKS).index(score.name)]
         shown = check.shown(score.sign * value)
         low, high = (check.shown(float(end)) for end in np.quantile(column, _USUAL))
-        usual = f"of simulated clips, 98 % have {low:.3g} to {high:.3g}"
+        usual = f"normal from {low:.3g} to {high:.3g}, as 98 % of the simulated clips"
     figure = f"{score.what}: {shown:.3g}; {usual}"
     return Cause(
         kind=score.reason, sentence=f"{reason.sentence} ({figure})", figure=figure, fix=reason.fix, check=score.name,

@@ -157,7 +157,7 @@ class NullTest:
         nulls: how they were made, in words: how many, from which parameters, with which numerics.
         open: whether the interval of p includes the level, so that another draw of nulls could decide otherwise;
             None in documents without it.
-        settling: kinds of numerics whose interval would exclude it, if the same share of them is as far; None where
+        settling: kinds of numerics whose interval would exclude it, if as large a share deviates as much; None where
             the test is not open, or 1,000 would not do.
     """
 

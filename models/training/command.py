@@ -15,6 +15,10 @@ from flagdata.caches import beside
 from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
 from flagdata.errors import ConflictError
 from flagdata.storage import Place
+from flagdata.workload import announced
+
+_PREPARED = 0.05
+"""s of one core for a crop: its maps take 0.03 to 0.04 (docs/results/bench-models.json), decoding its film the rest."""
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -149,6 +153,12 @@ def trained(
             held.enter_context(alone_in(folder, occupied=partial(_refuse, folder)))
         if several and not first:
             ranks.barrier()  # the first prepares the inputs for all
+        if first:
+            say(announced(
+                f"preparing {len(films)} films and {len(validation_pairs)} clips",
+                _PREPARED * (len(films) * recipe.variants + len(validation_pairs)), workers=workers,
+                kept="what was prepared before is kept and taken up",
+            ))  # fmt: skip
         with bars(len(films), f"{recipe.name}: prepare", "film") as advance:
             train_inputs = prepare_films(
                 train_pairs, recipe.front_end, recipe.cropping, variants=recipe.variants, folder=cache,
@@ -168,6 +178,10 @@ def trained(
         )  # fmt: skip
         if first:
             say(f"order of the first epoch: {training.batches.order_hash(0)}")
+            say(announced(
+                f"training for up to {recipe.optimiser.epochs} epochs", training.length() * workers, workers=workers,
+                kept="an interrupted training goes on from its last checkpoint",
+            ))  # fmt: skip
         done = training.complete()
         if several:
             ranks.barrier()  # no rank leaves while another still talks to it

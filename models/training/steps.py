@@ -33,6 +33,7 @@ from models.training.inputs import Prepared
 from models.training.progress import Course, Epoch
 from models.training.recipe import OptimiserSpec, Precision, Schedule, TrainingRecipe
 
+_TRIED = 2  # steps before the first, of which the second is timed
 CHECKPOINT_SECONDS = 60.0
 """A checkpoint is written after this time, and at the end of each epoch."""
 _WARM_UP = 0.05  # of all steps, of the cosine schedule
@@ -109,6 +110,23 @@ class Training:
         if standing.best is not None:
             learner.load_state_dict(standing.best)
         return Trained(learner=learner.eval(), course=course, seconds=sum(epoch.seconds for epoch in course.epochs))
+
+    def length(self) -> float:
+        """About how long all epochs take on this machine, validation left out, by a step that changes nothing [s]."""
+        spec = self.recipe.optimiser
+        with torch.random.fork_rng(devices=[]):
+            learner = self._fresh().train()
+            entries = np.arange(min(spec.batch, len(self.train)))
+            inputs = self.train.batch(entries, np.zeros(len(entries), dtype=np.int64)).to(self.device)
+            values, sequence = self._values(self.train, learner)[: len(entries)], torch.from_numpy(self.train.sequence)
+            begun = 0.0
+            for _ in range(_TRIED):
+                begun = time.monotonic()
+                with _computing(spec.precision, self.device):
+                    loss = learner.loss(inputs, values, sequence[: len(entries)].to(self.device))
+                loss.backward()
+                float(loss.detach())  # waits for the device
+            return (time.monotonic() - begun) * len(self.batches) * spec.epochs
 
     @cached_property
     def batches(self) -> Batches:

@@ -77,10 +77,14 @@ def build(
     from sim.datasets import card as cards
     from sim.datasets.build import Build
     from sim.datasets.cluster import connected
+    from sim.datasets.plan import length
 
     cards.check(card)
     lake = _lake(lake_path) or _made(lake_path)
     lake.check_writable()
+    lasting = length(loaded, lake, workers=_workers(scheduler, workers), branch=branch, device=device)
+    if lasting is not None:
+        say(lasting)
     with in_steps(added_since(lake, branch)), connected(scheduler, workers=workers or _cores()) as client:
         report = Build(
             lake=lake, recipe=loaded, client=client, bars=progress, say=_beside_bar, branch=branch, device=device

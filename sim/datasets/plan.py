@@ -17,6 +17,7 @@ from flagdata.errors import FlagdataError
 from flagdata.lake import Lake
 from flagdata.lake.meshes import MeshSequence, write_meshes
 from flagdata.schema import CLIP_FRAMES
+from flagdata.workload import announced
 from sim.datasets import jobs
 from sim.datasets.cast import Cast, Roll, casts
 from sim.datasets.films import Sequences
@@ -25,6 +26,9 @@ from sim.run.publish import one_thread
 
 T = TypeVar("T")
 _FEW, _MORE = 3, 9  # frames of the two runs between which costs are linear
+_BRIEF = 180.0  # s
+_USUAL_PACE = 25.0  # s of a flag in a second of one core
+_USUAL_FRAMES = 50.0  # of the raster renderer in a second of one core, docs/results/bench-render.json
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,12 +86,21 @@ class Plan:
         }  # fmt: skip
 
 
-def plan(recipe: DatasetRecipe, lake: Lake | None, *, workers: int, branch: str = "main", device: str = "cpu") -> Plan:
+def plan(
+    recipe: DatasetRecipe,
+    lake: Lake | None,
+    *,
+    workers: int,
+    branch: str = "main",
+    device: str = "cpu",
+    rates: Rates | None = None,
+) -> Plan:
     """Count what a build makes, and measure what it takes.
 
     Args:
         lake: what is in it is not made again; None where there is none yet.
         workers: that will share the work.
+        rates: as they are known; None to measure them.
 
     Raises:
         FlagdataError: the measurement failed, as the build would.
@@ -110,15 +123,42 @@ def plan(recipe: DatasetRecipe, lake: Lake | None, *, workers: int, branch: str 
         films={side.name: side.renders for side in recipe.sides},
         clips={side: sum(count // CLIP_FRAMES for count in counts) for side, counts in frames.items()},
         missing_sequences=sum(len(roll.pending(known)) for roll in rolls), missing_films=films,
-        rates=measure(recipe, _typical(rolls), device=device), workers=workers,
+        rates=rates or measure(recipe, _typical([roll.cast for roll in rolls]), device=device), workers=workers,
     )  # fmt: skip
 
 
-def _typical(rolls: Sequence[Roll]) -> Cast:
+def length(recipe: DatasetRecipe, lake: Lake, *, workers: int, branch: str = "main", device: str = "cpu") -> str | None:
+    """What a build makes, and for about how long; None where nothing is missing. Paces are measured where usual ones
+    give more than a few minutes.
+
+    Raises:
+        FlagdataError: the measurement failed, as the build would.
+    """
+    typical = _typical(list(casts(recipe)))
+    usual = plan(recipe, lake, workers=workers, branch=branch, rates=_usual(typical))
+    if not usual.missing_sequences and not usual.missing_films:
+        return None
+    found = usual if usual.seconds < _BRIEF else replace(usual, rates=measure(recipe, typical, device=device))
+    return announced(
+        f"building {found.missing_sequences} sequences and {found.missing_films} films", found.seconds * workers,
+        workers=workers, kept="an interrupted build goes on where its last commit was",
+    )  # fmt: skip
+
+
+def _usual(cast: Cast) -> Rates:
+    """What sequences and films of the raster renderer take; bytes are not known."""
+    time_ = cast.simulation.time
+    return Rates(
+        sequence_seconds=time_.total / time_.rate / _USUAL_PACE, film_seconds=time_.frames / _USUAL_FRAMES,
+        sequence_bytes=0.0, film_bytes=0.0,
+    )  # fmt: skip
+
+
+def _typical(every: Sequence[Cast]) -> Cast:
     """Of all sequences those whose number of frames is nearest to the mean."""
-    frames = [roll.cast.simulation.time.frames for roll in rolls]
+    frames = [cast.simulation.time.frames for cast in every]
     mean = sum(frames) / len(frames)
-    return min(rolls, key=lambda roll: abs(roll.cast.simulation.time.frames - mean)).cast
+    return min(every, key=lambda cast: abs(cast.simulation.time.frames - mean))
 
 
 def measure(recipe: DatasetRecipe, cast: Cast, *, device: str = "cpu") -> Rates:

@@ -10,9 +10,11 @@ from typing import NoReturn
 
 import pytest
 
-from sim.datasets import jobs
+from flagdata.lake import Lake
+from sim.datasets import jobs, plan
 from sim.datasets.build import BuildReport
 from sim.datasets.cast import casts
+from sim.datasets.plan import Rates
 from sim.datasets.reading import load
 from tests.program import Ended, invoke
 
@@ -110,3 +112,18 @@ def test_a_data_set_that_is_built_is_reported_although_its_card_cannot_be_writte
     assert code == 0
     assert (json.loads(out)["films"], json.loads(out)["card"]) == (15, None)
     assert "the data set tiny is published, but writing its card failed" in err
+
+
+def test_a_small_build_states_its_length_by_usual_paces_and_a_long_one_by_measured_ones(
+    recipe_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recipe, lake = load(str(recipe_file)), Lake.create(tmp_path / "lake")
+    rates = Rates(sequence_seconds=600.0, film_seconds=60.0, sequence_bytes=0.0, film_bytes=0.0)
+    measured = []
+    monkeypatch.setattr(plan, "measure", lambda *given, **options: measured.append(given) or rates)
+    made = "building 5 sequences and 10 films takes"
+    assert str(plan.length(recipe, lake, workers=2)).startswith(f"{made} a minute or two on 2 idle cores")
+    assert not measured
+    monkeypatch.setattr(plan, "_BRIEF", 0.0)
+    said = plan.length(recipe, lake, workers=2)
+    assert str(said).startswith(f"{made} about 30 minutes on 2 idle cores")  # (5 · 600 s + 10 · 60 s) / 2

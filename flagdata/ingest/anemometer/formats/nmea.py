@@ -368,7 +368,7 @@ def _findings(stream: Stream) -> tuple[Finding, ...]:
             where = None if at is None else f"line {at}"
             found.append(Finding(kind=kind, severity=severity, count=count, where=where, what=f"{count} {what}"))
 
-    before = f"sentences stand behind text that is no stamp, as {stream.first_before[:60]!r}; the text is not read"
+    before = f"sentences follow text that is not a timestamp, as in {stream.first_before[:60]!r}; the text was not read"
     note(stream.before, "text-before-sentences", Severity.WARNING, before)
     for talker, silent in stream.silent.items():
         note(silent, "sentences-not-read", Severity.NOTE, f"wind sentences of talker {talker} are empty; left out")

@@ -88,7 +88,7 @@ def _without_empty(reading: Reading) -> Reading:
     steps = np.diff(reading.time)
     stuck = (steps < 0) | (reading.stamped & (steps == 0))
     beside = np.concatenate(([False], stuck)) | np.concatenate((stuck, [False]))
-    what = "{n} rows hold no value, and do not come after the row before them"
+    what = "{n} empty rows dropped, whose stamps are not after that of the row before"
     rows = empty & beside if not empty.all() else np.zeros(len(empty), dtype=bool)
     return reading.without(rows, "empty-rows", what, severity=Severity.NOTE)
 
