@@ -56,7 +56,7 @@ def test_a_write_that_the_kernel_refuses_is_a_clear_error_and_publishes_nothing(
     source = tmp_path / "large.mcap"
     source.write_bytes(b"x" * (100_000 if doing == "storing an object" else 500))
     command = [sys.executable, "-c", _LIMITED, str(lake.path), str(limit), str(source)]
-    ended = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    ended = subprocess.run(command, capture_output=True, text=True, check=True, timeout=500)
     assert ended.stdout.startswith(f"{doing} failed: ")
     assert "ulimit" in ended.stdout
     assert lake.rows()["name"].to_pylist() == ["before"]
@@ -275,7 +275,7 @@ def test_of_several_processes_that_make_a_lake_at_once_one_does(tmp_path: Path) 
     code = "import sys; from flagdata.cli import main; main(['init', sys.argv[1]])"
     command = [sys.executable, "-c", code, str(tmp_path / "lake")]
     started = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for _ in range(4)]
-    assert sorted(process.wait(timeout=60) for process in started) == [0, 1, 1, 1]
+    assert sorted(process.wait(timeout=500) for process in started) == [0, 1, 1, 1]
     assert doctor(Lake.open(tmp_path / "lake"), grace=NOW) == ()
 
 
@@ -339,6 +339,6 @@ def test_the_catalog_refuses_to_work_in_a_forked_child(lake: Lake) -> None:
     queue = context.SimpleQueue()
     child = context.Process(target=_rows_in_child, args=(lake, queue))
     child.start()
-    child.join(timeout=60)
+    child.join(timeout=500)
     assert child.exitcode == 0
     assert "before this process was forked" in queue.get()

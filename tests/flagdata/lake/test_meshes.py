@@ -186,7 +186,7 @@ def test_a_forked_child_reads_after_its_parent_has(tmp_path: Path) -> None:
     queue = context.SimpleQueue()
     child = context.Process(target=_sum_in_child, args=(str(path), queue))
     child.start()
-    child.join(timeout=60)
+    child.join(timeout=500)
     assert child.exitcode == 0
     assert queue.get() == expected
 

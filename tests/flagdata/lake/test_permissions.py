@@ -51,7 +51,7 @@ def as_nobody(commands: Sequence[list[str]]) -> dict[str, tuple[int, str]]:
     """Command → its exit code and all it printed."""
     code = _AS_NOBODY.format(nobody=NOBODY)
     ended = subprocess.run(
-        [sys.executable, "-c", code, json.dumps(commands)], capture_output=True, text=True, timeout=120, check=True
+        [sys.executable, "-c", code, json.dumps(commands)], capture_output=True, text=True, timeout=500, check=True
     )
     found: dict[str, tuple[int, str]] = {}
     said: list[str] = []

@@ -260,16 +260,16 @@ def test_a_transaction_ends_only_when_no_collector_can_see_it_half_gone(lake: La
     def hold() -> None:
         with lake.transaction("held open"):
             begun.set()
-            go_on.wait(60)
+            go_on.wait(500)
 
     holder = threading.Thread(target=hold)
     holder.start()
-    assert begun.wait(60)
+    assert begun.wait(500)
     with collecting(lake.staging):
         go_on.set()
         holder.join(0.3)  # it wants to end, and may not yet
         assert [state.alive for state in leases(lake.staging)] == [True]
-    holder.join(60)
+    holder.join(500)
     assert leases(lake.staging) == []
 
 

@@ -139,7 +139,7 @@ def test_forks_and_threads_of_one_open_record_read_the_same(sample: Path) -> Non
     children = [context.Process(target=_fork_reads, args=(record, first, out)) for first in expected]
     for child in children:
         child.start()
-    assert dict(out.get(timeout=60) for _ in children) == expected
+    assert dict(out.get(timeout=500) for _ in children) == expected
     for child in children:
         child.join()
 

@@ -27,7 +27,7 @@ def server(lake: Lake) -> Iterator[Server]:
 
 def ask(server: Server, path: str, *, method: str = "GET", **headers: str) -> tuple[HTTPResponse, bytes]:
     """The answer to a request with these headers, underscores as dashes."""
-    connection = HTTPConnection("127.0.0.1", server.server_address[1], timeout=30)
+    connection = HTTPConnection("127.0.0.1", server.server_address[1], timeout=300)
     connection.putrequest(method, path, skip_host="Host" in headers)
     for name, value in headers.items():
         connection.putheader(name.replace("_", "-"), value)
@@ -91,4 +91,4 @@ def test_the_command_prints_the_address_and_ends_by_an_interrupt(lake: Lake) -> 
         with urlopen(process.stdout.readline().strip()) as found:
             assert found.status == 200
         os.kill(process.pid, signal.SIGINT)
-        assert process.wait(30) == 0
+        assert process.wait(300) == 0

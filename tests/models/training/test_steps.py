@@ -393,7 +393,7 @@ def test_two_ranks_take_the_steps_of_one(tmp_path: Path, monkeypatch: pytest.Mon
         patch.setattr(TrainingRecipe, "learner", small_learner)
         own = recipe(Loss.REGRESSION, epochs=2)
         alone = training(tmp_path / "run-1", own, checkpoint_seconds=1e9).complete().learner.state_dict()
-    assert [process.wait(timeout=240) for process in [started(rank) for rank in range(2)]] == [0, 0]
+    assert [process.wait(timeout=500) for process in [started(rank) for rank in range(2)]] == [0, 0]
     shared = json.loads((tmp_path / "weights.json").read_text())
     for name, values in alone.items():
         np.testing.assert_allclose(shared[name], values.numpy(), rtol=1e-5, atol=1e-6, err_msg=name)

@@ -81,7 +81,7 @@ def test_a_stream_that_ends_within_a_message_has_ended():
 def test_messages_larger_than_a_pipe_are_answered(tmp_path):
     large = Message(kind="frame", arrays={"a": np.arange(1_000_000, dtype=np.float32)})
     with worker(tmp_path) as process:
-        (answer,) = process.request([large], timeout=30)
+        (answer,) = process.request([large], timeout=300)
     np.testing.assert_array_equal(answer.arrays["a"], large.arrays["a"])
 
 
@@ -90,7 +90,7 @@ def test_a_lost_worker_is_replaced_and_its_frame_redone(tmp_path, mode, timeout)
     # The scene is request 1, frames 0 and 1 are 2 and 3; the worker is lost at frame 1.
     with worker(tmp_path, mode, "3") as process:
         setup = Message(kind="scene")
-        process.request([setup], timeout=30)
+        process.request([setup], timeout=300)
         answers = process.request(frames(4), timeout=timeout, setup=setup)
         assert process.restarts == 1
     assert [answer.fields["index"] for answer in answers] == [0, 1, 2, 3]
@@ -99,7 +99,7 @@ def test_a_lost_worker_is_replaced_and_its_frame_redone(tmp_path, mode, timeout)
 
 def test_a_worker_that_keeps_crashing_is_given_up_with_its_last_words(tmp_path):
     with worker(tmp_path, "crash", "2+") as process, pytest.raises(RenderError, match="something went wrong in C"):
-        process.request(frames(3), timeout=30)
+        process.request(frames(3), timeout=300)
     assert process.restarts == 3
     assert process.pid is None
 
@@ -107,19 +107,19 @@ def test_a_worker_that_keeps_crashing_is_given_up_with_its_last_words(tmp_path):
 def test_what_the_worker_refuses_is_not_tried_again(tmp_path):
     with worker(tmp_path, "refuse", "1") as process:
         with pytest.raises(RenderError, match="no such thing"):
-            process.request(frames(1), timeout=30)
+            process.request(frames(1), timeout=300)
         assert process.restarts == 0
-        assert process.request(frames(1), timeout=30)[0].fields["index"] == 0
+        assert process.request(frames(1), timeout=300)[0].fields["index"] == 0
 
 
 def test_closing_ends_the_process_and_asking_again_starts_another(tmp_path):
     process = worker(tmp_path)
-    process.request(frames(1), timeout=30)
+    process.request(frames(1), timeout=300)
     first = process.pid
     assert first is not None
     process.close()
     assert not alive(first)
-    process.request(frames(1), timeout=30)
+    process.request(frames(1), timeout=300)
     assert process.pid not in (None, first)
     process.close()
 
@@ -127,7 +127,7 @@ def test_closing_ends_the_process_and_asking_again_starts_another(tmp_path):
 def test_a_hung_worker_is_killed_when_it_is_given_up(tmp_path, monkeypatch):
     monkeypatch.setattr("sim.blender.process.EXIT_TIMEOUT", 3600.0)  # a hung worker's end is not waited for
     process = worker(tmp_path, "hang", "2", attempts=1)
-    process.request(frames(1), timeout=30)
+    process.request(frames(1), timeout=300)
     pid = process.pid
     assert pid is not None
     with pytest.raises(RenderError, match=r"did not answer for 0\.3 s"):

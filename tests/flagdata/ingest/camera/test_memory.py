@@ -28,7 +28,7 @@ def test_memory_does_not_grow_with_the_length(tmp_path: Path, write_video: Calla
             encoder={"preset": "ultrafast", "crf": "30", "bf": "0"},
         )  # fmt: skip
         result = subprocess.run(
-            [sys.executable, "-c", SCRIPT, str(path)], capture_output=True, text=True, check=True, timeout=120
+            [sys.executable, "-c", SCRIPT, str(path)], capture_output=True, text=True, check=True, timeout=500
         )
         count, kilobytes = result.stdout.split()
         return int(count), int(kilobytes)
