@@ -12,7 +12,7 @@ from torch import Tensor
 class State:
     """Positions and velocities (vertex, 3, batch) [m, m/s] at one time [s] since the start of the run.
 
-    `memory` holds what the system's hysteretic forces remember, in their order (see `System.frictions`).
+    `memory` holds what the system's forces remember, in their order (see `System.remembering`).
     """
 
     position: Tensor

@@ -95,18 +95,23 @@ class Tie(Protocol):
         ...
 
 
-class Friction(Protocol):
-    """A force that depends on the shapes gone through: it remembers (see `State.memory`), in steps of any size."""
+class Remembering(Protocol):
+    """A force that depends on what the cloth has gone through: it remembers (see `State.memory`), in steps of any size.
+
+    Positions and velocities are (vertex, 3, batch) [m, m/s], a wind (3, batch) or (vertex, 3, batch) [m/s].
+    """
 
     def start(self, cloth: Cloth, position: Tensor) -> Tensor:
         """What is remembered when nothing has happened."""
         ...
 
-    def update(self, cloth: Cloth, memory: Tensor, position: Tensor) -> Tensor:
-        """What is remembered after a step to a position (vertex, 3, batch) [m]."""
+    def update(
+        self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor, elapsed: float
+    ) -> Tensor:
+        """What is remembered after a step of `elapsed` [s] to a position."""
         ...
 
-    def force(self, cloth: Cloth, memory: Tensor, position: Tensor) -> Tensor:
+    def force(self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
         """(vertex, 3, batch) [N]."""
         ...
 
@@ -163,7 +168,7 @@ class System:
         flows: what makes the wind differ from place to place, applied in order.
         loads: air that moves with the cloth.
         ties: attachments beside the handles.
-        frictions: forces that remember.
+        remembering: forces that remember.
         contact: how layers keep apart; None lets them pass through each other.
         limits: of strain; None lets faces stretch as their stiffness allows.
     """
@@ -180,7 +185,7 @@ class System:
     flows: tuple[Flow, ...] = ()
     loads: tuple[Load, ...] = ()
     ties: tuple[Tie, ...] = ()
-    frictions: tuple[Friction, ...] = ()
+    remembering: tuple[Remembering, ...] = ()
     contact: Contact | None = None
     limits: StrainLimits | None = None
 
@@ -231,22 +236,35 @@ class System:
             return None
         return torch.stack([tie.stiffness(self.cloth, time, position) for tie in self.ties]).sum(0).unsqueeze(1)
 
-    def remembered(self, memory: tuple[Tensor, ...], position: Tensor) -> tuple[Tensor, ...]:
-        """What the frictions remember after a step to a position (vertex, 3, batch) [m]."""
+    def remembered(
+        self,
+        memory: tuple[Tensor, ...],
+        wind: Tensor,
+        time: float,
+        position: Tensor,
+        velocity: Tensor,
+        *,
+        elapsed: float,
+    ) -> tuple[Tensor, ...]:
+        """What forces remember after a step of `elapsed` [s] to a position, a velocity (vertex, 3, batch) [m, m/s] and a
+        time [s], in a wind (3, batch) [m/s]."""
+        if not self.remembering:
+            return self.checked(memory)
+        local = self.local(wind, time, position)
         return tuple(
-            friction.update(self.cloth, past, position)
-            for friction, past in zip(self.frictions, self.checked(memory), strict=True)
+            force.update(self.cloth, past, position, velocity, local, elapsed)
+            for force, past in zip(self.remembering, self.checked(memory), strict=True)
         )
 
     def checked(self, memory: tuple[Tensor, ...]) -> tuple[Tensor, ...]:
-        """What the frictions remember, as it is.
+        """What forces remember, as it is.
 
         Raises:
             UsageError: none of some, or too many.
         """
-        if len(memory) != len(self.frictions):
+        if len(memory) != len(self.remembering):
             raise UsageError(
-                f"a state with {len(memory)} memories for {len(self.frictions)} frictions",
+                f"a state with {len(memory)} memories for {len(self.remembering)} forces that remember",
                 where="system", fix="start from the state that `sim.effects.apply` returns with the system",
             )  # fmt: skip
         return memory
@@ -283,12 +301,12 @@ class System:
         air_position: Tensor | None = None,
         effect_velocity: Tensor | None = None,
     ) -> Tensor:
-        """Gravity, air, effects, ties and frictions: (vertex, 3, batch) [N].
+        """Gravity, air, effects, ties and forces that remember: (vertex, 3, batch) [N].
 
         Args:
             wind: (3, batch) [m/s].
             time: of the effects [s].
-            memory: of the frictions.
+            memory: of the forces that remember.
             air_position: the shape the air sees, if another than `position` (see `integrate.implicit.AirShape`).
             effect_velocity: the velocity the effects see, if another than `velocity` (see `integrate.symplectic`).
         """
@@ -305,8 +323,8 @@ class System:
     ) -> Tensor:
         for effect in self.effects:
             total = total + effect.force(self.cloth, time, position, velocity, wind)
-        for friction, past in zip(self.frictions, self.checked(memory), strict=True):
-            total = total + friction.force(self.cloth, past, position)
+        for force, past in zip(self.remembering, self.checked(memory), strict=True):
+            total = total + force.force(self.cloth, past, position, velocity, wind)
         return total
 
     def offset(self, time: float) -> Tensor:
@@ -367,7 +385,7 @@ class System:
             drive: wind and handles.
             share: where between its start (0) and its end (1).
             time: of the effects [s].
-            memory: of the frictions.
+            memory: of the forces that remember.
             effect_velocity: the velocity the effects see, if another than `velocity`.
         """
         wind = torch.lerp(*drive.wind, share)
@@ -384,12 +402,12 @@ class System:
     @property
     def extra(self) -> bool:
         """Whether anything acts beside the base model in the undisturbed wind, with ties and loads."""
-        return bool((*self.effects, *self.flows, *self.frictions)) or self.air is not self.air.plain
+        return bool((*self.effects, *self.flows, *self.remembering)) or self.air is not self.air.plain
 
     @cached_property
     def base(self) -> System:
         """The base model with ties and loads, in the undisturbed wind."""
-        return replace(self, air=self.air.plain, effects=(), flows=(), frictions=())
+        return replace(self, air=self.air.plain, effects=(), flows=(), remembering=())
 
     @cached_property
     def alone(self) -> System:
@@ -442,7 +460,8 @@ class System:
         cloth = self.cloth
         own = (cloth.mass, cloth.samples, cloth.segments, cloth.damping, self.gravity, self.anchors)
         parts = (
-            cloth.stiffening, self.wind, self.air, *self.effects, *self.flows, *self.loads, *self.ties, *self.frictions,
+            cloth.stiffening, self.wind, self.air, *self.effects, *self.flows, *self.loads, *self.ties,
+            *self.remembering,
         )  # fmt: skip
         return (*own, *(tensor for part in parts for tensor in _tensors_of(part)))
 

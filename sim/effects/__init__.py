@@ -21,6 +21,7 @@ EFFECTS = Registry(
         "added-mass": "sim.effects.added_mass:AddedMass",
         "reactive-loading": "sim.effects.reactive_loading:ReactiveLoading",
         "finite-span-loading": "sim.effects.finite_span_loading:FiniteSpanLoading",
+        "wagner-lag": "sim.effects.wagner_lag:WagnerLag",
         "porosity": "sim.effects.porosity:Porosity",
         "permeability": "sim.effects.permeability:Permeability",
         "air-density": "sim.effects.air_density:AirDensityChange",

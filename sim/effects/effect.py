@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from flagdata.errors import UsageError
-from sim.air import QuadraticNormal, face_wind
+from sim.air import AirForce, QuadraticNormal, face_wind
 from sim.cloth import Cloth
 from sim.effects.geometry import origin
 from sim.effects.parameter import Parametrised
@@ -82,15 +82,25 @@ class PressureEffect(Effect):
         """
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
-        air = system.air
-        if isinstance(air, FactoredNormal):
-            return replace(system, air=replace(air, effects=(*air.effects, self))), state
-        if isinstance(air, QuadraticNormal):
-            return replace(system, air=FactoredNormal(base=air, effects=(self,))), state
-        raise UsageError(
-            f"{type(self).__name__} changes a normal force, which {type(air).__name__} has none of",
-            where="effects", fix="use the quadratic-normal wind force",
-        )  # fmt: skip
+        base = pressing(self, system.air)
+        before = system.air.effects if isinstance(system.air, FactoredNormal) else ()
+        return replace(system, air=FactoredNormal(base=base, effects=(*before, self))), state
+
+
+def pressing(effect: Effect, air: AirForce) -> QuadraticNormal:
+    """The normal force of the base model's air, which an effect changes.
+
+    Raises:
+        UsageError: the air has none.
+    """
+    if isinstance(air, FactoredNormal):
+        return air.base
+    if isinstance(air, QuadraticNormal):
+        return air
+    raise UsageError(
+        f"{type(effect).__name__} changes a normal force, which {type(air).__name__} has none of",
+        where="effects", fix="use the quadratic-normal wind force",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)

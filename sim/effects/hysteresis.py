@@ -60,15 +60,17 @@ class Hysteresis(Effect):
         angle = bending.fold_angle(cloth, position)
         return torch.stack([torch.zeros_like(angle), angle])
 
-    def update(self, cloth: Cloth, memory: Tensor, position: Tensor) -> Tensor:
-        """z and the fold angles after a step to a position (vertex, 3, batch): (2, hinge, batch)."""
+    def update(
+        self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor, elapsed: float
+    ) -> Tensor:
+        """z and the fold angles after a step to a position (vertex, 3, batch), however long: (2, hinge, batch)."""
         past, before = memory
         angle = bending.fold_angle(cloth, position)
         change = CURVATURE_SPACING * cloth.hinge_column[:, None] * (angle - before)
         goal = torch.sign(change)
         return torch.stack([goal + (past - goal) * torch.exp(-change.abs() / self.curvature), angle])
 
-    def force(self, cloth: Cloth, memory: Tensor, position: Tensor) -> Tensor:
+    def force(self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
         """−½ l H z ∇θ on every hinge, as the elastic couple −½ l k α ∇θ: (vertex, 3, batch) [N]."""
         moment = (-_half_lengths(cloth)[:, None] * self.couple * memory[0]).unsqueeze(1)
         return gather_sum([moment * g for g in bending.fold(cloth, position).gradient], cloth.hinge_slots)
@@ -80,7 +82,7 @@ class Hysteresis(Effect):
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
         memory = (*state.memory, self.start(system.cloth, state.position))
-        return replace(system, frictions=(*system.frictions, self)), replace(state, memory=memory)
+        return replace(system, remembering=(*system.remembering, self)), replace(state, memory=memory)
 
 
 def _half_lengths(cloth: Cloth) -> Tensor:

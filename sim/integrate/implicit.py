@@ -72,7 +72,7 @@ class BackwardEuler:
         steps = max(1, math.ceil(duration / self.step - 1e-9))
         h = duration / steps
         kernel = self._kernel(system, state)
-        if kernel is not None and system.limits is None and not system.frictions:
+        if kernel is not None and system.limits is None and not system.remembering:
             return self._at_once(kernel, system, state, h, steps)
         for _ in range(steps):
             state = self.stepped(system, state, system.drive(state.time, state.time + h), h)
@@ -106,8 +106,7 @@ class BackwardEuler:
                 drive.wind[:1], drive.targets[1:], x, v, h, lag=self._lag(h), tolerance=self.tolerance,
                 iterations=self.iterations, offsets=drive.offset[:1], memory=system.checked(state.memory),
             )  # fmt: skip
-            x, v = system.limited(x, v, h)
-            return State(position=x, velocity=v, time=time + h, memory=system.remembered(state.memory, x))
+            return self._ended(system, state, drive, *system.limited(x, v, h), h)
         if system.clamped:
             v = v.index_copy(0, system.held, (drive.targets[1] - x[system.held]) / h)
         mass = cloth.mass.unsqueeze(1)
@@ -174,9 +173,12 @@ class BackwardEuler:
             operator, right, weight + factor * diagonal, tolerance=self.tolerance, iterations=self.iterations
         )
         v = v + change
-        after, v = system.limited(x + h * v, v, h)
-        memory = system.remembered(state.memory, after)
-        return State(position=after, velocity=v, time=time + h, memory=memory)
+        return self._ended(system, state, drive, *system.limited(x + h * v, v, h), h)
+
+    def _ended(self, system: System, state: State, drive: Drive, x: Tensor, v: Tensor, h: float) -> State:
+        """The end of a step from a state, with what forces remember of it in the wind of its start."""
+        memory = system.remembered(state.memory, drive.wind[0], state.time, x, v, elapsed=h)
+        return State(position=x, velocity=v, time=state.time + h, memory=memory)
 
 
 def _contacts(system: System, position: Tensor, velocity: Tensor) -> contact.Linearised | None:

@@ -98,7 +98,7 @@ class JointBatch:
 
     @classmethod
     def of(cls, batches: Sequence[tuple[System, State]]) -> tuple[JointBatch, State]:
-        """Batches with their starts, and the start of all: members in order, and what frictions remember.
+        """Batches with their starts, and the start of all: members in order, and what forces remember.
 
         Raises:
             UsageError: none, or starts at different times.
@@ -158,7 +158,7 @@ class JointBatch:
         """For every batch what `plain` lacks of its system, its place among the members, and its state."""
         memory = state.memory
         for system, members in zip(self.beside, self._members, strict=True):
-            own, memory = memory[: len(system.frictions)], memory[len(system.frictions) :]
+            own, memory = memory[: len(system.remembering)], memory[len(system.remembering) :]
             yield system, members, replace(state.select(members), memory=own)
 
 

@@ -49,7 +49,7 @@ class SplitEuler:
             return self._at_once(plain, *kernels, state, h, steps)
         for drive in system.drives(_times(state.time, h, steps)):
             begun = replace(state, velocity=self._pushed(system, state, drive, h), memory=())
-            state = _carried(system, state, self.base.stepped(plain, begun, drive, h), h)
+            state = _carried(system, state, self.base.stepped(plain, begun, drive, h), drive, h)
         return state
 
     def advance_jointly(self, batches: JointBatch, state: State, duration: float) -> State:
@@ -71,8 +71,8 @@ class SplitEuler:
             after = self.base.stepped(plain, replace(state, velocity=velocity, memory=()), drive, h)
             memory: list[Tensor] = []
             for system, members, own in parts:
-                if system.loads or system.frictions:
-                    carried = _carried(system, own, after.select(members), h)
+                if system.loads or system.remembering:
+                    carried = _carried(system, own, after.select(members), drive.select(members), h)
                     after.position[..., members] = carried.position
                     after.velocity[..., members] = carried.velocity
                     memory += carried.memory
@@ -131,12 +131,14 @@ def _times(start: float, h: float, steps: int) -> list[float]:
     return list(accumulate([h] * steps, initial=start))
 
 
-def _carried(system: System, before: State, after: State, h: float) -> State:
-    """The end of a step, after the base model's: with air that moves along, and what frictions remember."""
+def _carried(system: System, before: State, after: State, drive: Drive, h: float) -> State:
+    """The end of a step, after the base model's: with air that moves along, and what forces remember of it in the wind
+    of its start."""
     if system.loads:
         x, v = before.position, before.velocity
         mass, normals = system.cloth.mass.unsqueeze(1), mean_normals(system.cloth, x)
         change = mass * (after.velocity - v)
         change = effective(change, mass=system.cloth.mass, added=system.added_mass, normals=normals) / mass
         after = replace(after, position=x + h * (v + change), velocity=v + change)
-    return replace(after, memory=system.remembered(before.memory, after.position))
+    memory = system.remembered(before.memory, drive.wind[0], before.time, after.position, after.velocity, elapsed=h)
+    return replace(after, memory=memory)

@@ -125,7 +125,7 @@ def outer_limit(system: System, state: State, drive: Drive) -> float:
     inverse = system.free / system.cloth.mass.unsqueeze(1)
 
     def accelerated(position: Tensor, velocity: Tensor) -> Tensor:
-        memory = system.remembered(state.memory, position)
+        memory = system.remembered(state.memory, drive.wind[0], state.time, position, velocity, elapsed=0.0)
         force = system.extra_force(drive, 0.0, state.time, position, velocity, memory=memory)
         return inverse * system.effective(position, force)
 

@@ -21,6 +21,7 @@ import math
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
+import torch
 from torch import Tensor
 
 from flagdata.errors import UsageError
@@ -169,6 +170,8 @@ def _each_step(
         share = index / steps
         time = state.time + share * duration
         level = v + h / 2 * acceleration
+        if index > 0:
+            memory = system.remembered(memory, torch.lerp(*drive.wind, share), time, x, level, elapsed=h)
         if kernel is None:
             force = system.force(drive, share, time, x, v, memory=memory, effect_velocity=level)
         else:
@@ -178,7 +181,6 @@ def _each_step(
         v = v + (h / 2 if index in (0, steps) else h) * acceleration
         if index < steps:
             x, v = system.limited(x + h * v, v, h)
-            memory = system.remembered(memory, x)
     return State(position=x, velocity=v, time=state.time + duration, memory=memory)
 
 
@@ -195,13 +197,14 @@ def _impulses(
         share = index / outer
         level = v + length / 2 * acceleration
         time = state.time + share * duration
+        if index > 0:
+            memory = system.remembered(memory, torch.lerp(*drive.wind, share), time, x, level, elapsed=length)
         force = extra_force(whole, system, drive, share, time, x, level, memory=memory)
         acceleration = inverse_mass * system.effective(x, force)
         v = v + (length / 2 if index in (0, outer) else length) * acceleration
         if index < outer:
             part = drive.part(share, (index + 1) / outer)
             x, v = _base(base, part, time, x, v, length / inner, inner, kernel)
-            memory = system.remembered(memory, x)
     return State(position=x, velocity=v, time=state.time + duration, memory=memory)
 
 

@@ -26,6 +26,10 @@ class Acting {
   const V* number(const Effect<T>& effect) const {
     return reinterpret_cast<const V*>(effect.number + b * effect.numbers * L);
   }
+  // One of the two numbers of an element that an effect remembers; null where it remembers nothing.
+  V* past(const Effect<T>& effect, int64_t elements, int which, int64_t e) const {
+    return effect.memory ? reinterpret_cast<V*>(effect.memory + ((2 * b + which) * elements + e) * L) : nullptr;
+  }
   template <typename Kind, typename F>
   void each(F call) const {
     for (int64_t i = 0; i < p.effects; ++i)
@@ -45,7 +49,7 @@ class Acting {
     push = combine(seen.normal, normal, seen.relative, V{} + T(p.air_drag));
   }
 
-  void face_forces(const T* x, const T* v, const T* level, T lag, V3 wind, T* f) const {
+  void face_forces(const T* x, const T* v, const T* level, T lag, V3 wind, T elapsed, T* f) const {
     const T third = T(1) / 3;
     for (int64_t e = 0; e < p.faces; ++e) {
       const int64_t at[3] = {3 * L * int64_t(p.face[3 * e]), 3 * L * int64_t(p.face[3 * e + 1]),
@@ -61,7 +65,7 @@ class Acting {
       V3 push = {V{}, V{}, V{}};
       const auto meets = [&](V3 normal, V3 air, V3 w0, V3 w1, V3 w2) -> Face<V> {
         const V3 relative = sub(air, scale(add(w0, add(w1, w2)), V{} + third));
-        return {normal, relative, dot(relative, normal)};
+        return {normal, relative, dot(relative, normal), {nullptr, nullptr}, elapsed};
       };
       const auto normal_of = [](V3 y0, V3 y1, V3 y2) {
         const V3 normal = cross(sub(y1, y0), sub(y2, y0));
@@ -69,7 +73,10 @@ class Acting {
       };
       if (faces_) {
         Face<V> seen = meets(normal_of(x0, x1, x2), local, load3(level + at[0]), load3(level + at[1]), load3(level + at[2]));
-        each<FaceForce>([&](const Effect<T>& effect, auto act) { act(number(effect), seen, push); });
+        each<FaceForce>([&](const Effect<T>& effect, auto act) {
+          for (int k = 0; k < 2; ++k) seen.past[k] = past(effect, p.faces, k, e);
+          act(number(effect), seen, push);
+        });
       }
       if (flows_ || pressures_) {
         if (lag != 0) {
@@ -136,10 +143,10 @@ class Acting {
   bool folds() const { return hinges_; }
 
   // Adds all but the moments at hinges, in a wind; flows and the factors on the pressure see velocities v and the shape
-  // x - lag v, forces the velocities `level`.
-  void add_forces(const T* x, const T* v, const T* level, T lag, V3 wind, T* f) {
+  // x - lag v, forces the velocities `level`. What forces remember is brought up to date where time has elapsed since.
+  void add_forces(const T* x, const T* v, const T* level, T lag, V3 wind, T elapsed, T* f) {
     if (flows_) blow(x, lag, v, wind);
-    if (flows_ || pressures_ || faces_) face_forces(x, v, level, lag, wind, f);
+    if (flows_ || pressures_ || faces_) face_forces(x, v, level, lag, wind, elapsed, f);
     if (!sheets_) return;
     turn(x, level);
     scratch_.resize(7 * L * p.vertices);
@@ -153,11 +160,11 @@ class Acting {
   }
 
   // Adds the moments of effects at a hinge.
-  void add_moments(int64_t e, V angle, V stiffness, bool moved, V& moment) const {
+  void add_moments(int64_t e, V angle, V stiffness, T elapsed, V& moment) const {
     each<HingeMoment>([&](const Effect<T>& effect, auto act) {
       const V* own = reinterpret_cast<const V*>(effect.of_element + (b * p.hinges + e) * effect.own * L);
-      V* memory = effect.memory ? reinterpret_cast<V*>(effect.memory + (2 * b * p.hinges + e) * L) : nullptr;
-      act(number(effect), Hinge<V>{angle, stiffness, own, memory, memory + p.hinges, moved}, moment);
+      V *first = past(effect, p.hinges, 0, e), *second = past(effect, p.hinges, 1, e);
+      act(number(effect), Hinge<V>{angle, stiffness, own, first, second, elapsed}, moment);
     });
   }
 

@@ -50,19 +50,19 @@ class Acting:
     """All that acts beside the base model of a system.
 
     Attributes:
-        entries: in the order of factors on the pressure, flows, forces and frictions.
-        frictions: how many of them, at the end, remember.
+        entries: in the order of factors on the pressure, flows, forces and those forces that remember.
+        remembering: how many of them, at the end, remember.
         tensors: what the entries point to, kept alive here.
     """
 
     entries: Sequence[Entry]
-    frictions: int
+    remembering: int
     tensors: list[Tensor] = field(repr=False)
 
-    def remembering(self, memory: Sequence[Tensor]) -> ctypes.Array[Entry]:
-        """The entries with the frictions' memories, which are changed in place and must outlive the entries."""
+    def with_memory(self, memory: Sequence[Tensor]) -> ctypes.Array[Entry]:
+        """The entries with what forces remember, which is changed in place and must outlive the entries."""
         array = (Entry * len(self.entries))(*self.entries)
-        for entry, past in zip(array[len(array) - self.frictions :], memory, strict=True):
+        for entry, past in zip(array[len(array) - self.remembering :], memory, strict=True):
             entry.memory = past.data_ptr()
         return array
 
@@ -94,7 +94,7 @@ def acting(system: System, kind: str, pack: Callable[[Tensor], Tensor]) -> Actin
             entry.own, entry.of_element = own.shape[2], own.data_ptr()
             tensors.append(own)
         entries.append(entry)
-    return Acting(entries=entries, frictions=len(system.frictions), tensors=tensors)
+    return Acting(entries=entries, remembering=len(system.remembering), tensors=tensors)
 
 
 def _parts(system: System) -> Iterator[tuple[Compilable | None, tuple[Kind, ...]]]:
@@ -104,7 +104,7 @@ def _parts(system: System) -> Iterator[tuple[Compilable | None, tuple[Kind, ...]
         ((None,) if factors is None else factors, (Kind.PRESSURE_FACTOR,)),
         (system.flows, (Kind.FLOW,)),
         (system.effects, _FORCES),
-        (system.frictions, (Kind.HINGE_MOMENT,)),
+        (system.remembering, (Kind.HINGE_MOMENT, Kind.FACE_FORCE)),
     ]
     for parts, fitting in placed:
         for part in parts:

@@ -265,7 +265,7 @@ class Block {
     return p.stiffening ? k * (1 + load(p.stiffening + (b * p.hinges + e) * L)) : k;
   }
 
-  void hinges(const T* x, const T* v, bool moved, T* f) const {
+  void hinges(const T* x, const T* v, T elapsed, T* f) const {
     const bool folds = acting_.folds();
     for (int64_t e = 0; e < p.hinges; ++e) {
       const int32_t* c = p.hinge + 4 * e;
@@ -275,7 +275,7 @@ class Block {
       for (int i = 0; i < 4; ++i) rate += dot(g[i], load3(v + 3 * L * int64_t(c[i])));
       const V k = bending(e, angle);
       V moment = -k * (angle + damping * rate);
-      if (folds) acting_.add_moments(e, angle, k, moved, moment);
+      if (folds) acting_.add_moments(e, angle, k, elapsed, moment);
       for (int i = 0; i < 4; ++i) add3(f + 3 * L * int64_t(c[i]), scale(g[i], moment));
     }
   }
@@ -366,14 +366,14 @@ class Block {
   }
 
   // Adds what acts beside the base model; arguments as in acting.hpp.
-  void beside(const T* x, const T* v, const T* level, T lag, V3 wind, T* f) {
-    acting_.add_forces(x, v, level, lag, wind, f);
+  void beside(const T* x, const T* v, const T* level, T lag, V3 wind, T elapsed, T* f) {
+    acting_.add_forces(x, v, level, lag, wind, elapsed, f);
     if (!acting_.folds()) return;
     for (int64_t e = 0; e < p.hinges; ++e) {
       V3 g[4];
       V angle, moment = V{};
       fold(x, e, g, angle);
-      acting_.add_moments(e, angle, bending(e, angle), false, moment);
+      acting_.add_moments(e, angle, bending(e, angle), elapsed, moment);
       for (int i = 0; i < 4; ++i) add3(f + 3 * L * int64_t(p.hinge[4 * e + i]), scale(g[i], moment));
     }
   }
@@ -381,16 +381,16 @@ class Block {
   // What acts beside the base model alone, at `share` of the way between the drive's start and end.
   void extra(const T* x, const T* v, const T* level, T share, T* f) {
     std::memset(f, 0, sizeof(T) * p.vertices * 3 * L);
-    beside(x, v, level, T(0), wind_at(share), f);
+    beside(x, v, level, T(0), wind_at(share), T(0), f);
   }
 
-  // All forces at `share` of the way between the drive's start and end; `moved` whether the cloth has since those before.
-  void forces(const T* x, const T* v, const T* level, T share, bool moved, T* f) {
+  // All forces at `share` of the way between the drive's start and end; `elapsed` since those before, 0 for none.
+  void forces(const T* x, const T* v, const T* level, T share, T elapsed, T* f) {
     weigh(f);
     const V3 wind = wind_at(share);
     faces(x, v, wind, f);
-    hinges(x, v, moved, f);
-    if (p.effects > 0) acting_.add_forces(x, v, level, T(0), wind, f);
+    hinges(x, v, elapsed, f);
+    if (p.effects > 0) acting_.add_forces(x, v, level, T(0), wind, elapsed, f);
     if (p.stiffness > 0) springs(x, v, share, f);
     if (p.ties > 0) ties(x, v, share, f);
     if (p.contact.thickness > 0) contacts(x, v, f);
@@ -456,7 +456,7 @@ class Block {
     step_ = T(h);
     if (levelled) level_.assign(v, v + 3 * L * p.vertices);
     for (int64_t s = 0; s <= steps; ++s) {
-      forces(x, v, levelled ? level_.data() : v, T(double(s) / double(steps)), s > 0, f);
+      forces(x, v, levelled ? level_.data() : v, T(double(s) / double(steps)), s > 0 ? T(h) : T(0), f);
       if (p.added_mass) acting_.share_with_air(x, f);
       if (levelled) hasten(f, T(h / 2));
       const T kick = T(s == 0 || s == steps ? h / 2 : h), drift = s < steps ? T(h) : T(0);

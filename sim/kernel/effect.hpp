@@ -21,6 +21,8 @@ template <typename V>
 struct Face {
   Vector3<V> normal, relative;  // of length 1; the wind less the face's velocity
   V across;                     // its part along the normal
+  V* past[2];                   // the two numbers of this face that a force that remembers has; or null
+  Real<V> elapsed;              // since they were brought up to date [s]; 0 where they are
   Vector3<V> along() const { return sub(relative, scale(normal, across)); }
 };
 
@@ -30,7 +32,7 @@ struct Hinge {
   V angle, stiffness;  // stiffness times angle is the elastic moment
   const V* own;        // the effect's numbers of this hinge
   V *past, *angle_before;  // what a friction remembers, and the angle that was at
-  bool moved;          // since then: what is remembered is to be brought up to date
+  Real<V> elapsed;     // since then [s]: what is remembered is to be brought up to date where this is not 0
 };
 
 // The cloth's vertices and faces. Fields are (vertex, 3, lane), and (vertex, lane) where they are scalar.

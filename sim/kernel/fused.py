@@ -244,8 +244,8 @@ class Kernel:
     def advance(
         self, drive: Drive, x: Tensor, v: Tensor, h: float, steps: int, *, memory: Sequence[Tensor] = ()
     ) -> tuple[Tensor, Tensor, tuple[Tensor, ...]]:
-        """Leapfrog: positions and velocities (vertex, 3, batch) after `steps` steps of `h` [s], and the memory of
-        frictions. Where `beside` is None it is that of the base model."""
+        """Leapfrog: positions and velocities (vertex, 3, batch) after `steps` steps of `h` [s], and what forces
+        remember. Where `beside` is None it is that of the base model."""
         problem, alive = self._drive(drive)
         past = self._remember(problem, memory)
         xb, vb = self.pack(x), self.pack(v)
@@ -255,10 +255,10 @@ class Kernel:
         return self.unpack(xb), self.unpack(vb), tuple(map(self.unpack, past))
 
     def _remember(self, problem: _Problem, memory: Sequence[Tensor]) -> list[Tensor]:
-        """Set what acts beside the base model; returned is what frictions remember, which a call changes."""
+        """Set what acts beside the base model; returned is what forces remember, which a call changes."""
         past = [self.pack(tensor) for tensor in memory]
         if self.beside is not None:
-            problem.effects, problem.effect = len(self.beside.entries), self.beside.remembering(past)
+            problem.effects, problem.effect = len(self.beside.entries), self.beside.with_memory(past)
         return past
 
     def forces(self, drive: Drive, share: float, x: Tensor, v: Tensor) -> Tensor:
@@ -306,7 +306,7 @@ class Kernel:
             winds: (3, batch) at the start of each step [m/s].
             targets: (held, 3, batch) of the handles at the end of each [m].
             offsets: (3,) displacement of the ties' anchors at the start of each [m]; none where there are no ties.
-            memory: of the frictions, which is that of all steps.
+            memory: of the forces that remember, which is that of all steps.
             lag: the air sees the shape x − lag v [s].
 
         Returns:
@@ -337,13 +337,13 @@ class Kernel:
         memory: Sequence[Tensor] = (),
     ) -> tuple[Tensor, Tensor, tuple[Tensor, ...]]:
         """Steps of `h` [s] of the splitting (see `sim.integrate.split`): positions, velocities (vertex, 3, batch), and
-        the memory of frictions.
+        what forces remember.
 
         Args:
             parts: of the batches, of this one's kind, whose members side by side are this one's; `beside` is none of
                 theirs None.
             winds, targets, offsets, tolerance, iterations: as of `implicit`.
-            memory: of the frictions of all parts, in order.
+            memory: of the forces of all parts that remember, in order.
         """
         problem, alive = self._given(wind=self._each(winds), targets=self._each(targets), **self._tie_targets(offsets))
         problems: list[_Problem] = []
@@ -352,7 +352,7 @@ class Kernel:
         first = 0
         for place, part in enumerate(parts):
             mine, kept = part._given(**part._tie_targets(offsets))
-            count = 0 if part.beside is None else part.beside.frictions
+            count = 0 if part.beside is None else part.beside.remembering
             past = part._remember(mine, left[:count])
             own[place] = _Part(ctypes.pointer(mine), part.blocks, first, part.batch)
             remembered += [(part, tensor) for tensor in past]

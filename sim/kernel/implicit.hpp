@@ -155,7 +155,7 @@ class Implicit : Block<T, L> {
     for (auto* field : {&diagonal_, &right_, &residual_, &direction_, &image_, &solution_}) field->assign(n, V{});
     // Gravity and air go into right_ first; contact and elastic forces of the explicit step are not wanted here.
     this->external(x, v, lag, reinterpret_cast<T*>(right_.data()));
-    if (p.effects > 0) this->beside(x, v, v, lag, load3(p.wind + b * 3 * L), reinterpret_cast<T*>(right_.data()));
+    if (p.effects > 0) this->beside(x, v, v, lag, load3(p.wind + b * 3 * L), T(0), reinterpret_cast<T*>(right_.data()));
     carry(x);
     linearise_ties(x, right_.data(), diagonal_.data());
     linearise_faces(x, right_.data(), diagonal_.data());

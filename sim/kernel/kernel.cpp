@@ -19,7 +19,7 @@ void forces(const Problem<T>* p, int64_t blocks, void* lists, const T* x, const 
   const int64_t size = p->vertices * 3 * L;
   auto* of_block = static_cast<contact::Lists<T, L>*>(lists);
   for (int64_t b = 0; b < blocks; ++b)
-    Block<T, L>(*p, b, blocks, of_block + b).forces(x + b * size, v + b * size, v + b * size, T(share), false, f + b * size);
+    Block<T, L>(*p, b, blocks, of_block + b).forces(x + b * size, v + b * size, v + b * size, T(share), T(0), f + b * size);
 }
 
 template <typename T, int L>

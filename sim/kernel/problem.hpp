@@ -15,7 +15,7 @@ struct Effect {
   int64_t numbers, own;  // how many of all and of each element
   const T* number;       // (blocks, numbers, L)
   const T* of_element;   // (blocks, elements, own, L); or null
-  T* memory;             // (blocks, 2, hinges, L); or null
+  T* memory;             // (blocks, 2, elements, L); or null
 };
 
 // Field by field as in fused.py.

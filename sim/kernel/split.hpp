@@ -44,7 +44,7 @@ class Carried : Block<T, L> {
   // Makes `pushed` the velocities that the base model's step begins with, in a wind.
   void push(V3 wind, T h) {
     std::fill(f_.begin(), f_.end(), T(0));
-    if (p.effects > 0) this->beside(x(), v(), v(), T(0), wind, f_.data());
+    if (p.effects > 0) this->beside(x(), v(), v(), T(0), wind, T(0), f_.data());
     const T* mass = p.mass + b * p.vertices * L;
     for (int64_t i = 0; i < p.vertices; ++i)
       for (int64_t k = 3 * L * i; k < 3 * L * (i + 1); k += L)
@@ -73,15 +73,9 @@ class Carried : Block<T, L> {
       }
   }
 
-  // Brings what frictions remember to positions after a step.
-  void remember(const T* x) {
-    for (int64_t e = 0; e < p.hinges; ++e) {
-      V3 g[4];
-      V angle, unused = V{};
-      this->fold(x, e, g, angle);
-      acting_.add_moments(e, angle, this->bending(e, angle), true, unused);
-    }
-  }
+  // Brings what forces remember to positions and velocities after a step of h in a wind; the forces themselves are not
+  // wanted.
+  void remember(const T* x, const T* v, V3 wind, T h) { this->beside(x, v, v, T(0), wind, h, f_.data()); }
 };
 
 // A batch's blocks, and their members among all.
@@ -99,6 +93,11 @@ class Batch {
       const T* at = from + member / L * size + member % L;
       for (int64_t k = 0; k < numbers; ++k) to[k * L + l] = at[k * L];
     }
+  }
+  Vector3<typename Vector<T, L>::type> blown(const T* wind, int64_t block) const {
+    typename Vector<T, L>::type own[3];
+    gather(wind, 3 * L, block, 3, reinterpret_cast<T*>(own));
+    return {own[0], own[1], own[2]};
   }
   void scatter(const T* from, int64_t block, int64_t numbers, T* to) const {
     for (int l = 0; l < L && block * L + l < part_.count; ++l) {
@@ -124,15 +123,13 @@ class Batch {
       gather(x, numbers * L, b, numbers, own.x());
       gather(v, numbers * L, b, numbers, own.v());
       if (!own.pushes()) continue;
-      typename Vector<T, L>::type blown[3];
-      gather(wind, 3 * L, b, 3, reinterpret_cast<T*>(blown));
-      own.push({blown[0], blown[1], blown[2]}, h);
+      own.push(blown(wind, b), h);
       scatter(own.pushed(), b, numbers, v);
     }
     now_.tie_targets += part_.blocks * now_.ties * 3 * L;
   }
 
-  void carry(T* x, T* v, T h) {
+  void carry(T* x, T* v, const T* wind, T h) {
     const int64_t numbers = 3 * now_.vertices;
     for (int64_t b = 0; b < part_.blocks; ++b) {
       Carried<T, L>& own = blocks_[b];
@@ -145,7 +142,7 @@ class Batch {
         scatter(after_x_.data(), b, numbers, x);
         scatter(after_v_.data(), b, numbers, v);
       }
-      if (remembers) own.remember(after_x_.data());
+      if (remembers) own.remember(after_x_.data(), after_v_.data(), blown(wind, b), h);
     }
   }
 };
@@ -163,7 +160,7 @@ void split(const Problem<T>* p, int64_t blocks, T* x, T* v, int32_t* failed, dou
     for (auto& batch : batches) batch.push(x, v, now.wind, T(h));
     for (int64_t b = 0; b < blocks; ++b)
       Implicit<T, L>(now, b, blocks).step(x + b * size, v + b * size, failed + b * L, T(h), T(0), tolerance, iterations);
-    for (auto& batch : batches) batch.carry(x, v, T(h));
+    for (auto& batch : batches) batch.carry(x, v, now.wind, T(h));
     now.wind += blocks * 3 * L;
     now.targets += blocks * p->held * 3 * L;
     now.tie_targets += blocks * p->ties * 3 * L;

@@ -32,7 +32,7 @@ def lacking(system: System) -> list[str]:
         "effects on the wind": system.flows,
         "added mass": system.loads,
         "ties beside the handles": system.ties,
-        "hysteresis": system.frictions,
+        "forces that remember": system.remembering,
         "contact": system.contact is not None,
         "strain limits": system.limits is not None,
         "bending stiffness that differs along the cloth": system.cloth.stiffening is not None,

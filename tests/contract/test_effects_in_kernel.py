@@ -88,8 +88,8 @@ def test_forces_are_those_of_torch(name: str, dtype: torch.dtype, tolerance: flo
     system, state = with_effect(drawn(name), *flag(dtype=dtype))
     drive = system.drive(state.time, state.time + 0.01)
     moved = 0.97 * state.position.roll(1, 1) + state.position
-    memory = system.remembered(state.memory, moved)
     level = state.velocity.roll(1, 0)
+    memory = system.remembered(state.memory, drive.wind[0], state.time, moved, level, elapsed=0.2)
     expected = system.extra_force(drive, 0.3, state.time, moved, state.velocity, memory=memory, effect_velocity=level)
     computed = kernel_of(system).extra(drive, 0.3, moved, state.velocity, level, memory=memory)
     air = system.air.plain.force(system.cloth, moved, state.velocity, drive.wind[0])
@@ -108,7 +108,7 @@ def test_members_of_every_block_have_their_own_numbers(name: str) -> None:
     moved = state.position + 0.02 * torch.sin(30 * state.position.roll(1, 1))
     velocity = torch.cos(11 * moved.roll(1, 0))
     drive = system.drive(START, START + 0.01)
-    memory = system.remembered(state.memory, moved)
+    memory = system.remembered(state.memory, drive.wind[0], START, moved, velocity, elapsed=0.2)
     expected = system.extra_force(drive, 0.3, START, moved, velocity, memory=memory)
     computed = kernel_of(system).extra(drive, 0.3, moved, velocity, velocity, memory=memory)
     air = system.air.plain.force(system.cloth, moved, velocity, drive.wind[0])
@@ -177,7 +177,7 @@ def splitting(backend: Backend) -> SplitEuler:
 def test_batches_of_all_effects_split_jointly_in_one_call_as_torch_splits_each(
     dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Blocks hold members of several batches; the memory of frictions is carried from frame to frame."""
+    """Blocks hold members of several batches; what forces remember is carried from frame to frame."""
     base = flag(dtype=dtype)
     batches = [with_effect(drawn(name), *base) for name in EFFECTS]
     batches = [

@@ -129,10 +129,12 @@ def work_of_cycle(hinge, friction: Hysteresis, amplitude: float, steps: int) -> 
     system, state = apply([friction], system, replace(state, position=folded(0.0)))
     angles = amplitude * np.sin(2 * np.pi * np.arange(3 * steps + 1) / steps)
     memory, work = state.memory, 0.0
+    still, calm = state.velocity, torch.zeros_like(system.gravity)
     for index, (before, after) in enumerate(pairwise(angles)):
-        then = system.remembered(memory, folded(after))
+        then = system.remembered(memory, calm, 0.0, folded(after), still, elapsed=1e-3)
         if index >= 2 * steps:
-            pull = (friction.force(system.cloth, m, folded(a)) for m, a in ((memory[0], before), (then[0], after)))
+            ends = ((memory[0], before), (then[0], after))
+            pull = (friction.force(system.cloth, m, folded(a), still, calm) for m, a in ends)
             work -= float((sum(pull) / 2 * (folded(after) - folded(before))).sum())
         memory = then
     return work
@@ -148,14 +150,14 @@ def test_a_friction_cycle_takes_the_closed_form_of_work(hinge, turned) -> None:
 
 def test_friction_remembers_the_same_whatever_the_steps(hinge) -> None:
     """The update is exact for a monotone change: one step or twenty."""
-    system, _ = hinge
+    system, state = hinge
     friction = Hysteresis(couple=1e-3, curvature=0.05)
     once = friction.start(system.cloth, folded(0.0))
-    many = once
+    many, still = once, (state.velocity, torch.zeros_like(system.gravity))
     for before, after in ((0.0, 0.3), (0.3, -0.1)):
-        once = friction.update(system.cloth, once, folded(after))
+        once = friction.update(system.cloth, once, folded(after), *still, 0.02)
         for angle in np.linspace(before, after, 21)[1:]:
-            many = friction.update(system.cloth, many, folded(angle))
+            many = friction.update(system.cloth, many, folded(angle), *still, 0.001)
     torch.testing.assert_close(once, many, rtol=1e-12, atol=1e-12)
 
 
