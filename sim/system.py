@@ -246,8 +246,8 @@ class System:
         *,
         elapsed: float,
     ) -> tuple[Tensor, ...]:
-        """What forces remember after a step of `elapsed` [s] to a position, a velocity (vertex, 3, batch) [m, m/s] and a
-        time [s], in a wind (3, batch) [m/s]."""
+        """What forces remember after a step of `elapsed` [s] to a time [s], a position and a velocity
+        (vertex, 3, batch) [m, m/s], in a wind (3, batch) [m/s]."""
         if not self.remembering:
             return self.checked(memory)
         local = self.local(wind, time, position)

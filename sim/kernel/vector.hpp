@@ -131,7 +131,7 @@ inline V exponential(V a) {
   // ln 2 in two parts, the first of few digits, so that its multiples are exact.
   const V rest = a - n * T(0.693145751953125) - n * T(1.4286068203094172e-06);
   V series = V{} + 1;
-  for (int i = terms; i > 0; --i) series = 1 + series * rest * (T(1) / T(i));
+  for (int i = terms; i > 0; --i) series = 1 + series * (rest * (T(1) / T(i)));  // what is in brackets does not wait
   const I bits = (whole + bias) << mantissa;
   V power;
   std::memcpy(&power, &bits, sizeof power);
