@@ -5,9 +5,9 @@ one (see `tests.validation.mujoco`). Everything is judged through the public int
 tables that a user would bring, against one bank of nulls by flagdata's own simulator, which serves all experiments.
 
 Environment variables: FLAGDATA_FOREIGN_NULLS (how many nulls), FLAGDATA_FOREIGN_EFFECTS (how many of each effect),
-FLAGDATA_FOREIGN_KINDS (kinds of numerics in the bank), FLAGDATA_FOREIGN_WEIGHED (the relative uncertainty that each
-cloth is weighed with; its own density is then what is declared), FLAGDATA_FOREIGN_FOLDER (where bank, recordings and
-verdicts are kept; a run that was stopped goes on there).
+FLAGDATA_FOREIGN_ACTED (which effects, separated by commas), FLAGDATA_FOREIGN_KINDS (kinds of numerics in the bank),
+FLAGDATA_FOREIGN_WEIGHED (the relative uncertainty that each cloth is weighed with; its own density is then what is
+declared), FLAGDATA_FOREIGN_FOLDER (where bank, recordings and verdicts are kept; a run that was stopped goes on there).
 """
 
 from __future__ import annotations
@@ -48,8 +48,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         return {"missing": f"{error.what}: {error.fix}"}
     torch.set_num_threads(1)
     named = [(f"null-{k:03d}", NOTHING) for k in range(_number("NULLS", _NULLS))]
-    for name, undeclared in UNDECLARED.items():
-        named += [(f"{name}-{k:03d}", undeclared) for k in range(_number("EFFECTS", _EFFECTS))]
+    acted = os.environ.get("FLAGDATA_FOREIGN_ACTED", ",".join(UNDECLARED))
+    for name in filter(None, acted.split(",")):
+        named += [(f"{name}-{k:03d}", UNDECLARED[name]) for k in range(_number("EFFECTS", _EFFECTS))]
     truths = [draw(name, undeclared, seed=seed) for name, undeclared in named]
     with TemporaryDirectory(prefix="flagdata-foreign-") as temporary:
         folder = Path(os.environ.get("FLAGDATA_FOREIGN_FOLDER", temporary))

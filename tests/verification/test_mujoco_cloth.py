@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+import torch
+from scipy.integrate import quad, solve_ivp
 from scipy.special import j0
 
 from flagdata.errors import NotFoundError
+from sim.cloth import Cloth
+from sim.effects.finite_span_loading import FiniteSpanLoading
+from sim.material import named
 from sim.mesh import grid
-from tests.validation.environments import MUJOCO
+from tests.validation.environments import MUJOCO, UnusableError
 from tests.validation.mujoco.cloth import Air, Flight, Floats, Integrator, Method, Sheet, Wind, fly
 
 STILL, CALM = Air(pressure=0.0), Wind()
@@ -69,6 +76,79 @@ def test_a_level_sheet_in_air_falls_towards_its_terminal_speed(mujoco: Path, met
     expected = -terminal * np.tanh(GRAVITY * np.arange(21) * 0.04 / terminal)
     # Forces are those at the start of a step: late by half a step, h g/2 at most.
     np.testing.assert_allclose(made.velocities[:, :, 2].mean(axis=1), expected, atol=method.step * GRAVITY / 2)
+
+
+def test_a_level_sheet_whose_pressure_lags_falls_as_wagners_function_has_it(mujoco: Path) -> None:
+    """σ v̇ = −σ g + F − s Σ Aᵢ (F − zᵢ), F = p v², żᵢ = (2 |v|/L) bᵢ (F − zᵢ) with L = 0.6 m."""
+
+    def speeds(air: Air) -> Floats:
+        made = fly(
+            mujoco, FREE, start=_level(FREE), air=air, wind=CALM, method=Method(), rate=25.0, frames=21, gravity=GRAVITY
+        )
+        return made.velocities[:, :, 2].mean(axis=1)
+
+    def rates(_: float, state: Floats) -> list[float]:
+        speed, slow, fast = state
+        load = 1.3 * speed * abs(speed)
+        held_back = 0.165 * (load - slow) + 0.335 * (load - fast)
+        tau = 2 * abs(speed) / 0.6
+        return [
+            GRAVITY - (load - 0.8 * held_back) / FREE.density, tau * 0.0455 * (load - slow), tau * 0.3 * (load - fast)
+        ]  # fmt: skip
+
+    times = np.arange(21) * 0.04
+    expected = -solve_ivp(rates, (0.0, 0.8), [0.0, 0.0, 0.0], t_eval=times, rtol=1e-9).y[0]
+    lagging = speeds(Air(pressure=1.3, lag=0.8))
+    late = Method().step * GRAVITY / 2  # forces are those at the start of a step
+    np.testing.assert_allclose(lagging, expected, atol=late)
+    assert np.abs(lagging - speeds(Air(pressure=1.3)))[5:].max() > 40 * late
+
+
+def test_air_that_is_carried_slows_the_first_fall_of_a_level_sheet(mujoco: Path) -> None:
+    """v = −g t σ/(σ + m e) before the sheet has bent: m of k = π/L, and e an ellipse of mean 1 over the height."""
+    made = fly(
+        mujoco, FREE, start=_level(FREE), air=Air(pressure=0.0, carried=0.9), wind=CALM, method=Method(step=1e-4),
+        rate=1e3, frames=2, gravity=GRAVITY,
+    )  # fmt: skip
+    mass = 0.9 / ((math.pi / 0.6 / 2) ** 1.5 + (4 / (math.pi * 0.4)) ** 1.5) ** (2 / 3)
+    ellipse = np.sqrt(np.clip(1 - (FREE.mesh.rest[:, 1] / 0.2 - 1) ** 2, 0, None))
+    ellipse /= (ellipse * FREE.mesh.vertex_areas).sum() / FREE.mesh.vertex_areas.sum()
+    expected = -GRAVITY * 1e-3 * FREE.density / (FREE.density + mass * ellipse)
+    np.testing.assert_allclose(made.velocities[1, :, 2], expected, rtol=1e-3)
+
+
+def test_air_that_is_carried_moves_by_mujocos_explicit_steps_alone(mujoco: Path) -> None:
+    with pytest.raises(UnusableError, match="needs MuJoCo's integrator Euler"):
+        fly(
+            mujoco, FREE, start=_level(FREE), air=Air(carried=0.2), wind=CALM, method=METHODS[1], rate=25.0, frames=2,
+        )  # fmt: skip
+
+
+def test_the_inertia_of_the_air_about_a_still_wave_is_that_of_its_wavenumbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """η = a cos k₄u in a stream U: √e Σ_b m(k₄, b π/H) cos(b π v/H) ⟨√e cos⟩_b U² k₄² η; and the library's mass."""
+    monkeypatch.setitem(sys.modules, "mujoco", ModuleType("mujoco"))
+    mesh = grid(width=1.5, height=1.0, columns=40, rows=28)
+    carried = import_module("tests.validation.mujoco.worker").Carried(0.3, mesh.rest, mesh.vertex_areas)
+    u, v = mesh.rest.T
+    along = 4 * np.pi / 1.5
+    wave = 0.002 * np.cos(along * u)
+    position = np.stack([u, wave, v], axis=1)
+    found = carried.load(position, np.zeros_like(position), np.array([5.0, 0.0, 0.0]))
+
+    def root(at: Floats) -> Floats:
+        return np.sqrt(4 / np.pi * np.sqrt(np.clip(1 - (2 * at - 1) ** 2, 0, None)))
+
+    places = (np.arange(4000) + 0.5) / 4000
+    size = np.zeros_like(u)
+    for b in range(14):
+        part = (root(places) * np.cos(b * np.pi * places)).mean() * (1 if b == 0 else 2)
+        k = math.hypot(along, b * np.pi)
+        size += 0.3 * ((k / 2) ** 1.5 + (4 / np.pi) ** 1.5) ** (-2 / 3) * part * np.cos(b * np.pi * v)
+    expected = mesh.vertex_areas * root(v) * size * 25 * along**2 * wave
+    assert np.linalg.norm(found[:, 1] - expected) < 0.05 * np.linalg.norm(expected)
+    cloth = Cloth.build(mesh, [named("camel-ponte-roma")], dtype=torch.float64)
+    own = FiniteSpanLoading(share=1.0, density=0.3).added_mass(cloth)[:, 0].numpy()
+    np.testing.assert_allclose(carried.mass, own, rtol=1e-6)  # places are rounded to a nanometre
 
 
 def test_the_wind_pushes_a_level_sheet_by_its_tangential_drag(mujoco: Path) -> None:

@@ -44,6 +44,8 @@ class Air:
         linear: c w_t [kg/(m² s)].
         quadratic: q |w_t| w_t [kg/m³].
         side: m |w| (vertical × w) [kg/m³].
+        lag: s, the share of the pressure that lags as Wagner's function has it.
+        carried: c of the mass of air c/((k/2)^(3/2) + (4/(π H))^(3/2))^(2/3) [kg/m³]; on a grid, by Euler.
     """
 
     pressure: float = 1.0
@@ -51,6 +53,8 @@ class Air:
     linear: float = 0.0
     quadratic: float = 0.0
     side: float = 0.0
+    lag: float = 0.0
+    carried: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -164,8 +168,9 @@ def fly(
         job, made = Path(folder, "job.npz"), Path(folder, "made.npz")
         np.savez(
             job, start=start, reference=start if reference is None else reference, faces=sheet.mesh.faces,
-            held=np.array(sheet.held, dtype=np.int64), areas=sheet.mesh.areas, mass=sheet.mass, wind_times=wind.times,
-            wind=wind.velocity, settings=json.dumps(settings),
+            held=np.array(sheet.held, dtype=np.int64), areas=sheet.mesh.areas, mass=sheet.mass, rest=sheet.mesh.rest,
+            vertex_areas=sheet.mesh.vertex_areas, wind_times=wind.times, wind=wind.velocity,
+            settings=json.dumps(settings),
         )  # fmt: skip
         _run((str(python), "-I", str(_WORKER), str(job), str(made)))
         with np.load(made) as content:

@@ -85,10 +85,16 @@ UNDECLARED: Mapping[str, Undeclared] = {
     ),
     "rising-wind": Undeclared(title="wind that rises by 0.15 rad", effect="vertical-wind", strength=0.15, rise=0.15),
     "hem": Undeclared(title="hem of 20 g/m", effect="hem-mass", strength=0.02, hem=0.02),
+    "inertia": Undeclared(
+        title="inertia of the air, a share of 0.2", effect="finite-span-loading", strength=0.2,
+        air=Air(carried=AIR_DENSITY * 0.2), damping=0.5e-3,
+    ),
     "damping": Undeclared(title="internal damping of 20 ms", damping=20e-3),
     "magnus": Undeclared(title="force across the wind (Magnus)", air=Air(side=0.12)),
+    "wake": Undeclared(title="a pressure that lags by Wagner's function", air=Air(lag=1.0)),
 }  # fmt: skip
-"""By name. Damping is calibrated and not an effect; the last is not in the library."""
+"""By name. Damping is calibrated and not an effect; the last two are none that a verdict may name. The inertia of the
+air needs MuJoCo's explicit steps, and so little damping."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
