@@ -51,8 +51,13 @@ _LARGEST_OFFSET = 45.0  # s
 _ROUGH = 2e-3  # m, standard deviation of the free vertices' start
 CLOCK_SIGMA = 0.5
 """s, standard error with which a person reads the difference of two displays."""
-_SURVEYED = {"azimuth": math.radians(3.0), "elevation": math.radians(1.0), "distance": 0.1, "clock": CLOCK_SIGMA}
-"""Standard errors with which a person notes down where the camera stood, by compass and tape, and the clocks."""
+SCALE_SIGMA = 3e-3
+"""kg/m², standard error with which a kitchen scale and a tape give the cloth's area weight."""
+_SURVEYED = {
+    "azimuth": math.radians(3.0), "elevation": math.radians(1.0), "distance": 0.1, "clock": CLOCK_SIGMA,
+    "area_weight": SCALE_SIGMA,
+}  # fmt: skip
+"""Standard errors with which a person notes down where the camera stood, by compass and tape, clocks and cloth."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,19 +154,21 @@ class RecordingRecipe:
 
 @dataclass(frozen=True, kw_only=True)
 class Noted:
-    """Where the camera stood and how the clocks differed, as a person notes it down.
+    """Where the camera stood, how the clocks differed and what the cloth weighed, as a person notes it down.
 
     Attributes:
         azimuth: of its axis to the wind, 90° from the side [rad].
         elevation: of its axis [rad].
         distance: from the flag [m].
         clock: what the logger's display showed less the camera's [s].
+        area_weight: of the cloth, by a scale, before the flag was made of it [kg/m²].
     """
 
     azimuth: float
     elevation: float
     distance: float
     clock: float
+    area_weight: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -170,7 +177,7 @@ class Recording:
 
     Attributes:
         video, log, sensor: the files.
-        noted: where the camera stood, by compass and tape.
+        noted: where the camera stood, by compass and tape, and what a scale showed.
         clock_offset: what must be added to the camera's clock to reach the anemometer's [s].
         wind: true horizontal speed at the flag [m/s] at 10 Hz, from `BEFORE` seconds before the first frame on.
         area_weight, damping: of the cloth [kg/m²], [s].
@@ -299,6 +306,7 @@ def _noted(recipe: RecordingRecipe, sequence: MeshSequence, zeta: RenderParamete
     true = {
         "azimuth": zeta.camera_angle, "elevation": math.asin(camera.forward[2]),
         "distance": zeta.camera_radius / math.cos(math.asin(camera.forward[2])), "clock": offset,
+        "area_weight": _cloth(recipe)[0],
     }  # fmt: skip
     return Noted(
         **{

@@ -2,7 +2,8 @@
 
 A window starts on a frame. Where no frame is near an instant of the network, its picture is interpolated between the
 two frames about it (`models.conditioning.instants`); frames that repeat the one before are left out first. A window in
-which frames are missing is left out.
+which frames are missing is left out. Where a film's coding left no noise, some is given back
+(`models.conditioning.grain`).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, Severity
+from models.conditioning.grain import grained
 from models.conditioning.instants import Interpolator, TimedFrame, at_instants
 
 _BEYOND = 0.05
@@ -160,7 +162,7 @@ def _window(held: deque[TimedFrame], layout: Layout, index: int, interpolator: I
         if within < _FEWEST * (layout.frames - 1):
             return None
         clip, between = at_instants(held, instants, period=layout.period, interpolator=interpolator)
-        clips.append(clip)
+        clips.append(grained(clip, seed=index))
         interpolated += between
     return Window(index=index, start=start, clips=np.stack(clips), interpolated=interpolated)
 

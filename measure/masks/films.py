@@ -86,7 +86,7 @@ def example(runs: Sequence[MeshSequence], *, seed: int, assets: Assets) -> Examp
     found = conditioned(film, times).found
     if found.region is None or found.camera.moves:
         return None
-    small = np.stack([np.rint(halved(found.show(frame, STILL))).astype(np.uint8) for frame in film])
+    small = np.stack([halved(found.show(frame, STILL)) for frame in film])
     kept = np.sort(rng.choice(len(picked), size=min(PICTURES, len(picked)), replace=False))
     places = _places(meshes, zeta, [picked[k] for k in kept])
     cloth = np.stack([_cloth(one, runs[0].faces, zeta, found) for one in places])
@@ -147,7 +147,7 @@ def _cloth(
         cv2.fillConvexPoly(fine, corners[face], 255, shift=4)
     film = cv2.resize(fine, (zeta.width, zeta.height), interpolation=cv2.INTER_AREA)
     picture = framing.cut(np.asarray(film, np.uint8), found.square, found.size)
-    return np.rint(halved(picture)).astype(np.uint8)
+    return halved(picture)
 
 
 def _hoist(places: NDArray[np.float64], rest: NDArray[np.float32], found: Conditioning) -> NDArray[np.float32]:

@@ -141,13 +141,12 @@ def _chunk(
     nothing: list[FilmWindow | None] = [None] * count
     if film.found is None or not held:
         return nothing
-    shown = [frame for _, frame in held]
-    outliner = Outliner.of(shown)
+    frames = np.stack([halved(frame) for _, frame in held])
+    outliner = Outliner.of(frames)
     if outliner is None or outliner.hoist[1, 1] - outliner.hoist[0, 1] < _LEAST_HOIST:
         return nothing
     times = np.array([time for time, _ in held])
-    frames = np.stack([np.rint(halved(frame)).astype(np.uint8) for frame in shown])
-    cloth, expected = outliner.masks(shown)
+    cloth, expected = outliner.masks(frames)
     hoist = outliner.hoist
     found: list[FilmWindow | None] = []
     for k in range(count):

@@ -7,7 +7,7 @@ Both are found by a small network that sees each picture beside what the film sh
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from models.conditioning.mask_network import MaskNetwork, inputs_of, shipped
-from models.conditioning.stills import SAMPLE, Stills, halved
+from models.conditioning.stills import SAMPLE, Stills
 
 _CLOTH = 0.45
 """Probability from which on a place is cloth: on films that were not learned from, the masks' area is then right."""
@@ -63,15 +63,15 @@ class Outliner:
     network: MaskNetwork
 
     @classmethod
-    def of(cls, pictures: Sequence[NDArray[np.uint8]] | NDArray[np.uint8]) -> Outliner | None:
-        """From pictures (size, size) as `Conditioning.show` gives them, spread over the film; None where they are
-        fewer than ten or no upright hoist with cloth beside it is found.
+    def of(cls, pictures: NDArray[np.uint8]) -> Outliner | None:
+        """From pictures (n, size / 2, size / 2) as `Conditioning.show` gives them, `halved`, spread over the film; None
+        where they are fewer than ten or no upright hoist with cloth beside it is found.
         """
         if len(pictures) < _FEWEST:
             return None
-        small = np.stack([halved(picture) for picture in pictures[:: -(-len(pictures) // SAMPLE)]])
+        small = pictures[:: -(-len(pictures) // SAMPLE)]
         network, stills = shipped(), Stills.of(small)
-        maps = _maps(network, small[:: -(-len(small) // _LOOKED_AT)], stills)
+        maps = torch.cat(list(_maps(network, small[:: -(-len(small) // _LOOKED_AT)], stills)))
         ends = [_end(one) for one in maps[:, 1:].mean(dim=0).double()]
         if any(end is None for end in ends):
             return None
@@ -86,22 +86,15 @@ class Outliner:
         side = 1.0 if usual.sum(axis=0) @ (np.arange(usual.shape[1]) + 0.5 - places[:, 0].mean()) >= 0 else -1.0
         return cls(stills=stills, hoist=_lowered(usual > 0.5, places, side), side=side, network=network)
 
-    def masks(self, pictures: Sequence[NDArray[np.uint8]] | NDArray[np.uint8]) -> tuple[Masks, NDArray[np.float64]]:
-        """The cloth in pictures (n, size, size) that follow one another in the film, (n, size / 2, size / 2): the
+    def masks(self, pictures: NDArray[np.uint8]) -> tuple[Masks, NDArray[np.float64]]:
+        """The cloth in pictures (n, size / 2, size / 2), `halved`, that follow one another in the film: the
         largest part that is cloth, on its side of the hoist's line, with its holes filled; and (n,) Dice's coefficient
         with the truth that the network expects.
 
         A picture's probabilities count a half and its neighbours' a quarter each, so that an outline does not tremble
         from picture to picture.
         """
-        shown = np.concatenate(
-            [
-                _maps(self.network, np.stack([halved(one) for one in pictures[k : k + _TOGETHER]]), self.stills)[:, 0]
-                .sigmoid()
-                .numpy()
-                for k in range(0, len(pictures), _TOGETHER)
-            ]
-        )
+        shown = np.concatenate([maps[:, 0].sigmoid().numpy() for maps in _maps(self.network, pictures, self.stills)])
         ends = np.concatenate([shown[:1], shown, shown[-1:]])
         shown = (ends[:-2] + 2 * ends[1:-1] + ends[2:]) / 4
         shown *= _beside(self.hoist, self.side, self.stills.usual.shape)
@@ -110,14 +103,13 @@ class Outliner:
         return cloth, (both / np.maximum(shown.sum(axis=(1, 2)) + cloth.sum(axis=(1, 2)), 1.0)).astype(np.float64)
 
 
-def _maps(network: MaskNetwork, small: NDArray[np.float32], stills: Stills) -> Tensor:
-    """(n, 3, rows, columns) logits, a few pictures at a time."""
-    with torch.inference_mode():
-        parts = [
-            network(inputs_of(small[k : k + _TOGETHER], stills).contiguous(memory_format=torch.channels_last))
-            for k in range(0, len(small), _TOGETHER)
-        ]
-    return torch.cat(parts)
+def _maps(network: MaskNetwork, small: NDArray[np.uint8], stills: Stills) -> Iterator[Tensor]:
+    """(n, 3, rows, columns) logits of a few pictures after another."""
+    for k in range(0, len(small), _TOGETHER):
+        some = inputs_of(small[k : k + _TOGETHER], stills).contiguous(memory_format=torch.channels_last)
+        with torch.inference_mode():
+            maps = network(some)
+        yield maps
 
 
 def _end(logits: Tensor) -> NDArray[np.float64] | None:

@@ -15,7 +15,7 @@ from PIL import Image
 from flagdata.errors import InputError, LimitError, TimeError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.geometry import Orientation
-from flagdata.ingest.camera.luma import luma_of_image
+from flagdata.ingest.camera.luma import BROKEN, luma_of_image
 from flagdata.ingest.camera.options import CameraOptions, Limits, exact
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import Timing, survey
@@ -23,7 +23,6 @@ from flagdata.ingest.camera.stamps import Timing, survey
 _SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"})
 _FORMATS = ("PNG", "JPEG", "TIFF", "BMP")
 _NUMBER = re.compile(r"(\d+)(?!.*\d)")
-_BROKEN = (OSError, ValueError, SyntaxError, EOFError, Image.DecompressionBombError)
 _EXIF = 0x8769
 _ORIENTATION, _TAKEN, _TAKEN_PART, _TAKEN_ZONE = 0x0112, 0x9003, 0x9291, 0x9011
 
@@ -112,7 +111,7 @@ class SequenceSource:
                         sequence=True,
                         findings=tuple(findings),
                     )
-            except _BROKEN as error:
+            except BROKEN as error:
                 problem = f"{path.name}: {error}"
         raise InputError(
             f"not one of {len(self._paths)} images can be read ({problem})", where=self._where,
@@ -127,7 +126,7 @@ class SequenceSource:
                         self._resized += 1
                         continue
                     luma = luma_of_image(image)
-            except _BROKEN:
+            except BROKEN:
                 self._broken.append(path.name)
                 continue
             yield Picture(stamp=stamp, luma=lambda luma=luma: luma)
@@ -146,7 +145,7 @@ class SequenceSource:
                         if image.size == (self.facts.width, self.facts.height):
                             luma = luma_of_image(image)
                             pictures.append(Picture(stamp=self._stamps[index], luma=lambda luma=luma: luma))
-                except _BROKEN:
+                except BROKEN:
                     continue
             if pictures:
                 yield pictures

@@ -61,28 +61,29 @@ def test_the_cloth_is_weighed_with_what_a_person_noted_and_the_truth_stands_besi
     assert [truth.true for truth in truths] == ["0.175 kg/m²"]
 
 
-def test_the_loop_is_closed_on_what_was_weighed_and_its_findings_are_judged_by_the_truth(
+def test_the_loop_is_closed_with_the_scales_weight_and_its_finding_is_judged_by_the_truth(
     codes: dict[str, int], tmp_path: Path
 ) -> None:
-    acting = Acting(effect="tangential-linear-drag", parameter="coefficient", strength=0.8)
-    noted = SimpleNamespace(azimuth=math.pi / 2, elevation=math.radians(20.2), distance=8.24)
+    """On the same part of the film as the cloth was weighed on, which is not given what the scale showed."""
+    acting = Acting(effect="hem-mass", parameter="line_density", strength=0.06)
+    noted = SimpleNamespace(azimuth=math.pi / 2, elevation=math.radians(20.2), distance=8.24, area_weight=0.1731)
     made = cast(Any, SimpleNamespace(noted=noted, area_weight=0.1754, acting=acting))
     (tmp_path / "loop").mkdir()
-    for named, after, right in (
-        (["tangential-linear-drag"], {"value": 0.17, "low": 0.15, "high": 0.2}, [True, True]),
-        (["lift", "shear"], {"value": 0.1, "low": 0.08, "high": 0.12}, [False, False]),
-        ([], None, [False]),
+    for named, right, found in (
+        (["hem-mass"], True, "close-loop flag"),
+        (["wet-mass", "hem-mass", "lift"], True, "one of 3 effects; it is number 2 of them"),
+        (["lift", "shear"], False, "close-loop flag"),
+        ([], False, "close-loop flag"),
     ):
-        parameters = [{"name": "bending", "after": None}, {"name": "area_weight", "after": after}]
-        verdict = {"named": named, "parameters": parameters}
-        (tmp_path / "loop" / "verdict.json").write_text(json.dumps(verdict))
+        (tmp_path / "loop" / "verdict.json").write_text(json.dumps({"named": named}))
         shell, truths = Transcript(folder=tmp_path), list[Truth]()
         story.weighing_step(shell, made, [])
         story.loop_step(shell, made, truths)
-        weighed, closed = (card.commands[0].split() for card in shell.cards)
-        assert weighed[2:-2] == closed[2:-4]
-        assert [truth.right for truth in truths] == right
-        assert truths[0].true == "tangential-linear-drag, coefficient 0.8 kg/(m² s)"
+        weighed, closed = (card.commands[0].replace("'", "").split() for card in shell.cards)
+        assert closed[2:-4] == [*weighed[2:-2], "--area-weight", "0.173±0.003"]
+        (truth,) = truths
+        assert (truth.right, truth.true) == (right, "hem-mass, line_density 0.06 kg/m")
+        assert truth.found.startswith(found)
 
 
 @pytest.mark.parametrize(("found", "true", "right"), [

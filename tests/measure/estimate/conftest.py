@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 import av
@@ -13,7 +12,7 @@ import torch
 from numpy.typing import NDArray
 
 from flagdata.checksums import write_sums
-from flagdata.findings import Finding
+from flagdata.film_array import Frames
 from flagdata.rng import stream, torch_draws
 from models import estimator
 from models.crops import Cropping
@@ -38,48 +37,9 @@ def pictures(count: int, *, seed: int = 3, height: int = 32, width: int = 40) ->
     return np.clip(110 + 80 * patch * waves + rng.normal(0, 2, waves.shape), 0, 255).astype(np.uint8)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Pictures:
-    """Frames in memory as a film.
-
-    Attributes:
-        times: (n,) of the frames [s].
-        images: (n, height, width).
-    """
-
-    times: NDArray[np.float64]
-    images: NDArray[np.uint8]
-    name: str = "pictures"
-    start: int | None = None
-
-    @property
-    def width(self) -> int:
-        return self.images.shape[2]
-
-    @property
-    def height(self) -> int:
-        return self.images.shape[1]
-
-    @property
-    def rate(self) -> float:
-        return float(1 / np.median(np.diff(self.times)))
-
-    @property
-    def duration(self) -> float:
-        return float(self.times[-1])
-
-    def frames(self, first: float, last: float) -> Iterator[tuple[float, NDArray[np.uint8]]]:
-        for time, image in zip(self.times.tolist(), self.images, strict=True):
-            if first <= time <= last:
-                yield time, image
-
-    def findings(self) -> tuple[Finding, ...]:
-        return ()
-
-
-def even(count: int, *, rate: float = RATE, seed: int = 3) -> Pictures:
+def even(count: int, *, rate: float = RATE, seed: int = 3) -> Frames:
     """A film of an even rate."""
-    return Pictures(times=np.arange(count) / rate, images=pictures(count, seed=seed))
+    return Frames(time=np.arange(count) / rate, images=pictures(count, seed=seed))
 
 
 @pytest.fixture(scope="session")

@@ -7,18 +7,19 @@ import pytest
 from numpy.typing import NDArray
 
 from flagdata.errors import UsageError
+from flagdata.film_array import Frames
 from flagdata.ingest.camera import CropBox
 from measure.estimate import conditioned
 from measure.estimate.conditioned import ConditionedFilm
 from measure.estimate.pictures import steps
-from tests.measure.estimate.conftest import RATE, Pictures
+from tests.measure.estimate.conftest import RATE
 from tests.models.conditioning.test_conditioning import TIMES, Drawn, swaying
 
 TWO = Drawn(flags=((20, 40, 80, 60), (160, 60, 48, 36)))
 
 
-def film(drawn: Drawn) -> Pictures:
-    return Pictures(times=TIMES, images=drawn.frames())
+def film(drawn: Drawn) -> Frames:
+    return Frames(time=TIMES, images=drawn.frames())
 
 
 def read(made: ConditionedFilm, first: float = 0.0, last: float = 10.0) -> NDArray[np.uint8]:
@@ -94,7 +95,7 @@ def test_a_flag_that_is_longer_than_the_size_that_was_given_contradicts_it() -> 
 
 def test_a_film_of_two_frames_is_shown_as_it_is() -> None:
     images = Drawn().frames()[:2]
-    made = ConditionedFilm(Pictures(times=TIMES[:2], images=images))
+    made = ConditionedFilm(Frames(time=TIMES[:2], images=images))
     np.testing.assert_array_equal(read(made), images)
     assert made.as_dict() is None
     assert steps(made) is None

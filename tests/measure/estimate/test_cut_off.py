@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from flagdata.film_array import Frames
 from measure.estimate.conditioned import ConditionedFilm
 from measure.estimate.cut_off import CutOff
-from tests.measure.estimate.conftest import RATE, Pictures
+from tests.measure.estimate.conftest import RATE
 from tests.models.conditioning.test_conditioning import WIDTH, Drawn
 
 TIMES = np.arange(40) / 10
@@ -46,7 +47,7 @@ def test_a_whole_flag_is_not_reported() -> None:
 
 
 def read(images: NDArray[np.uint8]) -> ConditionedFilm:
-    made = ConditionedFilm(Pictures(times=np.arange(len(images)) / RATE, images=images))
+    made = ConditionedFilm(Frames(time=np.arange(len(images)) / RATE, images=images))
     assert list(made.frames(0.0, 10.0))
     return made
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import InputError, RefusedError, UsageError
+from flagdata.film_array import Frames
 from flagdata.findings import Severity
 from flagdata.rng import child_seed
 from flagdata.stated import parse
@@ -31,7 +32,7 @@ from models import estimator
 from models.estimator import Estimator
 from models.learner import Loss
 from models.mixture import Mixture
-from tests.measure.estimate.conftest import FRAMES, RATE, Pictures, even, pictures, written
+from tests.measure.estimate.conftest import FRAMES, RATE, even, pictures, written
 
 APART = Dependence(wind=0.2, cloth=0.2, source="given")
 WHOLE = FlagSize(length=1.5, height=1.0)
@@ -52,7 +53,7 @@ class Listed:
         return false_alarm
 
 
-def measured(film: Pictures, model: Estimator, **changes: object) -> Measurement:
+def measured(film: Frames, model: Estimator, **changes: object) -> Measurement:
     options = replace(Options(size=WHOLE), **changes)  # type: ignore[arg-type]
     return measure(film, model, gate=gate_of(model), dependence=APART, options=options)
 
@@ -81,8 +82,8 @@ def far(model: Estimator, column: int, sign: float) -> Estimator:
 def test_the_same_pictures_of_a_smaller_flag_played_faster_are_a_similar_flag(model: Estimator) -> None:
     # s = 1/4: the same frames twice as fast; wind by 1/2, area weight by 1/4, bending by 1/256.
     images = pictures(4 * FRAMES)
-    slow = Pictures(times=np.arange(len(images)) / RATE, images=images)
-    fast = Pictures(times=np.arange(len(images)) / (2 * RATE), images=images)
+    slow = Frames(time=np.arange(len(images)) / RATE, images=images)
+    fast = Frames(time=np.arange(len(images)) / (2 * RATE), images=images)
     whole = measured(slow, model)
     quarter = measured(fast, model, size=FlagSize(length=0.375, height=0.25))
     wind, density, bending, anisotropy = whole.draws.T
@@ -379,7 +380,7 @@ def test_a_mean_over_windows_some_of_which_lie_at_the_end_is_a_bound(model: Esti
 def test_a_still_film_and_a_black_one_are_given_no_number(model: Estimator, anyway: bool) -> None:
     still = pictures(1).repeat(2 * FRAMES, axis=0)
     for images in (still, np.zeros_like(still)):
-        found = measured(Pictures(times=np.arange(2 * FRAMES) / RATE, images=images), model)
+        found = measured(Frames(time=np.arange(2 * FRAMES) / RATE, images=images), model)
         assert found.verdict.refused
         assert not found.shown(anyway=anyway)
         assert found.as_dict(anyway=anyway)["quantities"] is None
@@ -387,7 +388,7 @@ def test_a_still_film_and_a_black_one_are_given_no_number(model: Estimator, anyw
 
 def test_a_part_in_which_nothing_moves_is_no_part_of_the_answer_even_anyway(model: Estimator) -> None:
     images = np.concatenate([pictures(1).repeat(2 * FRAMES, axis=0), pictures(2 * FRAMES)])
-    found = measured(Pictures(times=np.arange(len(images)) / RATE, images=images), model)
+    found = measured(Frames(time=np.arange(len(images)) / RATE, images=images), model)
     assert found.verdict.refused
     assert found.shown(anyway=True)
     assert found.verdict.blank == (True, True, False, False)
@@ -411,8 +412,8 @@ def test_a_refused_film_gives_no_estimate_unless_asked_for(model: Estimator) -> 
 
 def test_a_part_of_a_film_is_the_film_of_that_part(model: Estimator) -> None:
     images = pictures(3 * FRAMES)
-    film = Pictures(times=np.arange(len(images)) / RATE, images=images)
-    part = Pictures(times=np.arange(FRAMES) / RATE, images=images[FRAMES : 2 * FRAMES])
+    film = Frames(time=np.arange(len(images)) / RATE, images=images)
+    part = Frames(time=np.arange(FRAMES) / RATE, images=images[FRAMES : 2 * FRAMES])
     cut = measured(film, model, first=FRAMES / RATE, last=(2 * FRAMES - 1) / RATE)
     np.testing.assert_array_equal(cut.draws, measured(part, model).draws)
 
@@ -427,7 +428,7 @@ def test_a_film_that_is_too_short_or_too_slow_is_refused_with_what_it_takes(mode
 def test_a_film_full_of_gaps_is_refused(model: Estimator) -> None:
     times = np.delete(np.arange(60) / RATE, np.arange(5, 60, 8))
     with pytest.raises(UsageError, match="gaps"):
-        measured(Pictures(times=times, images=pictures(len(times))), model)
+        measured(Frames(time=times, images=pictures(len(times))), model)
 
 
 def test_a_model_without_distributions_measures_nothing(model: Estimator) -> None:

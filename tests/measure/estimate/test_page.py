@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from markupsafe import Markup
 
+from flagdata.film_array import Frames
 from measure.estimate.measuring import Measurement
 from measure.estimate.nearest import Neighbour
 from measure.estimate.page import Context, Section, page
 from measure.estimate.series import beside
 from models.estimator import Estimator
-from tests.measure.estimate.conftest import FRAMES, Pictures, even, pictures
+from tests.measure.estimate.conftest import FRAMES, even, pictures
 from tests.measure.estimate.test_measuring import far, measured
 from tests.measure.estimate.test_series import START, gusts, log, saying
 
@@ -52,7 +53,7 @@ def test_a_bound_is_shown_as_one_without_a_value(model: Estimator) -> None:
 
 
 def test_a_film_in_which_nothing_moves_is_shown_without_estimates_even_anyway(model: Estimator) -> None:
-    still = measured(Pictures(times=np.arange(24) / 25.0, images=pictures(1).repeat(24, axis=0)), model)
+    still = measured(Frames(time=np.arange(24) / 25.0, images=pictures(1).repeat(24, axis=0)), model)
     text = drawn(still, anyway=True)
     assert "no motion is found in the picture" in text
     assert "What the film says" not in text

@@ -109,6 +109,18 @@ def test_uneven_stamps_are_no_gap_and_a_missing_frame_is() -> None:
     assert {finding.kind: finding.count for finding in findings}["windows-left-out"] == 1
 
 
+def test_of_a_film_whose_still_places_never_change_they_get_noise_and_the_cloth_does_not() -> None:
+    """As a coder leaves them that skips what stands still: the cloth is in 4 of 16 columns."""
+    pictures = [np.full((16, 16), 100, dtype=np.uint8) for _ in range(20)]
+    for k, picture in enumerate(pictures):
+        picture[:, :4] += k
+    layout = lay_out(frames=10, spacings=(0.04,), rate=25.0, duration=19 / 25, step=None)
+    first, second = (window.clips[0] for window in cut(list(zip(np.arange(20) / 25, pictures, strict=True)), layout))
+    assert first[:, 0, :4].tolist() == [[100 + k] * 4 for k in range(10)]
+    assert 0.4 < first[:, :, 4:].std(axis=0).mean() < 0.8
+    assert (first[:, :, 4:] != second[:, :, 4:]).any()
+
+
 def test_a_part_of_the_film_begins_and_ends_as_given() -> None:
     layout = lay_out(frames=5, spacings=(0.04,), rate=25.0, duration=4.0, step=0.04, first=1.0, last=1.4)
     windows = list(cut(numbered(np.arange(101) / 25), layout))
