@@ -142,7 +142,7 @@ class NullBatch:
         return np.einsum("mv,fvcb->fmcb", onto(specimen.mesh.rest, self.markers), found)
 
     def _run(self, flat: Mesh, held: tuple[int, ...], integrator: Integrator, damped: float) -> Floats:
-        """The same by a method that damps by itself so much [s]; not finite where it diverges."""
+        """The same by a method that damps by itself so much [s]; of what diverges, the first frame that is not finite."""
         specimen = self.specimen
         lowest = specimen.held[int(np.argmin(specimen.anchors[:, 2]))]
         offset = flat.rest - specimen.mesh.rest[lowest]
@@ -170,6 +170,8 @@ class NullBatch:
         with torch.no_grad():
             for frame in range(round((SETTLE + self.duration) * self.rate)):
                 state = integrator.advance(system, state, 1 / self.rate)
+                if not torch.isfinite(state.position).all():
+                    return state.position.double().numpy()[None]
                 if frame >= round(SETTLE * self.rate):
                     frames.append(state.position.double().numpy().copy())
         return np.stack(frames)
