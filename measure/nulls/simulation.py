@@ -142,7 +142,7 @@ class NullBatch:
         return np.einsum("mv,fvcb->fmcb", onto(specimen.mesh.rest, self.markers), found)
 
     def _run(self, flat: Mesh, held: tuple[int, ...], integrator: Integrator, damped: float) -> Floats:
-        """The same by a method that damps by itself so much [s]; of what diverges, the first frame that is not finite."""
+        """The same by a method that damps by itself so much [s]; if it diverges, the first frame that is not finite."""
         specimen = self.specimen
         lowest = specimen.held[int(np.argmin(specimen.anchors[:, 2]))]
         offset = flat.rest - specimen.mesh.rest[lowest]
