@@ -54,9 +54,9 @@ def arcsim_run(path: Path, speed: float) -> None:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What the commands find: the demonstration's flag, shorter; two runs of ArcSim; a log."""
+    """What the commands find: the demonstration's flag, shorter and of fewer markers; two runs of ArcSim; a log."""
     path = tmp_path_factory.mktemp("loop")
-    recipe = TrackedRecipe(seed=5, speeds=SPEEDS, duration=5.0, settle=0.4)
+    recipe = TrackedRecipe(seed=5, speeds=SPEEDS, duration=5.0, settle=0.4, vertices=40)
     make_tracks(recipe, path, advance=lambda count: None)
     for speed, name in zip((4.0, 8.0), ("run-4ms", "run-8ms"), strict=True):
         arcsim_run(path / name, speed)
