@@ -81,7 +81,7 @@ class PairTable:
             if rows[column].null_count:
                 artifact = rows.filter(rows[column].is_null())["artifact"][0].as_py()
                 raise CorruptError(f"a clip without {column}", where=f"artifact {artifact}", fix="run flagdata doctor")
-        objects, index = np.unique(_text(rows, "object"), return_inverse=True)
+        objects, index = _coded(rows, "object")
         ids = rows["artifact"].to_pylist()
         texts = rows["parameters"].to_pylist()
         if labels:
@@ -94,7 +94,7 @@ class PairTable:
             day=_text(rows, "day"),
             seed=rows["seed"].fill_null(0).to_numpy().astype(np.int64),
             seeded=rows["seed"].is_valid().to_numpy().astype(np.bool_),
-            object=index.astype(np.int64),
+            object=index,
             objects=objects,
             frame_first=rows["frame_first"].to_numpy().astype(np.int64),
             frame_count=rows["frame_count"].to_numpy().astype(np.int64),
@@ -144,6 +144,13 @@ class PairTable:
 
 def _text(rows: pa.Table, column: str) -> NDArray[np.str_]:
     return np.array(rows[column].fill_null("").to_pylist(), dtype=np.str_)
+
+
+def _coded(rows: pa.Table, column: str) -> tuple[NDArray[np.str_], NDArray[np.int64]]:
+    """The different texts of a column, sorted, and of each row which it has; as `np.unique`, without sorting all."""
+    coded = rows[column].combine_chunks().dictionary_encode()
+    texts, places = np.unique(np.array(coded.dictionary.to_pylist(), dtype=np.str_), return_inverse=True)
+    return texts, places[coded.indices.to_numpy()].astype(np.int64)
 
 
 def _number(rows: pa.Table, column: str, *, null: float) -> NDArray[np.float64]:

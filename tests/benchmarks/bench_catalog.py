@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import secrets
+import shutil
 import sqlite3
 import subprocess
 import sys
@@ -67,10 +68,55 @@ found["commit of one row"] = lap()
 with lake.transaction("one more") as tx:
     tx.add(Artifact(kind="measurement", name="n", recipe={"of": sys.argv[3]}))
 found["commit of another"] = lap()
+"""
+_BEGIN = """
+import json, sys, time
+from contextlib import redirect_stdout
+from io import StringIO
+from flagdata.lake import Artifact, Lake
+from flagdata.view.media import Media
+from flagdata.view.pages import Site
+from flagdata.view.routes import answer
+def lap():
+    global wall, cpu
+    took = {"wall_s": time.perf_counter() - wall, "cpu_s": time.process_time() - cpu}
+    wall, cpu = time.perf_counter(), time.process_time()
+    return took
+def site():
+    return Site(lake=lake, media=Media(lake), base="/key/")
+wall, cpu = time.perf_counter(), time.process_time()
+lake = Lake.open(sys.argv[1])
+lap()
+"""
+_PEAK = """
 with open("/proc/self/status") as status:  # what getrusage gives is the parent's, before the program began
     found["peak_MiB"] = int(next(line for line in status if line.startswith("VmHWM")).split()[1]) // 1024
 print(json.dumps(found))
 """
+_WHOLE = {
+    "ls": """
+from flagdata.commands.lake import ls
+lap()
+with redirect_stdout(StringIO()):
+    ls.main(["--lake", sys.argv[1]], standalone_mode=False)""",
+    "merge": """
+lake.branch("side")
+with lake.transaction("one row", branch="side") as tx:
+    tx.add(Artifact(kind="measurement", name="aside", recipe={}))
+lap()
+lake.merge("side", "one row")""",
+    "withdraw": """
+clip = lake.rows({"name": "clip 77"})["artifact"][0].as_py()
+lap()
+lake.withdraw([clip], "wrong")""",
+    "view, first page": "answer(site(), '/key/?kind=clip')",
+    "view, another page": """
+shown = site()
+answer(shown, '/key/?kind=clip')
+lap()
+answer(shown, '/key/?kind=clip&page=9')""",
+}
+"""What looks at all rows, each in a process of its own."""
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
@@ -124,18 +170,28 @@ def clips(first: int, count: int, draws: np.random.Generator) -> pa.Table:
 def _million(folder: Path, seed: int) -> dict[str, Any]:
     lake = Lake.create(folder / "lake")
     fill(lake, ROWS, seed)
+    whole = {name: _whole(lake.path, work) for name, work in _WHOLE.items()}
     ours = _fresh(lake.path, "first")
     table = lake.rows()
     asked = table.filter((pc.field("wind") >= 3) & (pc.field("wind") <= 6)).group_by("session").aggregate([])
     assert ours["open, filter and group"]["groups"] == asked.num_rows
-    return {"flagdata": ours, **_peers(folder, table)}
+    return {"flagdata": ours, "of all rows": whole, **_peers(folder, table)}
 
 
 def _fresh(lake: Any, tag: str) -> dict[str, Any]:
-    done = subprocess.run(
-        [sys.executable, "-c", _FRESH, str(lake), SQL, tag], check=True, capture_output=True, text=True
-    )
-    return json.loads(done.stdout)
+    return _in_a_process(_FRESH + _PEAK, str(lake), SQL, tag)
+
+
+def _whole(lake: Any, work: str) -> dict[str, Any]:
+    """What one of `_WHOLE` takes of a copy of the lake."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(shutil.copytree(lake, Path(folder) / "lake"))
+        return _in_a_process(f"{_BEGIN}{work}\nfound = lap()\n{_PEAK}", str(copy))
+
+
+def _in_a_process(program: str, *arguments: str) -> dict[str, Any]:
+    done = subprocess.run([sys.executable, "-c", program, *arguments], check=True, capture_output=True, text=True)
+    return json.loads(done.stdout.splitlines()[-1])
 
 
 def _peers(folder: Path, table: pa.Table) -> dict[str, Any]:
