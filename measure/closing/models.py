@@ -71,27 +71,32 @@ def acting(verdict: Verdict) -> tuple[Candidate, ...]:
     return found if verdict.conclusion is Conclusion.EFFECT else found[:1]
 
 
+def fitted(verdict: Verdict, effects: Sequence[Candidate]) -> dict[str, float]:
+    """Parameters of the cloth, calibrated with the effects where there are any, by their names."""
+    return {p.name: (p.after if effects and p.after is not None else p.before).value for p in verdict.parameters}
+
+
+def acted(effects: Sequence[Candidate]) -> dict[str, dict[str, dict[str, float]]]:
+    """The table `effects` of a recipe, with the fitted strengths; nothing where there are none."""
+    strengths: dict[str, dict[str, float]] = {}
+    for candidate in effects:
+        described = EFFECTS[candidate.effect].parameters()[candidate.parameter]
+        own = strengths.setdefault(candidate.effect, {})
+        own[candidate.parameter.replace("_", "-")] = described.nearest(candidate.strength.value)
+        own.update(SHAPES.get(candidate.effect, ()))
+    return {"effects": strengths} if strengths else {}
+
+
 def _model(
     name: str, verdict: Verdict, common: Mapping[str, Any], specimen: Specimen, effects: Sequence[Candidate]
 ) -> NamedModel:
-    fitted = {
-        p.name: (p.after if effects and p.after is not None else p.before).value for p in verdict.parameters
-    }  # fmt: skip
+    own = fitted(verdict, effects)
     material = _material(specimen.material)
     material |= {
-        "density": specimen.material.density * fitted["density"], "bending-factor": fitted["bending"],
-        "damping": fitted["damping"],
+        "density": specimen.material.density * own["density"], "bending-factor": own["bending"],
+        "damping": own["damping"],
     }  # fmt: skip
-    content = {"title": name, **common, "material": material}
-    if effects:
-        strengths: dict[str, dict[str, float]] = {}
-        for candidate in effects:
-            described = EFFECTS[candidate.effect].parameters()[candidate.parameter]
-            own = strengths.setdefault(candidate.effect, {})
-            own[candidate.parameter.replace("_", "-")] = described.nearest(candidate.strength.value)
-            own.update(SHAPES.get(candidate.effect, ()))
-        content["effects"] = strengths
-    return NamedModel(name=name, content=content)
+    return NamedModel(name=name, content={"title": name, **common, "material": material, **acted(effects)})
 
 
 def _common(experiment: Experiment, seed: int) -> dict[str, Any]:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from measure.calibrate.simulation import COLUMNS, SETTLE, mean_bending
-from measure.closing.models import NamedModel, acting
+from measure.closing.models import NamedModel, acted, acting, fitted
 from measure.films.run import Outcome
-from measure.forecasting.regressors import SHAPES
-from measure.verdict.record import Verdict
-from sim.effects import EFFECTS
+from measure.verdict.record import Candidate, Verdict
 from sim.material import named
 
 FABRIC = "camel-ponte-roma"
@@ -26,27 +24,18 @@ def models(verdict: Verdict, outcome: Outcome, *, name: str) -> tuple[NamedModel
     Args:
         name: that theirs begin with.
     """
-    made = [NamedModel(name=f"{name}-base", content=_content(verdict, outcome, f"{name}-base", {}))]
+    made = [NamedModel(name=f"{name}-base", content=_content(verdict, outcome, f"{name}-base", ()))]
     if effects := acting(verdict)[:1]:
-        (one,) = effects
-        described = EFFECTS[one.effect].parameters()[one.parameter]
-        own = {
-            one.parameter.replace("_", "-"): described.nearest(one.strength.value),
-            **dict(SHAPES.get(one.effect, ())),
-        }
-        larger = f"{name}-{one.effect}"
-        made.append(NamedModel(name=larger, content=_content(verdict, outcome, larger, {one.effect: own})))
+        larger = f"{name}-{effects[0].effect}"
+        made.append(NamedModel(name=larger, content=_content(verdict, outcome, larger, effects)))
     return tuple(made)
 
 
-def _content(
-    verdict: Verdict, outcome: Outcome, title: str, effects: Mapping[str, Mapping[str, float]]
-) -> Mapping[str, Any]:
-    calibration = outcome.options.calibration
-    fitted = {p.name: (p.after if effects and p.after is not None else p.before).value for p in verdict.parameters}
+def _content(verdict: Verdict, outcome: Outcome, title: str, effects: Sequence[Candidate]) -> Mapping[str, Any]:
+    calibration, own = outcome.options.calibration, fitted(verdict, effects)
     speeds = [float(one.speed.mean()) for one in outcome.recordings]
     speed: Any = speeds[0] if min(speeds) == max(speeds) else {"low": min(speeds), "high": max(speeds)}
-    content: dict[str, Any] = {
+    return {
         "title": title, "seed": calibration.seed, "batch": 1,
         "scene": {
             "shape": "flag", "width": calibration.flag.length, "height": calibration.flag.height, "columns": COLUMNS,
@@ -56,9 +45,9 @@ def _content(
         "integrator": {"name": "implicit", "step": _STEP},
         "time": {"settle": SETTLE, "frames": _FRAMES, "rate": _RATE},
         "material": {
-            "name": FABRIC, "density": fitted["area_weight"],
-            "bending-factor": fitted["bending"] / mean_bending(named(FABRIC)),
-            "damping": max(fitted["damping"] - _STEP, 0.0),
+            "name": FABRIC, "density": own["area_weight"],
+            "bending-factor": own["bending"] / mean_bending(named(FABRIC)),
+            "damping": max(own["damping"] - _STEP, 0.0),
         },
+        **acted(effects),
     }  # fmt: skip
-    return {**content, "effects": effects} if effects else content

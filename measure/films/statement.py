@@ -47,15 +47,19 @@ def stated(
     return replace(
         verdict, words=lead(verdict), assumptions=assumptions(recordings, weighed=weighed, unseen=unseen),
         proposal=missing(departing) if verdict.conclusion not in _NOTHING_MISSING else "",
-        separating=separating(verdict),
+        separating=separating(verdict, weighed=weighed),
     )  # fmt: skip
 
 
-def separating(verdict: Verdict) -> str:
-    """What would decide between several effects."""
+def separating(verdict: Verdict, *, weighed: bool) -> str:
+    """What would decide between several effects.
+
+    Args:
+        weighed: whether the cloth's area weight was stated.
+    """
     if verdict.conclusion is not Conclusion.ONE_OF:
         return ""
-    return "a recording in another wind, or the cloth weighed (--area-weight)"
+    return f"a recording in another wind, or {'more minutes of it' if weighed else 'the cloth weighed (--area-weight)'}"
 
 
 def missing(departing: Sequence[Departure]) -> str:

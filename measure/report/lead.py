@@ -6,7 +6,15 @@ import math
 
 from measure.loop.selection import heterogeneous
 from measure.nulls.conformal import kinds_needed
-from measure.report.sentences import candidate_title, contradicted, heading, listed, named_candidates, readable
+from measure.report.sentences import (
+    candidate_title,
+    contradicted,
+    heading,
+    listed,
+    named_candidates,
+    readable,
+    shortened,
+)
 from measure.verdict.quantity import known, number, probability, with_level
 from measure.verdict.record import Candidate, Conclusion, NullTest, Verdict
 
@@ -70,7 +78,7 @@ def _found(verdict: Verdict) -> str:
     named = named_candidates(verdict) or [c for c in verdict.ranking if not c.why_not]
     whole = explained(verdict)
     if verdict.conclusion is Conclusion.ONE_OF:
-        either = " or ".join(_sized(verdict, one) for one in named)
+        either = " or ".join(shortened([_sized(verdict, one) for one in named]))
         does = f"explains {whole}" if whole else "explains what the base model lacks"
         return f"Adding one of {either} {does}; these recordings do not decide which"
     added = listed([_sized(verdict, one) for one in named])

@@ -12,7 +12,7 @@ CONTRADICTING = ("still-away-from-pins",)
 """Kinds of findings by which the recordings contradict what was declared: they lead a verdict that names nothing."""
 
 _LISTED = 3
-"""Parts of the data that a sentence names."""
+"""Effects of which one is meant, or parts of the data, that a sentence names."""
 _DETERMINED = 5.0
 """A factor to either side beyond which a quantity counts as not determined: cloths of all kinds lie within some ten."""
 _FACTORS = ("of nominal", "s")
@@ -24,13 +24,13 @@ def heading(verdict: Verdict) -> str:
     contradicting = contradicted(verdict)
     if verdict.conclusion is Conclusion.SUFFICIENT and contradicting:
         return f"The set-up is not as declared, so that this verdict does not count: {contradicting[0]}"
-    named = listed(titles(verdict))
+    named, either = listed(titles(verdict)), listed(shortened(titles(verdict)))
     partly = f"the base model lacked {named}, and something more" if verdict.named else "something is still missing"
     return {
         Conclusion.UNTESTED: "The base model cannot be tested: there are too few kinds of nulls for the level",
         Conclusion.SUFFICIENT: "No effect needed: the base model explains these recordings",
         Conclusion.EFFECT: f"The base model lacked {named}",
-        Conclusion.ONE_OF: f"The base model lacked one of {named}: these recordings do not decide which",
+        Conclusion.ONE_OF: f"The base model lacked one of {either}: these recordings do not decide which",
         Conclusion.PARTLY: f"Partly explained: {partly}",
         Conclusion.OUTSIDE: "The base model lacks something that no effect of the library explains",
     }[verdict.conclusion]
@@ -46,6 +46,11 @@ def listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names) or "an unnamed effect"
 
 
+def shortened(names: Sequence[str]) -> list[str]:
+    """The names, or if there are many the first of them and "12 more"."""
+    return list(names) if len(names) <= _LISTED + 1 else [*names[:_LISTED], f"{len(names) - _LISTED} more"]
+
+
 def after_label(verdict: Verdict) -> str:
     """What the columns "after" are of."""
     if verdict.conclusion in (Conclusion.UNTESTED, Conclusion.SUFFICIENT):
@@ -53,7 +58,7 @@ def after_label(verdict: Verdict) -> str:
     if not verdict.named:
         return "with the corrective field"
     if verdict.conclusion is Conclusion.ONE_OF:
-        return f"with the best of {listed(titles(verdict))}"
+        return f"with the best of {listed(shortened(titles(verdict)))}"
     return f"with {listed(titles(verdict))}"
 
 
@@ -120,7 +125,7 @@ def control_warnings(verdict: Verdict) -> list[str]:
 def _parts(some: Sequence[Comparison], verdict: Verdict) -> str:
     """Which parts of the data, the first few by name, and of how many."""
     names = [c.what for c in some]
-    which = _begun(listed([*names[:_LISTED], f"{len(names) - _LISTED} more"] if len(names) > _LISTED + 1 else names))
+    which = _begun(listed(shortened(names)))
     return which if len(verdict.comparisons) == 1 else f"{which}, {len(some)} of {len(verdict.comparisons)} parts"
 
 

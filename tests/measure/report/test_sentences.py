@@ -64,6 +64,21 @@ def test_of_two_strengths_of_one_effect_the_one_that_acts_is_named() -> None:
     assert titles(both) == ("tilted-pole (lean angle)", "tilted-pole (sway)")
 
 
+def test_of_many_effects_of_which_one_is_missing_the_first_three_are_named_and_the_others_counted() -> None:
+    whole = verdict(Conclusion.ONE_OF)
+    names = ("lift", "shear", "slack", "hem-mass", "added-mass", "wet-mass")
+    ranking = tuple(replace(whole.ranking[0], effect=name, parameter="strength", why_not="") for name in names)
+    for count, either, joined in ((4, "lift, shear, slack and hem-mass", 4), (6, "lift, shear, slack and 3 more", 3)):
+        found = replace(whole, named=names[:count], ranking=ranking[:count])
+        assert (
+            sentences.heading(found) == f"The base model lacked one of {either}: these recordings do not decide which"
+        )
+        assert sentences.after_label(found) == f"with the best of {either}"
+        assert lead(found).count(" or ") == 3
+        assert lead(found).count("(strength ") == joined
+        assert [name in words(found) for name in names[:count]] == [True] * count
+
+
 def test_a_base_model_that_is_not_rejected_is_not_called_true() -> None:
     remark = sentences.test_remark(verdict(Conclusion.SUFFICIENT).test)
     assert remark == "An effect that is too weak to show in these recordings may still act."
