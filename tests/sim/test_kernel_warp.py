@@ -111,6 +111,7 @@ class _Push:
     ("more", "named_"),
     [
         ({"effects": (_Push(),)}, "effects"),
+        ({"remembering": (_Push(),)}, "forces that remember"),
         ({"contact": Contact()}, "contact"),
         ({"limits": StrainLimits()}, "strain limits"),
         ({"air": Stokes()}, "the wind force Stokes"),

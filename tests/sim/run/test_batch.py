@@ -37,7 +37,8 @@ def all_bits(outcomes: Sequence[Outcome]) -> list[bytes | None]:
     [
         {}, {"more": '[integrator]\nname = "implicit"'}, {"more": "[contact]\nthickness = 0.02"},
         {"more": "[effects.gusts]\nintensity = 0.2\n[effects.hysteresis]\ncouple = 1e-3"},
-        {"more": "[effects.finite-span-loading]\nshare = 0.2"}, {"more": '[integrator]\nbackend = "warp"'},
+        {"more": "[effects.finite-span-loading]\nshare = 0.2\n[effects.wagner-lag]\nshare = 0.5"},
+        {"more": '[integrator]\nbackend = "warp"'},
     ],
     ids=["explicit", "implicit", "contact", "effects", "air", "warp"],
 )  # fmt: skip

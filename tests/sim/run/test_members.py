@@ -134,7 +134,7 @@ def test_seeds_of_members_are_theirs_alone(make_recipe: Callable) -> None:
     assert all(0 <= seed < 2**63 for seed in seeds)
 
 
-@pytest.mark.parametrize("effect", ["porosity", "shear", "hem-mass", "hysteresis", "finite-span-loading", "pole-wake"])
+@pytest.mark.parametrize("effect", ["porosity", "shear", "hem-mass", "wagner-lag", "finite-span-loading", "pole-wake"])
 def test_effects_are_named_by_their_registry(make_recipe: Callable, effect: str) -> None:
     parameters = "\n".join(f'{key.replace("_", "-")} = "prior"' for key in EFFECTS[effect].parameters())
     crew = Crew(make_recipe(more=f"[effects.{effect}]\n{parameters}"))
