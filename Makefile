@@ -91,7 +91,6 @@ lint: $(STAMP)
 	$(BIN)/pyright
 
 docs: $(STAMP)
-	$(BIN)/python -m docs.generate_api
 	$(BIN)/python -m docs.generate_cli
 	$(BIN)/python -m docs.generate_glossary
 	$(BIN)/python -m docs.generate_effects

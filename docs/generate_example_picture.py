@@ -26,7 +26,7 @@ MOST_BYTES = 600_000
 _STEP = 1.2  # s of a window of the network
 _EVERY = 3  # of the film's frames is shown
 _FILM = (320, 240)  # px
-_CHART = (480, 240)  # px
+_CHART = (400, 240)  # px, so that its words can be read on a screen of 400 px
 _DPI = 100
 
 
@@ -34,7 +34,7 @@ def chart(found: Measured, flag: Example) -> tuple[Image.Image, float, float]:
     """The winds over the film's time, and where its first and last instant lie [px from the left]."""
     figure = Figure(figsize=(_CHART[0] / _DPI, _CHART[1] / _DPI), dpi=_DPI)
     canvas = FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.1, 0.2, 0.87, 0.68))
+    axes = figure.add_axes((0.08, 0.2, 0.89, 0.68))
     windows = found.windows
     middle = (windows.start + windows.end) / 2
     speed, low, high = (of["wind_speed"] for of in (windows.value, windows.low, windows.high))
@@ -44,11 +44,11 @@ def chart(found: Measured, flag: Example) -> tuple[Image.Image, float, float]:
     axes.plot(during, logged, color="#c62828", lw=1.2, label="cup anemometer")
     axes.axhline(flag.truth["wind_speed"], color="0.35", lw=1, ls="--", label="simulated, mean")
     axes.set(xlim=(0, found.duration), ylim=(0, None))
-    axes.set_xlabel("time [s]", fontsize=8, labelpad=1)
-    axes.set_title("wind [m/s]", fontsize=9, loc="left")
-    axes.tick_params(labelsize=8)
+    axes.set_xlabel("time [s]", fontsize=11, labelpad=1)
+    axes.set_title("wind [m/s]", fontsize=11, loc="left")
+    axes.tick_params(labelsize=11)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(fontsize=7, frameon=False, loc="lower right", ncols=3, columnspacing=1.0, handlelength=1.4)
+    axes.legend(fontsize=9, frameon=False, loc="lower left", handlelength=1.4, labelspacing=0.1, borderpad=0.1)
     canvas.draw()
     picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3])
     (left, _), (right, _) = axes.transData.transform([(0, 0), (found.duration, 0)])

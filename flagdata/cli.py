@@ -141,7 +141,7 @@ class LazyGroup(click.Group):
 @click.option(
     "--debug", is_flag=True, envvar="FLAGDATA_DEBUG", help="Show the traceback of an error; also FLAGDATA_DEBUG."
 )
-@click.option("--json", "as_json", is_flag=True, help="As --json of the command.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON document, as --json after the command does.")
 @click.version_option(package_name="flagdata")
 @click.pass_context
 def root(context: click.Context, debug: bool, as_json: bool) -> None:

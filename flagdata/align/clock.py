@@ -44,7 +44,7 @@ class Segment:
         if self.sigma_offset < 0 or self.sigma_drift < 0:
             raise InputError("clock segment with a negative uncertainty", fix="give σ ≥ 0")
         if abs(self.drift) >= 0.1:
-            raise InputError(f"clock drift of {self.drift} s/s is not a clock", fix="check the time units")
+            raise InputError(f"a clock drift of {self.drift} s/s is too large to be one", fix="check the time units")
 
 
 @dataclass(frozen=True, kw_only=True)

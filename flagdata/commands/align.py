@@ -57,7 +57,8 @@ def _clock_options(command: F) -> F:
                 help="Its uncertainty; by default half of it, 0.3 at most, or 0.15 beside --response.",
             ),
             click.option(
-                "--max-sigma", type=float, metavar="S", help="Refuse an estimate less certain; 0.5 by default."
+                "--max-sigma", type=float, metavar="S",
+                help="Refuse an offset with a larger standard uncertainty [s]; 0.5 by default.",
             ),
             click.option("--name", help="What to call the recording; the camera's name by default."),
             click.option("--session", help="One set-up at one place, for splits; the parents' by default."),

@@ -85,7 +85,7 @@ from flagdata.errors import UsageError
 @click.option("--date-order", type=click.Choice(["dmy", "mdy", "ymd"]), help="Wind: order in dates of numbers only.")
 @click.option(
     "--platform", type=click.Choice(["fixed", "moving", "corrected"]),
-    help="Wind: a mast, a boat or vehicle, or one whose log holds the wind over ground.",
+    help="Wind: fixed, as on a mast; moving, as on a boat; corrected, if a moving one logs the wind over ground.",
 )  # fmt: skip
 @click.option("--talker", metavar="ID", help="Wind: NMEA 0183 talker to read, where several share a stream.")
 @click.option(

@@ -187,7 +187,11 @@ def _deletion_options(command: F) -> F:
     """Adds --delete, --discard and --message to the command of tags or of branches."""
     for option in (
         click.option("--message", "-m", help="--delete: why."),
-        click.option("--discard", is_flag=True, help="--delete: also if it alone shows artifacts, which gc deletes."),
+        click.option(
+            "--discard",
+            is_flag=True,
+            help="--delete: even if no other tag or branch shows its artifacts, which gc then deletes.",
+        ),
         click.option("-d", "--delete", is_flag=True, help="Delete NAME; the log notes what it showed."),
     ):
         command = option(command)
@@ -315,7 +319,7 @@ def diff(before: str, after: str | None, as_json: bool, lake_path: str) -> None:
 @click.argument("artifacts", nargs=-1, required=True)
 @click.option("--message", "-m", required=True, help="Why.")
 @click.option("--branch", "branch_name", default="main", show_default=True, help="The branch to take them off.")
-@click.option("--with-descendants", is_flag=True, help="And all that was made from them, directly or not.")
+@click.option("--with-descendants", is_flag=True, help="Hide all that was made from them as well, directly or not.")
 @click.option(
     "--everywhere", is_flag=True,
     help="Off every branch, and delete their data at once, also where tags and older versions show them.",

@@ -200,7 +200,7 @@ def _lost_pictures(streams: Sequence[Stream]) -> Iterator[Finding]:
 
 
 def _lost(what: str, text: str) -> Finding:
-    return Finding(kind=f"lost-{what}", severity=Severity.NOTE, what=f"an ingest leaves out {text}")
+    return Finding(kind=f"lost-{what}", severity=Severity.NOTE, what=f"not kept by ingest: {text}")
 
 
 def _unread(name: str, error: FlagdataError) -> Finding:

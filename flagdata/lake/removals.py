@@ -56,7 +56,7 @@ def _stored(lake: Store, version: int) -> pa.Table:
 
 
 def _keys(rows: pa.Table) -> pa.ChunkedArray:
-    """What rows are told apart by."""
+    """What distinguishes rows: artifact and branch."""
     return pc.binary_join_element_wise(rows["artifact"], rows["branch"], "/")  # type: ignore[attr-defined]
 
 

@@ -222,7 +222,10 @@ class RecordWriter:
             raise ConflictError(f"attachment {name!r} is there already", where=str(self.path), fix="rename it")
         self._names.add(f"attachment {name}")
         if media_type.endswith(GZIP_SUFFIX):
-            raise InputError(f"media type {media_type!r} is kept for what is packed here", fix="use application/gzip")
+            raise InputError(
+                f"media type {media_type!r} is reserved for attachments that the record itself compresses",
+                fix="use application/gzip",
+            )
         return size
 
     def _attach(

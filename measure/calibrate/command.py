@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 @click.command(cls=LongCommand)
 @click.argument("sources", nargs=-1, required=True, metavar="RECORDING...")
-@click.option("--only", type=click.Choice(["weight", "anemometer"]), help="Do one of both: weighing simulates, which "
-              "takes minutes, a reading model takes as long as reading the film.")  # fmt: skip
+@click.option("--only", type=click.Choice(["weight", "anemometer"]), help="Do only one: weigh the cloth, in minutes "
+              "of simulation, or calibrate the flag as an anemometer, as fast as its film is read.")  # fmt: skip
 @click.option("--name", metavar="NAME", help="Of the reading model, by which flagdata measure --model finds it; by "
               "default the first recording's with -anemometer.")  # fmt: skip
 @click.option("--model", metavar="NAME|FOLDER|ID", help="Network whose summary the reading model uses; by default "

@@ -29,11 +29,12 @@ def null_options(*, level: str) -> Callable[[_Command], _Command]:
     options = (
         click.option(
             "--nulls", type=click.IntRange(min=1),
-            help="Number of null recordings to simulate, 160 or more; on films kinds of numerics, 40 by default.",
+            help="Number of recordings without any effect to simulate for comparison, 160 or more; on films the number "
+            "of meshes and time-stepping methods, 40 by default.",
         ),
         click.option(
             "--bank", type=LocalPath(exists=True),
-            help="Folder of null recordings that were simulated before for such recordings.",
+            help="Folder of such simulations that were made before, by `flagdata challenge bank`.",
         ),
         click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), help=level),
         click.option(

@@ -253,8 +253,8 @@ def _of_flag(found: Conditioning, reference: NDArray[np.uint8] | None) -> list[F
         notes.append(
             Finding(
                 kind="enlarged", severity=Severity.WARNING, value=found.size / square.side,
-                what=f"the flag's square of {square.side} px is smaller than the {found.size} px that are judged: it "
-                f"was enlarged {found.size / square.side:.3g}-fold",
+                what=f"the flag fills {square.side} px of the picture and the network takes {found.size} px: it was "
+                f"enlarged {found.size / square.side:.3g}-fold",
             )
         )  # fmt: skip
     return notes
@@ -267,8 +267,8 @@ def _of_aspect(found: Conditioning, given: float | None) -> list[Finding]:
     return [
         Finding(
             kind="flag-size-contradicted", severity=Severity.WARNING, value=region.aspect,
-            what=f"the flag's outline is {region.aspect:.2f} times as long as it is high at the hoist, and of the size "
-            f"that was given it would be {given:.2f} times at most",
+            what=f"the flag's outline is {region.aspect:.2f} times as long as high at the hoist; a flag of the size "
+            f"given would be at most {given:.2f} times",
             fix="check --flag-size: length along the wind times height along the pole",
         )
     ]  # fmt: skip

@@ -69,7 +69,7 @@ def film_options(command: _Command) -> _Command:
         click.option("--log", metavar="ARTIFACT",
                      help="Of tables of observables without a wind: a wind of --lake beside them, by its id."),
         click.option("--clock-offset", type=STATED, metavar="S±SIGMA",
-                     help="Of these: seconds added to their clock to reach the log's; by default estimated."),
+                     help="Of such tables: seconds to add to their clock to reach the log's; by default estimated."),
         click.option("--start", "first", type=DURATION, default="0s", metavar="TIME",
                      help="Of films: where to begin, as in 12s."),
         click.option("--end", "last", type=DURATION, metavar="TIME",

@@ -64,7 +64,7 @@ class Options:
     def __post_init__(self) -> None:
         if not 0 < self.level < 1 or self.kinds < CRITERIA.fewest_kinds:
             raise UsageError(
-                f"a level of {self.level!r} by {self.kinds} kinds of numerics", where="close-loop",
+                f"{self.kinds} kinds of numerics cannot test at a level of {self.level!r}", where="close-loop",
                 fix=f"give a level between 0 and 1, and {CRITERIA.fewest_kinds} kinds or more",
             )  # fmt: skip
         known = {one.name for one in weighable(self.calibration.flag)}

@@ -77,7 +77,11 @@ class Evidence(Rows):
         if beside is not None or (statistics.turning is None and null.turning is None):
             return own
         if statistics.turning is None or null.turning is None:
-            raise UsageError("moments of nulls or data alone", where="evidence", fix="look at them in both or in none")
+            raise UsageError(
+                "moments of the nulls or of the data alone",
+                where="evidence",
+                fix="look at them in both or in none",
+            )
         return replace(own, turning=cls.of(statistics.turning, speeds, null.turning))
 
     @classmethod

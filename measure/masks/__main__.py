@@ -25,7 +25,7 @@ from models.storage import WEIGHTS, write_card, write_tensors
               help="Lake with the data sets' mesh sequences.")  # fmt: skip
 @click.option("--dataset", "datasets", multiple=True, default=("outdoor", "outdoor-damped"), show_default=True,
               help="Data set whose sequences are filmed.")  # fmt: skip
-@click.option("--films", default=520, show_default=True, help="Films that are learned from.")
+@click.option("--films", default=520, show_default=True, help="Number of films to train on.")
 @click.option("--judged", default=48, show_default=True, help="Films of the validation side that are judged.")
 @click.option("--epochs", default=12, show_default=True)
 @click.option("--seed", default=2127, show_default=True)

@@ -118,7 +118,8 @@ def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None
     if bank.anchors_given != setting.experiment.specimen.anchors_given:
         ways = ("taken from where the recordings show the attachments", "given")
         raise InputError(
-            f"its anchors were {ways[bank.anchors_given]}, those of the recordings are {ways[not bank.anchors_given]}",
+            f"the bank's anchors were {ways[bank.anchors_given]}, those of the recordings are "
+            f"{ways[not bank.anchors_given]}",
             where=where, fix="simulate nulls for these recordings: leave the bank out",
         )  # fmt: skip
     if abs(bank.duration - setting.segments.duration) > 0.1 * bank.duration:

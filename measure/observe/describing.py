@@ -141,8 +141,8 @@ def _arcsim_findings(scene: Mapping[str, Any], entry: Mapping[str, Any], where: 
         step = float(frame) / steps
         found.append(Finding(
             kind="simulated-with-numerical-damping", severity=Severity.NOTE, where=where, value=step / 2,
-            what=f"ArcSim ran with implicit steps of {1e3 * step:.3g} ms, which damp like a cloth of d = "
-            f"{5e2 * step:.3g} ms",
+            what=f"ArcSim ran with implicit steps of {1e3 * step:.3g} ms, which damp the cloth by {5e2 * step:.3g} ms "
+            "beside its own damping",
         ))  # fmt: skip
     if acting:
         found.append(Finding(

@@ -175,11 +175,11 @@ def _read(path: Path) -> Evaluated:
     again = "delete it: it is evaluated anew"
     try:
         if not is_sealed(path):
-            raise CorruptError("a kept evaluation is damaged, or of an older version", where=str(path), fix=again)
+            raise CorruptError("a cached simulation is damaged, or of an older version", where=str(path), fix=again)
         with path.open("rb") as file, np.load(file, allow_pickle=False) as content:
             embedding, frame, seconds = content["embedding"], content["frame"], content["seconds"].tolist()
     except (OSError, ValueError, KeyError) as error:
-        raise CorruptError(f"a kept evaluation cannot be read: {error}", where=str(path), fix=again) from None
+        raise CorruptError(f"a cached simulation cannot be read: {error}", where=str(path), fix=again) from None
     return Evaluated(
         embedding=embedding, frame=frame if frame.size else None, seconds=dict(zip(STAGES, seconds, strict=True))
     )

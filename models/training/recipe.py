@@ -334,9 +334,9 @@ def _loss(table: Table) -> LossSpec:
             fix='write targets = ["wind_speed"], or leave them out',
         )  # fmt: skip
     if name is not Loss.POSTERIOR and "components" in table:
-        raise UsageError(f"components say nothing of {name.value}", where=table.where, fix="leave them out")
+        raise UsageError(f"components have no effect on {name.value}", where=table.where, fix="leave them out")
     if name is not Loss.CONTRASTIVE and "margin" in table:
-        raise UsageError(f"a margin says nothing of {name.value}", where=table.where, fix="leave it out")
+        raise UsageError(f"a margin has no effect on {name.value}", where=table.where, fix="leave it out")
     return table.record(
         LossSpec, {"name": lambda: name, "targets": lambda: targets}, components=COUNT,
         margin=Bounds(above=0.0, most=NUMBER_LIMIT),

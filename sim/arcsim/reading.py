@@ -97,7 +97,7 @@ class ArcsimScene:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.frame_time) and self.frame_time > 0 and self.frame_steps >= 1 and self.frames >= 1):
             raise InputError(
-                f"{self.frames} frames of {self.frame_time!r} s in {self.frame_steps} steps",
+                f"a run of {self.frames} frames of {self.frame_time!r} s, each in {self.frame_steps} steps",
                 where="ArcSim scene", fix="let it last at least one frame of at least one step",
             )  # fmt: skip
 

@@ -174,7 +174,7 @@ def _camera(table: Table) -> CameraSpec:
     coding = table.choice("coding", Coding.JPEG)
     idle = "jpeg-quality" if coding is Coding.H264 else "rate-factor"
     if idle in table:
-        raise InputError(f"{idle} says nothing of {coding.value}", where=table.where, fix="leave it out")
+        raise InputError(f"{idle} has no effect on {coding.value}", where=table.where, fix="leave it out")
     noise = Bounds(least=0.0, most=128.0)
     return table.record(
         CameraSpec, jpeg_quality=Bounds(least=1.0, most=100.0), rate_factor=Bounds(least=0.0, most=51.0),

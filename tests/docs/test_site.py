@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import re
 import shutil
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+
+import flagdata
 
 ROOT = Path(__file__).resolve().parents[2]
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -18,8 +20,8 @@ BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    if importlib.util.find_spec("material") is None:
-        pytest.skip("mkdocs-material is not installed (extra docs)")
+    if missing := [name for name in ("material", "mkdocstrings", "mkdocs_jupyter") if find_spec(name) is None]:
+        pytest.skip(f"not installed: {', '.join(missing)} (extra docs)")
     folder = tmp_path_factory.mktemp("site")
     done = subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)],
@@ -49,6 +51,22 @@ def test_a_page_loads_nothing_from_elsewhere(site: Path) -> None:
     text = (site / "simulator.html").read_text(encoding="utf-8")
     assert 'src="http' not in text
     assert 'rel="stylesheet" href="http' not in text
+
+
+def test_the_reference_shows_each_call_with_its_arguments_and_its_source(site: Path) -> None:
+    text = (site / "api.html").read_text(encoding="utf-8")
+    assert ":::" not in text
+    for name in flagdata.__all__:
+        assert f'id="{name}"' in text
+    assert "Source code in" in text
+    assert "flag_size" in text.split('id="measure"')[1].split('id="wind"')[0]
+
+
+def test_the_notebooks_are_pages_with_their_pictures(site: Path) -> None:
+    for path in sorted((ROOT / "docs" / "notebooks").glob("*.ipynb")):
+        text = (site / "notebooks" / f"{path.stem}.html").read_text(encoding="utf-8")
+        assert "data:image/png;base64," in text
+        assert 'src="http' not in text
 
 
 def test_the_results_and_cases_stay_reachable(site: Path) -> None:

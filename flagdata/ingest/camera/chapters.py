@@ -57,8 +57,8 @@ def chapter_of(path: Path) -> Chapter | None:
         found = _header(path.with_name(name))
         if found is None or found[1] is None:
             what = (
-                f"chapter {len(earlier) + 1} of one recording, stamped with the creation time of the whole: it starts "
-                f"later by the length of the earlier chapters, of which {name} is not beside it or cannot be read"
+                f"chapter {len(earlier) + 1} of a recording carries the creation time of the whole one; it begins "
+                f"after the earlier chapters, of which {name} is not beside it or cannot be read"
             )
             return _not_placed(what, fix="put the earlier chapters into its folder, or give --start")
         if found[0] != own[0]:
@@ -66,8 +66,8 @@ def chapter_of(path: Path) -> Chapter | None:
         before += found[1]
     placed = Finding(
         kind="chapter-placed", severity=Severity.NOTE, value=float(before),
-        what=f"chapter {len(earlier) + 1} of one recording, stamped with the creation time of the whole: it was put "
-        f"{float(before):.3f} s later, by the length of {', '.join(earlier)}",
+        what=f"chapter {len(earlier) + 1} of a recording carries the creation time of the whole one; it begins "
+        f"{float(before):.3f} s later, after {', '.join(earlier)}",
     )  # fmt: skip
     return Chapter(before=float(before), finding=placed)
 

@@ -46,7 +46,7 @@ def luma_of_frame(frame: av.VideoFrame, *, codec: str) -> Luma:
     """
     name = frame.format.name
     if name.startswith(("xyz", "bayer", "vaapi", "cuda")):
-        raise InputError(f"pixel format {name} is not a picture of luma or RGB", fix="convert the file to H.264 first")
+        raise InputError(f"pixel format {name} is neither gray, YUV nor RGB", fix="convert the file to H.264 first")
     if frame.format.is_rgb or frame.format.has_palette or name.startswith("mono"):
         rgb = _converted(frame, "rgb24")
         plane = rgb.planes[0]

@@ -137,7 +137,7 @@ def check_sides(recording: Trajectory) -> tuple[Finding, ...]:
         Finding(
             kind="rest-upside-down", severity=Severity.WARNING, where=f"recording {recording.name!r}",
             value=float(slope[1, 2]),
-            what="v runs downward on the cloth as it hangs: statements about its top apply to its bottom",
+            what="the markers' v runs downward as the cloth hangs: what the answer calls the top is the bottom",
             fix="let v run from the bottom to the top, and u from the hoist to the fly",
         ),
     )  # fmt: skip

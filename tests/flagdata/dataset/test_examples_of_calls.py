@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 import flagdata
-from docs.generate_api import TASKS, example
 from flagdata.lake import Lake
 from sim.run import simulate
 from sim.run.arrays import recipe_of
+from tests.docs.calls import example
 
 ELSEWHERE = {"measure", "example", "calibrate", "close_loop"}
 
@@ -30,7 +30,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, field_lake: Lake) -> Path:
     return made
 
 
-@pytest.mark.parametrize("name", sorted(set(TASKS) - ELSEWHERE))
+@pytest.mark.parametrize("name", sorted(set(flagdata.__all__) - ELSEWHERE))
 def test_the_example_of_a_call_runs(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     exec(compile(example(name), name, "exec"), {"flagdata": flagdata})

@@ -261,7 +261,7 @@ def test_an_unobserved_column_carries_no_information() -> None:
 
 def test_moments_of_nulls_or_data_alone_are_refused(world: World, null: NullModel) -> None:
     own = world.draw(np.zeros((3, COLUMNS)), recordings=3, numerics=np.zeros(3), speeds=np.full(3, 5.0))
-    with pytest.raises(UsageError, match="moments of nulls or data alone"):
+    with pytest.raises(UsageError, match="moments of the nulls or of the data alone"):
         Evidence.of(replace(own, turning=own), np.full(3 * SEGMENTS, 5.0), null)
 
 
