@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @click.argument("artifact")
 @click.option("--details", is_flag=True, help="With recipe hash, code version and seed.")
 @click.option("--all", "whole", is_flag=True, help="List all relatives, also where there are many of a kind.")
-@click.option("--picture", metavar="FILE", type=LocalPath(), help="Write the lineage as an SVG picture, too.")
+@click.option("--picture", metavar="FILE", type=LocalPath(), help="Write the lineage as a picture, too: .svg or .png.")
 @at_option
 @json_option
 @lake_option
@@ -38,18 +38,23 @@ def lineage(
     from flagdata.lake import Lake
     from flagdata.lake.ancestry import ancestry
     from flagdata.outputs import check_file, write_file
-    from flagdata.pages.lineage import MOST
+    from flagdata.pages.graph_png import png
+    from flagdata.pages.lineage import MOST, graph
     from flagdata.pages.lineage import picture as drawn
 
+    kind = "" if picture is None else picture.suffix.lower()
     if picture is not None:
-        if picture.suffix.lower() != ".svg":
-            raise UsageError("the picture of a lineage is an SVG file", where=str(picture), fix="name a .svg file")
+        if kind not in (".svg", ".png"):
+            raise UsageError("a lineage is drawn as SVG or PNG", where=str(picture), fix="name a .svg or .png file")
         check_file(picture)
     lake = Lake.open(lake_path)
     found = ancestry(lake.table(lake.view(at)), lake.identity(artifact, at=at))
     most = None if whole else MOST
     if picture is not None:
-        write_file(picture, drawn(found, details=details, most=most))
+        if kind == ".png":
+            write_file(picture, png(*graph(found, details=details, most=most)))
+        else:
+            write_file(picture, drawn(found, details=details, most=most))
     if as_json:
         relatives = [asdict(relative) for relative in found.relatives.values()]
         document("lineage", {"at": at, "artifact": found.artifact, "relatives": relatives, "edges": found.edges})

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import html
 import unicodedata
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -19,9 +19,9 @@ WIDTH = 184  # px of a box
 _GAP_X, _GAP_Y = 56, 14
 _PASS = 8  # px that a passing line takes
 _MARGIN = 12
-_FIRST, _NEXT = 32, 14  # px of a box's height that its title takes, and each line
+_FIRST, NEXT = 32, 14  # px of a box's height that its title takes, and each line
 _SWEEPS = 4
-_TITLE_CELLS, _LINE_CELLS = 19, 27  # of a monospaced guess at a proportional font: what fits a box
+TITLE_CELLS, LINE_CELLS = 19, 27  # of a monospaced guess at a proportional font: what fits a box
 INK, QUIET, RULE, PAPER, MARKED = "#1c2326", "#56646b", "#9aa7ad", "#ffffff", "#1f6286"
 COLOURS = {
     "camera": "#b5541c", "wind": "#1f6fa8", "recording": "#3b7d6b", "clip": "#7aa69a", "meshes": "#7b5ea7",
@@ -55,7 +55,7 @@ class Box:
 
 
 @dataclass(kw_only=True)
-class _Place:
+class Place:
     """A box, or the passage of a line, in a column."""
 
     key: str
@@ -63,14 +63,24 @@ class _Place:
     y: float = 0.0
 
 
-def svg(boxes: Sequence[Box], edges: Collection[tuple[str, str]], *, title: str) -> str:
-    """The drawing as an SVG document, which can also be a part of a page.
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """Where everything is.
 
-    Args:
-        edges: (from, to) by key, each from a column to one further right; others are left out.
-        title: what it shows, for those who do not see it.
+    Attributes:
+        size: width and height [px].
+        at: key → column, and place in it, of each box.
+        ways: the columns and places that each line leads through.
     """
-    tall = _FIRST + _NEXT * max(len(box.lines) for box in boxes)
+
+    size: tuple[float, float]
+    at: Mapping[str, tuple[int, Place]]
+    ways: Sequence[Sequence[tuple[int, Place]]]
+
+
+def layout(boxes: Sequence[Box], edges: Collection[tuple[str, str]]) -> Layout:
+    """Places for boxes and lines; arguments as of `svg`."""
+    tall = _FIRST + NEXT * max(len(box.lines) for box in boxes)
     columns, ways = _placed(boxes, edges, tall)
     height = max(_stacked(column) for column in columns)
     _order(columns, ways)
@@ -80,18 +90,32 @@ def svg(boxes: Sequence[Box], edges: Collection[tuple[str, str]], *, title: str)
             place.y = y + place.height / 2
             y += place.height + _GAP_Y
     at = {place.key: (number, place) for number, column in enumerate(columns) for place in column}
-    whole = 2 * _MARGIN + len(columns) * WIDTH + (len(columns) - 1) * _GAP_X, 2 * _MARGIN + height
+    return Layout(
+        size=(2 * _MARGIN + len(columns) * WIDTH + (len(columns) - 1) * _GAP_X, 2 * _MARGIN + height),
+        at=at, ways=[[at[key] for key in way] for way in ways],
+    )  # fmt: skip
+
+
+def svg(boxes: Sequence[Box], edges: Collection[tuple[str, str]], *, title: str) -> str:
+    """The drawing as an SVG document, which can also be a part of a page.
+
+    Args:
+        edges: (from, to) by key, each from a column to one further right; others are left out.
+        title: what it shows, for those who do not see it.
+    """
+    drawn = layout(boxes, edges)
+    width, height = drawn.size
     head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="graph" role="img" width="{whole[0]:.0f}" '
-        f'height="{whole[1]:.0f}" viewBox="0 0 {whole[0]:.0f} {whole[1]:.0f}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="graph" role="img" width="{width:.0f}" '
+        f'height="{height:.0f}" viewBox="0 0 {width:.0f} {height:.0f}" '
         f'font-family="system-ui, sans-serif" font-size="13">'
     )
     parts = [
         head,
         f"<title>{_text(title)}</title>",
         f'<rect class="paper" width="100%" height="100%" fill="{PAPER}"/>',
-        *(_line([at[key] for key in way]) for way in ways),
-        *(_box(box, *at[box.key]) for box in boxes),
+        *map(_line, drawn.ways),
+        *(_box(box, *drawn.at[box.key]) for box in boxes),
         "</svg>",
     ]
     return "\n".join(parts) + "\n"
@@ -99,13 +123,13 @@ def svg(boxes: Sequence[Box], edges: Collection[tuple[str, str]], *, title: str)
 
 def _placed(
     boxes: Sequence[Box], edges: Collection[tuple[str, str]], tall: int
-) -> tuple[list[list[_Place]], list[tuple[str, ...]]]:
+) -> tuple[list[list[Place]], list[tuple[str, ...]]]:
     """The places of each column, and the keys that each line leads through."""
     numbers = {column: number for number, column in enumerate(sorted({box.column for box in boxes}))}
-    columns: list[list[_Place]] = [[] for _ in numbers]
+    columns: list[list[Place]] = [[] for _ in numbers]
     where = {box.key: numbers[box.column] for box in boxes}
     for box in boxes:
-        columns[where[box.key]].append(_Place(key=box.key, height=tall))
+        columns[where[box.key]].append(Place(key=box.key, height=tall))
     ways: list[tuple[str, ...]] = []
     for begin, end in edges:
         first, last = where[begin], where[end]
@@ -113,12 +137,12 @@ def _placed(
             continue
         between = [f"{begin} {end} {number}" for number in range(first + 1, last)]
         for number, key in enumerate(between, first + 1):
-            columns[number].append(_Place(key=key, height=_PASS))
+            columns[number].append(Place(key=key, height=_PASS))
         ways.append((begin, *between, end))
     return columns, ways
 
 
-def _order(columns: Sequence[list[_Place]], ways: Sequence[Sequence[str]]) -> None:
+def _order(columns: Sequence[list[Place]], ways: Sequence[Sequence[str]]) -> None:
     """Sort each column by the mean place of its neighbours, from left to right and back, a few times."""
     before: dict[str, list[str]] = {}
     behind: dict[str, list[str]] = {}
@@ -138,38 +162,48 @@ def _mean(values: Sequence[float]) -> float:
     return sum(values) / len(values)
 
 
-def _stacked(column: Sequence[_Place]) -> float:
+def _stacked(column: Sequence[Place]) -> float:
     return sum(place.height for place in column) + _GAP_Y * (len(column) - 1)
 
 
-def _left(column: int) -> float:
+def left(column: int) -> float:
+    """Where the boxes of a column begin [px]."""
     return _MARGIN + column * (WIDTH + _GAP_X)
 
 
-def _line(way: Sequence[tuple[int, _Place]]) -> str:
+Point = tuple[float, float]
+
+
+def curves(way: Sequence[tuple[int, Place]]) -> list[tuple[Point, Point, Point, Point]]:
+    """A line as cubic curves, each from one column to the next; where it passes a column it goes on straight."""
     (number, place), *others = way
-    path = [f"M{_left(number) + WIDTH:.0f} {place.y:.1f}"]
-    x, y = _left(number) + WIDTH, place.y
+    x, y = left(number) + WIDTH, place.y
+    found = []
     for number, place in others:
-        left = _left(number)
-        middle = (x + left) / 2
-        path.append(f"C{middle:.1f} {y:.1f} {middle:.1f} {place.y:.1f} {left:.0f} {place.y:.1f}")
-        x, y = left, place.y
-        if place.height == _PASS:
-            x = left + WIDTH
-            path.append(f"H{x:.0f}")
+        end = left(number)
+        middle = (x + end) / 2
+        found.append(((x, y), (middle, y), (middle, place.y), (end, place.y)))
+        x, y = end + WIDTH, place.y
+    return found
+
+
+def _line(way: Sequence[tuple[int, Place]]) -> str:
+    path: list[str] = []
+    for (x, y), one, two, (end, below) in curves(way):
+        path.append(f"{'H' if path else 'M'}{x:.0f}" + ("" if path else f" {y:.1f}"))
+        path.append(f"C{one[0]:.1f} {one[1]:.1f} {two[0]:.1f} {two[1]:.1f} {end:.0f} {below:.1f}")
     return f'<path class="edge" d="{" ".join(path)}" fill="none" stroke="{RULE}" stroke-width="1.5"/>'
 
 
-def _box(box: Box, column: int, place: _Place) -> str:
-    x, y = _left(column), place.y - place.height / 2
+def _box(box: Box, column: int, place: Place) -> str:
+    x, y = left(column), place.y - place.height / 2
     colour = COLOURS.get(box.kind or "", QUIET)
     frame = (MARKED, 2.5) if box.marked else (RULE, 1)
     title = f'<text class="title" x="{x + 14:.0f}" y="{y + 20:.1f}" font-weight="600" fill="{INK}">'
     line = f'<text class="line" x="{x + 14:.0f}" y="{{:.1f}}" font-size="11" fill="{QUIET}">'
-    texts = [f"{title}{_text(cut(box.title, _TITLE_CELLS))}</text>"]
+    texts = [f"{title}{_text(cut(box.title, TITLE_CELLS))}</text>"]
     texts += [
-        f"{line.format(y + 36 + _NEXT * number)}{_text(cut(text, _LINE_CELLS))}</text>"
+        f"{line.format(y + 36 + NEXT * number)}{_text(cut(text, LINE_CELLS))}</text>"
         for number, text in enumerate(box.lines)
     ]
     drawn = (

@@ -18,6 +18,19 @@ def picture(
     """The lineage as SVG.
 
     Args:
+        details, most, link: as of `graph`.
+    """
+    boxes, edges = graph(found, details=details, most=most, link=link)
+    name = found.relatives[found.artifact].name or found.artifact
+    return svg(boxes, edges, title=f"Lineage of {name}")
+
+
+def graph(
+    found: Ancestry, *, details: bool = False, most: int | None = MOST, link: Callable[[str], str] | None = None
+) -> tuple[list[Box], list[tuple[str, str]]]:
+    """The boxes and edges of its picture.
+
+    Args:
         details: with recipe hash, code version and seed.
         most: more relatives of a kind in one generation are one box that counts them; `None` draws all.
         link: gives the address to which the box of an id leads.
@@ -35,9 +48,7 @@ def picture(
                 boxes.append(_several(group, generation))
             else:
                 boxes.append(_single(first, details=details, link=link, marked=first.artifact == found.artifact))
-    edges = dict.fromkeys((key_of[parent], key_of[child]) for parent, child in found.edges)
-    name = found.relatives[found.artifact].name or found.artifact
-    return svg(boxes, list(edges), title=f"Lineage of {name}")
+    return boxes, list(dict.fromkeys((key_of[parent], key_of[child]) for parent, child in found.edges))
 
 
 def detail_lines(relative: Relative) -> list[str]:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import io
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import pyarrow as pa
 import pytest
+from PIL import Image
 
 from flagdata.commands.looking import _lines
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.ancestry import ancestry
-from flagdata.pages.graph import Box, svg
+from flagdata.pages.graph import COLOURS, PAPER, RULE, Box, svg
+from flagdata.pages.graph_png import _ascii, png
 from flagdata.pages.lineage import picture
 from flagdata.printable import printable
 from flagdata.schema import catalog_schema
@@ -140,9 +143,46 @@ def test_boxes_of_a_picture_are_apart_and_lines_that_pass_a_column_cross_none() 
         assert all(frame[0] != x or not frame[1] <= y <= frame[1] + frame[3] for frame in frames)
 
 
-def test_a_picture_is_written_as_svg_and_on_top_of_nothing(run: Run, lake: Lake, put_text: Put, tmp_path: Path) -> None:
+def test_a_png_writes_names_in_letters_that_its_font_has() -> None:
+    assert _ascii("115 × café über …") == "115 x cafe uber ..."
+    assert _ascii("旗 σ") == "? ?"
+
+
+def test_a_png_shows_the_boxes_and_lines_of_the_svg() -> None:
+    columns = {"one": 0, "other": 0, "between": 1, "last": 2}
+    edges = [("one", "between"), ("between", "last"), ("other", "last")]  # the last passes a column
+    boxes = [
+        Box(key=key, column=column, kind="wind", title=key, lines=["w"], about=key) for key, column in columns.items()
+    ]
+    whole = ET.fromstring(svg(boxes, edges, title="t"))
+    picture = Image.open(io.BytesIO(png(boxes, edges))).convert("RGB")
+    assert picture.size == (2 * int(whole.get("width", "")), 2 * int(whole.get("height", "")))
+
+    def pixel(x: float, y: float) -> str:
+        found = picture.getpixel((round(2 * x), round(2 * y)))
+        assert isinstance(found, tuple)
+        return "#{:02x}{:02x}{:02x}".format(*map(int, found))
+
+    bars = [rect for rect in whole.iter(f"{SVG}rect") if rect.get("fill") not in (PAPER, None)]
+    assert len(bars) == len(columns)
+    for bar in bars:
+        x, y, width, height = (float(bar.get(name, "")) for name in ("x", "y", "width", "height"))
+        assert pixel(x + width / 2, y + height / 2) == bar.get("fill") == COLOURS["wind"]
+    paths = [path.get("d", "") for path in whole.iter(f"{SVG}path")]
+    for path in paths:
+        x, y = (float(number.lstrip("M")) for number in path.split()[:2])
+        assert pixel(x + 2, y) == RULE
+    (passing,) = [path for path in paths if "H" in path]
+    x, y = passing.split(" H")[0].split()[-2:]
+    assert pixel(float(x) + 50, float(y)) == RULE
+
+
+@pytest.mark.parametrize(("name", "begin"), [("l.svg", b"<svg"), ("l.png", b"\x89PNG")])
+def test_a_picture_is_written_as_svg_or_png_and_on_top_of_nothing(
+    run: Run, lake: Lake, put_text: Put, tmp_path: Path, name: str, begin: bytes
+) -> None:
     put_text(lake, "mast")
-    assert run("lineage", "mast", "--picture", tmp_path / "l.svg").code == 0
-    assert ET.fromstring((tmp_path / "l.svg").read_text()).tag == f"{SVG}svg"
-    assert run("lineage", "mast", "--picture", tmp_path / "l.svg").code == 1
+    assert run("lineage", "mast", "--picture", tmp_path / name).code == 0
+    assert (tmp_path / name).read_bytes().startswith(begin)
+    assert run("lineage", "mast", "--picture", tmp_path / name).code == 1
     assert run("lineage", "mast", "--picture", tmp_path / "l.jpg").code == 2
