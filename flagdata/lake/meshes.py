@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import json
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -66,8 +67,33 @@ class Mesh:
     rest: Floats
 
 
+class _Moving(ABC):
+    """A sequence's length, and how it is shown."""
+
+    time: Instants
+    attributes: Mapping[str, Any]
+
+    @abstractmethod
+    def frame(self, index: int) -> Mesh:
+        """The mesh at one time; negative indices count from the end."""
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self._described()})"
+
+    def _repr_html_(self) -> str:
+        return table(self._described(), {name: str(value) for name, value in self.attributes.items()})
+
+    def _described(self) -> str:
+        seconds = (int(self.time[-1]) - int(self.time[0])) / NANOSECONDS if len(self) else 0.0
+        first = self.frame(0)
+        return f"{len(self)} frames in {seconds:.2f} s, {len(first.rest)} vertices, {len(first.faces)} faces"
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
-class MeshSequence:
+class MeshSequence(_Moving):
     """A moving mesh of one topology.
 
     Attributes:
@@ -95,22 +121,13 @@ class MeshSequence:
             raise _wrong(f"rest has shape {self.rest.shape} for {self.positions.shape[1]} vertices", "(vertex, 2)")
         _check_faces(self.faces, self.positions.shape[1], "faces")
 
-    def __len__(self) -> int:
-        return len(self.time)
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({_described(self)})"
-
-    def _repr_html_(self) -> str:
-        return table(_described(self), {name: str(value) for name, value in self.attributes.items()})
-
     def frame(self, index: int) -> Mesh:
         """The mesh at one time; negative indices count from the end."""
         return Mesh(time=int(self.time[index]), positions=self.positions[index], faces=self.faces, rest=self.rest)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class RaggedMeshSequence:
+class RaggedMeshSequence(_Moving):
     """A moving mesh whose topology changes, as remeshing simulators write it.
 
     Attributes:
@@ -144,15 +161,6 @@ class RaggedMeshSequence:
             own = self.faces[self.face_offset[i] : self.face_offset[i + 1]]
             _check_faces(own, int(self.vertex_offset[i + 1] - self.vertex_offset[i]), f"faces of frame {i}")
 
-    def __len__(self) -> int:
-        return len(self.time)
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({_described(self)})"
-
-    def _repr_html_(self) -> str:
-        return table(_described(self), {name: str(value) for name, value in self.attributes.items()})
-
     def frame(self, index: int) -> Mesh:
         """The mesh at one time; negative indices count from the end."""
         i = range(len(self.time))[index]
@@ -164,12 +172,6 @@ class RaggedMeshSequence:
             faces=self.faces[faces],
             rest=self.rest[vertices],
         )
-
-
-def _described(sequence: MeshSequence | RaggedMeshSequence) -> str:
-    seconds = (int(sequence.time[-1]) - int(sequence.time[0])) / NANOSECONDS if len(sequence) else 0.0
-    first = sequence.frame(0)
-    return f"{len(sequence)} frames in {seconds:.2f} s, {len(first.rest)} vertices, {len(first.faces)} faces"
 
 
 def write_meshes(path: Path, sequence: MeshSequence | RaggedMeshSequence) -> None:
