@@ -29,6 +29,7 @@ from sim.mesh import Mesh, grid
 from sim.scene import Scene, assemble
 from sim.state import State
 from sim.system import System
+from tests.contract.strengths import nulled, nulls
 
 NAMES = list(EFFECTS)
 BATCH = 2
@@ -102,11 +103,6 @@ def plain_outcome(name: str) -> Tensor:
     return outcome(drawn(name), flag())
 
 
-def nulled(effect: Effect) -> Effect:
-    """The effect with its strengths at null and its shapes as they are."""
-    return replace(effect, **{name: effect.parameters()[name].null for name in effect.strengths()})
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_at_its_null_value_trajectories_are_those_of_the_base_model_to_the_bit(name: str) -> None:
     effect = nulled(drawn(name))
@@ -118,8 +114,7 @@ def test_at_its_null_value_trajectories_are_those_of_the_base_model_to_the_bit(n
 @pytest.mark.parametrize("name", NAMES)
 def test_a_member_at_null_is_the_base_models_to_the_bit_whatever_the_others_have(name: str) -> None:
     effect = drawn(name)
-    nulls = {label: effect.parameters()[label].null for label in effect.strengths()}
-    mixed = {label: torch.tensor([null, float(getattr(effect, label)[1])]) for label, null in nulls.items()}
+    mixed = {label: torch.tensor([null, float(getattr(effect, label)[1])]) for label, null in nulls(effect).items()}
     mixed = {label: value.double() for label, value in mixed.items()}
     for run in (outcome, implicit_outcome):
         changed = run(replace(effect, **mixed), flag())

@@ -30,6 +30,7 @@ from sim.material import named
 from sim.scene import assemble
 from sim.state import State
 from sim.system import System
+from tests.contract.strengths import nulls
 from tests.contract.test_effects import START, drawn, flag, with_effect
 
 EFFECTS_BY_TORCH: dict[str, str] = {}
@@ -132,8 +133,7 @@ def test_a_member_at_null_is_the_base_models_to_the_bit(
     name: str, dtype: torch.dtype, run: Callable[[System, State], State]
 ) -> None:
     effect: Any = drawn(name)
-    nulls = {label: effect.parameters()[label].null for label in effect.strengths()}
-    mixed = {label: torch.tensor([null, float(getattr(effect, label)[1])]) for label, null in nulls.items()}
+    mixed = {label: torch.tensor([null, float(getattr(effect, label)[1])]) for label, null in nulls(effect).items()}
     changed, base = run(*with_effect(replace(effect, **mixed), *flag(dtype=dtype))), run(*flag(dtype=dtype))
     for field in ("position", "velocity"):
         assert torch.equal(getattr(changed, field)[..., 0], getattr(base, field)[..., 0])

@@ -15,6 +15,7 @@ from flagdata.rng import stream
 from sim.effects import SENSOR_EFFECTS
 from sim.effects.parameter import Parametrised
 from sim.effects.sensor import AnemometerEffect, CameraEffect, ClockEffect, Sampling
+from tests.contract.strengths import nulled
 
 NAMES = list(SENSOR_EFFECTS)
 BATCH = 2
@@ -55,10 +56,6 @@ def untouched(effect: Parametrised) -> Tensor:
         case CameraEffect():
             return Sampling.ideal(STAMPS, ROWS).observe(TIME, TRAJECTORY)
     raise AssertionError(effect)
-
-
-def nulled(effect: Parametrised) -> Parametrised:
-    return replace(effect, **{name: effect.parameters()[name].null for name in effect.strengths()})
 
 
 @pytest.mark.parametrize("name", NAMES)
