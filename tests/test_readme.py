@@ -195,10 +195,25 @@ def test_what_it_takes_is_what_the_pages_and_the_program_state() -> None:
     (full,) = re.findall(r"^\| `pip install 'flagdata\[physics\]'` .* \| ([\d.]+ GB) \|$", install, flags=re.MULTILINE)
     said = " ".join(README.split())
     assert f"{full} of disk and no graphics card; {light} without the physics" in said
+    start = (ROOT / "docs" / "start.md").read_text(encoding="utf-8")
+    assert f"in up to {MINUTES[Story.SHORT]} minutes on two idle cores" in start
     assert (
         f"takes up to {MINUTES[Story.FULL]} minutes on two idle cores, its short form up to {MINUTES[Story.SHORT]}"
         in said
     )
+
+
+def test_packages_and_disk_are_those_of_a_newcomers_run() -> None:
+    kept = ROOT / "docs" / "results" / "bench-newcomer.json"
+    if not kept.exists():
+        pytest.skip("not measured yet: python -m tests.benchmarks newcomer --out docs/results")
+    install = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+    stated = re.findall(r"^\| `pip install .*? \| (\d+) \| ([\d.]+) GB \|$", install, flags=re.MULTILINE)
+    result = sheet("bench-newcomer")["python3.11"]
+    assert all(result[kind]["right"] for kind in ("light", "physics"))
+    assert [(int(packages), float(disk)) for packages, disk in stated] == [
+        (result[kind]["packages"], round(result[kind]["megabytes_on_disk"] / 1e3, 2)) for kind in ("light", "physics")
+    ]
 
 
 def test_the_moving_picture_is_of_the_whole_example_and_light() -> None:

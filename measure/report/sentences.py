@@ -117,8 +117,12 @@ def control_warnings(verdict: Verdict) -> list[str]:
         what = f"the control {failing[0].control_name} does as well as the named effect, so that the attribution fails"
         found.append(f"{_parts(failing, verdict)}: {what} there.")
     if alike:
-        what = f"the control {alike[0].control_name} and the named effect fit equally well there"
-        found.append(f"{_parts(alike, verdict)}: {what}.")
+        what = f"the control {alike[0].control_name} and the named effect fit equally well"
+        better = verdict.apart is not None and known(verdict.apart) and verdict.apart.low > 0
+        together = "; over all parts together the named effect does better" if better else ""
+        everywhere = 1 < len(alike) == len(verdict.comparisons)
+        where = f"In each of the {len(alike)} parts by itself" if everywhere else f"{_parts(alike, verdict)}:"
+        found.append(f"{where} {what}{together}.")
     return found
 
 

@@ -100,10 +100,20 @@ def test_a_control_that_fits_as_well_as_the_named_effect_is_reported() -> None:
     whole = verdict(Conclusion.EFFECT)
     near, far = (replace(whole.comparisons[0], apart=about(0.3, half, unit="1")) for half in (0.4, 0.2))
     (warning,) = sentences.control_warnings(replace(whole, comparisons=(near, far)))
-    assert "and the named effect fit equally well there" in warning
+    assert warning.endswith("the control tangential-linear-drag and the named effect fit equally well.")
     assert "worse by 0.3 [−0.1, 0.7] nat per segment" in words(replace(whole, comparisons=(near,))).replace(
         "\n    ", " "
     )
+
+
+def test_where_every_part_leaves_two_effects_open_the_warning_adds_what_all_parts_together_decide() -> None:
+    whole = verdict(Conclusion.EFFECT)
+    parts = tuple(replace(one, apart=about(0.3, 0.4, unit="1")) for one in whole.comparisons)
+    for half, ending in ((0.2, "well; over all parts together the named effect does better."), (0.4, "well.")):
+        decided = replace(whole, comparisons=parts, apart=about(0.3, half, unit="1"))
+        (warning,) = sentences.control_warnings(decided)
+        assert warning.startswith(f"In each of the {len(parts)} parts by itself the control")
+        assert warning.endswith(f"fit equally {ending}")
 
 
 @pytest.mark.parametrize(("half", "comparison"), [(0.2, "does better"), (0.4, "the two fit equally well")])
