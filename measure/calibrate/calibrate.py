@@ -345,19 +345,12 @@ def answered(simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats]
 
 
 def with_errors(observed: Observed, readings: Floats, *, seed: int) -> Floats:
-    """(simulation, summary) of readings (simulation, window, observable) with what numerics and pixels may add to them.
-
-    The error of pixels is taken as the same in all windows of a film, since what segmentation leaves depends on the
-    flag's look more than on the moment.
-    """
+    """(simulation, summary) of readings (simulation, window, observable) with errors of numerics and of pixels."""
     summaries = observed.projection.of(readings)
-    rng = stream(seed, "calibrate", "errors")
     size = summaries.shape[1]
-    drawn = rng.standard_normal((2, *summaries.shape))
-    coarse = numerics.SIGMA[:size] * drawn[0] + numerics.BIAS[:size]
-    pixels = np.zeros_like(summaries)
-    pixels[:, 0] = observed.sigma * drawn[1][:, 0]
-    return (summaries + coarse + pixels).reshape(len(summaries), -1)
+    drawn = stream(seed, "calibrate", "numerics").standard_normal(summaries.shape)
+    coarse = numerics.SIGMA[:size] * drawn + numerics.BIAS[:size]
+    return (summaries + coarse + observed.pixels(len(summaries), seed=seed)).reshape(len(summaries), -1)
 
 
 def quantity(about: Uncertain, draws: Floats, level: float) -> Quantity:

@@ -10,6 +10,7 @@ import numpy as np
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from measure.calibrate import pixels
 from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.summary import LEAST_WINDOWS, SHOWN, Projection, shown
@@ -50,7 +51,7 @@ class Observed:
         source: identity of what it was read from.
         readings: (window, observable) of windows of `WINDOW` seconds that follow one another, in the order of
             `simulation.OBSERVED`; NaN where a window does not show one.
-        sigma: (observable,) what readings of a film are off by, the same in all its windows; 0 for geometry.
+        sigma: (observable,) what a window's readings of a film are off by; 0 for geometry.
         log: of the wind, its times since the first window begins.
         first: where the first window begins in the film or table [s].
         place: what is shared by recordings from one place with one anemometer, whose gain and view are one; None for
@@ -116,6 +117,10 @@ class Observed:
     def summary(self) -> Floats:
         """(summary,)."""
         return self.projection.of(self.readings).ravel()
+
+    def pixels(self, count: int, *, seed: int) -> Floats:
+        """(count, 1 or 2, observable) draws of what errors of pixels add to its summary."""
+        return self.sigma * pixels.drawn(self.projection, len(self.readings), count, name=self.name, seed=seed)
 
 
 def constant_wind(recordings: Sequence[Observed]) -> tuple[Finding, ...]:

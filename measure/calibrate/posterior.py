@@ -97,8 +97,7 @@ def _drawn(
         mean = np.concatenate([own for own, _ in found], axis=1)
         stretch = np.mean([own for _, own in found], axis=0)
         offset = np.repeat(whole, scores.shape[1], axis=0) - mean
-        variances = about.variances(stretch, np.zeros(len(mean)))
-        return about.log_density(offset, variances).reshape(scores.shape[:2])
+        return about.log_density(offset, stretch).reshape(scores.shape[:2])
 
     return ensemble(
         likelihood, groups=len(whole), dimension=dimension(sights), walkers=walkers, steps=steps, rng=rng

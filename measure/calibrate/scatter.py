@@ -25,7 +25,6 @@ FEWEST_FREEDOM = 20
 """Degrees of freedom below which recordings are taken as independent."""
 HEAVY = 10.0
 """Most degrees of freedom of the t distribution: residuals of simulations have a kurtosis of 4, 3 + 6/(ν − 4)."""
-_MISSED = 1.0
 TAKEN_APART = Finding(
     kind="recordings-taken-apart", severity=Severity.WARNING,
     what="too few simulations for so many recordings: the cloth was taken as a different one in each, so that "
@@ -36,56 +35,42 @@ TAKEN_APART = Finding(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scatter:
-    """Of k summaries, in coordinates in which both parts are diagonal.
+    """Of k summaries.
 
     Attributes:
-        white: (k, k), from offsets to these coordinates.
-        open: (k,) the second part there; the first is one.
-        determinant: half the logarithm of the first part's determinant.
+        white: (k, k), from offsets to coordinates in which it is one.
+        determinant: half the logarithm of its determinant.
         freedom: degrees of freedom of the t distribution.
         together: whether recordings' residuals were taken together.
     """
 
     white: Floats
-    open: Floats
     determinant: float
     freedom: float
     together: bool
 
-    def variances(self, stretch: Floats, leverage: Floats) -> Floats:
-        """(n, k) of what lies so far (n,) from the simulations, and so far from the pairs."""
-        return stretch[:, None] + (leverage + _MISSED)[:, None] * self.open
-
-    def log_density(self, offset: Floats, variances: Floats) -> Floats:
-        """(n,) logarithm of multivariate t at offsets (n, k)."""
+    def log_density(self, offset: Floats, stretch: Floats) -> Floats:
+        """(n,) logarithm of multivariate t at offsets (n, k), its covariance (n,) times as large."""
         k, freedom = offset.shape[1], self.freedom
         constant = gammaln((freedom + k) / 2) - gammaln(freedom / 2) - 0.5 * k * math.log(freedom * math.pi)
         return (
-            constant - self.determinant - 0.5 * np.log(variances).sum(axis=1)
-            - 0.5 * (freedom + k) * np.log1p(self.distance(offset, variances) / freedom)
+            constant - self.determinant - 0.5 * k * np.log(stretch)
+            - 0.5 * (freedom + k) * np.log1p(self.distance(offset, stretch) / freedom)
         )  # fmt: skip
 
-    def distance(self, offset: Floats, variances: Floats) -> Floats:
+    def distance(self, offset: Floats, stretch: Floats) -> Floats:
         """(n,) squared standardised distance of offsets (n, k)."""
-        return np.asarray((np.square(offset @ self.white.T) / variances).sum(axis=1))
+        return np.asarray(np.square(offset @ self.white.T).sum(axis=1) / stretch)
 
 
-def scatter(emulators: Sequence[Emulator], beside: Floats | None = None) -> Scatter:
-    """Of recordings of one cloth.
-
-    Args:
-        beside: (k, k) a second covariance of all their summaries, of what acts beside the base model.
-    """
+def scatter(emulators: Sequence[Emulator]) -> Scatter:
+    """Of recordings of one cloth."""
     covariance, freedom, together = _covariance(emulators)
     freedom = min(freedom, HEAVY)
     factor = np.linalg.cholesky(covariance * (freedom - 2) / freedom)
-    inverse = np.linalg.inv(factor)
-    open_, turned = np.zeros(len(factor)), np.eye(len(factor))
-    if beside is not None:
-        open_, turned = np.linalg.eigh(inverse @ beside @ inverse.T)
     return Scatter(
-        white=np.asarray(turned.T @ inverse, dtype=np.float64), open=np.maximum(open_, 0.0), freedom=freedom,
-        together=together, determinant=float(np.log(np.diag(factor)).sum()),
+        white=np.asarray(np.linalg.inv(factor), dtype=np.float64), freedom=freedom, together=together,
+        determinant=float(np.log(np.diag(factor)).sum()),
     )  # fmt: skip
 
 

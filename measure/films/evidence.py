@@ -20,7 +20,7 @@ from scipy.special import gammaln, logsumexp, ndtr
 from measure.calibrate.prior import Floats, Uncertain
 from measure.calibrate.scatter import Scatter, scatter
 from measure.calibrate.sights import Placed, dimension, values
-from measure.films.model import Model, missed
+from measure.films.model import Model
 
 _STEPS = 14
 _DIFFERENCE = 1e-3
@@ -113,9 +113,7 @@ class Hypothesis:
     @cached_property
     def scatter(self) -> Scatter:
         """Of all recordings' summaries about their prediction."""
-        models = [one.model for one in self.sights]
-        beside = None if self.effect is None else missed(models, self.effect.name)
-        return scatter([one.base for one in models], beside)
+        return scatter([one.model.base for one in self.sights])
 
     @property
     def dimension(self) -> int:
@@ -128,23 +126,21 @@ class Hypothesis:
         return cloth, places, None if self.effect is None else self.effect.at(ndtr(scores[:, -1]))
 
     def predicted(self, scores: Floats) -> tuple[Floats, Floats, Floats]:
-        """Means (n, k) of all recordings' summaries, their variances (n, k) in the scatter's coordinates, and the area
-        weights (n,) [kg/m²]."""
+        """Means (n, k) of all recordings' summaries, factors (n,) of their scatter, area weights (n,) [kg/m²]."""
         cloth, places, strength = self.values(scores)
         name = None if self.effect is None else self.effect.name
         found = [
             sight.model.predict({**cloth, **place}, name, strength)
             for sight, place in zip(self.sights, places, strict=True)
         ]
-        mean = np.concatenate([own for own, _, _ in found], axis=1)
-        stretch, leverage = (np.mean([own[place] for own in found], axis=0) for place in (1, 2))
-        return mean, self.scatter.variances(stretch, leverage), cloth["area_weight"]
+        mean = np.concatenate([own for own, _ in found], axis=1)
+        return mean, np.mean([own for _, own in found], axis=0), cloth["area_weight"]
 
     def log_posterior(self, scores: Floats, observed: Experiments) -> Floats:
         """(n,) logarithm of likelihood times prior, but for a constant of stated weights."""
-        mean, variances, weight = self.predicted(scores)
+        mean, stretch, weight = self.predicted(scores)
         total = -0.5 * np.square(scores).sum(axis=1) - 0.5 * scores.shape[1] * np.log(2 * np.pi)
-        total += self.scatter.log_density(observed.whole - mean, variances)
+        total += self.scatter.log_density(observed.whole - mean, stretch)
         return total - 0.5 * np.square(observed.off(weight))
 
     def fit(self, observed: Experiments, rng: np.random.Generator) -> Fit:
@@ -189,22 +185,22 @@ class Hypothesis:
             at, value = np.where(better[:, None], tried, at), np.where(better, found, value)
             damping = np.where(better, damping / 5, damping * 4).clip(1e-6, 1e6)
         _, curvature = self._slope(at, observed)
-        mean, variances, weight = self.predicted(at)
+        mean, stretch, weight = self.predicted(at)
         misfit = np.square(at).sum(axis=1) + np.square(observed.off(weight))
-        return at, curvature, misfit + self.scatter.distance(observed.whole - mean, variances)
+        return at, curvature, misfit + self.scatter.distance(observed.whole - mean, stretch)
 
     def _slope(self, at: Floats, observed: Experiments) -> tuple[Floats, Floats]:
         """Gradient (n, d) and Gauss–Newton's curvature (n, d, d) of minus the logarithm, at scores (n, d)."""
         n, d = at.shape
         moved = at[:, None] + _DIFFERENCE * np.concatenate([np.zeros((1, d)), np.eye(d)])
         gradient, curvature = -at.copy(), np.broadcast_to(np.eye(d), (n, d, d)).copy()
-        mean, variances, weight = self.predicted(moved.reshape(-1, d))
+        mean, stretch, weight = self.predicted(moved.reshape(-1, d))
         if observed.stated is not None:
             off = observed.repeated(d + 1).off(weight).reshape(n, d + 1)
             slopes_of = (off[:, :1] - off[:, 1:]) / _DIFFERENCE
             gradient += slopes_of * off[:, :1]
             curvature += slopes_of[:, :, None] * slopes_of[:, None]
-        mean, scale = mean.reshape(n, d + 1, -1), np.sqrt(variances.reshape(n, d + 1, -1)[:, 0])
+        mean, scale = mean.reshape(n, d + 1, -1), np.sqrt(stretch.reshape(n, d + 1)[:, :1])
         white = ((observed.whole - mean[:, 0]) @ self.scatter.white.T) / scale
         slopes = ((mean[:, 1:] - mean[:, :1]) / _DIFFERENCE) @ self.scatter.white.T / scale[:, None]
         freedom = self.scatter.freedom

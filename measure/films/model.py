@@ -6,15 +6,15 @@ it changed in pairs of simulations,
     Δ = Dᵀz(s, θ),   z = (u, u², u ln w),
 
 u the strength or its logarithm, whichever predicts pairs that are left out better, and w the area weight. How far what
-is shown lies from its prediction is in `measure.calibrate.scatter`. With an effect its covariance has a second part, R,
-of the residuals of pairs about the effect's regression: h R for what so few pairs leave open of it, and R once more for
-what the regression misses.
+is shown lies from its prediction is in `measure.calibrate.scatter`. With an effect its covariance S is that of the base
+model times 1 + c + h r: c is by how much flags with the effect scatter more about their prediction than the same
+flags without it, and h r what so few pairs leave open of D, in units of S each, averages over all summaries.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,8 +29,6 @@ _RIDGE = 1e-3
 FEWEST_PAIRS = 8
 _MIDDLE_WEIGHT = 0.15
 """kg/m² about which the area weight changes what an effect does."""
-_SHRUNK = 0.5
-"""Share of the pairs' covariances between summaries that is kept: they are from some dozen residuals."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,14 +40,16 @@ class Response:
         logarithmic: whether u is the strength's logarithm.
         coefficients: D (3, k).
         inverse: (ZᵀZ)⁻¹ (3, 3).
-        residuals: (pair, k) of the pairs; NaN of those that do not show all.
+        residual: r, the variance of pairs about the regression [base model's variance].
+        excess: c [base model's variance].
     """
 
     effect: Weighable
     logarithmic: bool
     coefficients: Floats
     inverse: Floats
-    residuals: Floats
+    residual: float
+    excess: float
 
     def features(self, strength: Floats, weight: Floats) -> Floats:
         """z (n, 3) at strengths beyond null (n,) and area weights (n,) [kg/m²]."""
@@ -75,23 +75,15 @@ class Model:
 
     def predict(
         self, values: Mapping[str, Floats], effect: str | None = None, strength: Floats | None = None
-    ) -> tuple[Floats, Floats, Floats]:
-        """Means (n, k) of the used summaries, factors (n,) of the scatter, and of the pairs' residuals' covariance."""
+    ) -> tuple[Floats, Floats]:
+        """Means (n, k) of the used summaries, and factors (n,) of the scatter."""
         mean, stretch = self.base.predict(values)
         if effect is None or strength is None:
-            return mean, stretch, np.zeros(len(mean))
+            return mean, stretch
         own = self.responses[effect]
         z = own.features(strength, values["area_weight"])
-        return mean + z @ own.coefficients, stretch, ((z @ own.inverse) * z).sum(axis=1)
-
-
-def missed(models: Sequence[Model], effect: str) -> Floats:
-    """(k, k) covariance R of the pairs' residuals, of several recordings' summaries together."""
-    responses = [one.responses[effect] for one in models]
-    residuals = np.concatenate([one.residuals for one in responses], axis=1)
-    whole = residuals[np.isfinite(residuals).all(axis=1)]
-    own = whole.T @ whole / max(len(whole) - len(responses[0].inverse), 1)
-    return np.asarray(_SHRUNK * own + (1 - _SHRUNK) * np.diag(np.diag(own)))
+        leverage = ((z @ own.inverse) * z).sum(axis=1)
+        return mean + z @ own.coefficients, stretch + own.excess + leverage * own.residual
 
 
 def responded(
@@ -121,11 +113,16 @@ def responded(
         tried.append((error, logarithmic, z, inverse))
     _, logarithmic, z, inverse = min(tried, key=lambda one: one[0])
     coefficients = inverse @ z.T @ change
-    residuals = np.full((len(there), change.shape[1]), np.nan)
-    residuals[there] = change - z @ coefficients
+    predicted, stretch = model.base.predict(values)
+    off = np.linalg.solve(model.base.factor, (without[there][:, model.used] - predicted).T).T
+    missed = white - z @ (inverse @ z.T @ white)
+    # The regression was fitted to the flags without the effect: their residuals are the smaller for it.
+    fitted, fresh = (2 - stretch)[:, None], stretch[:, None]
     return Response(
-        effect=effect, logarithmic=logarithmic, coefficients=coefficients, inverse=inverse, residuals=residuals
-    )
+        effect=effect, logarithmic=logarithmic, coefficients=coefficients, inverse=inverse,
+        residual=float(np.square(missed).sum() / (max(len(z) - z.shape[1], 1) * missed.shape[1])),
+        excess=max(0.0, float((np.square(off + missed) / fresh).mean() - (np.square(off) / fitted).mean())),
+    )  # fmt: skip
 
 
 def _features(effect: Weighable, logarithmic: bool, strength: Floats, weight: Floats) -> Floats:

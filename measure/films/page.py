@@ -64,7 +64,7 @@ def bands(
     """
     rng = stream(seed, "films", "bands")
     rows = rng.choice(len(weights), _DRAWS, p=weights / weights.sum())
-    mean, stretch, _ = sight.model.predict(
+    mean, stretch = sight.model.predict(
         {name: own[rows] for name, own in values.items()}, None if effect is None else effect.name,
         None if strength is None else strength[rows],
     )  # fmt: skip

@@ -213,7 +213,7 @@ def departing(outcome: Outcome) -> tuple[Departure, ...]:
     found = []
     cloth, places, _ = hypothesis(outcome.sights, None).values(outcome.base.scores[0])
     for one, own, place in zip(outcome.recordings, outcome.sights, places, strict=True):
-        mean, _, _ = own.model.predict({**cloth, **place})
+        mean, _ = own.model.predict({**cloth, **place})
         off = one.summary[own.model.used] - outcome.base.weights[0] @ mean
         for column, size, sigma in zip(
             np.flatnonzero(own.model.used).tolist(), off, own.model.base.deviations, strict=True

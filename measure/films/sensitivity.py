@@ -42,8 +42,8 @@ def sensitivity(
         strength = effect.prior.at(np.array([STRONG]))
         parts = []
         for sight, place in zip(sights, places, strict=True):
-            with_it, _, _ = sight.model.predict({**cloth, **place}, effect.name, strength)
-            without, _, _ = sight.model.predict({**cloth, **place})
+            with_it, _ = sight.model.predict({**cloth, **place}, effect.name, strength)
+            without, _ = sight.model.predict({**cloth, **place})
             parts.append((with_it - without)[0])
         column = np.concatenate([own.scatter.white @ np.concatenate(parts), [0.0]])
         found.append(float(np.sqrt(column @ left @ column)))

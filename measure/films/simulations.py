@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.rng import stream
+from flagdata.rng import child_seed, stream
 from measure.calibrate.calibrate import Options as Calibrating
 from measure.calibrate.calibrate import designs_of, with_errors
 from measure.calibrate.design import Design, read
-from measure.calibrate.emulator import Emulator
+from measure.calibrate.emulator import Emulator, informative
 from measure.calibrate.observed import Observed
 from measure.calibrate.prior import Floats
 from measure.calibrate.sights import first_of
+from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.summary import Projection, shown
 from measure.films.design import TOGETHER, Pairs, lasting, nulls, pairs
 from measure.films.evidence import Experiments, Sight
@@ -117,6 +118,10 @@ def sight(
     changes = seen.projection.changes
     values = design.values()
     looked = np.tile(shown(seen.readings), 1 + changes)
+    if changes:
+        # A change with the wind that depends on nothing here widens the scatter of all others.
+        telling = informative(values, summaries, looked, name=observed.name)
+        looked[len(OBSERVED) :] &= telling[len(OBSERVED) :]
     model = Model(base=Emulator.fit(values, summaries, looked, name=observed.name))
     found = {}
     for made, readings in own:
@@ -181,9 +186,8 @@ def of_nulls(
 ) -> tuple[Experiments, NDArray[np.int64]]:
     """Null experiments with errors of pixels and of the scale, those that show all, and their kinds of numerics."""
     found = []
-    for number, (one, own, seen) in enumerate(zip(sights, recordings, simulations.nulls, strict=True)):
-        summaries = own.projection.of(seen)
-        summaries[:, 0] += own.sigma * stream(seed, "films", "pixels", number).standard_normal(summaries[:, 0].shape)
+    for one, own, seen in zip(sights, recordings, simulations.nulls, strict=True):
+        summaries = own.projection.of(seen) + own.pixels(len(seen), seed=child_seed(seed, "films", "nulls"))
         found.append(summaries.reshape(len(seen), -1)[:, one.model.used])
     whole = np.all([np.isfinite(own).all(axis=1) for own in found], axis=0)
     made = Experiments(summaries=tuple(own[whole] for own in found))

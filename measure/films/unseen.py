@@ -142,7 +142,7 @@ def _predicted(
             values = places[place] if place is not None else {
                 q.name: q.at(rng.random(len(found.weights[0]))) for q in one.quantities
             }  # fmt: skip
-            mean, _, _ = one.model.predict({**own, **values}, None if which is None else which.name, strength)
+            mean, _ = one.model.predict({**own, **values}, None if which is None else which.name, strength)
             full = np.full(len(one.model.used), np.nan)
             full[one.model.used] = found.weights[0] @ mean
             made.append(full[: len(OBSERVED)])

@@ -177,3 +177,21 @@ def test_ten_seconds_are_enough_beside_ten_others_and_not_alone() -> None:
     assert [design.duration for design in module.designs_of(short, _OPTIONS)] == [10.0, 10.0]
     with pytest.raises(InputError, match="10 s of film with a log"):
         module.designs_of(short[:1], _OPTIONS)
+
+
+def test_pixels_err_by_the_film_and_by_the_window() -> None:
+    # Errors of windows of variance P σ², of the film of (1 − P) σ²: Var a = σ² (1 − P + P/n), Var b = P σ²/Σ(x − x̄)².
+    film = replace(_observed(0.2), sigma=np.full(len(OBSERVED), 0.03))
+    drawn = film.pixels(4000, seed=1) / 0.03
+    relative = np.log(film.speed) - np.log(film.speed).mean()
+    wanted = [0.6 + 0.4 / 48, 0.4 / np.square(relative).sum()]
+    assert np.square(drawn).mean(axis=(0, 2)) == pytest.approx(wanted, rel=0.03)
+    of_pair = np.corrcoef(drawn[:, 0, OBSERVED.index("extension")], drawn[:, 0, OBSERVED.index("area")])[0, 1]
+    assert of_pair == pytest.approx(0.77, abs=0.02)
+    assert (_observed(0.2).pixels(3, seed=1) == 0).all()
+
+
+def test_two_films_of_a_flag_err_alike_but_for_what_passes() -> None:
+    one, other = (replace(_observed(0.2), sigma=np.full(len(OBSERVED), 0.03), name=name) for name in ("a", "b"))
+    both = [film.pixels(4000, seed=1)[:, 0, 0] for film in (one, other)]
+    assert np.corrcoef(*both)[0, 1] == pytest.approx(0.6 / (0.6 + 0.4 / 48), abs=0.01)
