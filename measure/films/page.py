@@ -56,7 +56,8 @@ def bands(
     strength: Floats | None, *, seed: int,
 ) -> Floats:  # fmt: skip
     """(3, window, observable) lower end, middle and upper end of what a model of the posterior shows in the windows'
-    winds, without the scatter among windows; NaN of observables that are not used.
+    winds, without the scatter among windows; NaN of observables that are not used. A change with the wind that is not
+    used is drawn as none.
 
     Args:
         values: name → (draw,) of cloth and place; `weights` of the draws.
@@ -70,6 +71,7 @@ def bands(
     )  # fmt: skip
     mean = mean + (rng.standard_normal(mean.shape) @ sight.model.base.factor.T) * np.sqrt(stretch)[:, None]
     whole = np.full((_DRAWS, len(sight.model.used)), np.nan)
+    whole[:, len(OBSERVED) :] = 0.0  # changes that nothing predicts are none
     whole[:, sight.model.used] = mean
     windows = observed.projection.at(whole.reshape(_DRAWS, -1, len(OBSERVED)))
     tail = (1 - CRITERIA.interval) / 2
