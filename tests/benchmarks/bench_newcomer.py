@@ -19,7 +19,7 @@ import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlparse
@@ -42,9 +42,17 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     """Commands, minutes and bytes of every Python and installation; nothing is written into `out`."""
     del seed, out
     return {
-        python: {"light": _light(python), "physics": _physics(python)} if _runs(python) else
+        python: {"light": _tried(_light, python), "physics": _tried(_physics, python)} if _runs(python) else
         {"left_out": f"no {python} on the path"} for python in PYTHONS
     }  # fmt: skip
+
+
+def _tried(install: Callable[[str], dict[str, Any]], python: str) -> dict[str, Any]:
+    """What an installation came to, or the message of the command that failed: that is a result, too."""
+    try:
+        return install(python)
+    except RuntimeError as error:
+        return {"right": False, "failed": str(error)}
 
 
 def _runs(python: str) -> bool:
