@@ -6,10 +6,13 @@ and on a busy machine after its end. The process says where it is instead, and w
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from pathlib import Path
 from typing import IO
 
+ROOT = Path(__file__).resolve().parents[1]
 _PAUSED = "paused\n"
 
 
@@ -23,7 +26,11 @@ def pause() -> None:
 def start(*arguments: object, stderr: IO[bytes] | None = None) -> subprocess.Popen[str]:
     """Start a Python script that pauses."""
     command = [sys.executable, *map(str, arguments)]
-    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr, text=True)
+    paths = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])  # a script finds no tests
+    return subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr, text=True,
+        env={**os.environ, "PYTHONPATH": paths},
+    )  # fmt: skip
 
 
 def await_pause(process: subprocess.Popen[str]) -> None:

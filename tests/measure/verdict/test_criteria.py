@@ -42,6 +42,7 @@ METHOD = {
     "loop/selection": {"GUST_COLUMN"},
     "loop/validation": {"_DURATION", "_ENOUGH"},
     "verdict/quantity": {"_DIGITS", "_MOST_DIGITS", "_WIDEST", "_NARROWEST"},
+    "nulls/workload": {"_PACE", "_JUDGED"},
     "closing/artifacts": {"_FORMAT"},
     "closing/models": {"_SETTLE", "_FRAMES", "_ROUGH"},
 }
