@@ -109,14 +109,14 @@ class RecordingRecipe:
     """
 
     seed: int
-    duration: float = 240.0
+    duration: float = 180.0
     rate: int = 30
     columns: int = 20
     step: float = 2.5e-3
     length: float = 1.5
     height: float = 1.0
-    intensity: float = 0.45
-    eddies: float = 20.0
+    intensity: float = 0.35
+    eddies: float = 60.0
     width: int = 400
     rows: int = 300
     samples: int = 4
