@@ -38,7 +38,6 @@ def lineage(
     from flagdata.lake import Lake
     from flagdata.lake.ancestry import ancestry
     from flagdata.outputs import check_file, write_file
-    from flagdata.pages.graph_png import png
     from flagdata.pages.lineage import MOST, graph
     from flagdata.pages.lineage import picture as drawn
 
@@ -52,6 +51,8 @@ def lineage(
     most = None if whole else MOST
     if picture is not None:
         if kind == ".png":
+            from flagdata.pages.graph_png import png
+
             write_file(picture, png(*graph(found, details=details, most=most)))
         else:
             write_file(picture, drawn(found, details=details, most=most))

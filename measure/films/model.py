@@ -110,12 +110,11 @@ def responded(
         hat = z @ inverse @ z.T
         residual = white - hat @ white
         error = float(np.square(residual / (1 - np.diag(hat))[:, None]).mean())
-        tried.append((error, logarithmic, z, inverse))
-    _, logarithmic, z, inverse = min(tried, key=lambda one: one[0])
+        tried.append((error, logarithmic, z, inverse, residual))
+    _, logarithmic, z, inverse, missed = min(tried, key=lambda one: one[0])
     coefficients = inverse @ z.T @ change
     predicted, stretch = model.base.predict(values)
     off = np.linalg.solve(model.base.factor, (without[there][:, model.used] - predicted).T).T
-    missed = white - z @ (inverse @ z.T @ white)
     # The regression was fitted to the flags without the effect: their residuals are the smaller for it.
     fitted, fresh = (2 - stretch)[:, None], stretch[:, None]
     return Response(

@@ -45,14 +45,17 @@ VERSIONS = tuple(n for n in (10, 100, 1_000, 10_000) if n <= int(os.environ.get(
 TIDY = 32  # versions; as commits do it
 COMMITS = 20
 SQL = "select session, count(*) n, avg(wind) wind from catalog where wind between 3 and 6 group by session"
-_FRESH = """
+_LAP = """
 import json, sys, time
 def lap():
     global wall, cpu
     took = {"wall_s": time.perf_counter() - wall, "cpu_s": time.process_time() - cpu}
     wall, cpu = time.perf_counter(), time.process_time()
     return took
-wall, cpu = time.perf_counter(), time.process_time()
+"""
+_FRESH = (
+    _LAP
+    + """wall, cpu = time.perf_counter(), time.process_time()
 from flagdata.lake import Artifact, Lake
 from flagdata.selection import select
 found = {"import": lap()}
@@ -69,25 +72,23 @@ with lake.transaction("one more") as tx:
     tx.add(Artifact(kind="measurement", name="n", recipe={"of": sys.argv[3]}))
 found["commit of another"] = lap()
 """
-_BEGIN = """
-import json, sys, time
+)
+_BEGIN = (
+    _LAP
+    + """
 from contextlib import redirect_stdout
 from io import StringIO
 from flagdata.lake import Artifact, Lake
 from flagdata.view.media import Media
 from flagdata.view.pages import Site
 from flagdata.view.routes import answer
-def lap():
-    global wall, cpu
-    took = {"wall_s": time.perf_counter() - wall, "cpu_s": time.process_time() - cpu}
-    wall, cpu = time.perf_counter(), time.process_time()
-    return took
 def site():
     return Site(lake=lake, media=Media(lake), base="/key/")
 wall, cpu = time.perf_counter(), time.process_time()
 lake = Lake.open(sys.argv[1])
 lap()
 """
+)
 _PEAK = """
 with open("/proc/self/status") as status:  # what getrusage gives is the parent's, before the program began
     found["peak_MiB"] = int(next(line for line in status if line.startswith("VmHWM")).split()[1]) // 1024
