@@ -57,7 +57,7 @@ class Transcript:
 
     def _typed(self, arguments: tuple[str, ...]) -> tuple[str, int]:
         """What `flagdata ARGUMENTS` prints on stdout, and its exit code."""
-        typed = shlex.join(("flagdata", *arguments))
+        typed = " ".join(map(_word, ("flagdata", *arguments)))
         say(f"\n$ {typed}")
         done = subprocess.run(
             [sys.executable, "-m", "flagdata.cli", *arguments],
@@ -81,3 +81,10 @@ class Transcript:
         printed = json.loads(self.run(*arguments, "--json"))
         self.entries.pop()
         return printed
+
+
+def _word(argument: str) -> str:
+    """An argument as a person types it for a shell: within double quotes where it holds single ones, as SQL does."""
+    if "'" in argument and not set(argument) & set('"$`\\!'):
+        return f'"{argument}"'
+    return shlex.quote(argument)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 import subprocess
 from pathlib import Path
 from types import SimpleNamespace
@@ -44,6 +45,23 @@ def test_a_refusal_is_no_failure(codes: dict[str, int], tmp_path: Path) -> None:
         shell.attempt("align", "a", "b")
     with pytest.raises(FlagdataError, match="ended with 1"):
         shell.run("align", "a", "b")
+
+
+@pytest.mark.parametrize(
+    ("argument", "typed"),
+    [
+        ("plain", "plain"),
+        ("kind = 'clip' and wind > 4", "\"kind = 'clip' and wind > 4\""),
+        ("it's $5", "'it'\"'\"'s $5'"),
+    ],
+)
+def test_a_command_is_shown_as_a_person_types_it(
+    codes: dict[str, int], tmp_path: Path, argument: str, typed: str
+) -> None:
+    shell = Transcript(folder=tmp_path)
+    shell.run("query", argument)
+    assert shell.entries[-1][0] == f"flagdata query {typed}"
+    assert shlex.split(typed) == [argument]
 
 
 def test_the_cloth_is_weighed_with_what_a_person_noted_and_the_truth_stands_beside(
