@@ -20,7 +20,8 @@ BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    if missing := [name for name in ("material", "mkdocstrings", "mkdocs_jupyter") if find_spec(name) is None]:
+    needed = ("latex2mathml", "material", "mkdocstrings", "mkdocs_jupyter")
+    if missing := [name for name in needed if find_spec(name) is None]:
         pytest.skip(f"not installed: {', '.join(missing)} (extra docs)")
     folder = tmp_path_factory.mktemp("site")
     done = subprocess.run(
@@ -51,6 +52,41 @@ def test_a_page_loads_nothing_from_elsewhere(site: Path) -> None:
     text = (site / "simulator.html").read_text(encoding="utf-8")
     assert 'src="http' not in text
     assert 'rel="stylesheet" href="http' not in text
+
+
+def formulas(page: Path) -> list[str]:
+    """The TeX of a page's source, between dollar signs outside code."""
+    text = re.sub(r"^```.*?^```|`[^`\n]+`", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    return [one or other for one, other in re.findall(r"\$\$(.+?)\$\$|\$(.+?)\$", text, flags=re.DOTALL)]
+
+
+def test_every_formula_is_set_and_a_page_without_one_carries_nothing_for_it(site: Path) -> None:
+    pages = [page for page in (ROOT / "docs").rglob("*.md") if not page.parent.name.startswith("challenge-")]
+    sources = {page: formulas(page) for page in pages}
+    assert sum(map(bool, sources.values())) >= 7
+    for page, tex in sources.items():
+        built = site / page.relative_to(ROOT / "docs").with_suffix(".html")
+        if not built.is_file():  # the README of a folder
+            built = built.with_stem("index")
+        text = built.read_text(encoding="utf-8")
+        shown = re.findall(r"<math .*?</math>", text, flags=re.DOTALL)
+        assert len(shown) == len(tex), page
+        assert not [one for one in shown if "\\" in one or "merror" in one]
+        assert text.count('class="formula"') == sum(one.startswith("\n") for one in tex)
+        assert "arithmatex" not in text
+        assert "mathjax" not in text.lower()
+        assert "katex" not in text.lower()
+
+
+def test_a_formula_that_cannot_be_set_ends_the_build_and_is_named() -> None:
+    pytest.importorskip("latex2mathml")
+    from mkdocs.exceptions import PluginError
+
+    from docs.formulas import formulas_set
+
+    assert "<mfrac>" in formulas_set('<span class="arithmatex">\\(\\frac{a}{b}\\)</span>', "method/films.md")
+    with pytest.raises(PluginError, match=r"method/films\.md: \\frob in the formula a \\frob b "):
+        formulas_set('<span class="arithmatex">\\(a \\frob b\\)</span>', "method/films.md")
 
 
 def test_the_reference_shows_each_call_with_its_arguments_and_its_source(site: Path) -> None:
