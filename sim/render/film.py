@@ -10,13 +10,14 @@ import torch
 from flagdata.errors import UsageError
 from flagdata.film_array import Frames
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
+from flagdata.simulated import Simulated
 from flagdata.timebase import NANOSECONDS
 from sim.assets import Assets
 from sim.render import RENDERERS, Meshes, prior
 
 
 def rendered(
-    sequence: MeshSequence | RaggedMeshSequence, *, look: str, parameters: Mapping[str, float], cloth: str,
+    sequence: MeshSequence | RaggedMeshSequence | Simulated, *, look: str, parameters: Mapping[str, float], cloth: str,
     heading: float | None, renderer: str, photos: Path | None, seed: int,
 ) -> Frames:  # fmt: skip
     """A film of a moving cloth.
@@ -26,6 +27,11 @@ def rendered(
     """
     if cloth not in ("flag", "hanging-cloth"):
         raise UsageError(f"cloth {cloth!r}", where="cloth", fix="give 'flag' or 'hanging-cloth'")
+    if isinstance(sequence, Simulated):
+        raise UsageError(
+            f"a simulation of {len(sequence)} cloths", where="sequence",
+            fix="give one of its members, as in simulated[0]",
+        )  # fmt: skip
     assets = Assets(photos=photos)
     zeta = prior.named(look).with_quantities(dict(parameters), source="given").draw(seed, assets)
     toward = _toward(sequence) if heading is None else heading

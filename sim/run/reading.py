@@ -265,13 +265,13 @@ def _wind(table: Table, scene: SceneSpec) -> WindSpec:
         force = QuadraticNormal(
             density=table.number("density", base.density, least=0.0), drag=table.number("drag", base.drag, least=0.0)
         )
-    if "speed" not in table:
-        raise InputError("no wind speed is given", where=table.where, fix="add speed = 4.0 (m/s), or a range")
     spec = WindSpec(
         speed=table.quantity("speed", 0.0, least=0.0, most=100.0), toward=table.angle("toward", 0.0),
         vertical=table.number("vertical", 0.0), force=force,
     )  # fmt: skip
     table.done()
+    if "speed" not in table:
+        raise InputError("no wind speed is given", where=table.where, fix="add speed = 4.0 (m/s), or a range")
     return spec
 
 

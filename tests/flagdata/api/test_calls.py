@@ -23,7 +23,7 @@ def test_every_public_name_is_there_and_no_module_hides_it() -> None:
     modules = {path.stem for path in folder.glob("*.py")} | {path.name for path in folder.iterdir() if path.is_dir()}
     assert modules & set(flagdata.__all__) == set()
     assert all(callable(getattr(flagdata, name)) and getattr(flagdata, name).__doc__ for name in flagdata.__all__)
-    assert set(flagdata.__all__) <= set(dir(flagdata))
+    assert dir(flagdata) == sorted(flagdata.__all__)
     with pytest.raises(AttributeError, match="no_such_name"):
         flagdata.no_such_name  # noqa: B018
 
@@ -106,6 +106,8 @@ def test_a_flag_is_rendered_and_its_film_can_be_looked_at(flags) -> None:
         flagdata.render(flags[0], look="outdor")
     with pytest.raises(UsageError, match="hanging-cloth"):
         flagdata.render(flags[0], cloth="sail")
+    with pytest.raises(UsageError, match=r"one of its members, as in simulated\[0\]"):
+        flagdata.render(flags)  # pyright: ignore[reportArgumentType]
 
 
 def test_rest_and_rate_belong_together() -> None:
