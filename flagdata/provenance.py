@@ -57,13 +57,24 @@ def file_hash(path: Place) -> str:
 
 @functools.cache
 def code_version() -> str:
-    """Package version, and the commit when run from a checkout ("0.1.0+3f2a9c1", "-dirty" with uncommitted changes)."""
-    release = version("flagdata")
-    root = Path(__file__).resolve().parent.parent
+    """Package version, and the commit when run from a checkout: "0.1.0+3f2a9c1". With uncommitted changes it is
+    "0.1.0+3f2a9c1-dirty.5d41e0b", whose last part is a hash of them, files that git does not track aside."""
+    release, commit = version("flagdata"), commit_of(Path(__file__).resolve().parent.parent)
+    return release if commit is None else f"{release}+{commit}"
+
+
+def commit_of(root: Path) -> str | None:
+    """The commit of a checkout with a hash of what was changed since, as in `code_version`; `None` where it is none."""
     if not (root / ".git").exists():
-        return release
-    described = subprocess.run(
-        ["git", "describe", "--always", "--dirty", "--abbrev=7", "--exclude=*"],
-        cwd=root, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    return f"{release}+{described.stdout.strip()}" if described.returncode == 0 else release
+        return None
+    described = _git(root, "describe", "--always", "--dirty", "--abbrev=7", "--exclude=*")
+    if described is None:
+        return None
+    commit = described.decode().strip()
+    changes = _git(root, "diff", "HEAD") if commit.endswith("-dirty") else None
+    return commit if changes is None else f"{commit}.{hashlib.sha256(changes).hexdigest()[:7]}"
+
+
+def _git(root: Path, *arguments: str) -> bytes | None:
+    done = subprocess.run(["git", *arguments], cwd=root, capture_output=True, check=False)
+    return done.stdout if done.returncode == 0 else None

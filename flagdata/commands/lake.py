@@ -57,6 +57,7 @@ def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
     from flagdata.lake import Lake
     from flagdata.lake.matching import matching
     from flagdata.lake.removals import lost
+    from flagdata.lake.revisions import superseded
     from flagdata.schema import Kind
 
     if kind is not None and kind not in list(Kind):
@@ -65,14 +66,22 @@ def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
     found = lake.rows(None if kind is None else {"kind": kind}, at=at, columns=["name", "object"])
     rows = lake.rows("kind <> 'clip'" if kind is None else {"kind": kind}, at=at).to_pylist()
     gone = lost(lake, found)
+    older = superseded(row for row in rows if row["kind"] in (Kind.MEASUREMENT, Kind.MODEL))
     clips = found.num_rows - len(rows)
     if as_json:
-        listed = [{**_plain(row), "data": "lost" if row["object"] in gone else "there"} for row in rows]
+        listed = [
+            {
+                **_plain(row), "data": "lost" if row["object"] in gone else "there",
+                "superseded": row["artifact"] in older,
+            }
+            for row in rows
+        ]  # fmt: skip
         document("ls", {"at": at, "artifacts": listed, "clips_not_listed": clips})
         return
     header = ("artifact", "kind", "name", "start", "frames", "wind [m/s]", "size", "quality")
     if rows:
-        table(header, [_line(row, lost=row["object"] in gone) for row in rows])
+        lines = [_line(row, lost=row["object"] in gone, superseded=row["artifact"] in older) for row in rows]
+        table(header, lines)
     more = f" and {counted(clips, 'clip')} (--kind clip lists them)" if clips else ""
     say(f"{counted(len(rows), 'artifact')}{more}" if found.num_rows else "no artifacts")
     for name, why in gone.items():
@@ -95,6 +104,7 @@ def show(artifact: str, whole: bool, at: str | None, as_json: bool, lake_path: s
     from flagdata.ingest.before import unconfirmed
     from flagdata.lake import Lake
     from flagdata.lake.labels import PREFIX
+    from flagdata.lake.results import versions
     from flagdata.lake.tabled import labels_of
 
     lake = Lake.open(lake_path)
@@ -109,12 +119,16 @@ def show(artifact: str, whole: bool, at: str | None, as_json: bool, lake_path: s
     children = [_relative(other) for other in others if row["artifact"] in other["parents"]]
     path = lake.objects.path(row["object"]) if row["object"] else None
     doubts = unconfirmed([found])
+    stated = [
+        {"version": number, "artifact": one.id, "code_version": one.code_version}
+        for number, one in enumerate(versions(lake, found, at=at), start=1)
+    ]
     if as_json:
         document(
             "show",
             {
                 "artifact": row, "labels": labels, "path": str(path) if path else None, "parents": parents,
-                "children": children,
+                "children": children, "versions": stated,
                 "findings": [finding.as_dict() for finding in doubts],
             },
         )  # fmt: skip
@@ -129,6 +143,10 @@ def show(artifact: str, whole: bool, at: str | None, as_json: bool, lake_path: s
         click.echo(f"{PREFIX + name:<15} {value}")
     if path is not None:
         click.echo(f"{'path':<15} {path}")
+    for one in stated if len(stated) > 1 else ():
+        this = " (this one)" if one["artifact"] == found.id else ""
+        label = f"version {one['version']}"
+        click.echo(f"{label:<15} {one['artifact'][:_SHORT]} by code {one['code_version']}{this}")
     for label, relatives in (("made from", parents), ("made into", children)):
         for relative in relatives if whole else relatives[:_MOST]:
             click.echo(f"{label:<15} {relative['artifact'][:_SHORT]} {relative['kind']} {relative['name']}")
@@ -421,7 +439,7 @@ def size_text(size: float | None) -> str:
     return f"{size:.1f} TB"
 
 
-def _line(row: Mapping[str, Any], *, lost: bool) -> list[object]:
+def _line(row: Mapping[str, Any], *, lost: bool, superseded: bool) -> list[object]:
     from flagdata.documents import column_json
     from flagdata.schema import Kind
     from flagdata.timebase import iso
@@ -443,7 +461,7 @@ def _line(row: Mapping[str, Any], *, lost: bool) -> list[object]:
         wind,
         # A clip's object is its recording's.
         "lost" if lost else "" if row["kind"] == Kind.CLIP else size_text(row["object_bytes"]),
-        ",".join(row["quality"]),
+        ",".join([*row["quality"], *(["superseded"] if superseded else [])]),
     ]
 
 

@@ -57,7 +57,7 @@ class Artifact:
     source_name: str | None = None
     parents: Sequence[str] = ()
     recipe: Mapping[str, Any] = field(default_factory=dict)
-    code_version: str = field(default_factory=provenance.code_version)
+    code_version: str = field(default_factory=lambda: provenance.code_version())
     format_version: int = FORMAT_VERSION
     seed: int | None = None
     created: datetime | None = None
@@ -148,7 +148,8 @@ class Artifact:
         """Identity: what went in and what it is a part of; 32 hexadecimal digits of a SHA-256.
 
         Neither the object's bytes nor the code version take part: the same source under the same recipe is the same
-        artifact, so that ingesting it again finds it.
+        artifact, so that ingesting it again finds it. A result that is revised states so in its recipe, see
+        `flagdata.lake.results`.
         """
         identity = {
             "kind": self.kind.value,

@@ -107,10 +107,8 @@ class Store:
 
     def _row(self, artifact: str, at: str | None, kinds: Collection[Kind] = ()) -> pa.Table:
         view = self.view(at)
-        rows = self.scan(view)
-        named = naming.condition(artifact)
-        columns = rows.matching(named).table(naming.COLUMNS) if isinstance(rows, Scan) else rows.filter(named)
-        found = naming.meant(columns.select(naming.COLUMNS).to_pylist(), artifact, kinds=kinds)
+        named = self.meeting(view, naming.condition(artifact), naming.OF_RESULTS)
+        found = naming.meant(named.to_pylist(), artifact, kinds=kinds)
         name, _, ref = artifact.rpartition("@")
         if not found and name and at is None:
             return self._row(name, ref, kinds)
@@ -118,7 +116,7 @@ class Store:
             return self.matching(view, {"artifact": found[0]["artifact"]})
         where, listed = str(self.path), "flagdata ls lists them"
         if not found:
-            names = (rows.table(["name"]) if isinstance(rows, Scan) else rows)["name"].unique().to_pylist()
+            names = self.columns(view, ["name"])["name"].unique().to_pylist()
             close = difflib.get_close_matches(artifact, filter(None, names[:_NAMES]), n=1)
             suggestion = f"did you mean {close[0]!r}? {listed}" if close else listed
             raise NotFoundError(f"no artifact {artifact!r}", where=where, fix=suggestion)
@@ -149,6 +147,13 @@ class Store:
             if found is not None:
                 return found.matching(pc.field("branch") == view[0].branch)
         return self.table(view)
+
+    def meeting(self, view: View, condition: pc.Expression, columns: Sequence[str] = tuple(CATALOG)) -> pa.Table:
+        """Some columns of the rows of a view that meet a condition."""
+        rows = self.scan(view)
+        if isinstance(rows, Scan):
+            return rows.matching(condition).table(columns)
+        return rows.filter(condition).select(list(columns))
 
     def matching(self, view: View, values: Values, columns: Sequence[str] | None = None) -> pa.Table:
         """Rows of a view with these values, see `flagdata.lake.matching`, with at least some columns; all if `None`.

@@ -18,10 +18,11 @@ from flagdata.commands.lake import said, size_text
 from flagdata.commands.query import plain
 from flagdata.documents import column_json
 from flagdata.errors import FlagdataError, NotFoundError, UnknownNameError, UsageError
-from flagdata.lake import Lake
+from flagdata.lake import Artifact, Lake
 from flagdata.lake.ancestry import ancestry
 from flagdata.lake.labels import PREFIX
 from flagdata.lake.refs import MAIN, View
+from flagdata.lake.results import versions
 from flagdata.lake.tabled import labels_of
 from flagdata.pages.graph import COLOURS
 from flagdata.pages.lineage import SHORT, picture
@@ -175,6 +176,7 @@ def artifact(site: Site, identity: str) -> str:
     labels = labels_of(shown).get(identity, {})
     facts = [(name, printable(said(name, value))) for name, value in row.items() if _is_fact(name, value)]
     facts += [(PREFIX + name, printable(str(value))) for name, value in labels.items()]
+    facts += [(f"version {number}", text) for number, text in _versions(site, row)]
     drawn = picture(ancestry(shown, identity), link=lambda one: site.link(f"artifact/{one}"))
     stated = {name: _stated(row, name) for name in ("recipe", "parameters", "clock_model")}
     return _page(
@@ -251,6 +253,17 @@ def _card(site: Site, row: Mapping[str, Any]) -> dict[str, Any]:
 def _together(text: str | None) -> str | None:
     """A number and its unit in one line."""
     return text and text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
+def _versions(site: Site, row: Mapping[str, Any]) -> list[tuple[int, str]]:
+    """Number, id and code of each version of a result that has several."""
+    if row["kind"] != Kind.MEASUREMENT:
+        return []
+    known = versions(site.lake, Artifact.from_row(row), at=site.at)
+    return [
+        (number, f"{one.id[:SHORT]} by code {one.code_version}{', this one' if one.id == row['artifact'] else ''}")
+        for number, one in enumerate(known if len(known) > 1 else (), start=1)
+    ]
 
 
 def _clips(site: Site, shown: pa.Table, row: Mapping[str, Any]) -> tuple[list[dict[str, Any]], int]:

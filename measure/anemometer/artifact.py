@@ -7,7 +7,8 @@ read.
 from __future__ import annotations
 
 from flagdata.findings import quality_flags
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, results
+from flagdata.lake.results import Placed
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from measure.anemometer.calibration import ANSWER, Calibrated
@@ -17,8 +18,8 @@ from measure.estimate.source import CALIBRATED, Reading
 from models.conditioning.conditioning import VERSION as CONDITIONED
 
 
-def artifact(found: Calibrated, name: str, reading: Reading, *, stored: str | None = None) -> Artifact:
-    """The row of a reading model.
+def artifact(found: Calibrated, name: str, reading: Reading) -> Artifact:
+    """The row of a reading model, without its object.
 
     Args:
         name: under which `flagdata measure --model` finds it.
@@ -27,7 +28,7 @@ def artifact(found: Calibrated, name: str, reading: Reading, *, stored: str | No
     model = found.model
     spans = [[float(one.features.starts[0]), len(one.features.starts) * model.step] for one in found.recordings]
     return Artifact(
-        kind=Kind.MEASUREMENT, name=name, object=stored, parents=[one.identity for one in found.recordings],
+        kind=Kind.MEASUREMENT, name=name, parents=[one.identity for one in found.recordings],
         recipe={
             CALIBRATED: ANSWER, "features": VERSION, "conditioned": CONDITIONED, "network": model.identity,
             "flag_size": [model.size.length, model.size.height], "spans": spans, "level": found.level,
@@ -38,17 +39,13 @@ def artifact(found: Calibrated, name: str, reading: Reading, *, stored: str | No
     )  # fmt: skip
 
 
-def keep(lake: Lake, found: Calibrated, name: str, reading: Reading, *, branch: str) -> tuple[str, bool]:
-    """Commit a reading model: its id, and whether it is new; the same one again adds nothing.
+def keep(lake: Lake, found: Calibrated, name: str, reading: Reading, *, branch: str) -> Placed:
+    """Commit a reading model where it is new, see `flagdata.lake.results`.
 
     Raises:
         FlagdataError: as `Lake.transaction`.
     """
-    wanted = artifact(found, name, reading)
-    with lake.transaction(f"calibrate {name}", branch=branch) as transaction:
-        if transaction.find(wanted.id) is not None:
-            return wanted.id, False
-        staged = transaction.staging(".zarr")
-        write(staged, found.model, found.as_dict())
-        transaction.add(artifact(found, name, reading, stored=transaction.put(staged)))
-    return wanted.id, wanted.id in transaction.result.added
+    return results.keep(
+        lake, artifact(found, name, reading), lambda staged: write(staged, found.model, found.as_dict()),
+        f"calibrate {name}", branch=branch,
+    )  # fmt: skip

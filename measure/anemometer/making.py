@@ -9,6 +9,7 @@ from typing import Any
 
 from flagdata.errors import InputError
 from flagdata.lake import Lake
+from flagdata.lake.results import Placed
 from measure.anemometer.artifact import keep
 from measure.anemometer.calibration import ENOUGH, LEAST, Calibrated, calibrated, recorded
 from measure.estimate.similarity import FlagSize
@@ -23,13 +24,13 @@ class Made:
         name: by which `flagdata measure --model` finds it.
         found: what it is.
         artifact: its id in the lake; None where it is not to be there.
-        new: whether it was not there before.
+        place: its place among its versions in the lake; None as well.
     """
 
     name: str
     found: Calibrated
     artifact: str | None
-    new: bool
+    place: Placed | None
 
     def as_dict(self) -> dict[str, Any]:
         """JSON values."""
@@ -71,6 +72,6 @@ def made(
     result = calibrated(recordings, network=own, size=size, level=level)
     title = name if name is not None else f"{recordings[0].name}-anemometer"
     if lake is None or not commit:
-        return Made(name=title, found=result, artifact=None, new=False)
-    identity, new = keep(lake, result, title, reading, branch=branch)
-    return Made(name=title, found=result, artifact=identity, new=new)
+        return Made(name=title, found=result, artifact=None, place=None)
+    place = keep(lake, result, title, reading, branch=branch)
+    return Made(name=title, found=result, artifact=place.artifact.id, place=place)

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from flagdata.findings import quality_flags
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, results
 from flagdata.lake.meshes import write_plain
+from flagdata.lake.results import Placed
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from measure.calibrate.calibrate import ANSWER, Calibration
@@ -24,8 +25,8 @@ _FORMAT = 1
 _HEAD = "flagdata_calibration"
 
 
-def artifact(found: Calibration, reading: Reading, parents: tuple[str, ...], *, stored: str | None = None) -> Artifact:
-    """The row of a calibration.
+def artifact(found: Calibration, reading: Reading, parents: tuple[str, ...]) -> Artifact:
+    """The row of a calibration, without its object.
 
     Args:
         reading: how films were read.
@@ -35,7 +36,7 @@ def artifact(found: Calibration, reading: Reading, parents: tuple[str, ...], *, 
     sources = [one.observed.source for one in found.recordings]
     spans = [[one.observed.first, one.observed.duration] for one in found.recordings]
     return Artifact(
-        kind=Kind.MEASUREMENT, name=", ".join(one.observed.name for one in found.recordings), object=stored,
+        kind=Kind.MEASUREMENT, name=", ".join(one.observed.name for one in found.recordings),
         parents=parents, seed=found.options.seed, parameters=canonical(values),
         recipe={
             "calibrate": ANSWER, "simulations": VERSION, "observe": READINGS, "conditioned": CONDITIONED,
@@ -46,20 +47,14 @@ def artifact(found: Calibration, reading: Reading, parents: tuple[str, ...], *, 
     )  # fmt: skip
 
 
-def keep(lake: Lake, found: Calibration, reading: Reading, parents: tuple[str, ...], *, branch: str) -> bool:
-    """Commit a calibration and return whether it is new; the same one again adds nothing.
+def keep(lake: Lake, found: Calibration, reading: Reading, parents: tuple[str, ...], *, branch: str) -> Placed:
+    """Commit a calibration where it is new, see `flagdata.lake.results`.
 
     Raises:
         FlagdataError: as `Lake.transaction`.
     """
-    wanted = artifact(found, reading, parents)
-    with lake.transaction(f"calibrate {wanted.name}", branch=branch) as transaction:
-        if transaction.find(wanted.id) is not None:
-            return False
-        staged = transaction.staging(".zarr")
-        write(staged, found)
-        transaction.add(artifact(found, reading, parents, stored=transaction.put(staged)))
-    return wanted.id in transaction.result.added
+    row = artifact(found, reading, parents)
+    return results.keep(lake, row, lambda staged: write(staged, found), f"calibrate {row.name}", branch=branch)
 
 
 def write(path: Path, found: Calibration) -> None:

@@ -124,6 +124,7 @@ def calibrate(
         )  # fmt: skip
     from flagdata.caches import user_cache
     from flagdata.lake import Lake
+    from flagdata.lake.results import placed
     from flagdata.outputs import check_file, write_file
     from measure.calibrate.artifact import artifact, keep
     from measure.calibrate.calibrate import Options
@@ -169,12 +170,16 @@ def calibrate(
         found = calibrated(
             observed, options, folder=(cache or user_cache() / "calibrate"), workers=workers, advance=advance
         )
-    wanted = None if lake is None or read_only else artifact(found, reading, parents).id
+    wanted = None
+    if lake is not None and not read_only:
+        wanted = placed(lake, artifact(found, reading, parents), branch=branch).artifact.id
     text = None if report is None else page(found, _provenance(found, wanted), sections=_sections(anemometer))
-    new = lake is not None and wanted is not None and keep(lake, found, reading, parents, branch=branch)
-    if wanted is not None:
-        say(f"{wanted[:12]}  measurement, {'committed' if new else 'there already'}")
+    place = None
+    if lake is not None and wanted is not None:
+        place = keep(lake, found, reading, parents, branch=branch)
+        say(f"{wanted[:12]}  measurement, {place.sentence}")
     if report is not None and text is not None:
+        new = place is not None and place.new
         with following(f"the calibration {wanted}", "writing its report") if new else nullcontext():
             write_file(report, text, command="calibrate")
             say(f"report: {report}")
@@ -233,8 +238,8 @@ def _anemometer(
     for finding in done.found.findings:
         if finding.severity is not Severity.NOTE:
             say(finding.what + (f"; {finding.fix}" if finding.fix else ""), mark=finding.severity.value)
-    if done.artifact is not None:
-        say(f"{done.artifact[:12]}  reading model, {'committed' if done.new else 'there already'}")
+    if done.place is not None:
+        say(f"{done.place.artifact.id[:12]}  reading model, {done.place.sentence}")
         say(f"for flagdata measure: --model {done.name}")
     return done
 

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from flagdata.findings import Finding, quality_flags
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, results
 from flagdata.lake.meshes import check_format, read_part, store_errors, write_plain
+from flagdata.lake.results import Placed
 from flagdata.provenance import array_hash, canonical, digest, file_hash
 from flagdata.schema import Kind
 from measure.closing.models import NamedModel, acting
@@ -35,11 +36,17 @@ _HEAD = "flagdata_measurement"
 
 @dataclass(frozen=True, kw_only=True)
 class Kept:
-    """The contents of a commit: ids of the measurement and of its models, and whether they were there already."""
+    """The contents of a commit.
+
+    Attributes:
+        measurement: id of the verdict.
+        models: ids of its models.
+        place: of the verdict among its versions.
+    """
 
     measurement: str
     models: tuple[str, ...]
-    existing: bool
+    place: Placed
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,22 +105,20 @@ def answer_of(
 
 
 def keep(lake: Lake, answer: Answer, *, branch: str = "main") -> Kept:
-    """Publish a verdict and its models in one commit; what is there already is not published again.
+    """Publish a verdict and its models in one commit where it is new, see `flagdata.lake.results`.
 
     Raises:
         FlagdataError: as `Lake.transaction`.
     """
-    measurement = _measurement(answer)
-    models = [_model(answer, model, measurement) for model in answer.models]
-    with lake.transaction(f"close loop: {answer.name}", branch=branch) as transaction:
-        if transaction.find(measurement.id) is not None:
-            return Kept(measurement=measurement.id, models=models_of(lake, measurement.id, branch), existing=True)
-        staged = transaction.staging(".zarr")
-        write(staged, answer.verdict, page=answer.page)
-        transaction.add(_measurement(answer, stored=transaction.put(staged)))
-        for model in models:
-            transaction.add(model)
-    return Kept(measurement=measurement.id, models=tuple(m.id for m in models), existing=False)
+    place = results.keep(
+        lake, _measurement(answer), lambda staged: write(staged, answer.verdict, page=answer.page),
+        f"close loop: {answer.name}", branch=branch,
+        left=lambda verdict: [_model(answer, model, verdict) for model in answer.models],
+    )  # fmt: skip
+    verdict = place.artifact
+    made = tuple(_model(answer, model, verdict).id for model in answer.models)
+    models = made if place.new else models_of(lake, verdict.id, branch)
+    return Kept(measurement=verdict.id, models=models, place=place)
 
 
 def models_of(lake: Lake, measurement: str, branch: str) -> tuple[str, ...]:
@@ -166,7 +171,7 @@ def fingerprint(experiment: Experiment) -> str:
     return array_hash(content, arrays)
 
 
-def _measurement(answer: Answer, stored: str | None = None) -> Artifact:
+def _measurement(answer: Answer) -> Artifact:
     verdict = answer.verdict
     fitted = {p.name: (p.after or p.before).value for p in verdict.parameters}
     fitted |= {f"{c.effect}.{c.parameter}": c.strength.value for c in answer.effects}
@@ -176,7 +181,7 @@ def _measurement(answer: Answer, stored: str | None = None) -> Artifact:
         "findings": [finding.as_dict() for finding in answer.findings],
     }  # fmt: skip
     return Artifact(
-        kind=Kind.MEASUREMENT, name=answer.name, object=stored, parents=answer.parents, recipe=dict(answer.recipe),
+        kind=Kind.MEASUREMENT, name=answer.name, parents=answer.parents, recipe=dict(answer.recipe),
         seed=answer.seed, parameters=canonical(fitted), quality=quality_flags(answer.findings),
         report=json.dumps(report, allow_nan=False, ensure_ascii=False),
     )  # fmt: skip
@@ -187,6 +192,6 @@ def _model(answer: Answer, model: NamedModel, measurement: Artifact) -> Artifact
     report = {"schema": "flagdata.model-report/1", "words": answer.verdict.words, "findings": []}
     return Artifact(
         kind=Kind.MODEL, name=model.name, parents=(measurement.id, *answer.parents), seed=answer.seed,
-        recipe={**answer.recipe, "effects": effects}, parameters=canonical(model.content),
+        recipe={**measurement.recipe, "effects": effects}, parameters=canonical(model.content),
         report=json.dumps(report, allow_nan=False, ensure_ascii=False),
     )  # fmt: skip

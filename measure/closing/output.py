@@ -80,12 +80,11 @@ def _written(answer: Answer, *, out: Path, lake: Lake | None, branch: str) -> di
         kept = None if lake is None else keep(lake, answer, branch=branch)
     if kept is not None:
         as_written["artifacts"] = {
-            "measurement": kept.measurement, "models": list(kept.models), "existing": kept.existing
+            "measurement": kept.measurement, "models": list(kept.models), "existing": not kept.place.new,
+            "version": kept.place.version,
         }  # fmt: skip
-    if kept is not None and kept.existing:
-        say(f"the lake has this measurement already: {kept.measurement}")
-    elif kept is not None:
-        say(f"measurement {kept.measurement}")
+        say(f"measurement {kept.measurement}, {kept.place.sentence}")
+    if kept is not None and kept.place.new:
         for model, identity in zip(answer.models, kept.models, strict=True):
             say(f"model {identity} {model.name}")
     say(f"wrote {', '.join(str(out / file) for file in FILES[: 2 + len(answer.models)])}")

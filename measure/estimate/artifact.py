@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from flagdata.findings import quality_flags
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, results
 from flagdata.lake.meshes import check_format, read_part, store_errors, write_plain
+from flagdata.lake.results import Placed
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
@@ -32,10 +33,8 @@ REFUSED = "refused-by-gate"
 """Quality flag of what was kept although the gate refused it."""
 
 
-def artifact(
-    measured: Measurement, subject: Subject, network: Network, reading: Reading, *, stored: str | None = None
-) -> Artifact:
-    """The row of a measurement."""
+def artifact(measured: Measurement, subject: Subject, network: Network, reading: Reading) -> Artifact:
+    """The row of a measurement, without its object."""
     parents = [] if subject.artifact is None else [subject.artifact.id]
     parents += [] if network.artifact is None else [network.artifact.id]
     start = subject.film.start
@@ -45,7 +44,7 @@ def artifact(
     wind = estimates.get(WIND)
     flags = quality_flags(measured.noticed(anyway=True))
     return Artifact(
-        kind=Kind.MEASUREMENT, name=measured.film, object=stored, parents=parents, seed=measured.options.seed,
+        kind=Kind.MEASUREMENT, name=measured.film, parents=parents, seed=measured.options.seed,
         source_hash=subject.content_hash(), source_name=None if subject.path is None else subject.path.name,
         recipe={
             "measure": _ANSWER, "network": network.identity, **measured.options.recipe(), **reading.recipe(),
@@ -70,8 +69,8 @@ def report(measured: Measurement) -> Mapping[str, Any]:
 def keep(
     lake: Lake, measured: Measurement, subject: Subject, network: Network, reading: Reading, series: Beside, *,
     branch: str, refinement: Mapping[str, Any] | None = None,
-) -> bool:  # fmt: skip
-    """Commit a measurement and return whether it is new; the same one again adds nothing.
+) -> Placed:  # fmt: skip
+    """Commit a measurement where it is new, see `flagdata.lake.results`.
 
     Args:
         refinement: what a refinement found, as JSON values.
@@ -79,14 +78,10 @@ def keep(
     Raises:
         FlagdataError: as `Lake.transaction`.
     """
-    wanted = artifact(measured, subject, network, reading)
-    with lake.transaction(f"measure {measured.film}", branch=branch) as transaction:
-        if transaction.find(wanted.id) is not None:
-            return False
-        staged = transaction.staging(".zarr")
-        write(staged, measured, series, refinement)
-        transaction.add(artifact(measured, subject, network, reading, stored=transaction.put(staged)))
-    return wanted.id in transaction.result.added
+    return results.keep(
+        lake, artifact(measured, subject, network, reading), lambda staged: write(staged, measured, series, refinement),
+        f"measure {measured.film}", branch=branch,
+    )  # fmt: skip
 
 
 def write(path: Path, measured: Measurement, series: Beside, refinement: Mapping[str, Any] | None = None) -> None:

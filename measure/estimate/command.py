@@ -106,7 +106,7 @@ def measure(
     SOURCE is a video file, a folder of images, a recording, clip or camera of --lake by its name or id, or the film
     that comes with the package, example:flag, whose truth is printed beside. A gate looks first: a film unlike
     those the network was trained on is refused with the reason, exit code 3, and nothing estimated is shown. With
-    --lake the measurement becomes an artifact; the same one again adds nothing.
+    --lake the measurement becomes an artifact; the same one by the same code again adds nothing.
 
     \b
       flagdata measure example:flag
@@ -204,6 +204,7 @@ class _Job:
 
     def do(self, subject: Subject) -> _Done:
         """Measure one film; commit and write what is to be shown."""
+        from flagdata.lake.results import placed
         from flagdata.outputs import fresh_folder, write_file
         from measure.estimate.artifact import artifact as artifact_of
         from measure.estimate.artifact import keep, write
@@ -225,15 +226,20 @@ class _Job:
             _warn(refinement.findings)
         found = None if refinement is None else refinement.as_dict()
         lake = self.lake if self.commit and shown else None
-        artifact = None if lake is None else artifact_of(measured, subject, self.network, self.reading).id
+        artifact = None
+        if lake is not None:
+            row = artifact_of(measured, subject, self.network, self.reading)
+            artifact = placed(lake, row, branch=self.branch).artifact.id
         text = None
         if self.report is not None:
             text = self._page(measured, series, subject, artifact, refinement)
-        published = lake is not None and keep(
-            lake, measured, subject, self.network, self.reading, series, branch=self.branch, refinement=found
-        )
-        if artifact is not None:
-            say(f"{artifact[:12]}  measurement, {'committed' if published else 'there already'}")
+        published = False
+        if lake is not None and artifact is not None:
+            place = keep(
+                lake, measured, subject, self.network, self.reading, series, branch=self.branch, refinement=found
+            )
+            published = place.new
+            say(f"{artifact[:12]}  measurement, {place.sentence}")
 
         def writing(what: str) -> AbstractContextManager[None]:
             return following(f"the measurement {artifact}", f"writing {what}") if published else nullcontext()

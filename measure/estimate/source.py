@@ -16,7 +16,7 @@ from flagdata.film import RecordFilm
 from flagdata.ingest.camera import CropBox, parse_crop
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.matching import matching
-from flagdata.lake.naming import COLUMNS, meant
+from flagdata.lake.naming import OF_RESULTS, meant
 from flagdata.provenance import digest, file_hash
 from flagdata.record import Record
 from flagdata.schema import Kind
@@ -238,8 +238,8 @@ def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
 
 
 def _models(lake: Lake, at: str | None) -> list[dict[str, Any]]:
-    """Networks and reading models of a lake: artifact and name."""
-    rows = lake.rows({"kind": (Kind.NETWORK, Kind.MEASUREMENT)}, at=at, columns=(*COLUMNS, "recipe")).to_pylist()
+    """Networks and reading models of a lake."""
+    rows = lake.rows({"kind": (Kind.NETWORK, Kind.MEASUREMENT)}, at=at, columns=OF_RESULTS).to_pylist()
     return [row for row in rows if row["kind"] == Kind.NETWORK or CALIBRATED in json.loads(row["recipe"] or "{}")]
 
 

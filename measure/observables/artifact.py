@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, Lake, results
+from flagdata.lake.results import Placed
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
@@ -17,8 +18,8 @@ VERSION = 5
 """Raised whenever the same film gives other readings."""
 
 
-def artifact(table: Table, subject: Subject, options: Mapping[str, Any], *, stored: str | None = None) -> Artifact:
-    """The row of a table.
+def artifact(table: Table, subject: Subject, options: Mapping[str, Any]) -> Artifact:
+    """The row of a table, without its object.
 
     Args:
         options: all that shapes the readings beside the film: JSON values.
@@ -29,7 +30,7 @@ def artifact(table: Table, subject: Subject, options: Mapping[str, Any], *, stor
         for at in (float(table.time[0]) - half, float(table.time[-1]) + half)
     )
     return Artifact(
-        kind=Kind.MEASUREMENT, name=f"{table.film} observables", object=stored,
+        kind=Kind.MEASUREMENT, name=f"{table.film} observables",
         parents=[] if subject.artifact is None else [subject.artifact.id], source_hash=subject.content_hash(),
         source_name=None if subject.path is None else subject.path.name, start=start, end=end,
         recipe={"observe": VERSION, "conditioned": CONDITIONED, **table.head(), **options},
@@ -37,17 +38,11 @@ def artifact(table: Table, subject: Subject, options: Mapping[str, Any], *, stor
     )  # fmt: skip
 
 
-def keep(lake: Lake, table: Table, subject: Subject, options: Mapping[str, Any], *, branch: str) -> tuple[str, bool]:
-    """Commit a table: the artifact's id, and whether it is new; the same one again adds nothing.
+def keep(lake: Lake, table: Table, subject: Subject, options: Mapping[str, Any], *, branch: str) -> Placed:
+    """Commit a table where it is new, see `flagdata.lake.results`.
 
     Raises:
         FlagdataError: as `Lake.transaction`.
     """
-    wanted = artifact(table, subject, options)
-    with lake.transaction(f"observe {table.film}", branch=branch) as transaction:
-        if transaction.find(wanted.id) is not None:
-            return wanted.id, False
-        staged = transaction.staging(".zarr")
-        table.write_zarr(staged)
-        transaction.add(artifact(table, subject, options, stored=transaction.put(staged)))
-    return wanted.id, wanted.id in transaction.result.added
+    row = artifact(table, subject, options)
+    return results.keep(lake, row, table.write_zarr, f"observe {table.film}", branch=branch)

@@ -93,8 +93,9 @@ def observe(
         )  # fmt: skip
     identity = None
     if lake is not None and not read_only:
-        identity, new = keep(lake, table, subject, {**reading.recipe(), "part": [first, last]}, branch=branch)
-        say(f"{identity[:12]}  measurement, {'committed' if new else 'there already'}")
+        place = keep(lake, table, subject, {**reading.recipe(), "part": [first, last]}, branch=branch)
+        identity = place.artifact.id
+        say(f"{identity[:12]}  measurement, {place.sentence}")
     if parquet_path is not None:
         write_file(parquet_path, table.parquet())
     if zarr_path is not None:

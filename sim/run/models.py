@@ -10,7 +10,7 @@ from pathlib import Path
 from flagdata.addresses import local_path
 from flagdata.errors import CorruptError, NotFoundError, UnknownNameError
 from flagdata.lake import Artifact, Lake
-from flagdata.lake.naming import COLUMNS, meant
+from flagdata.lake.naming import OF_RESULTS, meant
 from flagdata.schema import Kind
 from sim.run import reading
 from sim.run.recipe import Recipe
@@ -26,7 +26,7 @@ def load(source: str, lake: Lake, *, branch: str = "main") -> Recipe:
     """
     if local_path(source).suffix in (".toml", ".json") or source in reading.SCENES.names():
         return reading.load(source)
-    rows = lake.rows({"kind": Kind.MODEL}, at=branch, columns=COLUMNS).to_pylist()
+    rows = lake.rows({"kind": Kind.MODEL}, at=branch, columns=OF_RESULTS).to_pylist()
     found = [row["artifact"] for row in meant(rows, source)]
     if len(found) > 1:
         raise NotFoundError(f"{len(found)} models are meant by {source!r}", where=str(lake.path), fix=_one_of(found))

@@ -108,6 +108,27 @@ def test_the_file_hash_is_sha256(tmp_path: Path) -> None:
     assert provenance.file_hash(tmp_path / "abc") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
 
 
+def test_two_states_of_a_checkout_are_two_versions_of_the_code(tmp_path: Path) -> None:
+    def git(*arguments: str) -> str:
+        who = ("-c", "user.name=a", "-c", "user.email=a@b")
+        done = subprocess.run(["git", *who, *arguments], cwd=tmp_path, capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+
+    assert provenance.commit_of(tmp_path) is None
+    (tmp_path / "lift.py").write_text("0.5")
+    git("init", "-q")
+    git("add", ".")
+    git("commit", "-qm", "lift")
+    commit = git("rev-parse", "--short=7", "HEAD")
+    found = [provenance.commit_of(tmp_path)]
+    for text in ("0.6", "0.7"):
+        (tmp_path / "lift.py").write_text(text)
+        found.append(provenance.commit_of(tmp_path))
+    assert found[0] == commit
+    assert len(set(found)) == 3
+    assert all(str(one).startswith(f"{commit}-dirty.") for one in found[1:])
+
+
 def test_the_catalog_schema_carries_units() -> None:
     arrow = schema.catalog_schema()
     assert arrow.field("wind").metadata[b"unit"] == b"m/s"

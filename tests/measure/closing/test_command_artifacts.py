@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import sim.run.models
 from flagdata.cli import main
 from flagdata.errors import CorruptError, InputError
 from flagdata.lake import Artifact, Lake
@@ -128,10 +129,25 @@ def test_closing_the_same_loop_again_adds_nothing(lake: Lake, specimen: Specimen
     first = keep(lake, closed(experiment(specimen)))
     head = lake.resolve(None)
     again = keep(lake, closed(experiment(specimen, name="renamed")))
-    assert (first.existing, again.existing) == (False, True)
+    assert (first.place.new, again.place.new) == (True, False)
     assert again.measurement == first.measurement
     assert set(again.models) == set(first.models)
     assert lake.resolve(None) == head
+
+
+def test_newer_code_leaves_its_verdict_and_models_under_the_same_names(
+    lake: Lake, recorded: str, specimen: Specimen, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As after a mistake was mended, by which the first verdict found no effect."""
+    observed = experiment(specimen, source=recorded)
+    first = keep(lake, closed(observed, Conclusion.SUFFICIENT))
+    monkeypatch.setattr("flagdata.provenance.code_version", lambda: "0.1.0+mended")
+    second = keep(lake, closed(observed))
+    assert (second.place.version, second.measurement != first.measurement) == (2, True)
+    assert json.loads(str(lake.artifact("tracks").report))["conclusion"] == Conclusion.EFFECT.value
+    assert json.loads(str(lake.artifact(first.measurement).report))["conclusion"] == Conclusion.SUFFICIENT.value
+    assert sim.run.models.load("tracks-base", lake).model == second.models[0]
+    assert lake.artifact("tracks-lift").parents == (second.measurement, recorded)
 
 
 def test_the_identity_is_that_of_all_that_was_known(specimen: Specimen) -> None:

@@ -1,0 +1,110 @@
+"""Results that a program infers, in versions: what other code makes of the same inputs is another version of it.
+
+Data are the same whichever code wrote them, so that a repeated ingest or simulation adds nothing. A measurement or a
+verdict may have been wrong until the code was mended: docs/decisions/057-versions-of-a-result.md. The recipe of a later
+version states what it revises and the code that inferred it, which gives it an identity of its own; that of the first
+version states neither.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import pyarrow.compute as pc
+
+from flagdata.lake.artifact import Artifact
+from flagdata.lake.lake import Lake
+from flagdata.lake.refs import MAIN
+from flagdata.lake.revisions import REVISION, revised
+from flagdata.lake.store import Store
+from flagdata.schema import Kind
+
+_SHORT = 12  # characters of an id that a sentence names
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placed:
+    """A result among its versions.
+
+    Attributes:
+        artifact: its row; without its object where it was not on the branch.
+        others: versions that were on the branch, in the order of their commits; `artifact` itself where it was.
+        new: whether it was not there.
+    """
+
+    artifact: Artifact
+    others: tuple[Artifact, ...]
+    new: bool
+
+    @property
+    def version(self) -> int:
+        """Its number, from 1."""
+        return len(self.others) + 1 if self.new else [one.id for one in self.others].index(self.artifact.id) + 1
+
+    @property
+    def sentence(self) -> str:
+        """What became of it, as the end of a line that begins with its id and what it is."""
+        if self.new and not self.others:
+            return "committed"
+        newest = self.others[-1]
+        by = f"version {len(self.others)}, {newest.id[:_SHORT]}, is by code {newest.code_version}"
+        if self.new:
+            return f"committed as version {self.version} of {self.artifact.name!r}; {by}"
+        if newest.id == self.artifact.id:
+            return "there already"
+        return f"there already as version {self.version} of {self.artifact.name!r}; {by}"
+
+
+def versions(lake: Store, result: Artifact, *, at: str | None = None) -> tuple[Artifact, ...]:
+    """The versions of a measurement that a ref shows, in the order of their commits; none of another kind."""
+    if result.kind is not Kind.MEASUREMENT:
+        return ()
+    first = revised(result.recipe) or result.id
+    mentioned = pc.match_substring(pc.field("recipe"), first)  # type: ignore[attr-defined]
+    wanted = (pc.field("kind") == result.kind.value) & ((pc.field("artifact") == first) | mentioned)
+    rows = sorted(lake.meeting(lake.view(at), wanted).to_pylist(), key=lambda row: row["created"])
+    return tuple(one for one in map(Artifact.from_row, rows) if first in (one.id, revised(one.recipe)))
+
+
+def placed(lake: Store, result: Artifact, *, branch: str = MAIN) -> Placed:
+    """Where a result goes that this code inferred: it is there already if the same code's is, else it is new.
+
+    Args:
+        result: its row as a first version, without its object.
+    """
+    others = versions(lake, result, at=branch)
+    for one in others:
+        if one.code_version == result.code_version:
+            return Placed(artifact=one, others=others, new=False)
+    if others:
+        result = replace(result, recipe={**result.recipe, REVISION: {"of": result.id, "code": result.code_version}})
+    return Placed(artifact=result, others=others, new=True)
+
+
+def keep(
+    lake: Lake, result: Artifact, write: Callable[[Path], object], message: str, *, branch: str = MAIN,
+    left: Callable[[Artifact], Iterable[Artifact]] = lambda kept: (),
+) -> Placed:  # fmt: skip
+    """Commit a result where it is new (see `placed`), with what it left.
+
+    Args:
+        result: its row as a first version, without its object.
+        write: writes its object, a Zarr folder that is not there yet.
+        left: rows made from it, by its row as it is kept.
+
+    Raises:
+        FlagdataError: as `Lake.transaction`.
+    """
+    with lake.transaction(message, branch=branch) as transaction:
+        found = placed(lake, result, branch=branch)
+        if found.new:
+            staged = transaction.staging(".zarr")
+            write(staged)
+            transaction.add(replace(found.artifact, object=transaction.put(staged)))
+            for one in left(found.artifact):
+                transaction.add(one)
+    if found.new and found.artifact.id not in transaction.result.added:  # another process was faster
+        return placed(lake, result, branch=branch)
+    return found
