@@ -1,4 +1,4 @@
-"""A tally of what a decoder could not give, and its findings."""
+"""Findings of frames that a source could not give, and the tally of a film's decoder."""
 
 from __future__ import annotations
 
@@ -59,14 +59,7 @@ class Damage:
                     count=self.suspect,
                 )
             )  # fmt: skip
-        if self.resized:
-            found.append(
-                Finding(
-                    kind="size-changed", severity=Severity.ERROR,
-                    what=f"{self.resized} frames have another size than the first and were left out",
-                    count=self.resized, fix="cut the file where its size changes and ingest the parts",
-                )
-            )  # fmt: skip
+        found += resized(self.resized)
         missing = expected - self.packets - self.shown
         if missing > 0:
             found.append(
@@ -76,3 +69,34 @@ class Damage:
                 )
             )  # fmt: skip
         return found
+
+
+def undecoded(count: int, *, total: int, first: str | None = None) -> list[Finding]:
+    """Finding of frames whose bytes a source could not decode, empty where `count` is 0.
+
+    Args:
+        count: how many of the source's `total` frames.
+        first: the first of them, where it has a name.
+    """
+    if not count:
+        return []
+    return [
+        Finding(
+            kind="corrupt-frames", severity=Severity.ERROR, count=count, where=first,
+            what=f"{count} of {total} frames cannot be decoded and were left out",
+            fix="copy the recording from the camera again",
+        )
+    ]  # fmt: skip
+
+
+def resized(count: int) -> list[Finding]:
+    """Finding of frames of another size than the first, empty where `count` is 0."""
+    if not count:
+        return []
+    return [
+        Finding(
+            kind="size-changed", severity=Severity.ERROR, count=count,
+            what=f"{count} frames have another size than the first and were left out",
+            fix="ingest the frames of each size as a recording of their own",
+        )
+    ]  # fmt: skip

@@ -32,6 +32,7 @@ from flagdata.errors import CorruptError, InputError, LimitError, NotFoundError,
 from flagdata.files import LEROBOT_INFO
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.container import open_container
+from flagdata.ingest.camera.damage import undecoded
 from flagdata.ingest.camera.geometry import Orientation
 from flagdata.ingest.camera.luma import BROKEN, STILLS, luma_of_frame, luma_of_image
 from flagdata.ingest.camera.options import CameraOptions
@@ -155,10 +156,7 @@ class EpisodeSource:
                 yield pictures
 
     def damage(self) -> list[Finding]:
-        if not self._broken:
-            return []
-        what = f"{self._broken} of {len(self._stamps)} frames cannot be decoded and were left out"
-        return [Finding(kind="corrupt-frames", severity=Severity.ERROR, count=self._broken, what=what)]
+        return undecoded(self._broken, total=len(self._stamps))
 
     def close(self) -> None:
         """Files are open only while pictures are read."""

@@ -14,6 +14,7 @@ from PIL import Image
 
 from flagdata.errors import InputError, LimitError, TimeError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.damage import resized, undecoded
 from flagdata.ingest.camera.geometry import Orientation
 from flagdata.ingest.camera.luma import BROKEN, luma_of_image
 from flagdata.ingest.camera.options import CameraOptions, Limits, exact
@@ -151,24 +152,8 @@ class SequenceSource:
                 yield pictures
 
     def damage(self) -> list[Finding]:
-        found = []
-        if self._broken:
-            found.append(
-                Finding(
-                    kind="corrupt-frames", severity=Severity.ERROR,
-                    what=f"{len(self._broken)} images cannot be read and were left out", where=self._broken[0],
-                    count=len(self._broken),
-                )
-            )  # fmt: skip
-        if self._resized:
-            found.append(
-                Finding(
-                    kind="size-changed", severity=Severity.ERROR,
-                    what=f"{self._resized} images have another size than the first and were left out",
-                    count=self._resized,
-                )
-            )  # fmt: skip
-        return found
+        first = self._broken[0] if self._broken else None
+        return undecoded(len(self._broken), total=len(self._paths), first=first) + resized(self._resized)
 
     def close(self) -> None:
         """Nothing stays open between images."""

@@ -22,6 +22,7 @@ from PIL import Image
 
 from flagdata.errors import InputError, LimitError, TimeError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.damage import resized, undecoded
 from flagdata.ingest.camera.geometry import Orientation
 from flagdata.ingest.camera.luma import BROKEN, STILLS, Luma, luma_of_frame, luma_of_image
 from flagdata.ingest.camera.options import CameraOptions
@@ -117,22 +118,7 @@ class TopicSource:
                 yield pictures
 
     def damage(self) -> list[Finding]:
-        found = []
-        if self._broken:
-            found.append(
-                Finding(
-                    kind="corrupt-frames", severity=Severity.ERROR, count=self._broken,
-                    what=f"{self._broken} of {len(self._log_times)} pictures cannot be decoded and were left out",
-                )
-            )  # fmt: skip
-        if self._resized:
-            found.append(
-                Finding(
-                    kind="size-changed", severity=Severity.ERROR, count=self._resized,
-                    what=f"{self._resized} pictures have another size than the first and were left out",
-                )
-            )  # fmt: skip
-        return found
+        return undecoded(self._broken, total=len(self._log_times)) + resized(self._resized)
 
     def close(self) -> None:
         """The file is open only while pictures are read."""

@@ -95,6 +95,7 @@ def test_an_unreadable_image_in_the_middle_is_left_out_and_counted(
     _, frames, found = read(folder, replace(options, sequence_fps=25.0))
     assert [number_of(f.image) for f in frames] == [0, 1, 2, 5]
     assert (found["corrupt-frames"].count, found["corrupt-frames"].where) == (1, "3.png")
+    assert found["corrupt-frames"].what == "1 of 6 frames cannot be decoded and were left out"
     assert found["size-changed"].count == 1
 
 

@@ -106,7 +106,9 @@ def test_pictures_that_cannot_be_decoded_are_counted_and_left_out(write_json: Ca
     with open_camera(path, options()) as stream:
         times = [frame.time for frame in stream]
     assert times == [NOON, NOON + 200_000_000, NOON + 300_000_000]
-    assert [finding.count for finding in stream.findings if finding.kind == "corrupt-frames"] == [1]
+    assert [finding.what for finding in stream.findings if finding.kind == "corrupt-frames"] == [
+        "1 of 4 frames cannot be decoded and were left out"
+    ]
 
 
 @pytest.mark.parametrize(
