@@ -19,6 +19,7 @@ from flagdata.console import LakePlace, LocalPath, document, following, json_opt
 from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.storage import Place
+from measure.film_options import film_options
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -40,13 +41,7 @@ if TYPE_CHECKING:
               "fabric that films of the lake declare; nothing else of it is used.")  # fmt: skip
 @click.option("--windows", "--window", "step", type=DURATION, metavar="TIME",
               help="A wind series, one window every so often, as in 1.2s.")  # fmt: skip
-@click.option("--crop", metavar="X,Y,W,H", help="Region in which the flag is [px]; by default the whole picture.")
-@click.option("--flag", type=click.IntRange(min=1), metavar="N",
-              help="Which moving cloth, as numbered on the page; by default the one that moves most.")  # fmt: skip
-@click.option("--start", "first", type=DURATION, metavar="TIME", help="Where to begin in the film, as in 12s.")
-@click.option("--end", "last", type=DURATION, metavar="TIME", help="Where to end.")
-@click.option("--true-fps", type=float, metavar="HZ", help="Rate at which a high-speed camera really ran.")
-@click.option("--sequence-fps", type=float, metavar="HZ", help="Rate of a folder of images.")
+@film_options
 @click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.9, show_default=True,
               help="Level of the intervals.")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of all draws.")

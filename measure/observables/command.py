@@ -11,6 +11,7 @@ from flagdata.commands.sections import LongCommand
 from flagdata.console import LakePlace, LocalPath, document, json_option, progress, say
 from flagdata.errors import RefusedError, UsageError
 from flagdata.storage import Place
+from measure.film_options import film_options
 
 
 @click.command(cls=LongCommand)
@@ -18,13 +19,7 @@ from flagdata.storage import Place
 @click.option("--flag-size", metavar="LxH", required=True, help="Length along the wind and height along the pole [m], "
               "as in 1.5x1.0; the height gives the scale.")  # fmt: skip
 @click.option("--window", "seconds", type=DURATION, default="2.5s", show_default=True, help="Length of a window.")
-@click.option("--crop", metavar="X,Y,W,H", help="Region in which the flag is [px]; by default the whole picture.")
-@click.option("--flag", type=click.IntRange(min=1), metavar="N",
-              help="Which moving cloth; by default the one that moves most.")  # fmt: skip
-@click.option("--start", "first", type=DURATION, metavar="TIME", help="Where to begin in the film, as in 12s.")
-@click.option("--end", "last", type=DURATION, metavar="TIME", help="Where to end.")
-@click.option("--true-fps", type=float, metavar="HZ", help="Rate at which a high-speed camera really ran.")
-@click.option("--sequence-fps", type=float, metavar="HZ", help="Rate of a folder of images.")
+@film_options
 @click.option("--parquet", "parquet_path", type=LocalPath(), metavar="FILE.parquet", help="Write the table as Parquet.")
 @click.option("--zarr", "zarr_path", type=LocalPath(), metavar="FOLDER", help="Write the table as a Zarr data set.")
 @click.option("--picture", "picture_path", type=LocalPath(), metavar="FILE.png", help="Draw each observable against "
