@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from docs.generate_cli import commands
+from docs.generate_refusal_pictures import FAULTS, FOLDER, MOST_BYTES, caption, found, looked_at
 from measure.gate.reasons import REASONS
 from tests.contract.imports import ROOT, modules, tree
 from tests.docs.pages import DOCS
@@ -54,11 +55,31 @@ def fixes(*places: str) -> Iterator[str]:
 
 def test_every_reason_of_the_gate_is_on_the_page_and_no_other() -> None:
     page = (DOCS / "refusals.md").read_text(encoding="utf-8")
-    shown = re.findall(r"^\| `([a-z-]+)` \|", page, flags=re.MULTILINE)
+    shown = re.findall(r"^### `([a-z-]+)`$", page, flags=re.MULTILINE)
     assert shown[: len(REASONS)] == list(REASONS)
-    assert set(shown) - set(VERBS) == {*REASONS, *WINDOWS, *CALIBRATED}
+    assert set(shown) == {*REASONS, *WINDOWS, *CALIBRATED}
     for kind in CALIBRATED:
         assert f'"{kind}"' in (ROOT / "measure" / "anemometer" / "novelty.py").read_text(encoding="utf-8"), kind
+
+
+def test_every_reason_but_a_short_film_has_a_picture_and_all_are_small() -> None:
+    page = (DOCS / "refusals.md").read_text(encoding="utf-8")
+    assert set(FAULTS) == set(REASONS) - {"too-few-frames"}
+    assert {path.stem for path in FOLDER.iterdir()} == set(FAULTS)
+    assert sum(path.stat().st_size for path in FOLDER.iterdir()) < MOST_BYTES
+    for reason in FAULTS:
+        assert re.search(
+            rf"^### `{reason}`\n\n!\[[^]]+\]\(pictures/refusals/{reason}\.webp\)", page, flags=re.MULTILINE
+        )
+
+
+@pytest.mark.parametrize("reason", FAULTS)
+def test_the_film_of_a_picture_is_refused_for_that_reason_as_the_page_says(reason: str) -> None:
+    kind, sentence = found(looked_at(reason))
+    assert kind.removesuffix("-found") == reason
+    shown = caption(reason).search((DOCS / "refusals.md").read_text(encoding="utf-8"))
+    assert shown is not None
+    assert shown[2] == sentence
 
 
 def test_what_a_reason_advises_can_be_done() -> None:
