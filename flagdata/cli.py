@@ -28,8 +28,8 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
         "recover": ("flagdata.commands.upkeep:recover", "Salvage a record that was cut off."),
     }),
     "look": ("what a lake holds", {
-        "ls": ("flagdata.commands.lake:ls", "List artifacts."),
-        "show": ("flagdata.commands.lake:show", "Show one artifact, its parents and its report."),
+        "ls": ("flagdata.commands.artifacts:ls", "List artifacts."),
+        "show": ("flagdata.commands.artifacts:show", "Show one artifact, its parents and its report."),
         "lineage": ("flagdata.commands.looking:lineage", "Show what an artifact was made from, and what from it."),
         "view": (
             "flagdata.commands.looking:view",

@@ -1,8 +1,27 @@
-"""Names from files as text that can be shown: they must move no cursor, and turn no line of text round."""
+"""Text for people: counts, sizes, and names from files, which must move no cursor and turn no line of text round."""
 
 from __future__ import annotations
+
+SHORT = 12
+"""Characters of an id that people are shown; look-ups take any unique beginning."""
 
 
 def printable(text: str) -> str:
     """The text in one line; control characters, marks of direction and bytes that are not UTF-8 are escaped."""
     return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
+
+
+def counted(count: int, noun: str) -> str:
+    """ "1 object", "2 objects": for nouns that take an s."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def size_text(size: float | None) -> str:
+    """Bytes for people: "12.3 MB", decimal units."""
+    if size is None:
+        return ""
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000:
+            return f"{size:.0f} {unit}" if unit == "B" else f"{size:.1f} {unit}"
+        size /= 1000
+    return f"{size:.1f} TB"

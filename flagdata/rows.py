@@ -9,9 +9,9 @@ import numpy as np
 import pyarrow as pa
 
 from flagdata.html import grid
+from flagdata.printable import SHORT
 
 _SHOWN = 10
-_SHORT = 12  # characters of an identity
 
 
 class Rows:
@@ -72,4 +72,4 @@ class Rows:
 
 def _text(value: Any) -> str:
     text = f"{value:.6g}" if isinstance(value, float) else "" if value is None else str(value)
-    return text if len(text) <= 2 * _SHORT else f"{text[:_SHORT]}…"
+    return text if len(text) <= 2 * SHORT else f"{text[:SHORT]}…"

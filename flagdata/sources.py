@@ -10,6 +10,7 @@ from flagdata.examples import example_of
 from flagdata.film import CameraFilm, RecordFilm
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.naming import COLUMNS, meant
+from flagdata.printable import SHORT
 from flagdata.schema import Kind
 
 FILMED = (Kind.RECORDING, Kind.CLIP, Kind.CAMERA)
@@ -73,7 +74,7 @@ def named(
     if not found:
         raise UnknownNameError.of(noun, source, {row["name"] for row in rows})
     if len(found) > 1:
-        several = ", ".join(f"{row['kind']} {row['artifact'][:12]}" for row in found[:4])
+        several = ", ".join(f"{row['kind']} {row['artifact'][:SHORT]}" for row in found[:4])
         what = f"{source!r} names {len(found)} of the lake: {several}"
         raise UsageError(what, where="SOURCE", fix="give the id of one")
     return lake.artifact(found[0]["artifact"], at=at)

@@ -21,6 +21,7 @@ from measure.demo.command import MINUTES, SCHEMA, Story
 from measure.demo.recording import RecordingRecipe
 from measure.estimate.command import measure
 from tests.docs.pages import Shell
+from tests.pools import Here
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -44,6 +45,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         small = partial(RecordingRecipe, rate=25, columns=10, step=4e-3, width=240, rows=180, samples=1)
         patch.setattr("measure.demo.story.RecordingRecipe", small)
+        patch.setattr("measure.camera.ProcessPoolExecutor", Here)
         Shell(patch=patch).run(f"flagdata demo --out {out}")
     return out
 

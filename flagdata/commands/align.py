@@ -12,6 +12,7 @@ import click
 from flagdata.commands.durations import DURATION
 from flagdata.commands.sections import LongCommand
 from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
+from flagdata.printable import SHORT
 from flagdata.timebase import NANOSECONDS
 
 if TYPE_CHECKING:
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from flagdata.lake import Lake
 
 F = TypeVar("F", bound=Callable[..., Any])
-_SHORT = 12  # characters of an identity
 
 
 def _clock_options(command: F) -> F:
@@ -149,7 +149,7 @@ def realign(
         dry_run=dry_run, plot=plot, as_json=as_json,
     )  # fmt: skip
     if not dry_run:
-        say(f"the recording {old.id[:_SHORT]} it supersedes is still on {branch}; flagdata withdraw takes it off")
+        say(f"the recording {old.id[:SHORT]} it supersedes is still on {branch}; flagdata withdraw takes it off")
 
 
 def _check_plot(plot: Path | None, options: ClockOptions) -> None:

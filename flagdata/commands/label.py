@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import click
 
-from flagdata.commands.lake import counted
 from flagdata.console import document, json_option, lake_option
 from flagdata.errors import UsageError
+from flagdata.printable import counted
 
 
 @click.command()

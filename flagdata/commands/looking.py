@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.commands.lake import size_text
 from flagdata.commands.upkeep import grace_option
 from flagdata.console import LocalPath, at_option, document, json_option, lake_option, say, table
 from flagdata.errors import UsageError
-from flagdata.printable import printable
+from flagdata.printable import SHORT, printable, size_text
 
 if TYPE_CHECKING:
     from flagdata.lake.ancestry import Ancestry, Line, Relative
@@ -86,7 +85,7 @@ def _tree_line(line: Line, *, details: bool) -> str:
 
 
 def _relative(relative: Relative, *, details: bool) -> str:
-    from flagdata.pages.lineage import SHORT, detail_lines
+    from flagdata.pages.lineage import detail_lines
 
     if relative.kind is None:
         return f"{relative.artifact[:SHORT]} not at this version"

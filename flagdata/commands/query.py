@@ -15,6 +15,7 @@ import click
 
 from flagdata.console import LocalPath, at_option, document, json_option, lake_option, say, table
 from flagdata.errors import UsageError
+from flagdata.printable import SHORT
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 PEOPLE_LIMIT = 20
 _TIME_LIMIT = 60.0  # s; that of `flagdata.selection`, which is not imported for --help
-_SHORT = 12  # characters of an identity; look-ups take unique prefixes
 
 # What people see without --columns, by the one kind that was selected.
 VIEWS: dict[str | None, tuple[str, ...]] = {
@@ -243,7 +243,7 @@ def _cell(value: Any, *, short: bool) -> str | None:
     if isinstance(value, list):
         return ",".join(str(item) for item in value)
     if short and isinstance(value, str) and len(value) == 32 and not value.strip("0123456789abcdef"):
-        return value[:_SHORT]
+        return value[:SHORT]
     return None if value is None else str(value)
 
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.commands.lake import counted, size_text
 from flagdata.console import document, json_option, lake_option, progress, say
+from flagdata.printable import counted, size_text
 
 if TYPE_CHECKING:
     from flagdata.lake.transfer import Transfer

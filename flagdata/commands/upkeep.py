@@ -11,11 +11,11 @@ from pathlib import Path
 import click
 
 from flagdata.addresses import local_path
-from flagdata.commands.lake import counted, size_text
 from flagdata.console import LocalPath, document, json_option, lake_option, progress, say, table
 from flagdata.errors import UsageError
 from flagdata.files import check_input
 from flagdata.findings import Finding, Severity
+from flagdata.printable import counted, size_text
 from flagdata.timebase import iso
 
 _GATE_NOT_MET = 3

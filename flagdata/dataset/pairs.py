@@ -17,6 +17,7 @@ from flagdata.dataset.sample import Sample
 from flagdata.dataset.table import PairTable
 from flagdata.dataset.tolerance import Refusal
 from flagdata.html import table
+from flagdata.printable import SHORT
 from flagdata.record import Record
 from flagdata.storage import Place
 from flagdata.timebase import NANOSECONDS
@@ -131,7 +132,7 @@ class Pairs(Batchable):
         return f"Pairs({len(self)} pairs at {at}, {len(self.refused)} refused, fingerprint {self.fingerprint[:12]})"
 
     def _repr_html_(self) -> str:
-        refused = {f"refused {one.artifact[:12]}": "; ".join(one.reasons) for one in self.refused[:_SHOWN]}
+        refused = {f"refused {one.artifact[:SHORT]}": "; ".join(one.reasons) for one in self.refused[:_SHOWN]}
         wind = self.table.wind
         rows = {"version": self.at or "the head of main", "wind": f"{wind.min():.2f} to {wind.max():.2f} m/s"}
         return table(f"{len(self)} pairs, {len(self.refused)} refused", rows | refused)

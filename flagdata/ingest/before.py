@@ -16,14 +16,13 @@ import numpy as np
 from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
 from flagdata.lake import Artifact, Lake
+from flagdata.printable import SHORT
 from flagdata.record import Record
 from flagdata.schema import Kind
 from flagdata.signals import WindSeries
 
 _CHOOSES = ("wind", "talker")
 """Options that choose one of several anemometers of a file: another choice is another log, no other reading of it."""
-_ID = 12
-"""Letters of an artifact's identity that messages name."""
 
 
 def other_readings(others: Sequence[Artifact], source_hash: str, recipe: Mapping[str, Any]) -> tuple[Finding, ...]:
@@ -43,14 +42,14 @@ def other_readings(others: Sequence[Artifact], source_hash: str, recipe: Mapping
         names = sorted(name for name in before.keys() | now.keys() if before.get(name) != now.get(name))
         changed = ", ".join(f"{name} {before.get(name)!s}, now {now.get(name)!s}" for name in names)
         if changed:
-            what = f"the same file is in the lake by other options as {artifact.id[:_ID]} ({changed}); both stay"
+            what = f"the same file is in the lake by other options as {artifact.id[:SHORT]} ({changed}); both stay"
         elif artifact.recipe.get("plan") != recipe.get("plan"):
             mean = json.loads(artifact.report or "{}").get("mean_speed")
             said = "" if mean is None else f", mean speed {mean:.4g} m/s"
-            what = f"the same file was understood otherwise before, as {artifact.id[:_ID]}{said}; both stay"
+            what = f"the same file was understood otherwise before, as {artifact.id[:SHORT]}{said}; both stay"
         else:
             continue
-        fix = f"if that one is wrong, take it off: flagdata withdraw {artifact.id[:_ID]}"
+        fix = f"if that one is wrong, take it off: flagdata withdraw {artifact.id[:SHORT]}"
         found.append(Finding(kind="ingested-before", severity=Severity.NOTE, what=what, fix=fix))
     return tuple(found)
 

@@ -30,12 +30,12 @@ from flagdata.ingest.report import REPORT_SCHEMA
 from flagdata.ingest.source import Source
 from flagdata.ingest.store import IngestResult, Labels, find_same, result_of
 from flagdata.lake import Artifact, Lake
+from flagdata.printable import SHORT
 from flagdata.record import Record
 from flagdata.record.metadata import CLOCK, PROVENANCE
 from flagdata.schema import CATALOG, TOPIC_IMAGE, TOPIC_WIND, Kind
 from flagdata.timebase import NANOSECONDS, iso
 
-_SHORT = 12
 _AT_ONCE = 64
 _OF_A_SAMPLE = (
     "name", "seed", "session", "dataset", "side", "day", "rate", "clock_method", "clock_offset", "clock_drift",
@@ -147,7 +147,7 @@ def _of_sample(record: Record, row: Mapping[str, Any] | None, source: Source) ->
         kind=Kind.RECORDING, source_hash=source.hash, source_name=source.name, parameters=parameters,
         recipe={"ingest": "record", "artifact": original, **window}, start=int(times[0]), end=int(times[-1]),
         frame_count=len(times), clock_model=_clock(record)[0],
-        **{**known, "session": known["session"] or f"recording {str(recording)[:_SHORT]}"},
+        **{**known, "session": known["session"] or f"recording {str(recording)[:SHORT]}"},
     )  # fmt: skip
 
 
@@ -194,7 +194,7 @@ def _clock(record: Record) -> tuple[str | None, int]:
 def _alone(artifact: Artifact, source: Source) -> Artifact:
     """A recording without its parents: its recipe names what it was, its session holds together what came of one."""
     recipe = {"ingest": "record", "artifact": artifact.id, **artifact.recipe}
-    session = artifact.session or f"camera {artifact.parents[0][:_SHORT]}"
+    session = artifact.session or f"camera {artifact.parents[0][:SHORT]}"
     return replace(
         artifact, parents=(), recipe=recipe, session=session, source_hash=source.hash, source_name=source.name
     )
@@ -203,7 +203,7 @@ def _alone(artifact: Artifact, source: Source) -> Artifact:
 def _without(absent: list[str]) -> Finding:
     return Finding(
         kind="parents-absent", severity=Severity.NOTE, count=len(absent),
-        what=f"what it was made from is not on the branch ({', '.join(one[:_SHORT] for one in absent)}): it came in as "
+        what=f"what it was made from is not on the branch ({', '.join(one[:SHORT] for one in absent)}): it came in as "
         "a recording without parents",
         fix="to restore it whole, export and ingest the camera and the wind first, then withdraw this one",
     )  # fmt: skip

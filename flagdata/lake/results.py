@@ -19,9 +19,8 @@ from flagdata.lake.lake import Lake
 from flagdata.lake.refs import MAIN
 from flagdata.lake.revisions import REVISION, revised
 from flagdata.lake.store import Store
+from flagdata.printable import SHORT
 from flagdata.schema import Kind
-
-_SHORT = 12  # characters of an id that a sentence names
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +48,7 @@ class Placed:
         if self.new and not self.others:
             return "committed"
         newest = self.others[-1]
-        by = f"version {len(self.others)}, {newest.id[:_SHORT]}, is by code {newest.code_version}"
+        by = f"version {len(self.others)}, {newest.id[:SHORT]}, is by code {newest.code_version}"
         if self.new:
             return f"committed as version {self.version} of {self.artifact.name!r}; {by}"
         if newest.id == self.artifact.id:

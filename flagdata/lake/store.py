@@ -21,6 +21,7 @@ from flagdata.lake.refs import Refs, Slice, View
 from flagdata.lake.remote_objects import RemoteObjects
 from flagdata.lake.rowfiles import ROW_ORDER, Scan, in_order
 from flagdata.lake.tabled import folded, with_labels
+from flagdata.printable import SHORT
 from flagdata.schema import CATALOG, Kind
 from flagdata.storage import Place, RemotePath
 
@@ -120,7 +121,7 @@ class Store:
             close = difflib.get_close_matches(artifact, filter(None, names[:_NAMES]), n=1)
             suggestion = f"did you mean {close[0]!r}? {listed}" if close else listed
             raise NotFoundError(f"no artifact {artifact!r}", where=where, fix=suggestion)
-        several = ", ".join(f"{row['kind']} {row['artifact'][:12]}" for row in found[:4])
+        several = ", ".join(f"{row['kind']} {row['artifact'][:SHORT]}" for row in found[:4])
         what = f"{artifact!r} may mean {len(found)} artifacts: {several}{', …' if len(found) > 4 else ''}"
         raise NotFoundError(what, where=where, fix=f"give the id of one: {listed}")
 

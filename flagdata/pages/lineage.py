@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 from flagdata.lake.ancestry import Ancestry, Relative, grouped
 from flagdata.pages.graph import Box, svg
+from flagdata.printable import SHORT
 
-SHORT = 12  # characters of an id that are shown; look-ups take any unique beginning
 MOST = 8
 """More relatives of a kind in one generation are one box."""
 

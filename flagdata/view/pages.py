@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from markupsafe import Markup
 
-from flagdata.commands.lake import said, size_text
+from flagdata.commands.artifacts import said
 from flagdata.commands.query import plain
 from flagdata.documents import column_json
 from flagdata.errors import FlagdataError, NotFoundError, UnknownNameError, UsageError
@@ -25,9 +25,9 @@ from flagdata.lake.refs import MAIN, View
 from flagdata.lake.results import versions
 from flagdata.lake.tabled import labels_of
 from flagdata.pages.graph import COLOURS
-from flagdata.pages.lineage import SHORT, picture
+from flagdata.pages.lineage import picture
 from flagdata.pages.render import render, text_of
-from flagdata.printable import printable
+from flagdata.printable import SHORT, printable, size_text
 from flagdata.schema import Kind
 from flagdata.selection import COLUMNS, Request, Selection
 from flagdata.timebase import iso

@@ -16,6 +16,7 @@ from flagdata.commands.statements import STATED
 from flagdata.console import LakePlace, LocalPath, document, following, json_option, progress, say
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.findings import Severity
+from flagdata.printable import SHORT
 from flagdata.stated import Stated
 from flagdata.storage import Place
 
@@ -177,7 +178,7 @@ def calibrate(
     place = None
     if lake is not None and wanted is not None:
         place = keep(lake, found, reading, parents, branch=branch)
-        say(f"{wanted[:12]}  measurement, {place.sentence}")
+        say(f"{wanted[:SHORT]}  measurement, {place.sentence}")
     if report is not None and text is not None:
         new = place is not None and place.new
         with following(f"the calibration {wanted}", "writing its report") if new else nullcontext():
@@ -239,7 +240,7 @@ def _anemometer(
         if finding.severity is not Severity.NOTE:
             say(finding.what + (f"; {finding.fix}" if finding.fix else ""), mark=finding.severity.value)
     if done.place is not None:
-        say(f"{done.place.artifact.id[:12]}  reading model, {done.place.sentence}")
+        say(f"{done.place.artifact.id[:SHORT]}  reading model, {done.place.sentence}")
         say(f"for flagdata measure: --model {done.name}")
     return done
 

@@ -18,6 +18,7 @@ from flagdata.commands.statements import STATED
 from flagdata.console import LakePlace, LocalPath, document, following, json_option, progress, say
 from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
+from flagdata.printable import SHORT
 from flagdata.storage import Place
 from measure.film_options import film_options
 
@@ -234,7 +235,7 @@ class _Job:
                 lake, measured, subject, self.network, self.reading, series, branch=self.branch, refinement=found
             )
             published = place.new
-            say(f"{artifact[:12]}  measurement, {place.sentence}")
+            say(f"{artifact[:SHORT]}  measurement, {place.sentence}")
 
         def writing(what: str) -> AbstractContextManager[None]:
             return following(f"the measurement {artifact}", f"writing {what}") if published else nullcontext()
@@ -322,7 +323,7 @@ def _several(job: _Job, found: Sequence[Subject], *, as_json: bool) -> None:
         document("measurements", {"measurements": [one.as_dict(anyway=job.anyway) for one in done]})
     else:
         for one in done:
-            source = one.subject.artifact.id[:12] if one.subject.artifact is not None else one.measured.film
+            source = one.subject.artifact.id[:SHORT] if one.subject.artifact is not None else one.measured.film
             answer = one.measured.sentence if one in shown else f"refused: {one.measured.verdict.sentence}"
             click.echo(f"{source}  {answer}")
     if not shown:

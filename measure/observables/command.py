@@ -10,6 +10,7 @@ from flagdata.commands.durations import DURATION
 from flagdata.commands.sections import LongCommand
 from flagdata.console import LakePlace, LocalPath, document, json_option, progress, say
 from flagdata.errors import RefusedError, UsageError
+from flagdata.printable import SHORT
 from flagdata.storage import Place
 from measure.film_options import film_options
 
@@ -90,7 +91,7 @@ def observe(
     if lake is not None and not read_only:
         place = keep(lake, table, subject, {**reading.recipe(), "part": [first, last]}, branch=branch)
         identity = place.artifact.id
-        say(f"{identity[:12]}  measurement, {place.sentence}")
+        say(f"{identity[:SHORT]}  measurement, {place.sentence}")
     if parquet_path is not None:
         write_file(parquet_path, table.parquet())
     if zarr_path is not None:

@@ -11,6 +11,7 @@ from flagdata.addresses import local_path
 from flagdata.errors import CorruptError, NotFoundError, UnknownNameError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.naming import OF_RESULTS, meant
+from flagdata.printable import SHORT
 from flagdata.schema import Kind
 from sim.run import reading
 from sim.run.recipe import Recipe
@@ -51,4 +52,4 @@ def of_artifact(artifact: Artifact) -> Recipe:
 
 
 def _one_of(found: Iterable[str]) -> str:
-    return f"give one's id: {', '.join(identity[:12] for identity in found)}"
+    return f"give one's id: {', '.join(identity[:SHORT] for identity in found)}"

@@ -96,7 +96,7 @@ print(json.dumps(found))
 """
 _WHOLE = {
     "ls": """
-from flagdata.commands.lake import ls
+from flagdata.commands.artifacts import ls
 lap()
 with redirect_stdout(StringIO()):
     ls.main(["--lake", sys.argv[1]], standalone_mode=False)""",

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +16,7 @@ from measure.calibrate.wind import Log
 from sim.integrate.implicit import BackwardEuler
 from sim.integrate.symplectic import Symplectic
 from sim.material import named
+from tests.pools import Here
 
 _LOG = Log(times=np.arange(-10.0, 20.0), speed=np.full(30, 5.0), distance=0.0)
 
@@ -98,7 +97,7 @@ def test_kept_simulations_are_not_made_anew(tmp_path: Path, monkeypatch: pytest.
         return batch.values["area_weight"][:, None, None, None] * np.ones((1, 1, 2, len(OBSERVED)))
 
     monkeypatch.setattr(Batch, "read", read)
-    monkeypatch.setattr("measure.calibrate.design.ProcessPoolExecutor", _Here)
+    monkeypatch.setattr("measure.calibrate.design.ProcessPoolExecutor", Here)
     design = Design(flag=Flag(length=1.5, height=1.0), log=_LOG, duration=5.0, count=24, seed=1)
     steps: list[int] = []
     first = simulated(design, folder=tmp_path, advance=steps.append)
@@ -113,21 +112,3 @@ def test_kept_simulations_are_not_made_anew(tmp_path: Path, monkeypatch: pytest.
     assert np.array_equal(again, first)
     simulated(replace(design, seed=2), folder=tmp_path)
     assert len(made) == 5
-
-
-class _Here:
-    """A pool of this process."""
-
-    def __init__(self, *_: object, **__: object) -> None:
-        pass
-
-    def __enter__(self) -> _Here:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-    def submit(self, call: Callable[..., None], *given: object) -> Future[None]:
-        done: Future[None] = Future()
-        done.set_result(call(*given))
-        return done

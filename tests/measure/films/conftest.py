@@ -65,6 +65,11 @@ def readings(batch: Batch, *, foreign: float = 0.0) -> Floats:
 
 @pytest.fixture
 def cheap(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Simulations that cost nothing, see `simulate_cheaply`."""
+    return simulate_cheaply(monkeypatch)
+
+
+def simulate_cheaply(patch: pytest.MonkeyPatch) -> list[int]:
     """Batches of two, simulated as `readings`; how many flags were asked for, each time."""
     asked: list[int] = []
 
@@ -72,9 +77,9 @@ def cheap(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         asked.append(sum(len(batch.seeds) for batch in batches))
         return np.concatenate([readings(batch) for batch in batches])[:, None]
 
-    monkeypatch.setattr(simulations, "read", read)
+    patch.setattr(simulations, "read", read)
     for module in (design, simulations):
-        monkeypatch.setattr(module, "TOGETHER", 2)
+        patch.setattr(module, "TOGETHER", 2)
     return asked
 
 

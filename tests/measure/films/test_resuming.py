@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,29 +15,9 @@ from measure.films import design, simulations
 from measure.films.run import close_loop
 from measure.report.document import as_document
 from tests.measure.films.conftest import options, readings, recording
+from tests.pools import Here
 
 KINDS = 20
-
-
-class Here:
-    """In place of a pool of processes: what is submitted is done at once."""
-
-    def __init__(self, *given: Any, **others: Any) -> None:
-        pass
-
-    def __enter__(self) -> Here:
-        return self
-
-    def __exit__(self, *raised: object) -> None:
-        pass
-
-    def submit(self, call: Any, *given: Any) -> Future[Any]:
-        done: Future[Any] = Future()
-        try:
-            done.set_result(call(*given))
-        except KeyboardInterrupt as error:
-            done.set_exception(error)
-        return done
 
 
 @pytest.fixture

@@ -13,8 +13,8 @@ from flagdata.errors import UsageError
 from flagdata.findings import Finding, Severity
 from measure.calibrate.observed import Observed
 from measure.films.run import close_loop, solve, verdict_of
-from measure.verdict.record import Conclusion
-from tests.measure.films.conftest import ALIKE, EFFECTS, options, recording
+from measure.verdict.record import Conclusion, Verdict
+from tests.measure.films.conftest import ALIKE, EFFECTS, options, recording, simulate_cheaply
 
 DRAG = {"tangential-linear-drag.coefficient": 0.9}
 
@@ -24,32 +24,44 @@ def both(effects: Mapping[str, float] | None = None, *, foreign: float = 0.0, se
     return [recording(mean=mean, seed=seed, foreign=foreign, effects=effects) for mean in (4.0, 6.5)]
 
 
-def test_flags_on_which_nothing_acts_need_no_effect_but_at_the_level(cheap: list[int], tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Verdict:
+    """Of flags on which nothing acts."""
+    with pytest.MonkeyPatch.context() as patch:
+        simulate_cheaply(patch)
+        return close_loop(both(), options(), folder=tmp_path_factory.mktemp("plain"))
+
+
+@pytest.fixture(scope="module")
+def dragged(tmp_path_factory: pytest.TempPathFactory) -> Verdict:
+    with pytest.MonkeyPatch.context() as patch:
+        simulate_cheaply(patch)
+        return close_loop(both(DRAG), options(), folder=tmp_path_factory.mktemp("dragged"))
+
+
+def test_flags_on_which_nothing_acts_need_no_effect_but_at_the_level(
+    cheap: list[int], plain: Verdict, tmp_path: Path
+) -> None:
     # Of twelve flags at a level of 5 % four or more are rejected with a probability of 0.2 %.
     found = [solve(both(seed=seed), options(), folder=tmp_path).judged for seed in range(5, 17)]
     assert sum(one.conclusion is not Conclusion.SUFFICIENT for one in found) <= 3
     assert np.median([one.p_value for one in found]) > 0.25
-    verdict = close_loop(both(), options(), folder=tmp_path)
-    assert verdict.conclusion is Conclusion.SUFFICIENT
-    assert verdict.named == ()
+    assert plain.conclusion is Conclusion.SUFFICIENT
+    assert plain.named == ()
 
 
-def test_an_effect_is_named_with_its_strength(cheap: list[int], tmp_path: Path) -> None:
-    verdict = close_loop(both(DRAG), options(), folder=tmp_path)
-    assert verdict.conclusion is Conclusion.EFFECT
-    assert verdict.named == ("tangential-linear-drag",)
-    assert verdict.test.p_value.value == pytest.approx(1 / 41)
-    strength = verdict.ranking[0].strength
+def test_an_effect_is_named_with_its_strength(dragged: Verdict) -> None:
+    assert dragged.conclusion is Conclusion.EFFECT
+    assert dragged.named == ("tangential-linear-drag",)
+    assert dragged.test.p_value.value == pytest.approx(1 / 41)
+    strength = dragged.ranking[0].strength
     assert strength.low < 0.9 < strength.high
     assert strength.value == pytest.approx(0.9, rel=0.15)
-    assert verdict.ranking[0].probability == pytest.approx(1.0, abs=0.05)
+    assert dragged.ranking[0].probability == pytest.approx(1.0, abs=0.05)
 
 
-def test_the_effect_lowers_the_error_on_unseen_windows_in_the_observables_own_unit(
-    cheap: list[int], tmp_path: Path
-) -> None:
-    verdict = close_loop(both(DRAG), options(), folder=tmp_path)
-    moved = {one.what: one for one in verdict.comparisons if one.what.startswith("amplitude-across")}
+def test_the_effect_lowers_the_error_on_unseen_windows_in_the_observables_own_unit(dragged: Verdict) -> None:
+    moved = {one.what: one for one in dragged.comparisons if one.what.startswith("amplitude-across")}
     assert set(moved) == {"amplitude-across, other halves", "amplitude-across, recordings left out"}
     for one in moved.values():
         assert one.before.unit == "1"
@@ -90,18 +102,18 @@ def test_an_effect_that_is_not_weighed_is_refused() -> None:
         options(only=("direction-change.angle",))
 
 
-def test_a_cloth_that_is_heavier_than_it_was_weighed_is_not_the_base_model(cheap: list[int], tmp_path: Path) -> None:
-    recordings = both()
-    own = close_loop(recordings, options(), folder=tmp_path).parameters[0].before.value
+def test_a_cloth_that_is_heavier_than_it_was_weighed_is_not_the_base_model(
+    cheap: list[int], plain: Verdict, tmp_path: Path
+) -> None:
+    recordings, own = both(), plain.parameters[0].before.value
     right = close_loop(recordings, options(area_weight=(own, 0.02 * own)), folder=tmp_path)
     wrong = close_loop(recordings, options(area_weight=(0.5 * own, 0.01 * own)), folder=tmp_path)
     assert right.conclusion is Conclusion.SUFFICIENT
     assert wrong.test.p_value.value <= 0.05
 
 
-def test_what_is_missing_is_stated_with_its_size_and_unit(cheap: list[int], tmp_path: Path) -> None:
-    verdict = close_loop(both(DRAG), options(), folder=tmp_path)
-    assert "amplitude-across +0.12 (" in verdict.proposal  # 0.2 · 0.9/1.5
+def test_what_is_missing_is_stated_with_its_size_and_unit(dragged: Verdict) -> None:
+    assert "amplitude-across +0.12 (" in dragged.proposal  # 0.2 · 0.9/1.5
 
 
 def test_effects_that_the_recordings_would_not_show_are_listed(cheap: list[int], tmp_path: Path) -> None:

@@ -32,6 +32,7 @@ from sim.cloth import Cloth
 from sim.effects import EFFECTS, Effect
 from sim.effects.effect import ForceEffect
 from sim.effects.parameter import Value, strength
+from tests.pools import Here
 
 DURATION, NOISE, SPEEDS, KINDS = 4.6, 5e-4, (3.5, 6.0), 9
 
@@ -52,12 +53,14 @@ class Push(ForceEffect):
 
 @pytest.fixture(scope="module")
 def bank(specimen: Specimen, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Nulls of nine kinds of numerics, the fewest that can test a level of 0.1; all but the last in this process."""
+    """Nulls of nine kinds of numerics, the fewest that can test a level of 0.1."""
     folder = tmp_path_factory.mktemp("bank")
     done: list[int] = []
     for index, batch in enumerate(batches(specimen)[:-1]):
         banks._cache(folder, batch, index)  # pyright: ignore[reportPrivateUsage]
-    banks.build(folder, batches(specimen), progress=done.append)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(banks, "ProcessPoolExecutor", Here)
+        banks.build(folder, batches(specimen), progress=done.append)
     assert done == [KINDS - 1, 1]  # a build goes on where it was
     return folder
 

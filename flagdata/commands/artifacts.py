@@ -1,0 +1,197 @@
+"""`flagdata ls|show`: the artifacts of a lake, in a table and one by one."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from flagdata.console import at_option, document, json_option, lake_option, say, table
+from flagdata.printable import SHORT, counted, size_text
+
+if TYPE_CHECKING:
+    from flagdata.lake import Lake
+
+_MOST = 20
+"""Parents, and artifacts made from one, that are listed without --all."""
+_INNER = ("recipe", "parameters", "clock_model", "recipe_hash")
+"""Columns that are JSON or hashes, for --all."""
+
+
+@click.command()
+@click.option("--kind", metavar="KIND", help="Only this kind: camera, wind, recording, clip, meshes, …")
+@at_option
+@json_option
+@lake_option
+def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
+    """List artifacts, clips counted only (--kind clip lists them); filters and SQL are `flagdata query`'s."""
+    from flagdata.errors import UnknownNameError
+    from flagdata.lake import Lake
+    from flagdata.lake.matching import matching
+    from flagdata.lake.removals import lost
+    from flagdata.lake.revisions import superseded
+    from flagdata.schema import Kind
+
+    if kind is not None and kind not in list(Kind):
+        raise UnknownNameError.of("kind", kind, [k.value for k in Kind])
+    lake = Lake.open(lake_path)
+    found = lake.rows(None if kind is None else {"kind": kind}, at=at, columns=["name", "object"])
+    rows = lake.rows("kind <> 'clip'" if kind is None else {"kind": kind}, at=at).to_pylist()
+    gone = lost(lake, found)
+    older = superseded(row for row in rows if row["kind"] in (Kind.MEASUREMENT, Kind.MODEL))
+    clips = found.num_rows - len(rows)
+    if as_json:
+        listed = [
+            {
+                **_plain(row), "data": "lost" if row["object"] in gone else "there",
+                "superseded": row["artifact"] in older,
+            }
+            for row in rows
+        ]  # fmt: skip
+        document("ls", {"at": at, "artifacts": listed, "clips_not_listed": clips})
+        return
+    header = ("artifact", "kind", "name", "start", "frames", "wind [m/s]", "size", "quality")
+    if rows:
+        lines = [_line(row, lost=row["object"] in gone, superseded=row["artifact"] in older) for row in rows]
+        table(header, lines)
+    more = f" and {counted(clips, 'clip')} (--kind clip lists them)" if clips else ""
+    say(f"{counted(len(rows), 'artifact')}{more}" if found.num_rows else "no artifacts")
+    for name, why in gone.items():
+        names = sorted(matching(found, {"object": name})["name"].unique().to_pylist())
+        say(f"without data: {', '.join(names)}: {why.what}")
+
+
+@click.command()
+@click.argument("artifact")
+@click.option("--all", "whole", is_flag=True, help="All columns, with their JSON, and all that was made from it.")
+@at_option
+@json_option
+@lake_option
+def show(artifact: str, whole: bool, at: str | None, as_json: bool, lake_path: str) -> None:
+    """Show one artifact: what it says, what it was made from and what was made from it.
+
+    ARTIFACT is an id or its beginning, a name, the file it came from, or NAME@TAG. Of a verdict or a measurement its
+    sentence comes first, of a network its card.
+    """
+    from flagdata.ingest.before import unconfirmed
+    from flagdata.lake import Lake
+    from flagdata.lake.labels import PREFIX
+    from flagdata.lake.results import versions
+    from flagdata.lake.tabled import labels_of
+
+    lake = Lake.open(lake_path)
+    found = lake.artifact(artifact, at=at)
+    row = _plain(found.row())
+    for column in ("recipe", "parameters", "clock_model", "report"):
+        row[column] = json.loads(row[column]) if row[column] else None
+    shown = lake.table(lake.view(at))
+    labels = labels_of(shown).get(found.id, {})
+    others = shown.select(["artifact", "kind", "name", "parents"]).to_pylist()
+    parents = [relative(other) for other in others if other["artifact"] in row["parents"]]
+    children = [relative(other) for other in others if row["artifact"] in other["parents"]]
+    path = lake.objects.path(row["object"]) if row["object"] else None
+    doubts = unconfirmed([found])
+    stated = [
+        {"version": number, "artifact": one.id, "code_version": one.code_version}
+        for number, one in enumerate(versions(lake, found, at=at), start=1)
+    ]
+    if as_json:
+        document(
+            "show",
+            {
+                "artifact": row, "labels": labels, "path": str(path) if path else None, "parents": parents,
+                "children": children, "versions": stated,
+                "findings": [finding.as_dict() for finding in doubts],
+            },
+        )  # fmt: skip
+        return
+    for name, text in _gist(lake, row):
+        click.echo(f"{name:<15} {text}")
+    left_out = ("parents", "report") if whole else ("parents", "report", *_INNER)
+    for column, value in row.items():
+        if value is not None and value != [] and column not in left_out:
+            click.echo(f"{column:<15} {said(column, value)}")
+    for name, value in labels.items():
+        click.echo(f"{PREFIX + name:<15} {value}")
+    if path is not None:
+        click.echo(f"{'path':<15} {path}")
+    for one in stated if len(stated) > 1 else ():
+        this = " (this one)" if one["artifact"] == found.id else ""
+        label = f"version {one['version']}"
+        click.echo(f"{label:<15} {one['artifact'][:SHORT]} by code {one['code_version']}{this}")
+    for label, relatives in (("made from", parents), ("made into", children)):
+        for one in relatives if whole else relatives[:_MOST]:
+            click.echo(f"{label:<15} {one['artifact'][:SHORT]} {one['kind']} {one['name']}")
+        if len(relatives) > _MOST and not whole:
+            kinds = Counter(one["kind"] for one in relatives[_MOST:])
+            more = ", ".join(counted(count, kind) for kind, count in sorted(kinds.items()))
+            click.echo(f"{label:<15} … and {more} more (--all lists them)")
+    for finding in (*(row["report"] or {}).get("findings", []), *(finding.as_dict() for finding in doubts)):
+        click.echo(f"{finding.get('severity', 'note'):<15} {finding.get('kind')}: {finding.get('what')}")
+
+
+def _gist(lake: Lake, row: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """What matters of an artifact of its kind: a sentence of its report, what a model adds, a network's card."""
+    from flagdata.schema import Kind
+
+    report = row["report"] or {}
+    if sentence := report.get("sentence") or report.get("words"):
+        yield "says", sentence
+    if row["kind"] == Kind.MODEL and row["parameters"]:
+        yield "adds", ", ".join(row["parameters"].get("effects", {})) or "nothing to the base model"
+    if row["kind"] == Kind.NETWORK and row["object"]:
+        card = json.loads((lake.object_path(row["object"]) / "card.json").read_text(encoding="utf-8"))
+        size = f"{card['parameters']:,} parameters, {card['epochs']} epochs, seed {card['seed']}"
+        yield "card", f"{card['title']}; {size}"
+
+
+def _line(row: Mapping[str, Any], *, lost: bool, superseded: bool) -> list[object]:
+    from flagdata.documents import column_json
+    from flagdata.schema import Kind
+    from flagdata.timebase import iso
+
+    wind = "" if row["wind"] is None else f"{row['wind']:.2f}"
+    if row["kind"] == Kind.WIND:  # a log's mean, over all of it
+        mean = (column_json(row["report"], "report", artifact=row["artifact"]) if row["report"] else {}).get(
+            "mean_speed"
+        )
+        wind = "" if mean is None else f"{mean:.2f}"
+    if row["wind"] is not None and row["wind_sigma"] is not None:
+        wind += f" ± {row['wind_sigma']:.2f}"
+    return [
+        row["artifact"][:SHORT],
+        row["kind"],
+        row["name"],
+        "" if row["start"] is None else iso(row["start"] // 10**9 * 10**9),
+        row["frame_count"],
+        wind,
+        # A clip's object is its recording's.
+        "lost" if lost else "" if row["kind"] == Kind.CLIP else size_text(row["object_bytes"]),
+        ",".join([*row["quality"], *(["superseded"] if superseded else [])]),
+    ]
+
+
+def said(column: str, value: object) -> str:
+    """A value for people: instants as times, numbers with their unit, mappings and lists as JSON."""
+    from flagdata.schema import CATALOG
+    from flagdata.timebase import iso
+
+    unit = CATALOG[column].unit
+    if unit == "ns" and isinstance(value, int):
+        return iso(value)
+    if isinstance(value, dict | list):
+        return json.dumps(value, ensure_ascii=False)
+    return f"{value} {unit}" if unit not in ("", "1") else str(value)
+
+
+def relative(row: Mapping[str, Any]) -> dict[str, str]:
+    """What names an artifact beside others: its id, kind and name."""
+    return {"artifact": row["artifact"], "kind": row["kind"], "name": row["name"]}
+
+
+def _plain(row: Mapping[str, Any]) -> dict[str, Any]:
+    return {column: value.isoformat() if isinstance(value, datetime) else value for column, value in row.items()}
