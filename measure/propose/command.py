@@ -56,6 +56,7 @@ def propose(
     """
     from flagdata.lake import Lake
     from measure.nulls.plan import NullOptions
+    from measure.nulls.workload import of_recordings
     from measure.observe import recipe as recipes
     from measure.propose import candidates, effect_file, proposal_log
     from measure.propose.propose import propose as seek
@@ -72,6 +73,8 @@ def propose(
     tried, controls = (dictionary(), ()) if effect is None else (candidates.from_file(effect), dictionary())
     observed = recipes.read(recipe, None if lake_path is None else Lake.open(lake_path))
     refuse(observed.findings)
+    recordings, cloth = observed.experiment.recordings, observed.experiment.specimen
+    say(of_recordings(recordings, cloth.mesh.vertex_count, options, workers=options.workers))
     outcome = seek(
         observed.experiment, tried, known=[candidates.weighed(name) for name in known],
         controls=controls, options=options, stage=stage_bars(),

@@ -1,0 +1,36 @@
+"""`flagdata propose` as it is called; the search itself is replaced."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from flagdata.cli import main
+from flagdata.errors import InputError
+from measure.nulls.plan import NullOptions
+from measure.nulls.workload import of_recordings
+from measure.observe import recipe as recipes
+from measure.observe.trajectory import Experiment
+from measure.propose import command, propose
+
+
+def test_how_long_it_takes_is_stated_before_it_begins(
+    pushed: Experiment, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    def begun(*_: Any, **__: Any) -> None:
+        raise InputError("the search began", fix="none")
+
+    monkeypatch.setattr(recipes, "load", lambda _: None)
+    monkeypatch.setattr(recipes, "read", lambda *_: SimpleNamespace(experiment=pushed, findings=()))
+    monkeypatch.setattr(command, "nulls_given", lambda *_, **__: {"nulls": 160})
+    monkeypatch.setattr(propose, "propose", begun)
+    with pytest.raises(SystemExit):
+        main(["propose", str(tmp_path / "flag.toml"), "--out", str(tmp_path), "--workers", "2"])
+    first, second = capsys.readouterr().err.splitlines()[:2]
+    vertices = pushed.specimen.mesh.vertex_count
+    assert first == of_recordings(pushed.recordings, vertices, NullOptions(nulls=160), workers=2)
+    assert "minutes in all takes" in first
+    assert "the search began" in second
