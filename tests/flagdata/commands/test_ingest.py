@@ -150,7 +150,7 @@ MISUSED = [
     (["{video}", "{log}", "--unit", "mm"], "'mm' is no unit of speed"),
     (["{video}", "--sensor", "generic-csv"], "--sensor means nothing for a camera file"),
     (["{video}", "--start", "2026-05-01T10:00:00Z", "--zone", "UTC"], "--zone means nothing for a camera file wh"),
-    (["{video}", "--start", "2026-02-30T10:00:00Z"], "day is out of range"),
+    (["{video}", "--start", "2026-02-30T10:00:00Z"], "no day or time of the calendar"),
     (["{video}", "--start", "x"], "not an ISO 8601 time"), (["{video}", "--zone", "+99:00"], "beyond"),
     (["{log}", "--zone", "Qwxzy"], "give a name such as Europe/Amsterdam"),
     (["{video}", "{video}", "--start", "2026-05-01T10:00:00Z"], "--start with 2 sources"),

@@ -177,10 +177,10 @@ def completed(
     month = day.astype("datetime64[D]").astype("datetime64[M]")
     first = start.astype("datetime64[M]") + (month - np.datetime64(f"{_LEAP}-01", "M"))
     into = day - month.astype("datetime64[D]").astype(np.int64)
-    length = (first + 1).astype("datetime64[D]") - first.astype("datetime64[D]")
+    length = (first + np.timedelta64(1, "M")).astype("datetime64[D]") - first.astype("datetime64[D]")
     if "%j" in form:
         first, into = start.astype("datetime64[M]"), day - np.datetime64(f"{_LEAP}-01-01", "D").astype(np.int64)
-        length = (start + 1).astype("datetime64[D]") - start.astype("datetime64[D]")
+        length = (start + np.timedelta64(1, "Y")).astype("datetime64[D]") - start.astype("datetime64[D]")
     lost = np.flatnonzero(into >= length.astype(np.int64))
     if len(lost):
         what = f"{start[lost[0]]} has no such day as this row's"
