@@ -53,12 +53,13 @@ grace_option = click.option(
 def verify(sample: int | None, as_json: bool, lake_path: str) -> None:
     """Re-hash the catalog's files and every object; exits with 3 when one is missing or has changed."""
     from flagdata.lake import Lake
-    from flagdata.lake.health import object_names, sampled, verify_catalog
+    from flagdata.lake.health import object_names, read_refs, sampled, verify_catalog
     from flagdata.lake.health import verify as verified
 
     lake = Lake.open(lake_path)
-    findings = verify_catalog(lake)
-    names = object_names(lake)
+    refs = read_refs(lake)
+    findings = verify_catalog(lake, refs)
+    names = object_names(lake, refs)
     chosen = names if sample is None else sampled(names, sample)
     with progress(len(chosen), label="verify", unit="object") as advance:
         findings += verified(lake, chosen, advance=advance)

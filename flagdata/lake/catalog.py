@@ -59,6 +59,7 @@ _CONFIGURATION = {  # neither this package nor another's VACUUM may take what an
 _INFO_PREFIX = "flagdata."
 _TIDY_EVERY = 32
 _SMALL = 4 << 20  # B
+_LISTED = 8  # versions whose files are kept in mind
 _PATIENCE = 120.0  # s, how long a commit competes with other writers before it gives up
 _LEAST_TRIES = 20  # whatever time these take: an attempt may have waited for a collection
 _FIRST_WAIT = 0.01  # s
@@ -121,6 +122,7 @@ class Catalog:
         self._table: DeltaTable | None = None
         self._files = RowFiles(path)
         self._rows: tuple[int, pa.Table] | None = None
+        self._listed: dict[int, list[str]] = {}
         self._history: tuple[int, list[dict[str, Any]]] | None = None
 
     def __reduce__(self) -> tuple[type[Catalog], tuple[Place, Place]]:
@@ -432,9 +434,13 @@ class Catalog:
         )  # fmt: skip
 
     def _names(self, version: int) -> list[str]:
-        table = self._open(version)
-        with self._log_errors():
-            return [Path(uri).name for uri in table.file_uris()]
+        """The files of a version, which never change; those of the versions that were asked for last are kept."""
+        if version not in self._listed:
+            table = self._open(version)
+            with self._log_errors():
+                names = [Path(uri).name for uri in table.file_uris()]
+            self._listed = {**dict(list(self._listed.items())[1 - _LISTED :]), version: names}
+        return self._listed[version]
 
     def _writable(self, version: int) -> DeltaTable:
         """The table at `version`, if it has all columns of this format; else they are added, and `Moved` is raised."""

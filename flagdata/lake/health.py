@@ -86,17 +86,22 @@ def verify(lake: Lake, names: Sequence[str], *, advance: Callable[[int], None] =
     return tuple(findings)
 
 
-def verify_catalog(lake: Lake) -> tuple[Finding, ...]:
+def read_refs(lake: Lake) -> Marked:
+    """What every ref shows, for `verify_catalog` and `object_names`, which read it themselves where it is not given."""
+    return mark(lake, grace=timedelta(0))
+
+
+def verify_catalog(lake: Lake, marked: Marked | None = None) -> tuple[Finding, ...]:
     """Re-hash the catalog's files and read every ref; a finding for what is missing, damaged, a link, or cannot be
     checked."""
     foreign = [path for path in _foreign(lake) if path.parent.name not in STORES]  # objects are `verify`'s
-    found = (*map(_linked, foreign), *mark(lake, grace=timedelta(0)).findings, *catalog_files(lake))
+    found = (*map(_linked, foreign), *(marked or read_refs(lake)).findings, *catalog_files(lake))
     return tuple(dict.fromkeys(found))  # an entry that cannot be read stops both
 
 
-def object_names(lake: Lake) -> list[str]:
+def object_names(lake: Lake, marked: Marked | None = None) -> list[str]:
     """Every object that is stored or that a readable ref needs, sorted; `verify_catalog` reports unreadable refs."""
-    needed = mark(lake, grace=timedelta(0)).objects
+    needed = (marked or read_refs(lake)).objects
     return sorted(needed | {stored.name for stored in lake.objects})
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from flagdata.findings import Severity
 from flagdata.lake import Lake
-from flagdata.lake.health import doctor, object_names, verify, verify_catalog
+from flagdata.lake.health import doctor, object_names, read_refs, verify, verify_catalog
 from tests.failing.groups import PUBLISHING, kinds
 from tests.failing.injector import Done, Fault, Injector
 
@@ -146,5 +146,8 @@ def _health(path: Path) -> list[str]:
     if not (path / "lake.json").exists():
         return []
     lake = Lake.open(path)
-    found = (*doctor(lake, grace=timedelta(0)), *verify_catalog(lake), *verify(lake, object_names(lake)))
+    refs = read_refs(lake)
+    found = (
+        *doctor(lake, grace=timedelta(0)), *verify_catalog(lake, refs), *verify(lake, object_names(lake, refs)),
+    )  # fmt: skip
     return [f"unhealthy: {finding.kind}: {finding.what}" for finding in found if finding.severity is Severity.ERROR]

@@ -111,3 +111,23 @@ def test_a_damaged_column_is_named_by_its_file(lake: Lake, put_text: Put) -> Non
         with pytest.raises(CorruptError, match="cannot be read") as caught:
             look()
         assert caught.value.where == str(file)
+
+
+def test_the_files_of_a_version_are_listed_once_however_often_versions_take_turns(
+    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put_text(lake, "a")
+    lake.tag("v1")
+    put_text(lake, "b")
+    listed: list[int] = []
+    whole = DeltaTable.file_uris
+
+    def counted(self: DeltaTable) -> list[str]:
+        listed.append(self.version())
+        return whole(self)
+
+    again = Lake.open(lake.path)
+    monkeypatch.setattr(DeltaTable, "file_uris", counted)
+    names = [again.rows(at=at)["name"].to_pylist() for at in (None, "v1", None, "v1")]
+    assert names == [["a", "b"], ["a"], ["a", "b"], ["a"]]
+    assert sorted(listed) == [1, 2]
