@@ -57,7 +57,7 @@ def observe(
     from measure.observables.artifact import keep
     from measure.observables.picture import picture
     from measure.observables.table import table_of
-    from measure.observables.watching import watched
+    from measure.observables.watching import count_of, watched
 
     if parquet_path is not None:
         check_file(parquet_path)
@@ -74,7 +74,8 @@ def observe(
         lake.check_writable()
     reading = Reading(crop=box, flag=flag, aspect=size.aspect, true_fps=true_fps, sequence_fps=sequence_fps)
     (subject,) = subjects(source, query=None, lake=lake, at=at if at is not None else branch, reading=reading)
-    with progress(None, label="observe", unit="window") as advance:
+    count = count_of(subject.film, first=first, last=last, seconds=seconds)
+    with progress(count, label="observe", unit="window") as advance:
         windows = watched(subject.film, size, first=first, last=last, seconds=seconds, advance=advance)
     table = table_of(
         windows, film=subject.film.name, length=size.length, height=size.height, start=subject.film.start,

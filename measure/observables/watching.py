@@ -44,6 +44,24 @@ class Watched:
     seconds: float
 
 
+def count_of(
+    film: ConditionedFilm, *, first: float | None = None, last: float | None = None, seconds: float = WINDOW
+) -> int:
+    """How many whole windows a part of a film has; the parameters as for `watched`.
+
+    Raises:
+        RefusedError: the film has no whole window.
+    """
+    begin, end = first or 0.0, min(film.duration, math.inf if last is None else last)
+    count = int((end - begin + 1 / film.rate) / seconds + 1e-6)
+    if count < 1:
+        raise RefusedError(
+            f"{end - begin:.1f} s of film have no window of {seconds:g} s", where=film.name,
+            fix="give a longer part of the film",
+        )  # fmt: skip
+    return count
+
+
 def watched(
     film: ConditionedFilm, size: FlagSize, *, first: float | None = None, last: float | None = None,
     seconds: float = WINDOW, advance: Callable[[int], object] | None = None,
@@ -58,13 +76,7 @@ def watched(
     Raises:
         RefusedError: the film has no whole window, or no moving cloth.
     """
-    begin, end = first or 0.0, min(film.duration, math.inf if last is None else last)
-    count = int((end - begin + 1 / film.rate) / seconds + 1e-6)
-    if count < 1:
-        raise RefusedError(
-            f"{end - begin:.1f} s of film have no window of {seconds:g} s", where=film.name,
-            fix="give a longer part of the film",
-        )  # fmt: skip
+    begin, count = first or 0.0, count_of(film, first=first, last=last, seconds=seconds)
     windows: list[FilmWindow | None] = []
 
     def keep(some: Sequence[FilmWindow | None]) -> None:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from flagdata.cli import main
 from flagdata.errors import RefusedError
 from flagdata.findings import Finding
 from measure.estimate.conditioned import ConditionedFilm
 from measure.estimate.similarity import FlagSize
+from measure.observables import command, watching
 from measure.observables.watching import watched
 
 SIZE = FlagSize(length=1.5, height=1.0)
@@ -41,3 +44,24 @@ def test_a_film_in_which_nothing_moves_is_refused() -> None:
 def test_a_film_shorter_than_a_window_is_refused() -> None:
     with pytest.raises(RefusedError, match="no window"):
         watched(ConditionedFilm(Still()), SIZE, last=1.0)
+
+
+def test_the_bar_of_observe_ends_at_the_whole_windows_of_the_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The example lasts 12 s: four windows of 2.5 s, and of its last 7 s three of 2 s."""
+    lengths: list[int] = []
+
+    @contextmanager
+    def bar(total: int, label: str, unit: str) -> Iterator[None]:
+        del label, unit
+        lengths.append(total)
+        yield
+
+    def read(*_: object, **__: object) -> None:
+        raise RefusedError("the film is read", fix="none")
+
+    monkeypatch.setattr(command, "progress", bar)
+    monkeypatch.setattr(watching, "watched", read)
+    for part in ([], ["--start", "5s", "--window", "2s"]):
+        with pytest.raises(SystemExit):
+            main(["observe", "example:flag", "--flag-size", "1.5x1.0", *part])
+    assert lengths == [4, 3]
