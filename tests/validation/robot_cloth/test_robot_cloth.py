@@ -188,7 +188,7 @@ def _followed(swing: Swing, cloth: Cloth, truth: Truth, *, seed: int) -> tuple[S
 def _programmes(truth: Truth) -> tuple[Cloth, dict[str, list[Swing]], dict[str, Floats]]:
     """Two programmes of two repeats each, as a tracker reports them; latencies by recording."""
     plain = {
-        (name, k): _swing(f"{name}_rep{k}", frequency=frequency, duration=4.0 + 0.1 * k)
+        (name, k): _swing(f"{name}_rep{k}", frequency=frequency, duration=3.0 + 0.1 * k)
         for name, frequency in (("slow", 0.7), ("fast", 1.1))
         for k in range(2)
     }
