@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +13,7 @@ from flagdata.lake import Artifact, Lake
 from flagdata.lake.ancestry import ancestry
 from flagdata.lake.results import Placed, keep, placed, versions
 from flagdata.schema import Kind
+from flagdata.selection import Request, Selection
 from tests.program import Run, invoke
 
 Put = Callable[..., Artifact]
@@ -116,3 +119,13 @@ def test_ls_and_show_say_which_version_is_superseded(
         {"version": 2, "artifact": second.id, "code_version": NEW},
     ]
     assert f"version 1       {first.id[:12]} by code {OLD}\n" in run("show", "flag").out
+
+
+def test_the_sql_of_the_docs_chooses_the_newest_versions(lake: Lake, recording: Artifact) -> None:
+    page = Path(__file__).resolve().parents[3] / "docs" / "versions-and-recovery.md"
+    (sql,) = re.findall(r"^```sql\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    for code in (OLD, NEW, NEWEST):
+        kept(lake, verdict(recording, code))
+    other = kept(lake, verdict(recording, OLD, level=0.01))
+    found = Selection(lake.scan(lake.view(None)), Request(sql=sql)).table()
+    assert set(found["artifact"].to_pylist()) == {versions(lake, verdict(recording, OLD))[-1].id, other.artifact.id}
