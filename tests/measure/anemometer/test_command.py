@@ -90,6 +90,13 @@ def test_a_recording_becomes_a_model_by_which_another_film_is_read(
     refused = _run(measure, "monday", "--lake", lake, "--model", said["artifact"])
     assert "another place" in str(refused.exception)
 
+    _shown(monkeypatch, seed=1)
+    monkeypatch.setattr("flagdata.provenance.code_version", lambda: "0.1.0+mended")
+    assert "committed as version 2 of 'garden'" in _run(calibrate, *given).stderr
+    newest = network("garden", lake=Lake.open(lake), at=None).artifact
+    assert newest is not None
+    assert newest.code_version == "0.1.0+mended"
+
 
 def test_a_model_whose_network_has_changed_is_refused(lake: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given = ("monday", "--lake", lake, "--flag-size", "1.5x1.0", "--only", "anemometer")

@@ -250,6 +250,19 @@ def test_a_recording_is_measured_once_with_its_parents(lake: Path, model_folder:
     assert len(measurements(lake)) == 2
 
 
+def test_a_recording_measured_by_newer_code_is_a_new_version_of_the_measurement(
+    lake: Path, model_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = ("--lake", lake, *SIZED, "--model", model_folder, "--anyway")
+    first = answer("made-1", *options)
+    monkeypatch.setattr("flagdata.provenance.code_version", lambda: "0.1.0+mended")
+    done = run("made-1", *options)
+    assert f"committed as version 2 of 'made-1'; version 1, {str(first['artifact'])[:12]}, is by code " in done.stderr
+    old, new = measurements(lake)
+    assert (old["artifact"], new["code_version"]) == (first["artifact"], "0.1.0+mended")
+    assert new["parents"] == old["parents"]
+
+
 def test_a_recording_in_a_bucket_is_measured_by_its_parts_as_in_a_folder(
     lake: Path, model_folder: Path, bucket_folder: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
