@@ -194,6 +194,23 @@ def test_the_forces_counted_are_those_of_the_sheet() -> None:
     )
 
 
+def test_the_forces_counted_on_films_are_those_of_the_second_sheet() -> None:
+    folder = ROOT / "docs" / "results" / "challenge-films-2"
+    score = json.loads((folder / "challenge-score.json").read_text(encoding="utf-8"))
+    said = [(one["key"]["kind"], one["conclusion"]) for one in score["outcomes"]]
+    tested, stated = rows()["the same, from films"]
+    nulls = [what for group, what in said if group == "null" and what != "refused"]
+    single = [what for group, what in said if group == "one"]
+    found = [what for what in single if what not in ("refused", "no effect needed")]
+    page = "docs/results/challenge-films-2/challenge-score.md"
+    assert tested == f"[{len(said)} sealed sets]({page}) of three films of 25 s"
+    assert set(found) == {"one of"}
+    assert stated == (
+        f"{sum(what != 'no effect needed' for what in nulls)} of {len(nulls)} rejected where nothing was missing; of "
+        f"{len(single)} with one force {len(found)} detected, each among several"
+    )
+
+
 def test_what_it_takes_is_what_the_pages_and_the_program_state() -> None:
     install = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
     (light,) = re.findall(r"^\| `pip install flagdata` .* \| ([\d.]+ GB) \|$", install, flags=re.MULTILINE)
