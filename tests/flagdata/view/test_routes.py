@@ -6,13 +6,15 @@ import html
 import io
 import json
 import re
+from dataclasses import replace
 from urllib.parse import quote
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from flagdata.lake import Lake
+from flagdata.lake import Artifact, Lake
+from flagdata.lake.results import keep
 from flagdata.schema import Kind
 from flagdata.view.routes import Answer, answer
 from tests.flagdata.view.conftest import CURVE, NAME, Shown
@@ -45,6 +47,19 @@ def test_the_overview_lists_artifacts_but_clips_and_filters_by_kind_and_name(sho
     assert "did you mean &#39;clip&#39;" in text(shown, "?kind=clp", status=400)
     assert cards(text(shown, "?page=7&kind=clip")) == [shown.clip]
     assert "no number of a page" in text(shown, "?page=-1", status=400)
+
+
+def test_the_page_of_a_result_lists_its_versions_with_the_code_of_each(shown: Shown) -> None:
+    lake = shown.site.lake
+    result = Artifact(kind=Kind.MEASUREMENT, name="wind", parents=[shown.recording], code_version="0.1.0+aaaaaaa")
+    ids = [
+        keep(lake, one, lambda staged: (staged.mkdir(), (staged / "x").write_text("y")), "measure").artifact.id
+        for one in (result, replace(result, code_version="0.1.0+<b>"))
+    ]
+    page = text(shown, f"artifact/{ids[1]}")
+    assert f"{ids[0][:12]} by code 0.1.0+aaaaaaa" in page
+    assert f"{ids[1][:12]} by code 0.1.0+&lt;b&gt;, this one" in page
+    assert "by code" not in text(shown, f"artifact/{shown.recording}")
 
 
 def test_names_texts_and_queries_of_others_are_escaped(shown: Shown) -> None:
