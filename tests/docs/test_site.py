@@ -9,6 +9,7 @@ import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -52,6 +53,18 @@ def test_a_page_loads_nothing_from_elsewhere(site: Path) -> None:
     text = (site / "simulator.html").read_text(encoding="utf-8")
     assert 'src="http' not in text
     assert 'rel="stylesheet" href="http' not in text
+
+
+def test_every_link_and_picture_of_the_site_leads_to_a_file_of_it(site: Path) -> None:
+    """MkDocs does not warn of a link to what its configuration leaves out."""
+    broken = [
+        f"{page.relative_to(site)}: {target}"
+        for page in site.rglob("*.html")
+        if page.name != "404.html"  # its links are from the root
+        for target in re.findall(r'(?:href|src)="([^"#?:]+)(?:[#?][^"]*)?"', page.read_text(encoding="utf-8"))
+        if not (page.parent / unquote(target)).exists()
+    ]
+    assert broken == []
 
 
 def formulas(page: Path) -> list[str]:
