@@ -62,7 +62,7 @@ def test_the_wheel_is_small(wheel: zipfile.ZipFile) -> None:
 def test_the_wheel_names_its_pythons_and_binds_no_one_to_blender(wheel: zipfile.ZipFile) -> None:
     (name,) = (name for name in wheel.namelist() if name.endswith(".dist-info/METADATA"))
     metadata = Parser().parsestr(wheel.read(name).decode())
-    assert metadata["Requires-Python"] == "<3.14,>=3.11"
+    assert metadata["Requires-Python"] == "<3.15,>=3.11"
     assert not [need for need in metadata.get_all("Requires-Dist", []) if need.startswith("bpy")]
 
 
