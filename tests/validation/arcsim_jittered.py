@@ -198,7 +198,7 @@ def _table(heading: str, verdicts: Mapping[str, Any]) -> list[str]:
             *unseen,
         ]
     named = [
-        f"| {name} | {c['effect']} | {c['value']:.2f} [{c['low']:.2f}, {c['high']:.2f}] |"
+        f"| {name} | {c['effect']} | {c['value']:.3g} [{c['low']:.3g}, {c['high']:.3g}] |"
         for name, own in verdicts.items()
         for c in own["candidates"]
         if c["effect"] in own["named"]
