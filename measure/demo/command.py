@@ -27,7 +27,7 @@ class Story(StrEnum):
     """A tracked flag, and what the model of it lacks."""
 
 
-MINUTES = {Story.SHORT: 3, Story.FULL: 10, Story.MARKERS: 10}
+MINUTES = {Story.SHORT: 3, Story.FULL: 10, Story.MARKERS: 5}
 """That each takes at most on two idle cores."""
 
 
@@ -59,7 +59,7 @@ MINUTES = {Story.SHORT: 3, Story.FULL: 10, Story.MARKERS: 10}
     "--markers",
     "story",
     flag_value=Story.MARKERS.value,
-    help="Instead find what the model of another flag lacks, from tracked markers; 10 minutes at most.",
+    help="Instead find what the model of another flag lacks, from tracked markers; 5 minutes at most.",
 )
 @json_option
 def demo(out: Path, seed: int, story: str, as_json: bool) -> None:
