@@ -257,8 +257,6 @@ def _together(text: str | None) -> str | None:
 
 def _versions(site: Site, row: Mapping[str, Any]) -> list[tuple[int, str]]:
     """Number, id and code of each version of a result that has several."""
-    if row["kind"] != Kind.MEASUREMENT:
-        return []
     known = versions(site.lake, Artifact.from_row(row), at=site.at)
     return [
         (number, f"{one.id[:SHORT]} by code {one.code_version}{', this one' if one.id == row['artifact'] else ''}")

@@ -23,14 +23,17 @@ class Made:
     Attributes:
         name: by which `flagdata measure --model` finds it.
         found: what it is.
-        artifact: its id in the lake; None where it is not to be there.
-        place: its place among its versions in the lake; None as well.
+        place: its place among its versions in the lake; None where it is not to be there.
     """
 
     name: str
     found: Calibrated
-    artifact: str | None
     place: Placed | None
+
+    @property
+    def artifact(self) -> str | None:
+        """Its id in the lake; None where it is not to be there."""
+        return None if self.place is None else self.place.artifact.id
 
     def as_dict(self) -> dict[str, Any]:
         """JSON values."""
@@ -72,6 +75,5 @@ def made(
     result = calibrated(recordings, network=own, size=size, level=level)
     title = name if name is not None else f"{recordings[0].name}-anemometer"
     if lake is None or not commit:
-        return Made(name=title, found=result, artifact=None, place=None)
-    place = keep(lake, result, title, reading, branch=branch)
-    return Made(name=title, found=result, artifact=place.artifact.id, place=place)
+        return Made(name=title, found=result, place=None)
+    return Made(name=title, found=result, place=keep(lake, result, title, reading, branch=branch))
