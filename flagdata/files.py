@@ -16,6 +16,15 @@ MCAP = b"\x89MCAP0\r\n"
 LEROBOT_INFO = "meta/info.json"
 """File that describes a LeRobot data set, within its folder."""
 _SHOWN = 300  # letters of a path in a message
+_OF_WINDOWS = frozenset({"thumbs.db", "ehthumbs.db", "desktop.ini"})
+
+
+def is_beside(name: str) -> bool:
+    """Whether a name is of a file that an operating system puts beside what a user keeps in a folder.
+
+    Hidden files are, among them macOS's `.DS_Store` and `._NAME`, and Windows's Thumbs.db and desktop.ini.
+    """
+    return name.startswith(".") or name.casefold() in _OF_WINDOWS
 
 
 def is_folder(path: Path) -> bool:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.errors import ConflictError, InputError
-from flagdata.files import check_input, is_folder, is_lerobot
+from flagdata.files import check_input, is_beside, is_folder, is_lerobot
 from flagdata.provenance import canonical, code_version, digest, file_hash, recipe_hash
 
 
@@ -18,7 +18,8 @@ class Source:
     """A file, or a folder of files, as it was when its hash was taken.
 
     Attributes:
-        hash: SHA-256 of the file, or of the names and hashes of the folder's files that are not hidden.
+        hash: SHA-256 of the file, or of the names and hashes of the folder's files; see `files.is_beside` for
+            those that do not count.
         state: name, size and time of change of each file.
         others: each further file of the source, with its state.
     """
@@ -45,14 +46,15 @@ class Source:
             with_files: that make one source with it, in order; they are hashed with it.
 
         Raises:
-            InputError: it cannot be read, or is empty, a pipe or a device.
+            InputError: it cannot be read, or is empty, a pipe or a device; or two of several files are the same.
         """
         for one in (path, *with_files):
-            if not is_folder(one):
+            if with_files or not is_folder(one):
                 check_input(one)
         before = _state(path)
         if with_files:
             parts = [file_hash(one) for one in (path, *with_files)]
+            _check_distinct((path, *with_files), parts)
             return cls(path=path, hash=digest("\n".join(parts)), state=before, others=_states(with_files))
         if path.is_dir():
             parts = [f"{os.fsencode(name).hex()} {file_hash(path / name)}" for name, _, _ in before]
@@ -85,23 +87,33 @@ class Source:
         }
 
 
+def _check_distinct(paths: Sequence[Path], hashes: Sequence[str]) -> None:
+    first: dict[str, Path] = {}
+    for path, own in zip(paths, hashes, strict=True):
+        if own in first:
+            raise InputError(
+                f"its bytes are those of {first[own].name}", where=str(path), fix="name each part of a recording once"
+            )
+        first[own] = path
+
+
 def _states(paths: Sequence[Path]) -> tuple[tuple[Path, tuple[tuple[str, int, int], ...]], ...]:
     return tuple((path, _state(path)) for path in paths)
 
 
 def _state(path: Path) -> tuple[tuple[str, int, int], ...]:
-    """Name, size and time of change of the file, or of each file in the folder that is not hidden; of a LeRobot data
-    set, of each below it."""
+    """Name, size and time of change of the file, or of each file in the folder that counts, see `files.is_beside`; of a
+    LeRobot data set, of each below it."""
     try:
         if not is_folder(path):
             status = path.stat()
             return ((path.name, status.st_size, status.st_mtime_ns),)
         if is_lerobot(path):
-            files = [one for one in path.rglob("*") if one.is_file() and not one.name.startswith(".")]
+            files = [one for one in path.rglob("*") if one.is_file() and not is_beside(one.name)]
             found = [(str(one.relative_to(path)), one.stat()) for one in files]
         else:
             with os.scandir(path) as entries:
-                found = [(e.name, e.stat()) for e in entries if e.is_file() and not e.name.startswith(".")]
+                found = [(e.name, e.stat()) for e in entries if e.is_file() and not is_beside(e.name)]
         return tuple(sorted((name, status.st_size, status.st_mtime_ns) for name, status in found))
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check the path") from None

@@ -67,3 +67,22 @@ def test_every_reader_of_inputs_refuses_devices_and_files_of_the_kernel(
         pytest.skip(f"this system has no {path}")
     with pytest.raises(InputError, match=what):
         READERS[reader](path, tmp_path)
+
+
+def test_files_that_an_operating_system_puts_beside_a_users_are_no_part_of_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "f_0.png").write_bytes(b"1")
+    alone = Source.of(tmp_path)
+    for name in ("._f_0.png", ".DS_Store", "Thumbs.db", "thumbs.db", "Desktop.ini", "desktop.ini", "ehthumbs.db"):
+        (tmp_path / name).write_bytes(b"2")
+    assert Source.of(tmp_path) == alone
+    (tmp_path / "._f_0.png").write_bytes(b"3")  # macOS writes it anew when the file is tagged
+    alone.check_unchanged()
+    (tmp_path / "f_1.png").write_bytes(b"1")
+    assert Source.of(tmp_path).hash != alone.hash
+
+
+def test_a_note_of_macos_in_place_of_a_file_is_named_as_one(tmp_path: Path) -> None:
+    note = tmp_path / "._a.mp4"
+    note.write_bytes(b"\0\5\x16\7\0\2\0\0Mac OS X        " + bytes(4000))
+    (guess, *_) = guesses(note)
+    assert (guess.kind, guess.fix) == ("other", "give that file: the name without ._")

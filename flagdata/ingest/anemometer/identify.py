@@ -7,6 +7,7 @@ from pathlib import Path
 
 from flagdata.addresses import local_path
 from flagdata.errors import FlagdataError, NotFoundError
+from flagdata.files import is_beside
 from flagdata.ingest.anemometer import untimed
 from flagdata.ingest.anemometer.containers import json_lines
 from flagdata.ingest.anemometer.draft.drafting import Draft
@@ -144,7 +145,7 @@ def unknown(source: TextFile) -> Guess:
 
 
 def _folder(path: Path) -> Guess:
-    names = [item.name for item in sorted(path.iterdir())]
+    names = [item.name for item in sorted(path.iterdir()) if not is_beside(item.name)]
     meshes = [name for name in names if Path(name).suffix.lower() in _MESHES]
     pictures = [name for name in names if Path(name).suffix.lower() in _PICTURES]
     if meshes and len(meshes) >= len(pictures):

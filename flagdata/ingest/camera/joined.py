@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from flagdata.errors import FlagdataError, InputError, TimeError, UsageError
+from flagdata.files import is_folder, is_mcap
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.chapters import place_by_name
 from flagdata.ingest.camera.options import CameraOptions
@@ -28,6 +29,8 @@ from flagdata.timebase import NANOSECONDS, parse
 _ROUNDED = 2.5
 """s by which a chapter may seem to begin beside the end of the one before: both times are stated in whole seconds, and
 a camera takes up to a second to open a file."""
+_RATE, _VARIES = Fraction(1, 100), Fraction(1, 4)
+"""Parts by which the frame rates of one recording's chapters differ at most: of constant rates, and of varying ones."""
 _DIGITS = re.compile(r"(\d+)")
 
 
@@ -35,8 +38,9 @@ def in_order(paths: Sequence[Path]) -> tuple[Path, ...]:
     """Chapters by the numbers in their names.
 
     Raises:
-        UsageError: fewer than two, or one of them twice.
+        UsageError: fewer than two, one of them twice, or what is no single file of a film.
     """
+    check_films(paths)
     if len(paths) < 2:
         raise UsageError("one file to join", where="--join", fix="name all chapters of the recording")
     if len({path.resolve() for path in paths}) < len(paths):
@@ -50,6 +54,21 @@ def in_order(paths: Sequence[Path]) -> tuple[Path, ...]:
         return (1, *(int(part) if part.isdigit() else part.lower() for part in parts))
 
     return tuple(sorted(paths, key=key))
+
+
+def check_films(paths: Sequence[Path]) -> None:
+    """Make sure that all that is to be joined are files of the kind that is: no folders, no MCAP files.
+
+    Raises:
+        UsageError: one is not.
+    """
+    for path in paths:
+        noun = "a folder" if is_folder(path) else "an MCAP file" if is_mcap(path) else None
+        if noun is not None:
+            raise UsageError(
+                f"{noun} cannot be joined with others, only video files can", where=str(path),
+                fix="ingest each by itself, without --join",
+            )  # fmt: skip
 
 
 class JoinedSource:
@@ -83,19 +102,21 @@ class JoinedSource:
         """Whether the files are of one recording, and what to report of it."""
         first = self._parts[0].facts
         for path, part in zip(self._paths[1:], self._parts[1:], strict=True):
+            if not _of_one_rate(part.facts.timing, first.timing):
+                rates = (f"{float(one.timing.rate):.5g} Hz" for one in (part.facts, first))
+                raise self._apart(path, "frame rate", *rates)
+        for path, part in zip(self._paths[1:], self._parts[1:], strict=True):
             own = part.facts
             for what, mine, theirs in (
-                ("pictures", (own.width, own.height), (first.width, first.height)),
+                ("size of the pictures", f"{own.width} × {own.height}", f"{first.width} × {first.height}"),
+                ("shape of a pixel", own.aspect, first.aspect),
                 ("coding", own.codec, first.codec),
+                ("pixel format", own.pixel_format, first.pixel_format),
                 ("orientation", own.orientation, first.orientation),
                 ("unit of time stamps", own.timing.tick, first.timing.tick),
             ):
                 if mine != theirs:
-                    raise UsageError(
-                        f"the {what} differ from those of {self._paths[0].name} ({mine} and "
-                        f"{theirs}): not one recording",
-                        where=str(path), fix="ingest it by itself, without --join",
-                    )  # fmt: skip
+                    raise self._apart(path, what, mine, theirs)
         for path, part in zip(self._paths, self._parts, strict=True):
             if part.facts.timing.end is not None or part.facts.sequence:
                 raise InputError(
@@ -103,6 +124,12 @@ class JoinedSource:
                     fix="ingest the files by themselves, without --join",
                 )  # fmt: skip
         return self._follow()
+
+    def _apart(self, path: Path, what: str, mine: object, theirs: object) -> UsageError:
+        return UsageError(
+            f"the {what} differs from that of {self._paths[0].name}: {mine} and {theirs}; they are not one recording",
+            where=str(path), fix="ingest it by itself, without --join",
+        )  # fmt: skip
 
     def _follow(self) -> list[Finding]:
         """Refuse chapters that do not follow one another, by their creation times.
@@ -200,6 +227,12 @@ def _offsets(timings: Sequence[Timing]) -> list[int]:
     for timing in timings[:-1]:
         found.append(found[-1] + timing.span + round(timing.period))
     return found
+
+
+def _of_one_rate(one: Timing, other: Timing) -> bool:
+    """Whether two files may be of one recording by their rates, of which a varying one states its median."""
+    apart = abs(one.period * one.tick / (other.period * other.tick) - 1)
+    return apart <= (_VARIES if one.variable or other.variable else _RATE)
 
 
 def _length(timing: Timing) -> Fraction:

@@ -18,7 +18,7 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.chapters import chapter_of
 from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
 from flagdata.ingest.camera.grid import EveryFrame, GridReport, Pick, Resampler, Sampler
-from flagdata.ingest.camera.joined import JoinedSource
+from flagdata.ingest.camera.joined import JoinedSource, check_films
 from flagdata.ingest.camera.motion import CropProposal, cut_off, propose
 from flagdata.ingest.camera.options import CameraOptions, CropBox, exact
 from flagdata.ingest.camera.sequence import SequenceSource
@@ -332,8 +332,14 @@ def open_source(path: Path, options: CameraOptions) -> Source:
     else a video file.
 
     Raises:
-        UsageError: a topic or an episode of what has none.
+        UsageError: a topic or an episode of what has none, or what cannot be joined.
     """
+    if options.chapters:
+        if options.episode is not None or options.topic is not None:
+            what = "an episode" if options.episode is not None else "a topic"
+            raise UsageError(f"{what} of joined video files, which have none", where=str(path), fix="leave it out")
+        check_films((path, *options.chapters))
+        return JoinedSource((path, *options.chapters), options)
     if is_lerobot(path):
         from flagdata.ingest.camera.lerobot import EpisodeSource
 
@@ -350,11 +356,6 @@ def open_source(path: Path, options: CameraOptions) -> Source:
         raise UsageError(
             "a topic of what is no MCAP file or LeRobot data set", where=str(path), fix="leave out --topic"
         )
-    if options.chapters:
-        for chapter in (path, *options.chapters):
-            if is_folder(chapter):
-                raise UsageError("a folder is no chapter", where=str(chapter), fix="join video files")
-        return JoinedSource((path, *options.chapters), options)
     if is_folder(path):
         _no_stream(path, options)
         return SequenceSource(path, options)

@@ -13,7 +13,7 @@ import numpy as np
 
 from flagdata.documents import SIZE_LIMIT, from_json
 from flagdata.errors import InputError, LimitError, NotFoundError
-from flagdata.files import check_input
+from flagdata.files import check_input, is_beside
 from flagdata.ingest.meshes.obj import Obj, obj_text, read_obj
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
 from flagdata.timebase import NANOSECONDS
@@ -94,7 +94,7 @@ def frame_files(path: Path) -> list[tuple[int, Path]]:
         InputError: numbers missing in between or twice, several cloths, or names that are no sequence.
         LimitError: more than `FRAME_LIMIT`.
     """
-    entries = sorted(entry for entry in path.iterdir() if entry.is_file())
+    entries = sorted(entry for entry in path.iterdir() if entry.is_file() and not is_beside(entry.name))
     found = [(int(m[1]), int(m[2]), entry) for entry in entries if (m := _FRAME.fullmatch(entry.name))]
     if not found:
         found = _numbered([entry for entry in entries if entry.suffix.lower() == ".obj"], path)

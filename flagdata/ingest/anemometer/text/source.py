@@ -148,6 +148,7 @@ _SIGNATURES: tuple[tuple[int, bytes, str, str], ...] = (
     (0, b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook", "save the sheet as CSV"),
     (0, b"{\\rtf", "rich text (RTF), whose marks stand among the readings", "save it as plain text, and ingest that"),
     (0, b"%PDF", "a PDF document", "export the readings as CSV"),
+    (0, b"\x00\x05\x16\x07", "macOS's note beside another file (AppleDouble)", "give that file: the name without ._"),
     (0, b"\x89PNG", "a PNG picture", "give the anemometer's log"),
     (0, b"\xff\xd8\xff", "a JPEG picture", "give the anemometer's log"),
     (4, b"ftyp", "a video (MP4 or MOV)", "ingest it as a camera file"),

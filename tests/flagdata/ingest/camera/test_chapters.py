@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-from flagdata.errors import UsageError
+from flagdata.errors import InputError, UsageError
+from flagdata.files import MCAP
 from flagdata.findings import Severity
 from flagdata.ingest.camera import CameraOptions, open_camera, probe
 from flagdata.ingest.camera.joined import in_order
@@ -151,3 +155,58 @@ def test_joined_chapters_are_one_artifact_of_all_their_bytes(tmp_path: Path, fil
     assert not ingest_camera(lake, first, options).created
     film("GH020042.MP4", 16)
     assert ingest_camera(lake, first, options).artifact.frame_count == 26
+
+
+def test_only_video_files_are_joined_whichever_comes_first(tmp_path: Path, film: Callable[..., Path]) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    bag, folder = tmp_path / "a_1.mcap", tmp_path / "a_2"
+    bag.write_bytes(MCAP)
+    folder.mkdir()
+    video, log = film("a_3.mp4", 10), tmp_path / "a_4.csv"
+    log.write_text("time,wind_speed (m/s)\n2026-05-01T10:00:00Z,3.0\n")
+    for others in ((bag,), (folder,), (log,)):
+        for first, *later in ((video, *others), (*others, video)):
+            camera = CameraOptions(size=96, chapters=tuple(later), start=TEN)
+            with pytest.raises((UsageError, InputError)) as refused:
+                open_camera(first, camera)
+            assert str(others[0]) in str(refused.value.where)
+            with pytest.raises((UsageError, InputError)):
+                ingest_camera(lake, first, CameraIngest(camera=camera))
+        if others != (log,):
+            with pytest.raises(UsageError, match="cannot be joined") as refused:
+                in_order((video, *others))
+            assert refused.value.where == str(others[0])
+    assert not lake.rows().num_rows
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        ({"rate": 50, "tick": Fraction(1, 50)}, "frame rate differs"),
+        ({"pixel_format": "yuv444p"}, "pixel format differs"),
+        ({"aspect": Fraction(4, 3)}, "shape of a pixel differs"),
+        ({"codec": "mpeg4"}, "coding differs"),
+        ({"rotation": 90}, "orientation differs"),
+        ({"picture": lambda number: np.full((48, 64), number, np.uint8)}, "size of the pictures differs"),
+    ],
+)
+def test_chapters_of_other_kinds_are_not_joined_and_the_difference_is_named(
+    change: dict[str, Any], what: str, tmp_path: Path, write_video: Callable[..., Path]
+) -> None:
+    plain: dict[str, Any] = {"tick": Fraction(1, 25), "container": "mp4"}
+    first = write_video(tmp_path / "a.mp4", range(10), **plain)
+    second = write_video(tmp_path / "b.mp4", range(10), **{**plain, **change})
+    with pytest.raises(UsageError, match=what) as refused:
+        open_camera(first, CameraOptions(size=96, start=TEN, chapters=(second,)))
+    assert refused.value.where == str(second)
+    # The fix works: it is read by itself.
+    with open_camera(second, CameraOptions(size=96, start=TEN, rate="native")) as stream:
+        assert len(list(stream)) == 10
+
+
+def test_a_file_and_its_copy_are_not_joined(tmp_path: Path, film: Callable[..., Path]) -> None:
+    first, copy = film("a.mp4", 10), tmp_path / "b.mp4"
+    shutil.copy(first, copy)
+    camera = CameraOptions(size=96, start=TEN, chapters=(copy,))
+    with pytest.raises(InputError, match=r"its bytes are those of a\.mp4"):
+        ingest_camera(Lake.create(tmp_path / "lake"), first, CameraIngest(camera=camera))

@@ -161,3 +161,8 @@ def test_arcsims_own_folders_come_back_from_a_written_one(name: str, reference_d
         one, other = sequence.frame(index), back.frame(index)
         for part in ("positions", "faces", "rest", "time"):
             np.testing.assert_array_equal(getattr(one, part), getattr(other, part))
+
+
+def test_notes_of_an_operating_system_are_no_frames(make_folder: Callable[..., Path]) -> None:
+    names = {"flag_0.obj": UNIT, "flag_1.obj": UNIT, "._flag_0.obj": "\0\5", "._flag_1.obj": "\0\5", ".DS_Store": "1"}
+    assert [entry.name for _, entry in frame_files(make_folder(names, configured="no"))] == ["flag_0.obj", "flag_1.obj"]
