@@ -178,13 +178,14 @@ def _check_span(offset: int, length: int, end: int, *, where: str) -> None:
         )
 
 
-def split_records(body: bytes | memoryview, *, where: str) -> Iterator[tuple[int, bytes]]:
-    """Opcode and content of each record in `body`.
+def split_records(body: bytes | memoryview, *, where: str) -> Iterator[tuple[int, memoryview]]:
+    """Opcode and content of each record in `body`; nothing is copied.
 
     Raises:
         CorruptError: a record reaches beyond the end.
     """
     at = 0
+    body = memoryview(body)
     while at < len(body):
         if at + RECORD_HEAD > len(body):
             raise CorruptError("a record's head is cut off", where=where, fix=_RECOVER)
@@ -192,11 +193,11 @@ def split_records(body: bytes | memoryview, *, where: str) -> Iterator[tuple[int
         at += RECORD_HEAD
         if at + length > len(body):
             raise CorruptError(f"a record of {length} bytes reaches beyond its section", where=where, fix=_RECOVER)
-        yield opcode, bytes(body[at : at + length])
+        yield opcode, body[at : at + length]
         at += length
 
 
-def parse(read: Callable[[ReadDataStream], R], record: bytes, *, where: str) -> R:
+def parse(read: Callable[[ReadDataStream], R], record: bytes | memoryview, *, where: str) -> R:
     """`record`'s content by the `read` of one of mcap.records.
 
     Raises:
@@ -466,7 +467,7 @@ def read_attachment(file: Bytes, entry: AttachmentIndex, *, where: str) -> bytes
     return parse(Attachment.read, record, where=where).data
 
 
-def _record_at(file: Bytes, offset: int, length: int, opcode: Opcode, *, where: str) -> bytes:
+def _record_at(file: Bytes, offset: int, length: int, opcode: Opcode, *, where: str) -> memoryview:
     whole = read_exact(file, length, offset, where=where)
     records = list(split_records(whole, where=where))
     if len(records) != 1 or records[0][0] != opcode:

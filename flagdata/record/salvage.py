@@ -17,15 +17,12 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import IO, Any
 
 from google.protobuf.message import DecodeError
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
-from mcap.stream_reader import get_chunk_data_stream
 
 from flagdata.errors import CorruptError, FlagdataError, NotFoundError
 from flagdata.findings import Finding, Severity
@@ -36,11 +33,12 @@ from flagdata.record.metadata import SALVAGE
 from flagdata.record.output import Output
 from flagdata.record.sound import SoundMessages
 from flagdata.record.source import open_bytes
+from flagdata.record.unpacking import unpacked
 from flagdata.record.writer import CHUNK_BYTES, PROFILE, Chunking, library_name
 from flagdata.timebase import iso
 
 CHUNK_LIMIT = 1 << 30
-"""No chunk, packed or not, is taken to be larger than this [B]; a longer one is a damaged length."""
+"""No record is taken to be longer than this in the file [B]; a longer one is a damaged length."""
 _IN_CHUNK = frozenset({Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE})
 _DATA_OPCODES = _IN_CHUNK | {
     Opcode.HEADER, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA,
@@ -49,6 +47,7 @@ _FIRST_PRIVATE = 0x80
 _DATA_END_BYTES = 4
 _CHUNK_START = re.compile(rb"\x06.{3}[\x00-\x40]\x00{4}", re.DOTALL)  # the opcode, and a length within CHUNK_LIMIT
 _CHUNK_FIELDS = struct.Struct("<QQQII")
+_LONGEST_NAME = 8  # bytes of the name of a compression
 _KNOWN: dict[str, Any] = {
     kind.DESCRIPTOR.full_name: kind
     for kind in (
@@ -251,14 +250,14 @@ class _Pass:
                 at = found.start()
                 length = int.from_bytes(view[at + 1 : at + RECORD_HEAD], "little")
                 end = at + RECORD_HEAD + length
-                if end > self._size or length > CHUNK_LIMIT:
+                if end > self._size or length > CHUNK_LIMIT or not _is_chunk(view, at, length):
                     continue
                 try:
-                    chunk = Chunk.read(ReadDataStream(BytesIO(view[at + RECORD_HEAD : end])))
-                    inside, size = get_chunk_data_stream(chunk)
-                except Exception:  # noqa: BLE001  anything may follow a byte that only looks like a chunk's first
+                    chunk = parse(Chunk.read, view[at + RECORD_HEAD : end], where=self._where)
+                    records = unpacked(chunk)
+                except FlagdataError:  # anything may follow a byte that only looks like a chunk's first
                     continue
-                if size == chunk.uncompressed_size and zlib.crc32(inside.read(size)) == chunk.uncompressed_crc:
+                if len(records) == chunk.uncompressed_size and zlib.crc32(records) == chunk.uncompressed_crc:
                     return at
         return None
 
@@ -291,20 +290,15 @@ class _Pass:
     def _chunk(self, content: bytes, start: int) -> None:
         chunk = parse(Chunk.read, content, where=self._where)
         end = start + RECORD_HEAD + len(content)
-        if chunk.uncompressed_size > CHUNK_LIMIT:
-            return self._damaged_chunk(start, end, f"it claims to unpack to {chunk.uncompressed_size} bytes")
         try:
-            inside, length = get_chunk_data_stream(chunk)
-            records = inside.read(length)
-        except Exception as error:  # noqa: BLE001  mcap, zstandard and lz4 each raise errors of their own
-            return self._damaged_chunk(start, end, f"it does not unpack: {error}")
-        if chunk.uncompressed_crc and zlib.crc32(records) != chunk.uncompressed_crc:
-            return self._damaged_chunk(start, end, "its checksum is wrong")
+            records = unpacked(chunk)
+        except FlagdataError as error:
+            return self._damaged_chunk(start, end, error.what)
         for opcode, record in _whole_records(records):
             self._inner(opcode, record)
         return None
 
-    def _inner(self, opcode: int, content: bytes) -> None:
+    def _inner(self, opcode: int, content: bytes | memoryview) -> None:
         if opcode == Opcode.SCHEMA:
             self._copy.schema(parse(Schema.read, content, where=self._where))
         elif opcode == Opcode.CHANNEL:
@@ -416,9 +410,25 @@ class _Pass:
         )  # fmt: skip
 
 
-def _whole_records(body: bytes, *, among: frozenset[Opcode] = _IN_CHUNK) -> Iterator[tuple[int, bytes]]:
+def _is_chunk(view: mmap.mmap, at: int, length: int) -> bool:
+    """Whether the head of a chunk of that length lies there, by the lengths that it states: one read in place, since
+    any byte may look like a chunk's first."""
+    fields = view[at + RECORD_HEAD : at + CHUNK_HEAD]
+    if len(fields) < CHUNK_HEAD - RECORD_HEAD:
+        return False
+    named = _CHUNK_FIELDS.unpack_from(fields)[-1]
+    if named > _LONGEST_NAME:
+        return False
+    packed = int.from_bytes(view[at + CHUNK_HEAD - 8 + named : at + CHUNK_HEAD + named], "little")
+    return CHUNK_HEAD - RECORD_HEAD + named + packed == length
+
+
+def _whole_records(
+    body: bytes | memoryview, *, among: frozenset[Opcode] = _IN_CHUNK
+) -> Iterator[tuple[int, memoryview]]:
     """Opcode and content of the records that lie whole in `body`, up to the first that does not or is not `among`."""
     at = 0
+    body = memoryview(body)
     while at + RECORD_HEAD <= len(body):
         opcode, length = struct.unpack_from("<BQ", body, at)
         at += RECORD_HEAD
