@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from typing import Literal
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError, available_timezones
 
 from flagdata.errors import TimeError, UnknownNameError
+from flagdata.zone_names import meanings
 
 NANOSECONDS = 1_000_000_000
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -27,8 +29,11 @@ WallStatus = Literal["unique", "ambiguous", "nonexistent"]
 def zone(name: str, *, where: str | None = None) -> tzinfo:
     """The time zone called `name`: an IANA name ("Europe/Amsterdam"), "UTC", or a fixed offset ("+02:00").
 
+    An abbreviation ("CET") is refused even where the tz database has a zone of that name: whether its clock is set in
+    summer is what the abbreviation leaves open.
+
     Raises:
-        UnknownNameError: with the nearest IANA name.
+        UnknownNameError: with what an abbreviation may mean, or with the nearest IANA name.
     """
     text = name.strip()
     if text.upper() in ("UTC", "Z", "GMT"):
@@ -40,14 +45,28 @@ def zone(name: str, *, where: str | None = None) -> tzinfo:
         if offset > timedelta(hours=14):
             raise TimeError(f"the offset {text!r} is beyond ±14:00", where=where, fix="give an offset such as +02:00")
         return timezone(sign * offset)
+    if text.isalpha() and (clocks := meanings(text)):
+        raise _abbreviated(text, clocks, where)
     try:
         return ZoneInfo(text)
     except (ZoneInfoNotFoundError, ValueError, OSError):
-        close = difflib.get_close_matches(text, sorted(available_timezones()), n=1)
+        places = sorted(name for name in available_timezones() if "/" in name and not name.startswith("Etc/"))
+        close = difflib.get_close_matches(text, places, n=1)
         raise UnknownNameError(
             f"unknown time zone {name!r}", where=where,
             fix=f"did you mean {close[0]!r}?" if close else "give a name such as Europe/Amsterdam, or +02:00, or UTC",
         ) from None  # fmt: skip
+
+
+def _abbreviated(text: str, clocks: Mapping[str, str], where: str | None) -> UnknownNameError:
+    """The error for an abbreviation of these clocks, offset → place."""
+    shown = " or ".join(f"{offset} (as in {place})" for offset, place in clocks.items())
+    offsets, places = (" or ".join(dict.fromkeys(names)) for names in (clocks, clocks.values()))
+    return UnknownNameError(
+        f"{text!r} is an abbreviation, no name of a time zone: it may mean {shown}", where=where,
+        fix=f"give the offset that the clock kept, {offsets}; if it was set in summer and winter, give the place whose "
+        f"time it followed, {places}",
+    )  # fmt: skip
 
 
 def from_datetime(moment: datetime, *, nanosecond: int = 0) -> int:

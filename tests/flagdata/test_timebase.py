@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import datetime, timedelta, timezone
 
 import pytest
@@ -67,3 +68,37 @@ def test_fixed_offsets_and_misspelt_zones() -> None:
         timebase.zone("Europe/Amsterdm")
     with pytest.raises(TimeError, match="14:00"):
         timebase.zone("+15:00")
+
+
+ABBREVIATIONS = {
+    "CEST": ("+02:00", "Europe/Amsterdam"), "CET": ("+01:00", "Europe/Amsterdam"), "MESZ": ("+02:00", "Europe/Berlin"),
+    "BST": ("+01:00", "Europe/London"), "WEST": ("+01:00", "Europe/Lisbon"), "EEST": ("+03:00", "Europe/Athens"),
+    "EDT": ("-04:00", "America/New_York"), "EST": ("-05:00", "America/New_York"), "MST": ("-07:00", "America/Denver"),
+    "PST": ("-08:00", "America/Los_Angeles"), "IST": ("+05:30", "Asia/Kolkata"), "JST": ("+09:00", "Asia/Tokyo"),
+    "AEDT": ("+11:00", "Australia/Sydney"), "NZST": ("+12:00", "Pacific/Auckland"), "BRT": ("-03:00", "Sao_Paulo"),
+    "SGT": ("+08:00", "Asia/Singapore"), "PT": ("-07:00", "America/Los_Angeles"), "cest": ("+02:00", "Amsterdam"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ABBREVIATIONS)
+def test_an_abbreviation_is_refused_with_the_offsets_and_places_that_it_may_mean(name: str) -> None:
+    with pytest.raises(UnknownNameError) as refused:
+        timebase.zone(name)
+    offset, place = ABBREVIATIONS[name]
+    assert offset in refused.value.what and place in refused.value.what
+    assert offset in str(refused.value.fix) and place in str(refused.value.fix)
+
+
+@pytest.mark.parametrize(("name", "offsets"), {"IST": ("+05:30", "+01:00", "+02:00"), "CST": ("-06:00", "+08:00")}.items())
+def test_an_abbreviation_of_several_clocks_names_each(name: str, offsets: tuple[str, ...]) -> None:
+    with pytest.raises(UnknownNameError) as refused:
+        timebase.zone(name)
+    assert all(one in refused.value.what for one in offsets)
+
+
+def test_no_zone_is_advised_by_the_abbreviation_of_another() -> None:
+    for name in ("XEST", "CESTX", "CESST", "Utrecht", "GMTX"):
+        with pytest.raises(UnknownNameError) as refused:
+            timebase.zone(name)
+        advised = re.findall(r"'([^']+)'", str(refused.value.fix))
+        assert all("/" in one for one in advised), refused.value.fix
