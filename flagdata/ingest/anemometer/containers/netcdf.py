@@ -13,8 +13,10 @@ import numpy as np
 
 from flagdata.errors import InputError, LimitError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.anemometer.containers.cf_time import NOT_A_TIME, instants, is_time
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.text.source import TableText
+from flagdata.timebase import iso
 from flagdata.units import UNITS, spelled
 
 _HDF = b"\x89HDF"
@@ -42,17 +44,19 @@ def open_dataset(path: Path, *, limits: Limits) -> TableText:
             raise InputError(what, where=where, fix=fix)
         stream.seek(0)
         try:
-            data = xarray.open_dataset(stream, decode_times=True).squeeze()
+            raw = xarray.open_dataset(stream, decode_cf=False)
+            data = xarray.decode_cf(raw, decode_times=False).squeeze()
         except Exception as error:  # noqa: BLE001 - a damaged file makes its libraries raise anything
             what = f"this netCDF or HDF5 file cannot be read: {type(error).__name__}"
             raise InputError(what, where=where, fix="copy it again, or export it as CSV") from None
-        with data:
-            return _table(data, path, limits)
+        with raw:
+            return _table(data, raw, path, limits)
 
 
-def _table(data: Any, path: Path, limits: Limits) -> TableText:
+def _table(data: Any, raw: Any, path: Path, limits: Limits) -> TableText:
+    """The lines of a data set; the times of `raw`, as they are stored."""
     where = str(path)
-    time = next((name for name, axis in data.coords.items() if axis.dtype.kind == "M" and axis.ndim == 1), None)
+    time = next((name for name, axis in data.coords.items() if axis.ndim == 1 and is_time(raw[name].attrs)), None)
     if time is None:
         raise InputError("no axis of time by the CF conventions", where=where, fix="export the readings as CSV")
     if data.sizes[time] > limits.rows:
@@ -75,12 +79,13 @@ def _table(data: Any, path: Path, limits: Limits) -> TableText:
     if not any("wind" in heading for heading in columns):
         fix = "give the variables of wind their standard names and one dimension, time; or export them as CSV"
         raise InputError("no variable of wind along time alone", where=where, fix=fix)
-    stamps = np.datetime_as_string(data[time].values.astype("datetime64[ns]"), unit="ns")
+    stamps, found = instants(raw[time].squeeze().values, raw[time].attrs, where=f"{where}, variable {time}")
     rows = zip(stamps.tolist(), *(values.tolist() for values in columns.values()), strict=True)
     lines = [",".join(["time", *columns])]
     lines += [
-        ",".join([f"{stamp}Z", *("" if value != value else repr(value) for value in row)]) for stamp, *row in rows
+        ",".join(["" if stamp == NOT_A_TIME else iso(stamp), *("" if value != value else repr(value) for value in row)])
+        for stamp, *row in rows
     ]
     what = f"variables that are not read: {', '.join(left)}"
-    found = (Finding(kind="columns-not-read", severity=Severity.NOTE, what=what),) if left else ()
+    found = (*found, Finding(kind="columns-not-read", severity=Severity.NOTE, what=what)) if left else found
     return TableText(path=path, encoding="utf-8", lines=len(lines), findings=found, text=tuple(lines))

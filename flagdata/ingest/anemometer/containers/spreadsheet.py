@@ -10,6 +10,7 @@ import csv
 import datetime as dt
 import importlib
 import io
+import re
 import zipfile
 import zlib
 from pathlib import Path
@@ -20,6 +21,8 @@ from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.text.source import TableText
 
+_OF_1904 = re.compile(rb"<(?:\w+:)?workbookPr\b[^>]*\bdate1904\s*=\s*[\"'](?:1|true|on)[\"']")
+"""Where a workbook says that its days are counted from 1904-01-01 (ECMA-376, part 1, 18.2.28)."""
 _WIDEST = 2000
 """Columns of the widest sheet that is read."""
 
@@ -45,9 +48,11 @@ def open_sheet(path: Path, *, limits: Limits) -> TableText:
             fix="install it: pip install 'flagdata[excel]', or save the sheet as CSV",
         ) from None  # fmt: skip
     sheets: dict[str, Any] = {}
+    of_1904 = False
     try:
         with zipfile.ZipFile(path) as archive:
             damaged = archive.testzip()  # calamine reads a damaged sheet as an empty one
+            of_1904 = _OF_1904.search(archive.read("xl/workbook.xml")) is not None
         book = calamine.CalamineWorkbook.from_path(where)
         names = [one.name for one in book.sheets_metadata if one.typ == calamine.SheetTypeEnum.WorkSheet]
         sheets = {name: book.get_sheet_by_name(name) for name in names}
@@ -66,7 +71,11 @@ def open_sheet(path: Path, *, limits: Limits) -> TableText:
         text = f"the sheet {title!r} is read, the first of {len(filled)}; not {', '.join(map(repr, others))}"
         fix = "save another sheet as a file of its own to read it"
         found = (Finding(kind="several-sheets", severity=Severity.WARNING, count=len(filled), what=text, fix=fix),)
-    return TableText(path=path, encoding="utf-8", lines=len(filled[title]), findings=found, text=tuple(filled[title]))
+    if of_1904:
+        text = "the workbook counts days from 1904-01-01: so its dates are read, and so is excel-days"
+        found = (*found, Finding(kind="days-since-1904", severity=Severity.NOTE, what=text))
+    lines, days = tuple(filled[title]), "excel-days-1904" if of_1904 else "excel-days"
+    return TableText(path=path, encoding="utf-8", lines=len(lines), findings=found, text=lines, serial_days=days)
 
 
 def _lines(sheet: Any, limits: Limits, where: str) -> list[str]:

@@ -7,7 +7,7 @@ assumed, what was read counts only when it is confirmed (see `confirm`).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from flagdata import compass
@@ -16,10 +16,18 @@ from flagdata.ingest.anemometer.draft.beside import gust_factor
 from flagdata.ingest.anemometer.draft.given import GivenColumns, given_columns
 from flagdata.ingest.anemometer.draft.questions import ZONE, Open
 from flagdata.ingest.anemometer.draft.shape import Shape, is_missing, is_number, shape_of
-from flagdata.ingest.anemometer.draft.times import TimeFields, find_time, of_columns
+from flagdata.ingest.anemometer.draft.times import (
+    TimeFields,
+    counts_of,
+    find_time,
+    of_another_origin,
+    of_columns,
+    unread_count,
+)
 from flagdata.ingest.anemometer.draft.toml import ChannelText, quoted, recipe_text, reference
 from flagdata.ingest.anemometer.draft.words import MOVING, Meaning, fits, meaning
 from flagdata.ingest.anemometer.instants import dates
+from flagdata.ingest.anemometer.instants.stamps import EPOCH
 from flagdata.ingest.anemometer.options import WindOptions
 from flagdata.units import canonical, spelled
 
@@ -108,8 +116,11 @@ class _Parts:
     used: set[int] = field(default_factory=set)
 
 
-def draft(lines: Sequence[str], options: WindOptions) -> Draft | None:
+def draft(lines: Sequence[str], options: WindOptions, *, serial_days: str = "excel-days") -> Draft | None:
     """The draft of the table that a file begins with; `None` where it holds none.
+
+    Args:
+        serial_days: the form that "excel-days" are in this file.
 
     Raises:
         UsageError, UnknownNameError, InputError: `options.columns` do not fit the table.
@@ -119,6 +130,8 @@ def draft(lines: Sequence[str], options: WindOptions) -> Draft | None:
         return None
     meanings = [meaning(name, below) for name, below in zip(shape.names, shape.units, strict=True)]
     given = given_columns(options.columns, shape) if options.columns is not None else None
+    if given is not None and given.form == "excel-days":
+        given = replace(given, form=serial_days)
     parts = _Parts()
     winds, of_earth = (
         _of_wind(parts, shape, meanings, options) if given is None else (_given(parts, shape, given), False)
@@ -175,15 +188,15 @@ def _time(
     else:
         time = find_time(shape, meanings, options.date_order)
     if time is None:
-        question = "no column reads as a time: which one is it, and in what format?"
+        question = f"no column reads as a time: which one is it, and in what format?{unread_count(shape, meanings)}"
         parts.open.append(Open(key="columns", question=question, example="'1=time[FORMAT],2=wind_speed[UNIT]'"))
         return None
     parts.used.update(time.columns)
     shown = " + ".join(shape.shown(i) for i in time.columns)
     if time.form is None:
-        question = (
-            f"{shown}: {shape.rows[0][time.columns[0]]!r} reads as {' and as '.join(time.forms)}: which is right?"
-        )
+        first = shape.rows[0][time.columns[0]]
+        question = f"{shown}: {first!r} reads as {' and as '.join(time.forms)}: which is right?"
+        question += f" (It would be {counts_of(first)})" if set(time.forms) & set(EPOCH) else ""
         orders = {form.replace("%d", "%m") for form in time.forms}
         if len(orders) == 1:
             parts.open.append(Open(key="date_order", question=question, example="ORDER (dmy, mdy or ymd)"))
@@ -191,6 +204,10 @@ def _time(
             example = f"'{shape.reference(time.columns[0])}=time[FORMAT], and all other columns'"
             parts.open.append(Open(key="columns", question=question, example=example))
         return time
+    if given is None and of_another_origin(time, meanings):
+        question = f"{shown} reads as {time.form}, and its heading speaks of another origin than 1970: which is right?"
+        example = f"'{shape.reference(time.columns[0])}=time[FORMAT], and all other columns'"
+        parts.open.append(Open(key="columns", question=question, example=example))
     if given is not None and given.form:
         origin: Origin = "given"
     elif time.form == "iso" and all(meanings[i].kind == "time" for i in time.columns):
@@ -213,11 +230,9 @@ def _time(
     if dates.needs_date(time.form) and options.date is None:
         question = f"{shown} has no whole date: of what day is the first row?"
         parts.open.append(Open(key="date", question=question, example="DATE (as 2026-05-01)"))
-    epoch = time.form.startswith("epoch")
-    if time.zoned or epoch:
-        parts.facts.append(
-            Fact(what="zone", value="in the stamps" if not epoch else "UTC, as Unix time", origin="stated")
-        )
+    if time.zoned:
+        stated = f"UTC, as {time.form}" if time.form in EPOCH else "in the stamps"
+        parts.facts.append(Fact(what="zone", value=stated, origin="stated"))
     elif options.zone is not None:
         parts.facts.append(Fact(what="zone", value=options.zone, origin="given"))
     elif time.utc:

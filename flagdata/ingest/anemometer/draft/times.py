@@ -6,11 +6,12 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from flagdata.ingest.anemometer.draft.shape import Shape
-from flagdata.ingest.anemometer.draft.words import Meaning
+from flagdata.ingest.anemometer.draft.shape import Shape, is_number
+from flagdata.ingest.anemometer.draft.words import Meaning, words_of
 from flagdata.ingest.anemometer.instants import stamps
 from flagdata.ingest.anemometer.instants.dates import is_time_of_day, parse
 from flagdata.ingest.anemometer.instants.stamps import Stamps
+from flagdata.timebase import iso
 
 _CLOCKS = ("%H:%M:%S%f", "%H:%M", "%I:%M:%S%f %p", "%I:%M %p", "%H%M%S", "%H%M", "%H")
 _DATES = (
@@ -18,7 +19,11 @@ _DATES = (
     "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%d %b %Y", "%d-%b-%Y", "%b %d %Y", "%Y %j",
 )  # fmt: skip
 _WHOLE = ("iso", "%Y%m%d%H%M%S", "%Y%m%d%H%M", "%Y%m%dT%H%M%S%z")
-_EPOCHS = ("epoch-s", "epoch-ms", "epoch-us")
+_UNITS_OF_A_COUNT = re.compile(r"\d{9,19}([.,]\d+)?|\d([.,]\d+)?[eE]\+?\d{1,2}")
+_OTHER_ORIGINS = words_of(
+    "gps gpst tow tai labview 1900 1904 1980 2000 j2000 ntp filetime ticks datenum matlab excel julian jd mjd"
+)
+"""Words of a heading that speak of a count from another instant than the beginning of 1970."""
 _FITS = 0.95
 """Share of the stamps that a form must read."""
 _ORDER = {"%d": "d", "%m": "m", "%Y": "y", "%y": "y"}
@@ -95,10 +100,36 @@ def of_columns(shape: Shape, columns: tuple[int, ...], order: str | None, form: 
     return TimeFields(columns=columns, forms=kept, zoned=bool(read.utc[read.valid].all()), evidence=evidence)
 
 
+def of_another_origin(time: TimeFields, meanings: Sequence[Meaning]) -> bool:
+    """Whether a count of Unix time stands below a heading that speaks of another origin."""
+    words = {word for i in time.columns for word in meanings[i].plain.split()}
+    return time.form in stamps.EPOCH and time.form not in words and bool(words & _OTHER_ORIGINS)
+
+
+def counts_of(text: str) -> str:
+    """The date that a number is by each count since an origin that reads it, for people; "" where none does."""
+    read = {form: parse([text], form)[0] for form in (*stamps.EPOCH, *stamps.SERIAL)}
+    found = [f"{iso(int(one.ns[0])).removesuffix('Z')} as {form}" for form, one in read.items() if one.valid[0]]
+    return " or ".join(found)
+
+
+def unread_count(shape: Shape, meanings: Sequence[Meaning]) -> str:
+    """What the first number may be that stands below the heading of a time and that no form reads, for people."""
+    for index, one in enumerate(meanings):
+        cell = shape.rows[0][index]
+        if one.kind not in ("time", "date") or not is_number(cell):
+            continue
+        if re.fullmatch(stamps.EXPONENT, cell):
+            return f"; {shape.shown(index)} begins with {cell!r}, which was rounded: export it with all its digits"
+        if found := counts_of(cell):
+            return f"; {shape.shown(index)} begins with {cell!r}, which would be {found}"
+    return ""
+
+
 def _candidates(texts: Sequence[str], columns: tuple[int, ...]) -> list[str]:
     first = texts[0] if texts else ""
-    if re.fullmatch(r"\d{9,19}(\.\d+)?", first):
-        return [*_EPOCHS, *(one for one in _WHOLE if one != "iso")]
+    if _UNITS_OF_A_COUNT.fullmatch(first):
+        return [*stamps.EPOCH, *(one for one in _WHOLE if one != "iso")]
     dated = [f"{date} {clock}" for date in _DATES for clock in _CLOCKS]
     dated += _CLOCKS if len(columns) == 1 else ()
     return [*_WHOLE, *dated] if len(columns) > 1 or _CLOCK.search(first) else [*_WHOLE, *dated, *_DATES]

@@ -19,46 +19,47 @@ Kind = Literal[
 ]  # fmt: skip
 
 
-def _words(text: str) -> frozenset[str]:
+def words_of(text: str) -> frozenset[str]:
+    """The words of a text, which stand between blanks."""
     return frozenset(text.split())
 
 
-_WIND = _words("wind winds windmean anemometer anemo anem sonic csat viento vent vento gill vane cup cups windvane")
-_SPEED = _words(
+_WIND = words_of("wind winds windmean anemometer anemo anem sonic csat viento vent vento gill vane cup cups windvane")
+_SPEED = words_of(
     "speed spd sp velocity vel ws wspd wsp windspeed windspd windsp wndspd wndsp ff fff vv geschwindigkeit "
     "windgeschwindigkeit vitesse velocidad snelheid windsnelheid velocita"
 )
-_DIRECTION = _words(
+_DIRECTION = words_of(
     "direction dir dirn wd wdir winddir winddirection wnddir dd ddd bearing azimuth richtung windrichtung "
     "direccion richting direzione"
 )
 _AXES: tuple[tuple[Kind, frozenset[str]], ...] = (
-    ("x", _words("u ux x east eastward")), ("y", _words("v uy y north northward")),
-    ("z", _words("w uz z up vertical upward")),
+    ("x", words_of("u ux x east eastward")), ("y", words_of("v uy y north northward")),
+    ("z", words_of("w uz z up vertical upward")),
 )  # fmt: skip
-_TIME = _words(
+_TIME = words_of(
     "time timestamp datetime stamp clock hour uhrzeit zeit heure hora tijd ora tmstamp epoch unixtime utc gmt "
     "localtime zeitstempel date_time sampletime recordtime timestring millis elapsed"
 )
-_DATE = _words("date day datum fecha jour giorno dato yyyymmdd")
-_TEMPERATURE = _words("temperature temp ta airtemp tair temperatur temperatura")
-_HUMIDITY = _words("humidity rh hum relhum feuchte humedad umidita humidite")
-_PRESSURE = _words("pressure press baro bp barometer luftdruck presion pression pressione druk")
-_EXTREME = _words(
+_DATE = words_of("date day datum fecha jour giorno dato yyyymmdd")
+_TEMPERATURE = words_of("temperature temp ta airtemp tair temperatur temperatura")
+_HUMIDITY = words_of("humidity rh hum relhum feuchte humedad umidita humidite")
+_PRESSURE = words_of("pressure press baro bp barometer luftdruck presion pression pressione druk")
+_EXTREME = words_of(
     "gust gusts gustspeed max maximum min minimum peak high hi low lo highest lowest extreme boe böe bö rafale "
     "racha raffica windgust maxi mini"
 )
-GUSTS = _EXTREME - _words("min minimum low lo lowest mini")
-_SPREAD = _words("std stdev sd stddev sigma deviation dev variance var rms ti turbulence count quality qc flag")
-MOVING = _words(
+GUSTS = _EXTREME - words_of("min minimum low lo lowest mini")
+_SPREAD = words_of("std stdev sd stddev sigma deviation dev variance var rms ti turbulence count quality qc flag")
+MOVING = words_of(
     "apparent aws awa awd relative bow vessel boat ship drone uav sog cog heading hdg ground gps vehicle truewind "
     "tws twd twa track roll pitch yaw vx vy vz"
 )
 """Words that speak of a platform which may move."""
-_TOWARDS = _words("to toward towards going")
-_RAW = _words("volt volts voltage counts pulses pulse raw adc mv frequency freq beaufort bft class chill")
-_OTHER = _words("battery batt rain solar radiation uv soil dew dewpoint snow wave tide water sea current")
-_SITES = _words("station site sensor device location turbine buoy node mast id serial place logger")
+_TOWARDS = words_of("to toward towards going")
+_RAW = words_of("volt volts voltage counts pulses pulse raw adc mv frequency freq beaufort bft class chill")
+_OTHER = words_of("battery batt rain solar radiation uv soil dew dewpoint snow wave tide water sea current")
+_SITES = words_of("station site sensor device location turbine buoy node mast id serial place logger")
 _BRACKET = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]{1,20})[\])]\s*(?P<rest>.*)$")
 _WORD = re.compile(r"[a-zäöüß°]+|\d+(?:\.\d+)?")
 _HEIGHT = re.compile(r"(?<![a-z\d.])(\d{1,3}(?:\.\d+)?)\s*m(?![a-z/])", re.IGNORECASE)

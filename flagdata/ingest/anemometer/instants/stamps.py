@@ -10,8 +10,13 @@ cut short. Numbers between blanks may end in ".0", as tables of floats have them
 Names of counts:
 
     epoch-s, -ms, -us, -ns      Unix time
+    labview-s                   seconds since 1904-01-01 in UTC (LabVIEW, timestamps)
+    filetime                    tenths of a microsecond since 1601-01-01 in UTC (Windows, FILETIME)
+    ticks                       tenths of a microsecond since year 1, of the wall clock (.NET, DateTime.Ticks)
     excel-days                  days since 1899-12-30 (ECMA-376, part 1, 18.17.4.1), of the wall clock
+    excel-days-1904             days since 1904-01-01 (the same, workbooks of the 1904 date system), of the wall clock
     datenum                     days since year 0, 1 January being 1 (MATLAB, datenum), of the wall clock
+    julian-days, -modified      days since noon of -4712-01-01, and since 1858-11-17, of the wall clock
     elapsed-s, -ms, -us, -min, -h, -d   since a start that the user gives (see `dates`)
 """
 
@@ -23,6 +28,7 @@ import functools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from typing import Any
 
 import numpy as np
@@ -79,16 +85,29 @@ _CENTURY = YEARS[0] % 100
 """The first year of two digits that is of the 1900s: no log is of the years to come, and some are of the 1990s."""
 PLAIN_FORMS = ("iso", "%Y-%m-%d %H:%M:%S%f")
 """Forms of which 2021-05-14 00:00:00.05 is one."""
-EPOCH = {"epoch-s": NANOSECONDS, "epoch-ms": 1_000_000, "epoch-us": 1_000, "epoch-ns": 1}
+EPOCH = {
+    "epoch-s": NANOSECONDS, "epoch-ms": 1_000_000, "epoch-us": 1_000, "epoch-ns": 1, "labview-s": NANOSECONDS,
+    "filetime": 100, "ticks": 100,
+}  # fmt: skip
+"""Counts of seconds or their parts since an origin: the nanoseconds of one unit."""
+_SINCE_1970 = {
+    "labview-s": 2_082_844_800, "filetime": 116_444_736_000_000_000, "ticks": 621_355_968_000_000_000,
+}  # fmt: skip
+"""What a count of another origin than 1970 says of it, in its unit."""
 _SINCE, _UNTIL = 631_152_000, 4_102_444_800
 """1990 and 2100 in Unix time: what lies beyond is a counter or another unit."""
-_SERIAL = {"excel-days": 25_569, "datenum": 719_529}
+SERIAL = {
+    "excel-days": 25_569, "excel-days-1904": 24_107, "datenum": 719_529, "julian-days": 2_440_587.5,
+    "julian-days-modified": 40_587,
+}  # fmt: skip
 """Number of the day 1970-01-01."""
 ELAPSED = {
     "elapsed-s": NANOSECONDS, "elapsed-ms": 1_000_000, "elapsed-us": 1_000, "elapsed-min": _MINUTE, "elapsed-h": HOUR,
     "elapsed-d": DAY,
 }  # fmt: skip
-NAMED = (*EPOCH, *_SERIAL, *ELAPSED)
+EXPONENT = r"^\d(?:[.,]\d{1,20})?[eE]\+?\d{1,2}$"
+"""A number that is written with an exponent."""
+NAMED = (*EPOCH, *SERIAL, *ELAPSED)
 """Forms that are names of counts."""
 
 
@@ -183,9 +202,9 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
     """
     text = pc.utf8_trim_whitespace(array(texts))
     if form in EPOCH:
-        return _epoch(text, EPOCH[form])
-    if form in _SERIAL:
-        return _serial(text, _SERIAL[form])
+        return _epoch(text, EPOCH[form], _SINCE_1970.get(form, 0), utc=form != "ticks")
+    if form in SERIAL:
+        return _serial(text, SERIAL[form])
     if form in ELAPSED:
         return _elapsed(text, form)
     if form in PLAIN_FORMS and (plain := _plain(text)) is not None:
@@ -247,16 +266,29 @@ def _counts(ns: NDArray[np.int64], valid: NDArray[np.bool_], step: int, *, utc: 
     return Stamps(ns=np.where(valid, ns, 0), utc=valid.copy() if utc else none, valid=valid, distant=none, step=step)
 
 
-def _epoch(text: pa.StringArray, scale: int) -> Stamps:
-    """Unix time, exact in integers: a double holds today's seconds to 0.2 µs only."""
+def _epoch(text: pa.StringArray, scale: int, zero: int, *, utc: bool) -> Stamps:
+    """A count of units of `scale` ns that is `zero` in 1970, exact in integers: a double holds today's seconds to
+    0.2 µs only."""
+    text = _without_exponents(text, scale)
     found = pc.extract_regex(text, r"^(?P<whole>\d{1,18}|[1-8]\d{18})(?:[.,](?P<f>\d{1,9})\d*)?$")
     whole = _part(found, "whole")
     fraction, digits = _fraction(found)
-    whole = np.zeros(len(text), dtype=np.int64) if whole is None else whole
+    whole = (np.zeros(len(text), dtype=np.int64) if whole is None else whole) - zero
     seconds = whole * (scale / NANOSECONDS)
     valid = found.is_valid().to_numpy(zero_copy_only=False) & (seconds > _SINCE) & (seconds < _UNTIL)
-    ns = np.where(valid, whole, 0) * scale + fraction // (NANOSECONDS // scale)
-    return _counts(ns, valid, max(1, scale // 10**digits), utc=True)
+    ns = np.where(valid, whole, 0) * scale + fraction * scale // NANOSECONDS
+    return _counts(ns, valid, max(1, scale // 10**digits), utc=utc)
+
+
+def _without_exponents(text: pa.StringArray, scale: int) -> pa.StringArray:
+    """Numbers such as 1.777636801e9 with all their digits; of a column that was rounded to more than a second none."""
+    written = pc.fill_null(pc.match_substring_regex(text, EXPONENT), False)
+    if not pc.any(written).as_py():
+        return text
+    numbers = [Decimal(one.replace(",", ".")) for one in text.filter(written).to_pylist()]
+    last = min(int(one.as_tuple().exponent) for one in numbers)
+    whole = [f"{one:f}" if 10.0**last * scale <= NANOSECONDS else "" for one in numbers]
+    return pc.replace_with_mask(text, written, pa.array(whole, pa.string()))
 
 
 def _numbers(text: pa.StringArray) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
@@ -269,16 +301,16 @@ def _numbers(text: pa.StringArray) -> tuple[NDArray[np.float64], NDArray[np.bool
     return value, number.to_numpy(zero_copy_only=False).astype(bool), digits
 
 
-def _serial(text: pa.StringArray, base: int) -> Stamps:
+def _serial(text: pa.StringArray, base: float) -> Stamps:
     """Serial days. A double holds a day's number to a microsecond or so, and days have no round seconds: noise of the
     last digits below a millisecond is rounding, and so is what is within the last digit of whole minutes."""
     value, valid, digits = _numbers(text)
     days = value - base
     valid = valid & (days > _SINCE / 86_400) & (days < _UNTIL / 86_400)
     ns = np.round(np.where(valid, days, 0.0) * 86_400e6).astype(np.int64) * 1_000
-    ns = _snapped(ns, 1_000_000, 100_000)
+    ns = snapped(ns, 1_000_000, 100_000)
     step = max(1_000, round(DAY / 10**digits))
-    minute = _snapped(ns, _MINUTE, step)
+    minute = snapped(ns, _MINUTE, step)
     ns = minute if step > 1_000_000 and not np.any(minute % _MINUTE) else ns
     return _counts(ns, valid, step)
 
@@ -291,11 +323,11 @@ def _elapsed(text: pa.StringArray, form: str) -> Stamps:
     valid = valid & (value * (scale / NANOSECONDS) < 3.2e8)
     ns = np.round(np.where(valid, value, 0.0) * scale).astype(np.int64)
     step = max(1, scale // 10 ** min(digits, 9))
-    ns = _snapped(ns, NANOSECONDS, step) if scale > NANOSECONDS and step < NANOSECONDS else ns
+    ns = snapped(ns, NANOSECONDS, step) if scale > NANOSECONDS and step < NANOSECONDS else ns
     return _counts(ns, valid, step)
 
 
-def _snapped(ns: NDArray[np.int64], whole: int, within: int) -> NDArray[np.int64]:
+def snapped(ns: NDArray[np.int64], whole: int, within: int) -> NDArray[np.int64]:
     """Instants, those within so much of a multiple of `whole` on it."""
     near = np.round(ns / whole).astype(np.int64) * whole
     return np.where(np.abs(ns - near) <= within, near, ns)

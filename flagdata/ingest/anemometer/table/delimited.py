@@ -74,6 +74,8 @@ class Delimited:
 def _by_recipe(source: TextFile, recipe: Recipe, options: WindOptions, azimuth: float | None) -> Reading:
     """All rows of a table, in the order of the file; `azimuth` of components' axes [rad, clockwise from true north]."""
     where, rows = str(source.path), RowReader(source, recipe.file)
+    if recipe.time.format == "excel-days":
+        recipe = replace(recipe, time=replace(recipe.time, format=source.serial_days))
     columns = platform.position_columns(rows.header or ()) or ()
     given = Given(start=options.start, date=options.date, clock=options.clock)
     table = read_table(rows, recipe, where=where, zone_name=options.zone, extra=columns, given=given)
@@ -91,7 +93,7 @@ def drafted(source: TextFile, options: WindOptions) -> Draft | None:
     for key in options.expect:
         if key not in KEYS:
             raise UnknownNameError.of("check", key, KEYS, where="--expect")
-    return draft(source.head(HEAD_LINES), options)
+    return draft(source.head(HEAD_LINES), options, serial_days=source.serial_days)
 
 
 def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:

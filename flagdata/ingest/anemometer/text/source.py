@@ -40,12 +40,14 @@ class TextFile:
         encoding: a Python codec name.
         lines: number of line ends, roughly the number of lines.
         findings: about encoding, line ends and NUL bytes.
+        serial_days: what "excel-days" are in it: "excel-days-1904" in a workbook of that date system.
     """
 
     path: Path
     encoding: str
     lines: int
     findings: tuple[Finding, ...] = ()
+    serial_days: str = "excel-days"
 
     @property
     def counted(self) -> bool:
@@ -136,9 +138,11 @@ _CHUNK = 1 << 20
 HEAD = 65_536
 """Bytes looked at to find what a file is."""
 
+_OPEN_DOCUMENT = b"application/vnd.oasis.opendocument.spreadsheet"
 # First bytes → what it is, what to do. Signatures as in the formats' own specifications.
 _SIGNATURES: tuple[tuple[int, bytes, str, str], ...] = (
     (0, GZIP, "gzip-compressed and damaged", "copy it again, or unpack it: gunzip FILE"),
+    (30, b"mimetype" + _OPEN_DOCUMENT, "an OpenDocument spreadsheet", "save it as .xlsx, or the sheet as CSV"),
     (0, b"PK\x03\x04", "a zip archive or an Excel workbook", "unpack it, or save the sheet as CSV"),
     (0, b"PK\x05\x06", "an empty zip archive", "give the log itself"),
     (0, b"\xfd7zXZ\x00", "xz-compressed", "unpack it first: unxz FILE"),

@@ -66,6 +66,50 @@ def test_each_fact_has_its_origin(heading: str, form: str, what: str, expected: 
     assert origin(found, what) == expected
 
 
+UNIX = 1_777_636_800
+"""2026-05-01T12:00:00Z."""
+
+
+@pytest.mark.parametrize(
+    ("scale", "form"), [(1, "epoch-s"), (10**3, "epoch-ms"), (10**6, "epoch-us"), (10**9, "epoch-ns")]
+)
+@pytest.mark.parametrize("written", [str, "{}.0".format, "{:.9e}".format])
+def test_unix_time_is_read_in_each_unit_and_writing_and_is_inferred(
+    scale: int, form: str, written: Callable[[int], str]
+) -> None:
+    table = ["time,wind_speed (m/s)", *(f"{written((UNIX + k) * scale)},{4 + k % 7 / 10}" for k in range(30))]
+    found = draft(table, WindOptions())
+    assert found is not None
+    assert (asked(found), origin(found, "time")) == (set(), "inferred")
+    assert f'format = "{form}"' in found.recipe
+
+
+@pytest.mark.parametrize(
+    ("heading", "cell", "says"),
+    [
+        ("time", "46143.5{s:02d}", ("2026-05-01T12:", "excel-days", "2030-05-02T12:", "excel-days-1904")),
+        ("time", "2461162.5{s:02d}", ("2026-05-02T00:", "julian-days")),
+        ("date", "740103.5{s:02d}", ("2026-05-01T12:", "datenum")),
+        ("time", "38604816{s:02d}", ("2092-05-01T12:00:00 as epoch-s", "2026-05-01T12:00:00 as labview-s")),
+        ("time", "6391323360000000{s:02d}", ("epoch-ns", "2026-05-01T12:00:00 as ticks")),
+        ("time", "1.7776{s:02d}E+12", ("'1.777600E+12'", "rounded")),
+        ("GPS time", "14616720{s:02d}", ("another origin than 1970",)),
+        ("time since 1904", "20000000{s:02d}", ("another origin than 1970",)),
+    ],
+)
+def test_a_count_that_may_be_of_another_origin_is_asked_with_the_dates_that_it_would_be(
+    heading: str, cell: str, says: tuple[str, ...]
+) -> None:
+    found = drafted(f"{heading},wind_speed (m/s)", cell + ",{v}")
+    (question,) = [one for one in found.open if one.key == "columns"]
+    assert [one for one in says if one not in question.question] == []
+
+
+def test_a_count_of_another_origin_is_read_where_the_user_gives_its_form() -> None:
+    found = drafted("GPS time,wind (m/s)", "14616720{s:02d},{v}", columns="1=time[epoch-s],2=wind_speed[m/s]")
+    assert found.stated
+
+
 @pytest.mark.parametrize(
     ("heading", "form", "key"),
     [

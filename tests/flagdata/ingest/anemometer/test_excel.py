@@ -72,6 +72,31 @@ def test_the_first_sheet_with_a_table_is_read_and_the_others_are_named(book: Boo
     assert "'More'" in found.what
 
 
+@pytest.mark.parametrize("plain", [False, True], ids=["dates", "numbers"])
+def test_days_of_the_1904_system_are_those_of_the_workbook(book: Book, plain: bool) -> None:
+    path = book(Log=PLAIN)
+    made: Any = importlib.import_module("openpyxl").load_workbook(path)
+    made.epoch = dt.datetime(1904, 1, 1)  # noqa: DTZ001  as openpyxl names the system
+    for row, (cell,) in enumerate(made.active.iter_rows(min_row=2, max_col=1)):
+        cell.value = 44681.5 + row / 86_400 if plain else START + dt.timedelta(seconds=row)
+        cell.number_format = "General" if plain else "yyyy-mm-dd hh:mm:ss"
+    made.save(path)
+    form = "excel-days" if plain else "iso"
+    log = read_log(path, WindOptions(columns=f"1=time[{form}],2=wind_speed[m/s]", zone="UTC"))
+    assert iso(int(log.series.time[0])) == ("2026-05-01T12:00:00Z" if plain else "2026-05-01T23:59:58Z")
+    assert "days-since-1904" in {finding.kind for finding in log.findings}
+    assert ("excel-days-1904" in str(log.drafted)) is plain  # what was understood is part of an artifact's identity
+
+
+def test_an_opendocument_spreadsheet_is_refused_by_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "wind.ods"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("mimetype", "application/vnd.oasis.opendocument.spreadsheet")
+        archive.writestr("content.xml", "<office:document-content/>")
+    with pytest.raises(InputError, match="OpenDocument spreadsheet"):
+        read_log(path)
+
+
 def test_line_numbers_are_those_of_the_sheets_rows(book: Book) -> None:
     rows = [list(row) for row in PLAIN]
     rows[3][1] = "broken"
