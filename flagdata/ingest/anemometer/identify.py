@@ -17,7 +17,7 @@ from flagdata.ingest.anemometer.sniffing import HEAD_LINES, NAMED, SURE, Guess, 
 from flagdata.ingest.anemometer.table.delimited import Delimited, drafted
 from flagdata.ingest.anemometer.text.source import TextFile, first_bytes, is_workbook, open_text, signature
 
-_PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"}
+_PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"}
 _MESHES = {".obj", ".ply", ".stl", ".off"}
 
 
@@ -157,5 +157,5 @@ def _folder(path: Path) -> Guess:
         return Guess(format="image sequence", score=0.9, reasons=(reason,), kind="camera", fix="ingest it as a camera")
     return Guess(
         format="folder", score=0.0, reasons=(f"a folder of {len(names)} files, neither meshes nor pictures",),
-        kind="other", fix="give one file",
+        kind="other", fix="give one file, or a folder of PNG, JPEG, TIFF, BMP or WebP pictures",
     )  # fmt: skip

@@ -6,13 +6,14 @@ Kinds of findings, by severity:
 
 - notes: resampled, frames-dropped, true-rate, variable-rate, exposure-unknown, crop-proposed, letterboxed (a chosen
   crop), enlarged (up to twice), mirrored, more-video-streams, telemetry-without-time, numbered-by-steps,
-  start-by-gps, start-passed-over, chapter-placed, chapters-joined;
+  start-by-gps, start-passed-over, chapter-placed, chapters-joined, files-not-read;
 - warnings: crop-cuts-motion, letterboxed (no crop chosen), enlarged, frames-missing, frames-repeated,
   frames-not-shown, frames-undecoded, stamps-missing, stamps-duplicate, stamps-disordered, stamps-synthetic (of LeRobot
   data sets), true-rate-of-variable, start-unsure, start-unknown, chapter-not-placed, chapters-unproven, interlaced,
   odd-rotation, hdr-transfer, alpha-ignored, gif-delays, damaged-references, index-damaged, stream-appeared,
-  order-by-name, truncated (within a transport packet);
-- errors: truncated, corrupt-packets, corrupt-frames, size-changed, clock-reset.
+  order-by-name, order-by-time, rate-unlike-names, depth-by-content, orientation-changed, truncated (within a
+  transport packet);
+- errors: truncated, corrupt-packets, corrupt-frames, size-changed, clock-reset, pages-not-read.
 
 Names are imported when they are first used: ingesting an anemometer's log needs no video decoder.
 """

@@ -89,14 +89,18 @@ def undecoded(count: int, *, total: int, first: str | None = None) -> list[Findi
     ]  # fmt: skip
 
 
-def resized(count: int) -> list[Finding]:
-    """Finding of frames of another size than the first, empty where `count` is 0."""
+def resized(count: int, *, than: str = "the first") -> list[Finding]:
+    """Finding of frames of another size than the one that was kept, empty where `count` is 0.
+
+    Args:
+        than: the frames whose size was kept.
+    """
     if not count:
         return []
     return [
         Finding(
             kind="size-changed", severity=Severity.ERROR, count=count,
-            what=f"{count} frames have another size than the first and were left out",
+            what=f"{count} frames have another size than {than} and were left out",
             fix="ingest the frames of each size as a recording of their own",
         )
     ]  # fmt: skip

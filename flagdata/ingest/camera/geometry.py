@@ -46,6 +46,20 @@ class Orientation:
             upright = upright[:, ::-1]
         return upright[::-1] if self.flip_y else upright
 
+    def upright(self, image: Image.Image) -> Image.Image:
+        """As `apply`, of a Pillow image."""
+        return _turned(image, self._steps)
+
+    def stored(self, image: Image.Image) -> Image.Image:
+        """The stored picture of an upright one: undoes `upright`."""
+        return _turned(image, self._steps[::-1])
+
+    @property
+    def _steps(self) -> tuple[Image.Transpose, ...]:
+        chosen = (self.transpose, self.flip_x, self.flip_y)
+        steps = (Image.Transpose.TRANSPOSE, Image.Transpose.FLIP_LEFT_RIGHT, Image.Transpose.FLIP_TOP_BOTTOM)
+        return tuple(step for step, there in zip(steps, chosen, strict=True) if there)
+
     @classmethod
     def of_display_matrix(cls, matrix: Sequence[int]) -> Orientation:
         """The orientation by the nine numbers a, b, u, c, d, v, x, y, w of a container's display matrix.
@@ -151,6 +165,12 @@ def _stretch(image: NDArray[np.generic], *, black: float, white: float) -> NDArr
         table = np.clip(np.rint((np.arange(256) - black) * (255 / (white - black))), 0, 255).astype(np.uint8)
         return table[image.astype(np.uint8, copy=False)]
     return np.clip(np.rint((image.astype(np.float64) - black) * (255 / (white - black))), 0, 255).astype(np.uint8)
+
+
+def _turned(image: Image.Image, steps: Sequence[Image.Transpose]) -> Image.Image:
+    for step in steps:
+        image = image.transpose(step)
+    return image
 
 
 def upright_size(width: int, height: int, aspect: Fraction, orientation: Orientation) -> tuple[int, int]:

@@ -1,11 +1,10 @@
-"""Image sequences: a folder of PNG, JPEG, TIFF or BMP files, in the order of the numbers in their names."""
+"""Image sequences: a folder of PNG, JPEG, TIFF, BMP or WebP files, in the order of the numbers in their names."""
 
 from __future__ import annotations
 
-import math
-import re
-import warnings
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -13,29 +12,30 @@ import numpy as np
 from PIL import Image
 
 from flagdata.errors import InputError, LimitError, TimeError
+from flagdata.files import is_beside
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.damage import resized, undecoded
-from flagdata.ingest.camera.geometry import Orientation
-from flagdata.ingest.camera.luma import BROKEN, luma_of_image
-from flagdata.ingest.camera.options import CameraOptions, Limits, exact
+from flagdata.ingest.camera.luma import BROKEN, Luma, luma_of_image
+from flagdata.ingest.camera.options import CameraOptions, exact
+from flagdata.ingest.camera.picture_names import ordered
 from flagdata.ingest.camera.source import Picture, SourceFacts
-from flagdata.ingest.camera.stamps import Timing, survey
+from flagdata.ingest.camera.stamps import survey
+from flagdata.ingest.camera.stills import PICTURES, Head, heads, open_picture, size_of_most, taken
 
-_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"})
-_FORMATS = ("PNG", "JPEG", "TIFF", "BMP")
-_NUMBER = re.compile(r"(\d+)(?!.*\d)")
-_EXIF = 0x8769
-_ORIENTATION, _TAKEN, _TAKEN_PART, _TAKEN_ZONE = 0x0112, 0x9003, 0x9291, 0x9011
+_DEEP = "I;16"
+_DEPTHS = (10, 12, 14, 16)
+"""Bits of gray of the cameras that store it in 16."""
 
 
 class SequenceSource:
     """A folder of images. See `Source`.
 
-    The last number in a file's name is its place in the sequence, so that a number that is missing is a missing frame.
-    The rate is `options.sequence_fps`; file times are not looked at.
+    The numbers in the names say the order and which frames are missing, see `picture_names`. Images of another size
+    than most are left out. The rate is `options.sequence_fps`; file times are not looked at.
 
     Raises:
-        InputError: no images, images of several kinds, or none that can be read.
+        InputError: no images, images of several kinds, names or sizes that do not say which are the recording, or none
+            that can be read.
         LimitError: larger than `options.limits`.
         TimeError: no `sequence_fps`.
     """
@@ -43,94 +43,165 @@ class SequenceSource:
     def __init__(self, folder: Path, options: CameraOptions) -> None:
         self._limits = options.limits
         self._where = str(folder)
-        try:
-            paths = sorted(p for p in folder.iterdir() if p.suffix.lower() in _SUFFIXES and p.is_file())
-        except OSError as error:
-            what = f"the folder cannot be read ({error.strerror})"
-            raise InputError(what, where=self._where, fix="check its rights") from error
-        if not paths:
-            raise InputError(
-                "the folder holds no PNG, JPEG, TIFF or BMP image", where=self._where, fix="give the folder"
-            )
-        kinds = {p.suffix.lower() for p in paths}
-        if len(kinds - {".jpeg", ".tiff"}) > 1:
-            raise InputError(
-                f"the folder holds images of several kinds ({', '.join(sorted(kinds))})",
-                where=self._where, fix="keep one recording in a folder",
-            )  # fmt: skip
-        if len(paths) > options.limits.frames:
-            raise LimitError(
-                f"{len(paths)} images are beyond the limit of {options.limits.frames}",
-                where=self._where, fix="split the folder, or raise the limit",
-            )  # fmt: skip
+        paths, others = self._files(folder)
         if options.sequence_fps is None:
             raise TimeError(
                 "images have no time stamps", where=self._where, fix="give the camera's frame rate (sequence_fps)"
             )
-        numbers, findings = _places(paths)
-        order = np.argsort(numbers, kind="stable")
-        self._paths = [paths[i] for i in order]
-        self._stamps = [int(numbers[i]) for i in order]
-        self._broken: list[str] = []
-        self._resized = 0
         rate = exact(options.sequence_fps)
-        timing = survey(np.array(self._stamps, dtype=np.int64), tick=1 / rate, missing=0, fallback_rate=rate)
-        self.facts = self._describe(timing, findings)
+        found = ordered([path.name for path in paths], rate=rate, where=self._where)
+        self._paths = [paths[i] for i in found.order]
+        self._stamps = found.places
+        self._broken: list[str] = []
+        self._heads = heads(self._paths, self._limits)
+        self._size = size_of_most(self._heads, where=self._where)
+        kept = [head for head in self._heads if head is not None and head.upright == self._size]
+        self._resized = sum(head is not None for head in self._heads) - len(kept)
+        self._orientation = Counter(head.orientation for head in kept).most_common(1)[0][0]
+        self._white, depths = self._depth()
+        self.facts = self._describe(rate, [*others, *found.findings, *depths, *_shown_otherwise(kept)])
         pixels = self.facts.width * self.facts.height * len(paths)
         if pixels > options.limits.total_pixels:
             raise LimitError(
                 f"{pixels} px in all are beyond the limit of {options.limits.total_pixels}",
-                where=self._where, fix="split the folder, or raise the limit",
-            )  # fmt: skip
+                where=self._where,
+                fix="split the folder, or raise the limit",
+            )
 
-    def _describe(self, timing: Timing, findings: list[Finding]) -> SourceFacts:
-        """Facts from the first image that can be read."""
-        problem = "none"
-        for path in self._paths:
+    def _files(self, folder: Path) -> tuple[list[Path], list[Finding]]:
+        """Its images by name, and a note of what else is in it."""
+        try:
+            files = sorted(path for path in folder.iterdir() if not is_beside(path.name) and path.is_file())
+        except OSError as error:
+            what = f"the folder cannot be read ({error.strerror})"
+            raise InputError(what, where=self._where, fix="check its rights") from error
+        paths = [path for path in files if path.suffix.lower() in PICTURES]
+        others = Counter(path.suffix.lower() or "no ending" for path in files if path.suffix.lower() not in PICTURES)
+        beside = ", ".join(f"{count} of {ending}" for ending, count in others.most_common(5))
+        if not paths:
+            raise InputError(
+                "the folder holds no PNG, JPEG, TIFF, BMP or WebP image" + (f", but files: {beside}" if others else ""),
+                where=self._where,
+                fix="give the folder of the images; convert those of other formats to PNG",
+            )
+        kinds = sorted({PICTURES[path.suffix.lower()] for path in paths})
+        if len(kinds) > 1:
+            raise InputError(
+                f"the folder holds images of several kinds ({', '.join(kinds)})",
+                where=self._where,
+                fix="keep one recording in a folder",
+            )
+        if len(paths) > self._limits.frames:
+            raise LimitError(
+                f"{len(paths)} images are beyond the limit of {self._limits.frames}",
+                where=self._where,
+                fix="split the folder, or raise the limit",
+            )
+        if not others:
+            return paths, []
+        return paths, [
+            Finding(
+                kind="files-not-read",
+                severity=Severity.NOTE,
+                count=others.total(),
+                what=f"{others.total()} files beside the images were not read: {beside}",
+            )
+        ]
+
+    def _depth(self) -> tuple[float, list[Finding]]:
+        """The white of images of 16 bits by the brightest gray of all, since cameras of fewer bits store theirs so."""
+        brightest = 0
+        for path, head in zip(self._paths, self._heads, strict=True):
+            if head is None or not head.mode.startswith(_DEEP) or brightest >> _DEPTHS[-2]:
+                continue
             try:
-                with _open(path, self._limits) as image:
-                    exif = image.getexif()
-                    orientation = Orientation.of_exif(int(exif.get(_ORIENTATION, 1)))
-                    recorded = _taken(exif.get_ifd(_EXIF)) if path == self._paths[0] else None
-                    if image.mode in ("LA", "PA", "RGBA") or "transparency" in image.info:
-                        findings.append(
-                            Finding(kind="alpha-ignored", severity=Severity.WARNING, what="transparency was left aside")
-                        )
-                    luma_of_image(image)
-                    return SourceFacts(
-                        container="image-sequence",
-                        codec=str(image.format).lower(),
-                        pixel_format=image.mode,
-                        width=image.width,
-                        height=image.height,
-                        aspect=Fraction(1),
-                        orientation=orientation,
-                        interlaced=False,
-                        timing=timing,
-                        metadata={},
-                        recorded=recorded,
-                        sequence=True,
-                        findings=tuple(findings),
-                    )
+                with open_picture(path, self._limits) as image:
+                    brightest = max(brightest, int(np.asarray(image).max()))
+            except BROKEN:
+                continue
+        bits = next(bits for bits in _DEPTHS if not brightest or not brightest >> bits)
+        if not brightest or bits == _DEPTHS[-1]:
+            return 65535.0, []
+        return float(2**bits - 1), [
+            Finding(
+                kind="depth-by-content",
+                severity=Severity.WARNING,
+                value=float(bits),
+                what=f"no pixel of these images of 16 bits is brighter than {brightest}: they are read as gray of "
+                f"{bits} bits, 0 to {2**bits - 1}",
+                fix="if they are only dark, convert them to 8 bits first",
+            )
+        ]
+
+    def _describe(self, rate: Fraction, findings: list[Finding]) -> SourceFacts:
+        """Facts from the first image that can be read."""
+        stamps = np.array(self._stamps, dtype=np.int64)
+        timing = survey(stamps, tick=1 / rate, missing=0, fallback_rate=rate)
+        problem = "none"
+        for index, path in enumerate(self._paths):
+            if not self._is_kept(index):
+                continue
+            try:
+                with open_picture(path, self._limits) as image:
+                    recorded = taken(image) if index == 0 else None
+                    name, mode = str(image.format).lower(), image.mode
+                    self._luma(image, index)
             except BROKEN as error:
                 problem = f"{path.name}: {error}"
+                continue
+            wide, high = self._size
+            return SourceFacts(
+                container="image-sequence",
+                codec=name,
+                pixel_format=mode,
+                width=high if self._orientation.transpose else wide,
+                height=wide if self._orientation.transpose else high,
+                aspect=Fraction(1),
+                orientation=self._orientation,
+                interlaced=False,
+                timing=timing,
+                metadata={},
+                recorded=recorded,
+                sequence=True,
+                findings=tuple(findings),
+            )
         raise InputError(
-            f"not one of {len(self._paths)} images can be read ({problem})", where=self._where,
+            f"not one of {len(self._paths)} images can be read ({problem})",
+            where=self._where,
             fix="copy them from the camera again",
-        )  # fmt: skip
+        )
+
+    def _is_kept(self, index: int) -> bool:
+        """Whether an image has the size of most; one whose head is damaged has none."""
+        head = self._heads[index]
+        return head is not None and head.upright == self._size
+
+    def _luma(self, image: Image.Image, index: int) -> Luma:
+        """The luma of an open image, turned as most of them are stored."""
+        luma = luma_of_image(image)
+        if image.mode.startswith(_DEEP):
+            luma = replace(luma, white=self._white)
+        head = self._heads[index]
+        if head is None or head.orientation == self._orientation:
+            return luma
+        return replace(luma, image=self._orientation.stored(head.orientation.upright(luma.image)))
+
+    def _picture(self, index: int) -> Picture | None:
+        """The image at a place in the order; None where it cannot be decoded."""
+        try:
+            with open_picture(self._paths[index], self._limits) as image:
+                luma = self._luma(image, index)
+        except BROKEN:
+            return None
+        return Picture(stamp=self._stamps[index], luma=lambda: luma)
 
     def pictures(self) -> Iterator[Picture]:
-        for path, stamp in zip(self._paths, self._stamps, strict=True):
-            try:
-                with _open(path, self._limits) as image:
-                    if image.size != (self.facts.width, self.facts.height):
-                        self._resized += 1
-                        continue
-                    luma = luma_of_image(image)
-            except BROKEN:
-                self._broken.append(path.name)
-                continue
-            yield Picture(stamp=stamp, luma=lambda luma=luma: luma)
+        for index, head in enumerate(self._heads):
+            picture = self._picture(index) if self._is_kept(index) else None
+            if picture is not None:
+                yield picture
+            elif head is None or self._is_kept(index):
+                self._broken.append(self._paths[index].name)
 
     def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
         length = len(self._paths)
@@ -139,76 +210,51 @@ class SequenceSource:
             start = max(first, length * run // runs)
             chosen = range(start, min(start + count * stride, length), stride)
             first = chosen.stop
-            pictures = []
-            for index in chosen:
-                try:
-                    with _open(self._paths[index], self._limits) as image:
-                        if image.size == (self.facts.width, self.facts.height):
-                            luma = luma_of_image(image)
-                            pictures.append(Picture(stamp=self._stamps[index], luma=lambda luma=luma: luma))
-                except BROKEN:
-                    continue
+            found = [self._picture(index) for index in chosen if self._is_kept(index)]
+            pictures = [picture for picture in found if picture is not None]
             if pictures:
                 yield pictures
 
     def damage(self) -> list[Finding]:
         first = self._broken[0] if self._broken else None
-        return undecoded(len(self._broken), total=len(self._paths), first=first) + resized(self._resized)
+        return undecoded(len(self._broken), total=len(self._paths), first=first) + resized(self._resized, than="most")
 
     def close(self) -> None:
         """Nothing stays open between images."""
 
 
-def _places(paths: Sequence[Path]) -> tuple[list[int], list[Finding]]:
-    """Place of each file in the sequence: the last number of its name in units of their common step."""
-    found = [_NUMBER.search(path.stem) for path in paths]
-    numbers = [int(match[1][-18:]) for match in found if match]
-    if len(numbers) < len(paths) or len(set(numbers)) < len(numbers):
-        note = Finding(
-            kind="order-by-name", severity=Severity.WARNING,
-            what="the file names have no numbers: the images are taken in the order of their names, none as missing",
-        )  # fmt: skip
-        return list(range(len(paths))), [note]
-    first = min(numbers)
-    step = math.gcd(*(number - first for number in numbers)) or 1
-    places = [(number - first) // step for number in numbers]
-    if step == 1:
-        return places, []
-    note = Finding(
-        kind="numbered-by-steps", severity=Severity.NOTE,
-        what=f"the file names count in steps of {step}; one step is taken as one frame", value=float(step),
-    )  # fmt: skip
-    return places, [note]
-
-
-def _open(path: Path, limits: Limits) -> Image.Image:
-    """The image with its header read, its pixels not yet.
-
-    Raises:
-        LimitError: its header states a size beyond the limit.
-    """
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", Image.DecompressionBombWarning)
-            image = Image.open(path, formats=_FORMATS)
-    except (Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
-        raise LimitError(
-            f"the image is absurdly large ({error})", where=str(path), fix="scale it down, or leave it out"
-        ) from None
-    if image.width * image.height > limits.frame_pixels:
-        image.close()
-        raise LimitError(
-            f"an image of {image.width} × {image.height} px is beyond the limit of {limits.frame_pixels} px",
-            where=str(path), fix="raise the limit if the file is to be trusted",
-        )  # fmt: skip
-    return image
-
-
-def _taken(exif: dict[int, object]) -> str | None:
-    """ISO 8601 text of Exif's DateTimeOriginal, its fraction and its zone, the last two where it has them."""
-    date, _, clock = str(exif.get(_TAKEN, "")).partition(" ")
-    if not clock:
-        return None
-    part = str(exif.get(_TAKEN_PART, "")).strip()
-    place = str(exif.get(_TAKEN_ZONE, "")).strip()
-    return f"{date.replace(':', '-')}T{clock.strip()}{'.' + part if part.isdigit() else ''}{place}"
+def _shown_otherwise(found: Sequence[Head]) -> list[Finding]:
+    """What in the images is not shown as their files say: transparency, further pages, turns that differ."""
+    alpha, pages = sum(head.alpha for head in found), sum(head.several for head in found)
+    turned = len(found) - max(Counter(head.orientation for head in found).values())
+    findings = []
+    if alpha:
+        findings.append(
+            Finding(
+                kind="alpha-ignored",
+                severity=Severity.WARNING,
+                count=alpha,
+                what=f"transparency of {alpha} images was left aside: the picture below it is read",
+            )
+        )
+    if pages:
+        findings.append(
+            Finding(
+                kind="pages-not-read",
+                severity=Severity.ERROR,
+                count=pages,
+                what=f"{pages} files hold several pictures each, of which the first was read",
+                fix="write each picture to a file of its own, numbered",
+            )
+        )
+    if turned:
+        findings.append(
+            Finding(
+                kind="orientation-changed",
+                severity=Severity.WARNING,
+                count=turned,
+                what=f"{turned} images are to be turned otherwise than the rest, by their Exif; they were turned so",
+                fix="if the camera did not turn, remove the tag Orientation from all of them",
+            )
+        )
+    return findings

@@ -56,7 +56,9 @@ class CameraStream:
         if duration > options.limits.duration:
             raise LimitError(
                 f"the time stamps span {duration:.0f} s, beyond the limit of {options.limits.duration:.0f} s",
-                where=str(path), fix="the stamps are damaged; repair the container, or raise the limit",
+                where=str(path),
+                fix="give the rate at which they were taken (sequence_fps), or number them by frames"
+                if facts.sequence else "the stamps are damaged; repair the container, or raise the limit",
             )  # fmt: skip
         chapter = chapter_of(path) if options.start is None else None
         if chapter is not None:

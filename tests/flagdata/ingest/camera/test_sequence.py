@@ -135,3 +135,119 @@ def test_two_kinds_of_images_in_one_folder_are_refused(
     folder = save(tmp_path / "mixed", {0: "0.png", 1: "1.jpg"}, numbered)
     with pytest.raises(InputError, match="several kinds"):
         open_camera(folder, options)
+
+
+def test_notes_of_an_operating_system_are_no_images_and_change_neither_order_nor_count(
+    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray], number_of: Callable[..., int]
+) -> None:
+    folder = save(tmp_path / "images", {n: f"f_{n}.png" for n in range(14)}, numbered)
+    for name in (*(f"._f_{n}.png" for n in range(14)), ".DS_Store", "Thumbs.db", "desktop.ini", "._f_0.jpg"):
+        (folder / name).write_bytes(b"\0\5\x16\7" + bytes(100))
+    _, frames, found = read(folder, replace(options, rate="native"))
+    assert [number_of(f.image) for f in frames] == list(range(14))
+    assert found.keys() == {"exposure-unknown"}
+    (folder / "notes.txt").write_text("calm")
+    assert "1 of .txt" in read(folder, options)[2]["files-not-read"].what
+
+
+@pytest.mark.parametrize("odd", [0, 5, 11])
+def test_an_image_of_another_size_is_left_out_wherever_it_is(
+    odd: int,
+    tmp_path: Path,
+    options: CameraOptions,
+    numbered: Callable[..., np.ndarray],
+    number_of: Callable[..., int],
+    start: int,
+) -> None:
+    folder = save(tmp_path / "images", {n: f"{n}.png" for n in range(12)}, numbered)
+    Image.fromarray(np.zeros((40, 30), dtype=np.uint8)).save(folder / f"{odd}.png")
+    _, frames, found = read(folder, replace(options, rate="native"))
+    kept = [n for n in range(12) if n != odd]
+    assert [number_of(f.image) for f in frames] == kept
+    assert [(f.time - start) // 20_000_000 for f in frames] == kept
+    assert found["size-changed"].count == 1
+    assert "than most" in found["size-changed"].what
+
+
+def test_as_many_images_of_one_size_as_of_another_are_refused(
+    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray]
+) -> None:
+    folder = save(tmp_path / "images", {n: f"{n}.png" for n in range(4)}, numbered)
+    for n in (0, 2):
+        Image.fromarray(np.zeros((40, 30), dtype=np.uint8)).save(folder / f"{n}.png")
+    with pytest.raises(InputError, match="30 × 40 and 96 × 96 px"):
+        open_camera(folder, options)
+    for n in (0, 2):  # the fix
+        (folder / f"{n}.png").unlink()
+    assert len(read(folder, replace(options, rate="native"))[1]) == 2
+
+
+@pytest.mark.parametrize("mode", ["RGBA", "LA", "P"])
+def test_transparency_of_any_image_is_reported(
+    mode: str, tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray]
+) -> None:
+    folder = save(tmp_path / "images", {n: f"{n}.png" for n in range(6)}, numbered)
+    palette = {"transparency": b"\x00\xff"} if mode == "P" else {}
+    Image.fromarray(numbered(4)).convert(mode).save(folder / "4.png", **palette)
+    _, frames, found = read(folder, replace(options, rate="native"))
+    assert found["alpha-ignored"].count == 1
+    assert np.array_equal(frames[4].image, numbered(4))
+
+
+def test_gray_of_fewer_bits_than_it_is_stored_in_shows_and_says_so(
+    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray], number_of: Callable[..., int]
+) -> None:
+    for bits, suffix in ((10, "png"), (12, "tif"), (12, "png"), (14, "png"), (16, "png")):
+        folder = tmp_path / f"{bits}{suffix}"
+        folder.mkdir()
+        for n in range(5):
+            deep = (numbered(n) * ((2**bits - 1) / 255)).round().astype(np.uint16)
+            Image.fromarray(deep).save(folder / f"{n}.{suffix}")
+        _, frames, found = read(folder, replace(options, rate="native"))
+        assert all(np.array_equal(f.image, numbered(n)) for n, f in enumerate(frames))
+        assert (found["depth-by-content"].value == bits) if bits < 16 else ("depth-by-content" not in found)
+
+
+def test_an_image_that_is_to_be_turned_otherwise_than_the_rest_is_upright_and_reported(
+    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray]
+) -> None:
+    turned = {1: 0, 6: 1, 3: 2, 8: 3}  # Exif's number → quarter turns anticlockwise of the stored picture
+    for most in (1, 6):
+        folder = tmp_path / f"most{most}"
+        folder.mkdir()
+        values = [most, most, 1, 6, most, 3, 8, most]
+        for n, value in enumerate(values):
+            exif = Image.Exif()
+            exif[0x0112] = value
+            Image.fromarray(np.ascontiguousarray(np.rot90(numbered(n), turned[value]))).save(
+                folder / f"{n}.png", exif=exif
+            )
+        _, frames, found = read(folder, replace(options, rate="native"))
+        assert all(np.array_equal(f.image, numbered(n)) for n, f in enumerate(frames))
+        assert found["orientation-changed"].count == len(values) - values.count(most)
+
+
+def test_pages_behind_the_first_are_reported_as_not_read(
+    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray]
+) -> None:
+    for suffix in ("tif", "png", "webp"):
+        folder = tmp_path / suffix
+        folder.mkdir()
+        pages = [Image.fromarray(numbered(n)).convert("RGB") for n in range(3)]
+        for n in range(2):
+            lossless = {"lossless": True} if suffix == "webp" else {}
+            pages[0].save(folder / f"{n}.{suffix}", save_all=True, append_images=pages[1:], **lossless)
+        assert read(folder, options)[2]["pages-not-read"].count == 2
+
+
+def test_images_of_other_formats_are_named_in_the_refusal(
+    tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray]
+) -> None:
+    for n in range(3):
+        (tmp_path / f"{n}.heic").write_bytes(b"heic")
+    with pytest.raises(InputError, match=r"3 of \.heic") as refused:
+        open_camera(tmp_path, options)
+    assert "PNG" in refused.value.fix
+    folder = save(tmp_path / "mixed", {0: "0.png", 1: "1.jpeg"}, numbered)
+    with pytest.raises(InputError, match=r"several kinds \(JPEG, PNG\)"):
+        open_camera(folder, options)
