@@ -59,7 +59,7 @@ class Damage:
                     count=self.suspect,
                 )
             )  # fmt: skip
-        found += resized(self.resized)
+        found += resized(self.resized, fix="bring all frames to one size: ffmpeg -i IN -vf scale=WIDTH:HEIGHT OUT")
         missing = expected - self.packets - self.shown
         if missing > 0:
             found.append(
@@ -89,7 +89,9 @@ def undecoded(count: int, *, total: int, first: str | None = None) -> list[Findi
     ]  # fmt: skip
 
 
-def resized(count: int, *, than: str = "the first") -> list[Finding]:
+def resized(
+    count: int, *, than: str = "the first", fix: str = "ingest the frames of each size as a recording of their own"
+) -> list[Finding]:
     """Finding of frames of another size than the one that was kept, empty where `count` is 0.
 
     Args:
@@ -101,6 +103,6 @@ def resized(count: int, *, than: str = "the first") -> list[Finding]:
         Finding(
             kind="size-changed", severity=Severity.ERROR, count=count,
             what=f"{count} frames have another size than {than} and were left out",
-            fix="ingest the frames of each size as a recording of their own",
+            fix=fix,
         )
     ]  # fmt: skip

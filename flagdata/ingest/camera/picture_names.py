@@ -67,7 +67,7 @@ class _Column:
         return len(set(self.values)) > 1
 
     @property
-    def tells_apart(self) -> bool:
+    def distinguishes(self) -> bool:
         return len(set(self.values)) == len(self.values)
 
     @property
@@ -197,7 +197,7 @@ def _with_fractions(columns: list[_Column]) -> list[_Column]:
         values = tuple(one * 10**width + int(text) for one, text in zip(whole.values, padded, strict=True))
         tick = Fraction(1, 10**width) if seconds else None
         merged = _Column(before=whole.before, values=values, digits=part.digits, tick=tick)
-        even = _spaced(sorted(values)) if merged.tells_apart else None
+        even = _spaced(sorted(values)) if merged.distinguishes else None
         if seconds or (even is not None and even.places[-1] < 2 * len(values)):
             return [*columns[:k], merged, *columns[k + 2 :]]
     return columns
@@ -205,7 +205,7 @@ def _with_fractions(columns: list[_Column]) -> list[_Column]:
 
 def _by_number(columns: Sequence[_Column], names: Sequence[str], rate: Fraction, where: str) -> Ordered:
     varying = [column for column in columns if column.varies]
-    telling = [column for column in varying if column.tells_apart]
+    telling = [column for column in varying if column.distinguishes]
     if not telling:
         raise _undecided(columns, names, where)
     order = sorted(range(len(names)), key=telling[0].values.__getitem__)
@@ -254,7 +254,7 @@ def _by_clock(clock: Clock, columns: Sequence[_Column], names: Sequence[str], ra
     counted = [
         (reading, column.values[order[0]])
         for column in columns
-        if column.tells_apart and _rises(column, order)
+        if column.distinguishes and _rises(column, order)
         if (reading := _spaced([column.values[i] for i in order])) is not None
     ]
     # Numbers from 0 or 1 on that look like times are counted frames.
@@ -329,7 +329,7 @@ def _open_order(names: Sequence[str], where: str) -> InputError:
 
 
 def _undecided(columns: Sequence[_Column], names: Sequence[str], where: str) -> InputError:
-    """The error of pictures that no number tells apart: two of them have all numbers alike, or several numbers vary."""
+    """The error of pictures that no number distinguishes: all numbers of two are alike, or several numbers vary."""
     first: dict[tuple[int, ...], str] = {}
     for key, name in zip(zip(*(column.values for column in columns), strict=True), names, strict=True):
         if key in first:

@@ -159,22 +159,14 @@ class VideoSource:
         return found
 
     def pictures(self) -> Iterator[Picture]:
-        codec, size = self.facts.codec, (self.facts.width, self.facts.height)
-        kept = 1
+        codec = self.facts.codec
         stamp, frame = self._first
         yield Picture(stamp=stamp, luma=partial(luma_of_frame, frame, codec=codec))
         for stamp, frame in self._decoded:
-            if (frame.width, frame.height) != size:
+            if (frame.width, frame.height) != (self.facts.width, self.facts.height):
                 self._damage.resized += 1
                 continue
-            kept += 1
             yield Picture(stamp=stamp, luma=partial(luma_of_frame, frame, codec=codec))
-        if self._damage.resized > kept:
-            raise InputError(
-                f"{self._damage.resized} of {self._damage.resized + kept} frames have another size than the first, "
-                f"{size[0]} × {size[1]} px",
-                where=str(self._path), fix="bring all frames to one size: ffmpeg -i IN -vf scale=WIDTH:HEIGHT OUT",
-            )  # fmt: skip
 
     def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
         container, stream = self._open()
