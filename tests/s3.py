@@ -119,14 +119,15 @@ class Denying(Careless):
     do_GET = do_HEAD = do_POST = do_PUT  # noqa: N815
 
 
-class ReadOnly(Denying):
-    """Passes reads on to another store, and refuses writes."""
+class Passing(BaseHTTPRequestHandler):
+    """Passes requests on to another store."""
 
     store: ClassVar[str] = ""
 
     def do_GET(self) -> None:
+        body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
         connection = HTTPConnection(self.store, timeout=30)
-        connection.request(self.command, self.path, headers=dict(self.headers))
+        connection.request(self.command, self.path, body, headers=dict(self.headers))
         answer = connection.getresponse()
         content = answer.read()
         connection.close()
@@ -135,9 +136,110 @@ class ReadOnly(Denying):
             if name.lower() not in ("connection", "transfer-encoding"):
                 self.send_header(name, value)
         self.end_headers()
-        self.wfile.write(content)
+        if self.command != "HEAD":
+            self.wfile.write(content)
 
-    do_HEAD = do_GET  # noqa: N815
+    do_HEAD = do_PUT = do_POST = do_DELETE = do_GET  # noqa: N815
+
+    def refuse(self, status: int, code: str) -> None:
+        """Answer without passing anything on."""
+        self.rfile.read(int(self.headers.get("Content-Length") or 0))
+        content = f"<Error><Code>{code}</Code><Message>{code}</Message></Error>".encode()
+        self.send_response(status)
+        self.send_header("Content-Length", str(len(content)))
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(content)
+
+    def log_message(self, format: str, *args: object) -> None:  # noqa: A002 — as the library names it
+        pass
+
+
+class ReadOnly(Passing):
+    """Refuses writes, as S3 does to keys that may only read; at /refused it says which."""
+
+    refused: ClassVar[list[str]] = []
+
+    def do_GET(self) -> None:
+        if self.path != "/refused":
+            super().do_GET()
+            return
+        said = "\n".join(self.refused).encode()
+        self.send_response(200)
+        self.send_header("Content-Length", str(len(said)))
+        self.end_headers()
+        self.wfile.write(said)
+
+    def do_PUT(self) -> None:
+        self.refused.append(f"{self.command} {self.path}")
+        self.refuse(403, "AccessDenied")
+
+    do_POST = do_DELETE = do_PUT  # noqa: N815
+
+
+class Forbidding(Passing):
+    """Forbids to list or to delete, as policies may."""
+
+    forbidden: ClassVar[str] = ""
+
+    def do_GET(self) -> None:
+        deleting = self.command == "DELETE" or (self.command == "POST" and "delete" in self.path)
+        if {"list": "list-type" in self.path, "delete": deleting}[self.forbidden]:
+            self.refuse(403, "AccessDenied")
+        else:
+            super().do_GET()
+
+    do_HEAD = do_PUT = do_POST = do_DELETE = do_GET  # noqa: N815
+
+
+class Failing(Passing):
+    """Fails at the parts of an upload, or where they are joined."""
+
+    failing: ClassVar[str] = ""
+
+    def do_PUT(self) -> None:
+        mine = self.failing in self.path or (
+            self.failing == "complete" and self.command == "POST" and "uploadId" in self.path
+        )
+        self.refuse(500, "InternalError") if mine else self.do_GET()
+
+    do_POST = do_PUT  # noqa: N815
+
+
+class Scripted(BaseHTTPRequestHandler):
+    """A store that gives one answer to all requests; None closes the connection."""
+
+    protocol_version = "HTTP/1.1"
+    answer: ClassVar[tuple[int, dict[str, str], bytes] | None] = None
+    asked: ClassVar[list[tuple[str, str]]] = []
+
+    def do_GET(self) -> None:
+        self.rfile.read(int(self.headers.get("Content-Length") or 0))
+        self.asked.append((self.command, self.path))
+        if self.answer is None:
+            self.close_connection = True
+            return
+        status, headers, content = self.answer
+        self.send_response_only(status)
+        for name, value in headers.items():
+            self.send_header(name, value)
+        if "Date" not in headers:
+            self.send_header("Date", self.date_time_string())
+        self.send_header("Content-Length", str(len(content)))
+        self.end_headers()
+        if self.command != "HEAD":
+            self.wfile.write(content)
+
+    do_HEAD = do_PUT = do_POST = do_DELETE = do_GET  # noqa: N815
+
+    def log_message(self, format: str, *args: object) -> None:  # noqa: A002 — as the library names it
+        pass
+
+
+def refusing(status: int, code: str, message: str = "no", *, rest: str = "") -> tuple[int, dict[str, str], bytes]:
+    """An answer of S3 that refuses a request."""
+    text = f"<Error><Code>{code}</Code><Message>{message}</Message>{rest}</Error>"
+    return status, {"Content-Type": "application/xml"}, text.encode()
 
 
 @contextmanager

@@ -148,15 +148,20 @@ def gc(grace: timedelta, dry_run: bool, as_json: bool, lake_path: str) -> None:
                 "deleted": not dry_run,
                 "objects": list(found.objects),
                 "leftovers": [str(path) for path in found.leftovers],
+                "uploads": [str(upload) for upload in found.uploads],
                 "bytes": found.size,
             },
         )
         return
-    for name in (*found.objects, *map(str, found.leftovers)):
+    for name in (*found.objects, *map(str, found.leftovers), *map(str, found.uploads)):
         click.echo(name)
     verb = "would be deleted" if dry_run else "deleted"
     what = f"{counted(len(found.objects), 'object')} and {counted(len(found.leftovers), 'leftover')}"
     say(f"{what}, {size_text(found.size)}, {verb}")
+    if found.uploads:
+        say(f"{counted(len(found.uploads), 'unfinished upload')} {'would be aborted' if dry_run else 'aborted'}")
+    if found.unlisted is not None:
+        say(f"the store does not say which uploads are unfinished: {found.unlisted.strerror}", mark="note")
 
 
 @click.command()

@@ -16,7 +16,6 @@ can keep of its pages: the hash covers the whole file, footer too, costs readers
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 import random
@@ -45,8 +44,9 @@ from flagdata.lake.log import CHECKPOINT, FILE_HASH, PREVIOUS_HASH, Log
 from flagdata.lake.rowfiles import RowFiles, Scan
 from flagdata.lake.summaries import Summaries
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
-from flagdata.storage import Place, RemotePath, StoreError
+from flagdata.storage import Place, RemotePath
 from flagdata.storage.connection import delta_options, plain
+from flagdata.storage.refusals import refusal
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -241,6 +241,10 @@ class Catalog:
                 f"version {version} was committed here by another", where=str(self.path), fix="try again"
             )
 
+    def written(self, version: int) -> float:
+        """When a version's entry was put here, by the clock of the disk or store [s since 1970]."""
+        return self._entries.path(version).stat().st_mtime
+
     def acknowledge(self, version: int) -> None:
         """Note that a version that was adopted, and those before it, are there for good."""
         self._entries.acknowledge(version)
@@ -404,7 +408,7 @@ class Catalog:
         except (DeltaError, OSError) as error:
             if isinstance(self._log, RemotePath):
                 if _NO_ANSWER.search(str(error)):
-                    raise self._unreachable(error) from None
+                    raise self._unreachable(error, self._log) from None
             elif _SYSTEM_ERROR in str(error):
                 with disk_errors("reading the catalog", self._log):
                     raise OSError(str(error).splitlines()[0]) from error
@@ -423,15 +427,15 @@ class Catalog:
 
     def _refused(self, error: DeltaError) -> OSError:
         """What the Delta library could not write, as an error of the system."""
-        return StoreError(errno.EREMOTEIO, plain(error), str(self.path)) if self._options() else OSError(str(error))
+        if isinstance(self.path, RemotePath):
+            return refusal(error, bucket=self.path.bucket, where=str(self.path))
+        return OSError(str(error))
 
-    def _unreachable(self, error: Exception) -> FlagdataError:
+    def _unreachable(self, error: Exception, log: RemotePath) -> FlagdataError:
         """The error for a log in a bucket that the Delta library cannot read: without what it says of credentials."""
         self._entries.files()  # raises, where an entry is to blame
-        return FlagdataError(
-            f"the catalog's log cannot be read: {plain(error)}", where=str(self._log),
-            fix="check the network and the store; then run flagdata doctor",
-        )  # fmt: skip
+        found = refusal(error, bucket=log.bucket, where=str(log))
+        return FlagdataError(f"the catalog's log cannot be read: {found.strerror}", where=str(log), fix=found.fix)
 
     def _names(self, version: int) -> list[str]:
         """The files of a version, which never change; those of the versions that were asked for last are kept."""

@@ -1,7 +1,8 @@
 """Garbage collection: delete unreferenced files that no running transaction holds.
 
 Kept are all objects that a branch or tag shows, that a row withdrawn less than the grace period ago points to, that a
-living transaction has put or looked up, and whatever is younger than the grace period. Staging folders go as soon as
+living transaction has put or looked up, and whatever is younger than the grace period by the clock that gave it its
+time. Unfinished uploads in parts to a bucket go by the same rules. Staging folders go as soon as
 their owner is dead, which its lock proves; what lies there without a lease, after the grace period. All files of the
 catalog that some version is made of stay.
 """
@@ -9,27 +10,38 @@ catalog that some version is made of stay.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from dataclasses import dataclass, replace
+from datetime import timedelta
 
 from flagdata.errors import CorruptError
 from flagdata.findings import Severity
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.lake import Lake
 from flagdata.lake.layout import check_own
-from flagdata.lake.leases import LeaseState, collecting, last_written, leases, unleased
+from flagdata.lake.leases import LeaseState, collecting, last_written, leases, looking, unleased
 from flagdata.lake.marking import Marked, catalog_files, mark
-from flagdata.lake.objects import Objects, bytes_at
-from flagdata.storage import Place
+from flagdata.lake.objects import Objects, bytes_at, path_in_lake
+from flagdata.storage import Place, RemotePath, StoreError
+from flagdata.storage.uploads import Upload
 
 
 @dataclass(frozen=True, kw_only=True)
 class Garbage:
-    """What can go: names of objects, other paths (staging folders, unpublished files), and their size [B] in all."""
+    """What can go.
+
+    Attributes:
+        objects: by name.
+        leftovers: other paths: staging folders, unpublished files.
+        size: of these and of the objects [B].
+        uploads: to a bucket that were begun and not finished; no listing states the size of their parts.
+        unlisted: why the store does not say which uploads there are; `None` where it does.
+    """
 
     objects: tuple[str, ...]
     leftovers: tuple[Place, ...]
     size: int
+    uploads: tuple[Upload, ...] = ()
+    unlisted: StoreError | None = None
 
 
 def garbage(lake: Lake, *, grace: timedelta) -> Garbage:
@@ -40,7 +52,7 @@ def garbage(lake: Lake, *, grace: timedelta) -> Garbage:
         CorruptError: a ref cannot be read or the catalog is damaged, so what it needs is unknown.
     """
     check_own(lake.path)
-    with collecting(lake.staging):
+    with looking(lake.staging), disk_errors("looking for garbage", lake.path):
         return _find(lake, grace)
 
 
@@ -60,6 +72,9 @@ def collect(lake: Lake, *, grace: timedelta) -> Garbage:
         for path in found.leftovers:
             check()
             Objects.remove(path)
+        for upload in found.uploads:
+            check()
+            upload.abort()
     return found
 
 
@@ -75,7 +90,25 @@ def _find(lake: Lake, grace: timedelta) -> Garbage:
             where=first.where,
             fix=first.fix or "run flagdata doctor",
         )
-    return unneeded(lake, marked, states, grace=grace)
+    found = unneeded(lake, marked, states, grace=grace)
+    try:
+        limit = lake.now() - grace.total_seconds()
+        left = tuple(upload for upload in left_uploads(lake, states) if upload.begun <= limit)
+    except StoreError as error:
+        return replace(found, unlisted=error)
+    return replace(found, uploads=left)
+
+
+def left_uploads(lake: Lake, states: Sequence[LeaseState]) -> tuple[Upload, ...]:
+    """Unfinished uploads to a lake in a bucket of which no living transaction has the object.
+
+    Raises:
+        StoreError: the store does not list them.
+    """
+    if not isinstance(lake.path, RemotePath):
+        return ()
+    held = {str(lake.path / path_in_lake(name)) for state in states if state.alive for name in state.objects}
+    return tuple(one for one in lake.path.uploads() if not any(f"{one}/".startswith(f"{place}/") for place in held))
 
 
 def unneeded(lake: Lake, marked: Marked, states: Sequence[LeaseState], *, grace: timedelta) -> Garbage:
@@ -87,7 +120,7 @@ def unneeded(lake: Lake, marked: Marked, states: Sequence[LeaseState], *, grace:
             not younger than the grace period, may be among what is found.
     """
     held = {name for state in states if state.alive for name in state.objects}
-    limit = (datetime.now(UTC) - grace).timestamp()
+    limit = lake.now() - grace.total_seconds()
     objects = [o for o in lake.objects if o.name not in marked.objects and o.name not in held and o.modified <= limit]
     leftovers: list[Place] = [state.folder for state in states if state.leased and not state.alive]
     leftovers += [path for path in unleased(lake.staging) if last_written(path) <= limit]

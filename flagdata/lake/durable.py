@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from flagdata.errors import FlagdataError
+from flagdata.errors import CorruptError, FlagdataError
 from flagdata.storage import Place, RemotePath, StoreError
 from flagdata.storage.connection import COLOUR
 
@@ -110,6 +110,19 @@ def disk_errors(doing: str, where: Place) -> Iterator[None]:
         raise FlagdataError(
             f"{doing} failed: {text}", where=str(error.filename or where), fix=f"{fix}, then do it again"
         ) from error
+
+
+def unreadable(what: str, where: Place, error: OSError) -> FlagdataError:
+    """The error for a file of the lake that cannot be read: damaged or closed to this user on a disk; in a bucket, what
+    the store says and its remedy, since the file itself may be whole.
+
+    Args:
+        what: is read.
+    """
+    said = f"{what} cannot be read: {error.strerror}"
+    if isinstance(error, StoreError):
+        return FlagdataError(said, where=str(where), fix=error.fix)
+    return CorruptError(said, where=str(where), fix="give yourself read permission on it, or restore it from a copy")
 
 
 _NUMBER = re.compile(r"\(os error (\d+)\)|\bOs \{ code: (\d+)")  # as the Delta library writes it

@@ -28,6 +28,7 @@ BEYOND = (
     "exports that were made of them",
     "clones and copies of this lake",
     "caches outside it, and backups",
+    "older versions of its objects, where it lies in a bucket that keeps them",
     "the files that were ingested",
 )
 """What holds the bytes where this lake does not reach."""

@@ -15,7 +15,7 @@ from flagdata.errors import ConflictError, CorruptError
 from flagdata.findings import Severity
 from flagdata.lake.catalog import persist
 from flagdata.lake.durable import disk_errors
-from flagdata.lake.leases import collecting, leases
+from flagdata.lake.leases import collecting, leases, looking
 from flagdata.lake.lineage import EXPIRED
 from flagdata.lake.marking import catalog_files, mark
 from flagdata.lake.refs import View
@@ -68,10 +68,16 @@ def expire(lake: Store, up_to: int, message: str | None = None, *, dry_run: bool
     """
     if not dry_run:
         lake.check_writable()
-    with disk_errors("expiring versions", lake.path), collecting(lake.staging) as check:
-        found = _found(lake, up_to)
+    with disk_errors("expiring versions", lake.path):
         if dry_run or up_to < 0:
-            return found
+            with looking(lake.staging):
+                return _found(lake, up_to)
+        return _expire(lake, up_to, message)
+
+
+def _expire(lake: Store, up_to: int, message: str | None) -> Expiry:
+    with collecting(lake.staging) as check:
+        found = _found(lake, up_to)
         noted = json.dumps({"up_to": up_to, "objects": list(found.objects)})
         info = {"message": message or f"expire versions up to {up_to}", EXPIRED: noted}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Collection, Sequence
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 
 import pyarrow as pa
@@ -12,15 +12,17 @@ import pyarrow as pa
 from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
 from flagdata.lake.artifact import Artifact
+from flagdata.lake.collect import left_uploads
 from flagdata.lake.lake import Lake
 from flagdata.lake.layout import STORES, foreign_entries
-from flagdata.lake.leases import LeaseState, collecting, last_written, leases, unleased
+from flagdata.lake.leases import LeaseState, last_written, leases, looking, unleased
 from flagdata.lake.log import LogGapError
 from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import StoredObject
 from flagdata.lake.removals import erased, expirations, removals
 from flagdata.schema import FORMAT_VERSION
-from flagdata.storage import Place
+from flagdata.storage import Place, StoreError
+from flagdata.storage.uploads import Upload
 
 GRACE = timedelta(hours=24)
 """How long unreferenced files are left alone."""
@@ -40,11 +42,12 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
     if not _is_among(lake.staging, foreign) and any(
         lake.staging.glob("*")
     ):  # in an empty one, a lock would have to be made
-        with collecting(lake.staging):
+        with looking(lake.staging):
             states = leases(lake.staging)
             unowned = [(path, last_written(path)) for path in unleased(lake.staging)]
     # The catalog last: what was put by now is protected by a lease read above, or committed below, or left behind.
     marked = mark(lake, grace=grace)
+    limit = lake.now() - grace.total_seconds()
     findings = [*map(_linked, foreign), *marked.findings, *_rows(lake, marked, foreign)]
     if LogGapError.kind in {finding.kind for finding in marked.findings}:
         return tuple(findings)  # what follows would call the files of the missing entries' commits leftovers
@@ -54,12 +57,13 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
         findings += _expired(lake, marked, {found.name for found in stored})
         findings += _collected(lake, marked, {found.name for found in stored})
         needed = marked.objects | held
-        findings += [_orphan(found, grace) for found in stored if found.name not in needed]
+        findings += [_orphan(found, limit, grace) for found in stored if found.name not in needed]
+        findings += _left_uploads(lake, states, limit, grace)
     findings += _strays(lake, foreign)
     findings += [_abandoned(state) for state in states if state.leased and not state.alive]
-    findings += [_unleased(path, written, grace) for path, written in unowned]
+    findings += [_unleased(path, written, limit, grace) for path, written in unowned]
     try:
-        findings += [_unpublished(path, grace) for path in lake.unpublished_files()]
+        findings += [_unpublished(path, limit, grace) for path in lake.unpublished_files()]
     except FlagdataError as error:
         findings.append(
             Finding(kind="log-damaged", severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
@@ -263,8 +267,8 @@ def _needed(marked: Marked) -> frozenset[str]:
     return frozenset(name for table in marked.refs.values() for name in table["object"].drop_null().to_pylist())
 
 
-def _orphan(stored: StoredObject, grace: timedelta) -> Finding:
-    old = stored.modified <= (datetime.now(UTC) - grace).timestamp()
+def _orphan(stored: StoredObject, limit: float, grace: timedelta) -> Finding:
+    old = stored.modified <= limit
     return Finding(
         kind="orphan",
         severity=Severity.WARNING if old else Severity.NOTE,
@@ -272,6 +276,33 @@ def _orphan(stored: StoredObject, grace: timedelta) -> Finding:
         where=str(stored.path),
         value=float(stored.size),
         fix="run flagdata gc" if old else f"none needed; flagdata gc takes it {_later(grace)}",
+    )
+
+
+def _left_uploads(lake: Lake, states: Sequence[LeaseState], limit: float, grace: timedelta) -> list[Finding]:
+    """A finding for each upload to a bucket that was begun and not finished."""
+    try:
+        return [_left_upload(upload, limit, grace) for upload in left_uploads(lake, states)]
+    except StoreError as error:
+        return [
+            Finding(
+                kind="uploads-unlisted",
+                severity=Severity.NOTE,
+                what=f"the store does not say whether parts of unfinished uploads are left: {error.strerror}",
+                where=str(lake.path),
+                fix=f"{error.fix}; or give the bucket a lifecycle rule that aborts incomplete multipart uploads",
+            )
+        ]
+
+
+def _left_upload(upload: Upload, limit: float, grace: timedelta) -> Finding:
+    old = upload.begun <= limit
+    return Finding(
+        kind="upload-unfinished",
+        severity=Severity.WARNING if old else Severity.NOTE,
+        what="a multipart upload was cut off: its parts show nowhere, and are paid for",
+        where=str(upload),
+        fix="run flagdata gc" if old else f"none needed; flagdata gc aborts it {_later(grace)}",
     )
 
 
@@ -308,8 +339,8 @@ def _abandoned(state: LeaseState) -> Finding:
     )
 
 
-def _unleased(path: Place, written: float, grace: timedelta) -> Finding:
-    old = written <= (datetime.now(UTC) - grace).timestamp()
+def _unleased(path: Place, written: float, limit: float, grace: timedelta) -> Finding:
+    old = written <= limit
     return Finding(
         kind="staging-unleased",
         severity=Severity.WARNING if old else Severity.NOTE,
@@ -321,8 +352,8 @@ def _unleased(path: Place, written: float, grace: timedelta) -> Finding:
     )
 
 
-def _unpublished(path: Place, grace: timedelta) -> Finding:
-    old = path.lstat().st_mtime <= (datetime.now(UTC) - grace).timestamp()
+def _unpublished(path: Place, limit: float, grace: timedelta) -> Finding:
+    old = path.lstat().st_mtime <= limit
     return Finding(
         kind="write-left",
         severity=Severity.WARNING if old else Severity.NOTE,

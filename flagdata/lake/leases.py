@@ -171,6 +171,17 @@ def collecting(staging: Place) -> Iterator[Check]:
             yield _sure
 
 
+@contextmanager
+def looking(staging: Place) -> Iterator[None]:
+    """Staging is looked at: on a disk, where folders appear before their leases do, none is being made meanwhile; in a
+    bucket each entry shows whole, so that no lock is put for which the keys would have to permit writing."""
+    if isinstance(staging, RemotePath):
+        yield
+    else:
+        with collecting(staging):
+            yield
+
+
 def _sure() -> None:
     """The kernel keeps a lock until it is given up."""
 

@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.documents import from_json
-from flagdata.errors import CorruptError
+from flagdata.errors import CorruptError, FlagdataError
 from flagdata.files import open_regular
-from flagdata.lake.durable import put_if_absent
+from flagdata.lake.durable import put_if_absent, unreadable
 from flagdata.provenance import digest, file_hash
 from flagdata.storage import Place
 
@@ -274,9 +274,5 @@ def _content_of(path: Place) -> str:
         raise _unreadable(path, error) from None
 
 
-def _unreadable(path: Place, error: OSError) -> CorruptError:
-    return CorruptError(
-        f"{path.name} of the catalog's log cannot be read: {error.strerror}",
-        where=str(path),
-        fix="give yourself read permission on it, or restore it from a copy",
-    )
+def _unreadable(path: Place, error: OSError) -> FlagdataError:
+    return unreadable(f"{path.name} of the catalog's log", path, error)

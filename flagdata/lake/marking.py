@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
+from math import inf
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -18,6 +20,9 @@ from flagdata.lake.refs import MAIN, Slice, View
 from flagdata.lake.store import Store
 from flagdata.provenance import file_hash
 from flagdata.storage import Place
+
+_BEHIND = 86_400.0
+"""Most seconds by which a writer's clock is taken to have been behind."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +70,7 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
             findings.append(_unreadable(error, f"ref {name}"))
     try:
         findings += _lost(lake.catalog.rows(lake.catalog.head()), names)
-        recent = list(_withdrawn(lake, since=datetime.now(UTC) - grace, first=first))
+        recent = list(_withdrawn(lake, since=lake.now() - grace.total_seconds() if grace else inf, first=first))
     except FlagdataError as error:
         findings.append(_unreadable(error, "recent versions"))
     objects = {name for table in (*kept, *recent) for name in table["object"].drop_null().to_pylist()}
@@ -130,11 +135,10 @@ def _lost(head: pa.Table, known: list[str]) -> list[Finding]:
     ]
 
 
-def _withdrawn(lake: Store, *, since: datetime, first: int | None) -> Iterator[pa.Table]:
-    limit = since.timestamp() * 1000
+def _withdrawn(lake: Store, *, since: float, first: int | None) -> Iterator[pa.Table]:
     for entry in lake.catalog.history():
         before = entry["version"] - 1
-        recent = entry["timestamp"] >= limit
+        recent = _is_recent(lake, entry, since)
         if not recent and (first is None or before < first):
             continue
         if "withdrawn" in entry:
@@ -144,6 +148,14 @@ def _withdrawn(lake: Store, *, since: datetime, first: int | None) -> Iterator[p
             yield _unerased(lake, lake.table(view), view)
         if recent and "deleted" in entry:
             yield _unerased(lake, lake.table(noted_view(entry)), noted_view(entry))
+
+
+def _is_recent(lake: Store, entry: Mapping[str, Any], since: float) -> bool:
+    """Whether a version was committed since then: as its writer's clock says, or that of the disk or store, since the
+    writer's may be behind."""
+    stated = entry["timestamp"] / 1000
+    taken = any(word in entry for word in ("withdrawn", "deleted")) or noted_hidden(entry)
+    return stated >= since or (taken and stated >= since - _BEHIND and lake.catalog.written(entry["version"]) >= since)
 
 
 def _unerased(lake: Store, rows: pa.Table, view: View) -> pa.Table:

@@ -11,7 +11,7 @@ from functools import cache
 
 from flagdata.errors import FlagdataError, RefusedError
 from flagdata.storage import RemotePath, StoreError
-from flagdata.storage.path import DeniedError
+from flagdata.storage.refusals import DeniedError
 
 
 @cache
@@ -36,7 +36,9 @@ def probe(folder: RemotePath) -> None:
         ) from None
     except StoreError as error:
         raise FlagdataError(
-            f"the store did not answer: {error.strerror}", where=str(folder.parent), fix=f"{error.fix}, then try again"
+            f"this lake cannot be written: {error.strerror}",
+            where=str(folder.parent),
+            fix=f"{error.fix}, then try again",
         ) from None
     if not first or twice or swapped or there != b"1":
         raise RefusedError(

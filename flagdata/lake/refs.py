@@ -19,7 +19,7 @@ from typing import Any
 from flagdata.documents import from_json
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownNameError, UsageError
 from flagdata.files import open_regular
-from flagdata.lake.durable import confirming, disk_errors, flush_folder, put_if_absent
+from flagdata.lake.durable import confirming, disk_errors, flush_folder, put_if_absent, unreadable
 from flagdata.lake.moments import moment
 from flagdata.storage import Place
 
@@ -196,11 +196,7 @@ class Refs:
                 content: dict[str, Any] = from_json(stream.read())
             return Ref(name=content["name"], created=content["created"], view=view_from(content["view"]))
         except OSError as error:
-            raise CorruptError(
-                f"the ref cannot be read: {error.strerror}",
-                where=str(path),
-                fix="give yourself read permission on it, or restore it from a copy",
-            ) from None
+            raise unreadable("the ref", path, error) from None
         except (ValueError, KeyError, TypeError):
             raise CorruptError("the ref cannot be read", where=str(path), fix="restore it from a copy") from None
 

@@ -249,18 +249,9 @@ def _living(place: RemotePath, staging: RemotePath) -> dict[str, Any] | None:
         return None
     with suppress(FileNotFoundError):
         written = RemotePath(place.bucket, place.key).stat().st_mtime
-        if time.time() - _ahead(staging) - written <= life:
+        if staging.now() - written <= life:
             return content
     return None
-
-
-def _ahead(staging: RemotePath) -> float:
-    """By how much this machine's clock is ahead of the store's, which gives whole seconds [s]."""
-    place = staging / f"clock-{uuid.uuid4().hex}"
-    place.write_bytes(b"")
-    ahead = time.time() - place.stat().st_mtime
-    place.unlink()
-    return ahead
 
 
 def _now() -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import time
 from collections.abc import Collection, Sequence
 
 import pyarrow as pa
@@ -13,6 +14,7 @@ from flagdata.lake import naming
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Catalog
+from flagdata.lake.durable import disk_errors
 from flagdata.lake.layout import STAGING, check_writable
 from flagdata.lake.lineage import Lineage
 from flagdata.lake.matching import Values, Where, condition, matching
@@ -54,6 +56,18 @@ class Store:
             FlagdataError: the lake can only be read.
         """
         check_writable(self.path)
+
+    def now(self) -> float:
+        """The clock by which files of the lake have their times: this machine's or, of a bucket, the store's [s since
+        1970].
+
+        Raises:
+            FlagdataError: the store did not say.
+        """
+        if isinstance(self.path, RemotePath):
+            with disk_errors("asking for the store's time", self.path):
+                return self.path.now()
+        return time.time()
 
     def rows(
         self, where: Where | None = None, *, at: str | None = None, columns: Sequence[str] | None = None

@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from flagdata.errors import UsageError
 from flagdata.storage import connection
+from flagdata.storage.refusals import DeniedError, StoreError, refusal, store_time
+from flagdata.storage.uploads import Upload, unfinished
 
 if TYPE_CHECKING:
     from obstore.store import S3Store
@@ -28,34 +30,14 @@ BLOCK = 8 << 20
 """Bytes that one request reads or writes of a larger object."""
 _UPLOADS = 3
 """How often a file is put whose parts the store does not find."""
+_CONFLICTS = 8
+"""How often a conditional put is made that the store calls in conflict with another, and neither shows."""
 _ADDRESS = re.compile(r"s3://([a-z0-9][a-z0-9.-]{1,61}[a-z0-9])(?:/(.*))?", re.DOTALL)
 _SECRET = re.compile(r"(?<!^[sS]3):|[@?]")
 """What stands beside credentials in an address: a user's name and password, or the query of a signed one."""
 _KEY = re.compile(r"[A-Za-z0-9._=+-]+(?:/[A-Za-z0-9._=+-]+)*")
 
 T = TypeVar("T")
-
-
-class StoreError(OSError):
-    """What a store refused or did not answer; its message shows no credentials.
-
-    Attributes:
-        fix: what can be done about it.
-    """
-
-    fix = "check the network and the store"
-
-
-class DeniedError(StoreError, PermissionError):
-    """The credentials do not permit it, or there are none."""
-
-    fix = "check the credentials (AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or AWS_PROFILE) and what they permit"
-
-
-class NoBucketError(StoreError):
-    """There is no such bucket at this end point."""
-
-    fix = "make the bucket with the store's own tools, or check its name and the end point (AWS_ENDPOINT_URL)"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,11 +196,47 @@ class RemotePath:
         self._ask(lambda obstore, store: obstore.put(store, self.key, data))
 
     def upload(self, file: Path) -> None:
-        """Put a file's bytes; of a large file in parts, which show together.
+        """Put a file's bytes; of a large file in parts, which show together. What fails leaves no parts behind.
 
         Raises:
             StoreError: the store did not take it.
         """
+        if file.stat().st_size <= BLOCK:
+            self._upload(file)
+            return
+        before = self._unfinished()
+        try:
+            self._upload(file)
+        except BaseException:
+            for upload in self._unfinished() - before:
+                with suppress(StoreError):  # what is left is a collection's
+                    upload.abort()
+            raise
+
+    def uploads(self) -> list[Upload]:
+        """Uploads of this key and of those beneath that were begun and are not finished, nor aborted.
+
+        Raises:
+            StoreError: the store did not list them; some cannot.
+        """
+        beneath = unfinished(self.bucket, self.key)
+        return [one for one in beneath if one.key == self.key or not self.key or one.key.startswith(f"{self.key}/")]
+
+    def now(self) -> float:
+        """The store's clock, which gives objects their times [s since 1970].
+
+        Raises:
+            StoreError: the store did not say.
+        """
+        return store_time(self.bucket)
+
+    def _unfinished(self) -> set[Upload]:
+        """What `uploads` gives; nothing where the store does not say."""
+        with suppress(StoreError):
+            return {*self.uploads()}
+        return set()
+
+    def _upload(self, file: Path) -> None:
         for _ in range(_UPLOADS):
             # A store that is asked again to join the parts, since its first answer was lost, knows of no parts.
             with suppress(FileNotFoundError):
@@ -234,25 +252,37 @@ class RemotePath:
         Raises:
             StoreError: the store did not say whether it took it; it may yet appear.
         """
-        try:
-            self._ask(lambda obstore, store: obstore.put(store, self.key, data, mode="create"))
-        except FileExistsError:
-            return self._holds(data)
-        except DeniedError:
-            raise
-        except StoreError:
-            if self._holds(data):
-                return True
-            raise
-        return True
+        for _ in range(_CONFLICTS):
+            try:
+                self._ask(lambda obstore, store: obstore.put(store, self.key, data, mode="create"))
+            except FileExistsError:
+                if (there := self._content()) is not None:
+                    return there == data
+                continue  # 409: of two puts in one moment the store may take neither
+            except DeniedError:
+                raise
+            except StoreError:
+                with suppress(StoreError):
+                    if self._content() == data:
+                        return True
+                raise
+            return True
+        raise StoreError(errno.EREMOTEIO, "the store took none of several puts of this object", str(self))
 
     def replace_if(self, e_tag: str | None, data: bytes) -> str | None:
         """Put an object in place of the one of that version; the new one's version, or None where it was not that."""
-        try:
-            mode: Any = {"e_tag": e_tag}
-            return self._ask(lambda obstore, store: obstore.put(store, self.key, data, mode=mode))["e_tag"]
-        except (FileExistsError, FileNotFoundError):
-            return None
+        mode: Any = {"e_tag": e_tag}
+        for _ in range(_CONFLICTS):
+            try:
+                return self._ask(lambda obstore, store: obstore.put(store, self.key, data, mode=mode))["e_tag"]
+            except FileExistsError:
+                with suppress(FileNotFoundError):
+                    if RemotePath(self.bucket, self.key).stat().e_tag == e_tag:  # 409, as above
+                        continue
+            except FileNotFoundError:
+                pass
+            break
+        return None
 
     def unlink(self, missing_ok: bool = False) -> None:
         self._ask(lambda obstore, store: obstore.delete(store, self.key))
@@ -305,16 +335,11 @@ class RemotePath:
         keys = [path.key for path in self.rglob("*")]
         self._ask(lambda obstore, store: obstore.delete(store, [self.key, *keys]))
 
-    def _holds(self, data: bytes) -> bool:
+    def _content(self) -> bytes | None:
         try:
-            return self.read_bytes() == data
+            return self.read_bytes()
         except FileNotFoundError:
-            return False
-
-    def _check_bucket(self, error: Exception) -> None:
-        """Raises NoBucketError where that is what the store says."""
-        if "NoSuchBucket" in str(error):
-            raise NoBucketError(errno.ENOENT, f"there is no bucket {self.bucket!r}", str(self)) from None
+            return None
 
     def _ask(self, request: Callable[[Any, S3Store], T]) -> T:
         """The answer of the store; what it refuses is an error of the system that shows no credentials."""
@@ -325,19 +350,20 @@ class RemotePath:
         try:
             return request(obstore, store)
         except (FileNotFoundError, exceptions.NotFoundError) as error:
-            self._check_bucket(error)
+            if "NoSuchBucket" in str(error):
+                raise self._refusal(error) from None
             raise FileNotFoundError(errno.ENOENT, "there is no such object", str(self)) from None
-        except (exceptions.AlreadyExistsError, exceptions.PreconditionError):
+        except (exceptions.AlreadyExistsError, exceptions.PreconditionError) as error:
+            if "performing PUT" not in str(error):  # 409 of a bucket that is being changed
+                raise self._refusal(error) from None
             raise FileExistsError(
                 errno.EEXIST, "there is such an object, or another version of it", str(self)
             ) from None
-        except (exceptions.PermissionDeniedError, exceptions.UnauthenticatedError) as error:
-            raise DeniedError(errno.EACCES, connection.plain(error), str(self)) from None
         except (exceptions.BaseError, OSError) as error:
-            self._check_bucket(error)
-            denied = "status code: 403" in str(error) or "status code: 401" in str(error)
-            kind = DeniedError if denied else StoreError
-            raise kind(errno.EACCES if denied else errno.EREMOTEIO, connection.plain(error), str(self)) from None
+            raise self._refusal(error) from None
+
+    def _refusal(self, error: Exception) -> StoreError:
+        return refusal(error, bucket=self.bucket, where=str(self))
 
 
 def _status(meta: Any) -> Status:

@@ -14,12 +14,14 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from pathlib import Path
+from urllib.request import urlopen
 
 import pytest
 
 import flagdata
 from flagdata.caches import beside
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError, RefusedError, UsageError
+from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake, remote_leases
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, object_names, verify, verify_catalog
@@ -31,7 +33,7 @@ from flagdata.storage import RemotePath, StoreError
 from flagdata.storage import cache as object_cache
 from flagdata.storage.connection import plain
 from tests.program import invoke
-from tests.s3 import SECRETS, Careless, Denying, read_only, serving
+from tests.s3 import SECRETS, Careless, Denying, Forbidding, read_only, serving
 
 NOW = timedelta(0)
 Put = Callable[..., Artifact]
@@ -479,3 +481,90 @@ def test_a_film_and_a_log_are_ingested_aligned_exported_and_loaded(
     assert [pairs[index].clip.shape[:2] for index in range(len(pairs))] == [(1, 30), (1, 30)]
     assert [sample.recording for sample in pairs] == [aligned["recording"]] * 2
     assert doctor(remote_lake, grace=NOW) == ()
+
+
+READING = (
+    ("ls",), ("ls", "--at", "v1"), ("log",), ("query", "--where", "kind = 'wind'"), ("show", "gusts"),
+    ("lineage", "gusts"),
+    ("diff", "v1", "main"), ("tag",), ("branch",), ("du",), ("verify",), ("doctor",), ("doctor", "--deep"),
+    ("doctor", "--older-than", "0s"), ("gc", "--dry-run"), ("gc", "--dry-run", "--older-than", "0s"),
+    ("expire", "--keep", "1", "--dry-run"), ("expire", "--keep", "1", "--dry-run", "--json"),
+)  # fmt: skip
+"""Commands that commit nothing."""
+
+
+def test_with_keys_that_only_read_every_command_that_commits_nothing_works_and_asks_for_no_write(
+    remote_lake: Lake, put_text: Put, use_store: Use, s3_server: str, tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    put_text(remote_lake, "gusts")
+    remote_lake.tag("v1")
+    put_text(remote_lake, "more")
+    leftover = json.dumps({**remote_leases.owner(), "machine": "another", "pid": 1}).encode() + b"\n"
+    (remote_lake.staging / ("0" * 32) / "lease").write_bytes(leftover)  # of a transaction on another machine
+    with read_only(s3_server) as address:
+        use_store(address)
+        for command in READING:
+            ended = invoke(capsys, *command, "--lake", remote_lake.path)
+            assert (command, ended.code) == (command, 0), ended.err
+        ended = invoke(capsys, "clone", remote_lake.path, tmp_path / "clone")
+        assert ended.code == 0, ended.err
+        ended = invoke(capsys, "pull", remote_lake.path, "--lake", tmp_path / "clone")
+        assert ended.code == 0, ended.err
+        assert urlopen(f"{address}/refused").read() == b""
+
+
+def test_what_is_young_by_the_stores_clock_is_kept_whatever_this_machines_says(
+    remote_lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    transaction = remote_lake.transaction("is given up").__enter__()
+    (path := transaction.staging(".mcap")).write_text("young")
+    name = transaction.put(path)
+    transaction.__exit__(RuntimeError, RuntimeError(), None)
+    withdrawn = put_text(remote_lake, "withdrawn")
+    for ahead in (-7200.0, 7200.0):
+        with monkeypatch.context() as patch:
+            patch.setattr(time, "time_ns", lambda ahead=ahead, now=time.time_ns: now() + int(ahead * 1e9))
+            patch.setattr(time, "time", lambda ahead=ahead, now=time.time: now() + ahead)
+            if ahead < 0:
+                remote_lake.withdraw([withdrawn.id], "by a clock that is behind")
+            assert collect(remote_lake, grace=timedelta(hours=1)).objects == ()
+            assert [found.severity for found in doctor(remote_lake, grace=timedelta(hours=1))] == [Severity.NOTE]
+    assert remote_lake.objects.has(name)
+    assert set(collect(remote_lake, grace=NOW).objects) == {name, str(withdrawn.object)}
+
+
+def test_a_put_in_conflict_with_another_is_made_again(bucket_folder: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    place, asked, conflicts = RemotePath.parse(bucket_folder) / "ref.json", RemotePath._ask, [True, True]
+
+    def conflicting(path: RemotePath, request: Callable[..., object]) -> object:
+        if conflicts and "put" in request.__code__.co_names:  # 409 ConditionalRequestConflict
+            conflicts.pop()
+            raise FileExistsError
+        return asked(path, request)
+
+    monkeypatch.setattr(RemotePath, "_ask", conflicting)
+    assert place.create(b"mine")
+    conflicts[:] = [True, True]
+    assert place.replace_if(place.stat().e_tag, b"other") is not None
+    assert place.read_bytes() == b"other"
+    conflicts[:] = [True] * 99
+    with pytest.raises(StoreError, match="none of several"):
+        (place.parent / "another.json").create(b"mine")
+
+
+def test_without_permission_to_list_or_to_delete_a_command_says_which_is_missing(
+    remote_lake: Lake, put_text: Put, use_store: Use, s3_server: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    put_text(remote_lake, "gusts")
+    Forbidding.store = s3_server.removeprefix("http://")
+    with serving(Forbidding) as address:
+        for forbidden, command, action in (
+            ("list", ("ls",), "s3:ListBucket"), ("list", ("tag", "v1"), "s3:ListBucket"),
+            ("delete", ("tag", "v1"), "s3:DeleteObject"), ("delete", ("gc",), "s3:DeleteObject"),
+        ):  # fmt: skip
+            use_store(address)
+            Forbidding.forbidden = forbidden
+            ended = invoke(capsys, *command, "--lake", remote_lake.path)
+            assert ended.code == 1
+            assert f"have {action} permitted" in ended.err.partition("fix:")[2]
