@@ -1,6 +1,6 @@
 """Requests that the client library does not make: signed by version 4 of Amazon's process, over the standard library.
 
-They list and abort uploads in parts, tell the store's time, and find out why the client was refused: the client's
+They list and abort uploads in parts, ask for the store's time, and find out why the client was refused: the client's
 errors of requests without a body state neither code nor headers.
 """
 

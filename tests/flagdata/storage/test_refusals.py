@@ -47,7 +47,7 @@ NAMED = {
     "another region, as a denial": ((403, ABROAD, b""), "eu-west-1", "AWS_REGION=eu-west-1"),
     "a clock that is off": (refusing(403, "RequestTimeTooSkewed"), "clock", "clock"),
     "a clock that is off, without a code": (
-        (403, {"Date": formatdate(time.time() - 1500, usegmt=True)}, b""), "25 min ahead", "clock",
+        (403, {"Date": formatdate(time.time() - 1500, usegmt=True)}, b""), "min ahead of the store", "clock",
     ),
     "expired credentials": (refusing(400, "ExpiredToken"), "expired", "AWS_SESSION_TOKEN"),
     "another's token": (refusing(400, "InvalidToken"), "token", "AWS_SESSION_TOKEN"),
@@ -118,7 +118,7 @@ def test_a_bucket_that_is_not_there_is_no_object_that_is_not_there(answering: An
         answering(refusing(404, "NoSuchBucket")).read_bytes()
 
 
-def test_without_credentials_that_is_what_is_said(answering: Answering, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_credentials_are_named(answering: Answering, monkeypatch: pytest.MonkeyPatch) -> None:
     place = answering(refusing(403, "AccessDenied"))
     for name in SECRETS:
         monkeypatch.delenv(name)
