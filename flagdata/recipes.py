@@ -15,6 +15,7 @@ from flagdata.addresses import local_path
 from flagdata.documents import SIZE_LIMIT, LimitsError, from_toml
 from flagdata.errors import InputError, LimitError, UnknownNameError
 from flagdata.files import check_input
+from flagdata.plain_text import plain_text
 
 _SUFFIX = ".toml"
 NAME_LIMIT = 100
@@ -42,12 +43,9 @@ class Found:
         """The file's text.
 
         Raises:
-            InputError: it is not UTF-8.
+            InputError: it is not UTF-8, and no byte-order mark says what else.
         """
-        try:
-            return self.data.decode("utf-8")
-        except UnicodeDecodeError:
-            raise InputError("the recipe is not UTF-8 text", where=self.where, fix="save it as UTF-8") from None
+        return plain_text(self.data, noun="recipe", where=self.where)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,6 @@ steady wind and its standard uncertainty, both or neither). Other columns are re
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,11 +20,13 @@ from pathlib import Path
 from flagdata.addresses import local_path
 from flagdata.errors import FlagdataError, InputError
 from flagdata.files import check_input, is_folder
-from flagdata.ingest.headings import check_columns, delimiter_of
+from flagdata.ingest.headings import check_columns, small_table
+from flagdata.plain_text import plain_text
 
 COLUMNS = ("film", "fabric", "area_weight")
 """Columns that every table has."""
 OPTIONAL = ("bending_stiffness", "wind_level", "wind_speed", "wind_sigma")
+_NUMBERS = frozenset({"area_weight", "bending_stiffness", "wind_speed", "wind_sigma"})
 SIZE_LIMIT = 1 << 24
 """Largest table that is read [B]."""
 _WEIGHTS = (0.005, 5.0)  # kg/m²; silk organza has 0.02, heavy canvas 1
@@ -63,7 +64,7 @@ class ClothFilm:
 
 
 def read_cloths(path: Path) -> tuple[ClothFilm, ...]:
-    """The films of a table, CSV (comma, semicolon or tab; decimal points), in its order.
+    """The films of a table, CSV (comma, semicolon or tab; a decimal comma beside the latter two), in its order.
 
     Raises:
         NotFoundError: no such table, or a film that it names is not there.
@@ -73,33 +74,23 @@ def read_cloths(path: Path) -> tuple[ClothFilm, ...]:
             two area weights or stiffnesses.
     """
     check_input(path, noun="table", limit=SIZE_LIMIT)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError("the table is not UTF-8", where=str(path), fix="export it as UTF-8") from None
-    heading = text.split("\n", 1)[0]
-    reader = csv.reader(text.splitlines(), delimiter=delimiter_of(heading), strict=True)
-    try:
-        lines = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
-    except csv.Error as error:
-        raise InputError(
-            f"not a table: {error}", where=f"{path}, line {reader.line_num}", fix="export it anew"
-        ) from None
-    rows = [(line, cells) for line, cells in lines if any(cells)]
-    if len(rows) < 2:
+    table = small_table(plain_text(path.read_bytes(), noun="table", where=str(path)), where=str(path))
+    names = table.names
+    if not table.rows:
         raise InputError("no rows", where=str(path), fix=f"give a heading with {', '.join(COLUMNS)}, and a row a film")
-    names = rows[0][1]
     check_columns(
         names, needed=COLUMNS, optional=OPTIONAL, where=str(path), fix=f"give {', '.join(COLUMNS)}, each once"
     )
     found: list[ClothFilm] = []
-    for line, cells in rows[1:]:
+    for line, cells in table.rows:
         where = f"{path}, line {line}"
         if len(cells) != len(names):
             raise InputError(
                 f"{len(cells)} cells, the heading has {len(names)}", where=where, fix="mind the delimiters"
             )
-        found.append(_film(dict(zip(names, cells, strict=True)), path.parent, where))
+        cell = dict(zip(names, cells, strict=True))
+        numbers = {name: table.number(cell[name]) for name in names if name in _NUMBERS}
+        found.append(_film(cell | numbers, path.parent, where))
         _check_alike(found, where)
     return tuple(found)
 

@@ -1,17 +1,95 @@
-"""The heading of a small table with columns of our own names: its delimiter, and whether all columns are there."""
+"""Small tables with columns of our own names: how their text is cut, and whether all columns are there."""
 
 from __future__ import annotations
 
+import csv
+import re
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 from flagdata.errors import InputError, UnknownNameError
+from flagdata.plain_text import encoding_of
 
 DELIMITERS = (",", ";", "\t")
+_SEP = "sep="
+_COMMA, _POINT = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?"), re.compile(r"[-+]?\d*\.\d+([eE][-+]?\d+)?")
+_HEAD = 1 << 16
+"""Bytes of a table that a look at it takes."""
 
 
 def delimiter_of(heading: str) -> str:
     """The one of `DELIMITERS` that stands most often in a heading."""
     return max(DELIMITERS, key=heading.count)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmallTable:
+    """The cells of a table, trimmed.
+
+    Attributes:
+        line: of the heading.
+        delimiter: between them.
+        names: of the columns; empty headings at the end, which a spreadsheet leaves, are none.
+        rows: number of the line and cells of each row that has any.
+    """
+
+    line: int
+    delimiter: str
+    names: tuple[str, ...]
+    rows: tuple[tuple[int, tuple[str, ...]], ...]
+
+    @property
+    def decimal_commas(self) -> bool:
+        """Whether its numbers have decimal commas, as those of a spreadsheet that writes ";"; none has a point."""
+        cells = [cell for _, row in self.rows for cell in row]
+        return self.delimiter != "," and any(map(_COMMA.fullmatch, cells)) and not any(map(_POINT.fullmatch, cells))
+
+    def number(self, cell: str) -> str:
+        """A cell with the decimal point of programs."""
+        return cell.replace(",", ".") if self.delimiter != "," and _COMMA.fullmatch(cell) else cell
+
+
+def small_table(text: str, *, where: str) -> SmallTable:
+    """The table in a text: CSV with commas, semicolons or tabs, which a first line "sep=;" may name.
+
+    Raises:
+        InputError: quotes that do not close, and the like.
+    """
+    return _cut(text.splitlines(), where, strict=True)
+
+
+def _cut(lines: Sequence[str], where: str, *, strict: bool) -> SmallTable:
+    named = int(bool(lines) and len(lines[0]) == len(_SEP) + 1 and lines[0].lower().startswith(_SEP))
+    delimiter = lines[0][len(_SEP) :] if named else delimiter_of(lines[0] if lines else "")
+    reader = csv.reader(lines[named:], delimiter=delimiter, strict=strict)
+    try:
+        rows = [(reader.line_num + named, tuple(cell.strip() for cell in row)) for row in reader]
+    except csv.Error as error:
+        line = f"{where}, line {reader.line_num + named}"
+        raise InputError(f"not a table: {error}", where=line, fix="export it anew") from None
+    (line, names), *rows = rows or [(1, ())]
+    while names and not names[-1]:
+        names = names[:-1]
+    filled = ((at, _without_blank_end(cells, len(names))) for at, cells in rows if any(cells))
+    return SmallTable(line=line, delimiter=delimiter, names=names, rows=tuple(filled))
+
+
+def small_table_head(path: Path) -> SmallTable:
+    """The heading and first rows of a table of any length, for a look at it: what is damaged is replaced.
+
+    Raises:
+        InputError: it is no text.
+    """
+    with path.open("rb") as stream:
+        head = stream.read(_HEAD)
+    text = head.decode(encoding_of(head), errors="replace").replace("\r\n", "\n").replace("\r", "\n")
+    whole = text if len(head) < _HEAD else text[: text.rfind("\n") + 1]
+    return _cut(whole.splitlines(), str(path), strict=False)
+
+
+def _without_blank_end(cells: tuple[str, ...], width: int) -> tuple[str, ...]:
+    return cells[:width] if not any(cells[width:]) else cells
 
 
 def check_columns(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -16,7 +15,8 @@ import numpy as np
 
 from flagdata.errors import InputError, TimeError
 from flagdata.files import check_input
-from flagdata.ingest.headings import delimiter_of
+from flagdata.ingest.headings import small_table, small_table_head
+from flagdata.plain_text import plain_text
 from flagdata.timebase import NANOSECONDS, parse
 from flagdata.units import spelled, unit
 from measure.calibrate.prior import Floats
@@ -27,7 +27,6 @@ TIME, WIND, DURATION, COUNT = "time", "wind", "duration", "count"
 SIGMA, _REASON = "-sigma", "-reason"
 _Value = TypeVar("_Value", int, float)
 _LIMIT = 1 << 26  # B
-_LONGEST_HEADING = 1 << 16  # B
 _UNITS = {TIME: "s", WIND: "m/s", DURATION: "s", COUNT: "1"}
 _HEADING = re.compile(r"(?P<name>[^\[\](),/]+?)\s*(?:[\[(](?P<bracketed>[^\])]*)[\])]|[,/]\s*(?P<after>\S.*))?\s*")
 
@@ -81,13 +80,12 @@ def read(path: Path, size: FlagSize) -> Columns:
     known_columns(names, where=where)
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise InputError(f"columns {', '.join(twice)} stand twice", where=where, fix="keep one of each")
-    lines = tuple(number for number, row in enumerate(rows, start=2) if any(cell.strip() for cell in row))
-    rows = [rows[number - 2] for number in lines]
+    lines = tuple(number for number, _ in rows)
     values: dict[str, Floats] = {}
     origin = 0
     for place, name, stated in wanted:
         scale = _scale(name, stated, size, where=where)
-        cells = [row[place].strip() if place < len(row) else "" for row in rows]
+        cells = [row[place].strip() if place < len(row) else "" for _, row in rows]
         if name == TIME:
             instants = _converted(cells, lines, name, where, partial(_instant, scale=scale))
             if None in instants or not instants:
@@ -122,9 +120,10 @@ def names(path: Path) -> set[str]:
             return {_named(one) for one in pq.read_schema(path).names}
         except pa.ArrowException:
             return set()
-    with path.open("rb") as file:
-        line = file.readline(_LONGEST_HEADING).decode("utf-8-sig", errors="replace").strip()
-    return {_named(cell) for cell in next(csv.reader([line], delimiter=delimiter_of(line)), [])}
+    try:
+        return {_named(cell) for cell in small_table_head(path).names}
+    except InputError:
+        return set()
 
 
 def _named(heading: str) -> str:
@@ -162,8 +161,8 @@ def _scale(name: str, stated: str | None, size: FlagSize, *, where: str) -> floa
     )
 
 
-def _cells(path: Path) -> tuple[list[str], list[list[str]]]:
-    """Headings and rows of a table as text; of Parquet, with the units that its fields state.
+def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Headings of a table, and the line and cells of its rows; of Parquet, with the units that its fields state.
 
     Raises:
         InputError: no table of that format.
@@ -181,13 +180,10 @@ def _cells(path: Path) -> tuple[list[str], list[list[str]]]:
             stated = (field.metadata or {}).get(b"unit", b"").decode()
             headings.append(f"{field.name} [{stated}]" if stated and _parsed(field.name)[1] is None else field.name)
         columns = [["" if cell is None else str(cell) for cell in column.to_pylist()] for column in table.columns]
-        return headings, [list(row) for row in zip(*columns, strict=True)]
-    text = path.read_text(encoding="utf-8-sig")
-    delimiter = delimiter_of(text.partition("\n")[0])
-    rows = list(csv.reader(text.splitlines(), delimiter=delimiter))
-    if delimiter == ";":
-        rows[1:] = [[cell.replace(",", ".") for cell in row] for row in rows[1:]]
-    return ([cell.strip() for cell in rows[0]] if rows else []), rows[1:]
+        rows = enumerate(map(list, zip(*columns, strict=True)), start=2)
+        return headings, [(line, row) for line, row in rows if any(cell.strip() for cell in row)]
+    table = small_table(plain_text(path.read_bytes(), noun="table", where=str(path)), where=str(path))
+    return list(table.names), [(line, [table.number(cell) for cell in row]) for line, row in table.rows]
 
 
 def _converted(

@@ -11,6 +11,7 @@ from flagdata.addresses import local_path
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.files import check_input
 from flagdata.installed_names import installed, renamed
+from flagdata.plain_text import plain_text
 from flagdata.provenance import file_hash
 from sim.effects.effect import Effect
 
@@ -47,7 +48,7 @@ def _module(path: Path) -> object:
     module.__file__ = str(path)
     sys.modules[name] = module
     try:
-        source = path.read_text(encoding="utf-8")
+        source = plain_text(path.read_bytes(), noun="file of an effect", where=str(path))
         if installed():  # the file imports sim as in a checkout
             source = renamed(source, path.parent)
         exec(compile(source, str(path), "exec"), vars(module))

@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError, LimitError, UsageError
 from flagdata.files import check_input
-from flagdata.ingest.headings import check_columns, delimiter_of
+from flagdata.ingest.headings import check_columns, small_table_head
 from flagdata.lake.markers import MarkerSequence
+from flagdata.plain_text import encoding_of
 from flagdata.timebase import NANOSECONDS
 from flagdata.units import unit
 
@@ -119,9 +120,7 @@ def _columns(path: Path) -> list[str]:
     if _is_parquet(path):
         with _table_errors(path):
             return list(_parquet(path).schema_arrow.names)
-    with path.open("rb") as stream:
-        line = stream.readline(1 << 16).decode("utf-8-sig", "replace").strip()
-    return [name.strip().strip('"') for name in line.split(delimiter_of(line))]
+    return list(small_table_head(path).names)
 
 
 def _check_columns(names: list[str], options: MarkerOptions, where: str) -> None:
@@ -146,13 +145,16 @@ def _rows(path: Path, names: list[str]) -> pa.Table:
                 table = pa.concat_tables(file.read_row_group(i, columns=names) for i in range(file.num_row_groups))
                 table.validate(full=True)  # text that is not UTF-8, for one
                 return table.select(names).cast(wanted)
+        head = small_table_head(path)
         with path.open("rb") as stream:
-            delimiter = delimiter_of(stream.readline(1 << 16).decode("utf-8-sig", "replace"))
+            encoding = encoding_of(stream.read(4))
         return pyarrow.csv.read_csv(
-            path, read_options=pyarrow.csv.ReadOptions(column_names=names, skip_rows=1),
-            parse_options=pyarrow.csv.ParseOptions(delimiter=delimiter),
+            path,
+            read_options=pyarrow.csv.ReadOptions(column_names=names, skip_rows=head.line, encoding=encoding),
+            parse_options=pyarrow.csv.ParseOptions(delimiter=head.delimiter),
             convert_options=pyarrow.csv.ConvertOptions(
-                column_types=wanted, strings_can_be_null=True, null_values=["", "NaN", "nan", "NA"]
+                column_types=wanted, strings_can_be_null=True, null_values=["", "NaN", "nan", "NA"],
+                decimal_point="," if head.decimal_commas else ".",
             ),
         )  # fmt: skip
     except pa.ArrowException as error:

@@ -32,7 +32,7 @@ def read_json(path: Path) -> dict[str, Any]:
         LimitError: larger than any scene.
     """
     check_input(path, limit=SIZE_LIMIT)
-    text = path.read_text(encoding="utf-8", errors="replace")
+    text = path.read_text(encoding="utf-8-sig", errors="replace")
     # A string, kept, or a comment up to the end of its line, dropped.
     bare = re.sub(r'"(?:[^"\\]|\\.)*"|//[^\n]*', lambda m: m[0] if m[0].startswith('"') else "", text)
     try:

@@ -59,7 +59,7 @@ def read_obj(path: Path) -> Obj:
     corners: list[tuple[int, int]] = []
     sizes: list[int] = []
     face_lines: list[int] = []
-    with path.open(encoding="utf-8", errors="replace") as lines:
+    with path.open(encoding="utf-8-sig", errors="replace") as lines:
         for number, line in enumerate(lines, start=1):
             words = line.split("#", 1)[0].split()
             if not words:
