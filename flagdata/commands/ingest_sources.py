@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 from flagdata.commands.ingest_options import Given, check_applies
 from flagdata.commands.ingest_report import print_results, print_sniffed
 from flagdata.console import document, fail, progress, say
-from flagdata.errors import FlagdataError
+from flagdata.errors import FlagdataError, UsageError
 from flagdata.findings import Finding, Severity
 
 if TYPE_CHECKING:
@@ -46,12 +46,13 @@ def ingest_sources(
     from flagdata.ingest.classify import classify
 
     wind = options.wind.wind
-    kinds = _recognised(
-        sources,
-        lambda source: classify(
-            source, format_name=format_name, recipe=wind.recipe, columns=wind.columns, topic=wind.topic
-        ),
-    )
+
+    def kind_of(source: Path) -> Guess:
+        return classify(source, format_name=format_name, recipe=wind.recipe, columns=wind.columns, topic=wind.topic)
+
+    kinds = _recognised(sources, kind_of)
+    if options.camera.camera.chapters:
+        _check_joined((*sources, *options.camera.camera.chapters), kind_of)
     check_applies([None if isinstance(kind, FlagdataError) else kind.kind for kind in kinds], options, given=given)
     if any(not isinstance(kind, FlagdataError) and kind.kind == "camera" for kind in kinds):
         options = replace(options, wind=replace(options.wind, wind=replace(options.wind.wind, start=None, rate=None)))
@@ -68,6 +69,25 @@ def ingest_sources(
             },
         )
     _exit_on(failures, sources)
+
+
+def _check_joined(paths: Sequence[Path], kind_of: Callable[[Path], Guess]) -> None:
+    """Refuse to join what are no films.
+
+    Raises:
+        FlagdataError: as `kind_of`; or one of them is something else.
+    """
+    for path in paths:
+        kind = kind_of(path).kind
+        if kind != "camera":
+            raise UsageError(
+                f"{_NOT_JOINED.get(kind, 'what is no film')} cannot be joined with others, only video files can",
+                where=str(path),
+                fix=f"ingest each by itself: flagdata ingest {' '.join(map(str, paths))}",
+            )
+
+
+_NOT_JOINED = {"anemometer": "a wind log", "meshes": "a folder of meshes", "markers": "a table of markers"}
 
 
 def sniff_sources(sources: Sequence[Path], options: Given, *, given: frozenset[str], as_json: bool) -> None:

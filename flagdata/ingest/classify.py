@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flagdata.errors import FlagdataError, InputError, UnknownNameError
-from flagdata.files import LEROBOT_INFO, check_input, is_folder, is_lerobot, is_mcap
+from flagdata.files import LEROBOT_INFO, check_input, is_folder, is_lerobot
 from flagdata.ingest.anemometer import Guess, sniff
 from flagdata.ingest.anemometer.formats.registry import FORMATS
 from flagdata.ingest.markers import COLUMNS, is_marker_table
+from flagdata.ingest.mcap.bags import is_bag, other_bag
 
 if TYPE_CHECKING:
     from flagdata.ingest.camera import CameraProbe
@@ -34,8 +35,11 @@ def guesses(path: Path, *, topic: str | None = None) -> tuple[Guess, ...]:
     if path.is_file() and is_marker_table(path):
         reason = f"its columns are {', '.join(COLUMNS)} and more"
         return (Guess(format="marker table", score=0.99, reasons=(reason,), kind="markers"),)
-    if is_mcap(path):
+    if is_bag(path):
         return _of_mcap(path, topic)
+    other = other_bag(path)
+    if other is not None:
+        return (Guess(format="bag", score=0.99, reasons=(f"this is {other[0]}",), kind="other", fix=other[1]),)
     if is_lerobot(path):
         reason = f"it has LeRobot's {LEROBOT_INFO}"
         return (Guess(format="LeRobot", score=0.99, reasons=(reason,), kind="camera"),)
@@ -106,9 +110,9 @@ def _of_mcap(path: Path, topic: str | None) -> tuple[Guess, ...]:
     from flagdata.ingest.records import is_ours
     from flagdata.record.writer import PROFILE
 
-    if topic is None and profile(path) == PROFILE and is_ours(path):
+    if topic is None and path.is_file() and profile(path) == PROFILE and is_ours(path):
         return (Guess(format="record", score=1.0, reasons=("its header says that flagdata wrote it",), kind="record"),)
-    present = [one for one in topics(path) if topic in (None, one.name)]
+    present = [one for one in topics(path) if topic in (None, one.name, one.plain)]
     found = [
         Guess(format="MCAP", score=0.9, reasons=(f"the topic {one} holds pictures",), kind="camera")
         for one in of_pictures(present)

@@ -16,8 +16,9 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 
 from flagdata.errors import CorruptError, FlagdataError, InputError
-from flagdata.files import is_lerobot, is_mcap
+from flagdata.files import is_lerobot
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.mcap.bags import is_bag, other_bag
 from flagdata.schema import FRAME_RATE, FRAME_SIZE
 from flagdata.timebase import NANOSECONDS, iso
 
@@ -77,19 +78,21 @@ def examine(path: Path) -> Examination:
         InputError: it is neither.
         CorruptError: it cannot be read, or was cut off.
     """
-    if is_mcap(path):
+    if is_bag(path):
         return _mcap(path)
     if is_lerobot(path):
         return _lerobot(path)
-    raise InputError(
-        "neither an MCAP file nor a LeRobot data set", where=str(path), fix="flagdata ingest --sniff looks at others"
+    what, fix = other_bag(path) or (
+        "neither an MCAP file nor a LeRobot data set",
+        "flagdata ingest --sniff looks at others",
     )
+    raise InputError(what, where=str(path), fix=fix)
 
 
 def _mcap(path: Path) -> Examination:
     from flagdata.ingest.anemometer.containers.mcap import of_numbers
     from flagdata.ingest.mcap.pictures import of_pictures
-    from flagdata.ingest.mcap.topics import instants, topics
+    from flagdata.ingest.mcap.topics import index, topics
 
     present = topics(path)
     pictures, numbers = of_pictures(present), of_numbers(path, present)
@@ -98,25 +101,16 @@ def _mcap(path: Path) -> Examination:
     for topic in present:
         holds = "pictures" if topic in pictures else "numbers" if topic in numbers else topic.schema or topic.encoding
         try:
-            pairs = instants(path, topic.name)
-            if not len(pairs):
+            read = index(path, topic.name, sort=False)
+            if not len(read.stamps):
                 raise CorruptError(f"{topic.count} messages are stated and none is there", fix="copy the file again")
         except FlagdataError as error:
             findings.append(_unread(topic.name, error))
             continue
-        stream = Stream.of(topic.name, holds, pairs[:, 0])
+        stream = Stream.of(topic.name, holds, read.stamps)
         streams.append(stream)
         findings += _judged(stream)
-        apart = float(np.abs(pairs[:, 0].astype(float) - pairs[:, 1]).max()) / NANOSECONDS
-        if apart > 1:
-            findings.append(
-                Finding(
-                    kind="clocks-apart", severity=Severity.WARNING, where=topic.name, value=apart,
-                    what=f"the stamps of its messages lie up to {apart:.3f} s from when they were logged: a delay, or "
-                    "another clock",
-                    fix="compare it with another topic; align it after it is ingested",
-                )
-            )  # fmt: skip
+        findings += read.findings
     findings += _lost_pictures([one for one in streams if one.holds == "pictures"])
     rest = [topic.name for topic in present if topic not in (*pictures, *numbers)]
     if rest:
@@ -125,7 +119,7 @@ def _mcap(path: Path) -> Examination:
 
 
 def _lerobot(folder: Path) -> Examination:
-    from flagdata.ingest.camera.lerobot import TIME, cameras, described, read, stamps_of
+    from flagdata.ingest.camera.lerobot import TIME, cameras, described, read, stamps_of, tables
 
     info = described(folder)
     fps = float(info["fps"])
@@ -133,7 +127,7 @@ def _lerobot(folder: Path) -> Examination:
     found = cameras(info)
     streams: list[Stream] = []
     findings: list[Finding] = []
-    for path in sorted((folder / "data").glob("*/*.parquet")):
+    for path in tables(folder / "data"):
         table = read(path, ["episode_index", "frame_index", "timestamp", *([TIME] if timed else [])])
         for episode in pc.unique(table["episode_index"]).to_pylist():  # pyright: ignore[reportAttributeAccessIssue]
             rows = table.filter(pc.field("episode_index") == episode)

@@ -17,7 +17,6 @@ import pyarrow.compute as pc
 
 from flagdata.align.paired import PairedClocks, host_clock
 from flagdata.errors import ConflictError, FlagdataError, InputError, NothingMeasuredError
-from flagdata.files import is_mcap
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.ingest.anemometer.confirm import UNASKED, Confirm, confirmed
@@ -25,6 +24,7 @@ from flagdata.ingest.anemometer.recipe import SENSORS
 from flagdata.ingest.anemometer.samples.neighbours import hours_off
 from flagdata.ingest.before import earlier, other_readings
 from flagdata.ingest.camera import CameraOptions
+from flagdata.ingest.mcap.bags import is_bag
 from flagdata.ingest.report import FrameTimes, camera_report, wind_report
 from flagdata.ingest.source import Source
 from flagdata.lake import Artifact, Lake, Transaction
@@ -313,7 +313,7 @@ def _staged(
     staged = transaction.staging(".mcap")
     with RecordWriter(staged, metadata={PROVENANCE: source.provenance(recipe)}) as record:
         record.wind(log.series)
-        if is_mcap(path):
+        if is_bag(path):
             findings = (*findings, _left_whole(path))
         elif path.stat().st_size <= ATTACHMENT_LIMIT:
             record.attach_file(source.name, path, media_type="text/plain", log_time=int(time[0]))

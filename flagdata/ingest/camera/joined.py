@@ -24,6 +24,7 @@ from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import Timing
 from flagdata.ingest.camera.video import VideoSource
+from flagdata.ingest.mcap.bags import to_join
 from flagdata.timebase import NANOSECONDS, parse
 
 _ROUNDED = 2.5
@@ -65,10 +66,12 @@ def check_films(paths: Sequence[Path]) -> None:
     for path in paths:
         noun = "a folder" if is_folder(path) else "an MCAP file" if is_mcap(path) else None
         if noun is not None:
+            alone = f"ingest each by itself: flagdata ingest {' '.join(map(str, paths))}"
             raise UsageError(
-                f"{noun} cannot be joined with others, only video files can", where=str(path),
-                fix="ingest each by itself, without --join",
-            )  # fmt: skip
+                f"{noun} cannot be joined with others, only video files can",
+                where=str(path),
+                fix=to_join(paths) if all(map(is_mcap, paths)) else alone,
+            )
 
 
 class JoinedSource:

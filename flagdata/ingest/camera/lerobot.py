@@ -29,7 +29,7 @@ from PIL import Image
 
 from flagdata.documents import read_json
 from flagdata.errors import CorruptError, InputError, LimitError, NotFoundError, TimeError, UnknownNameError
-from flagdata.files import LEROBOT_INFO
+from flagdata.files import LEROBOT_INFO, is_beside
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.container import open_container
 from flagdata.ingest.camera.damage import undecoded
@@ -271,7 +271,7 @@ def _chosen(found: Mapping[str, str], wanted: str | None, where: str) -> tuple[s
 
 
 def _episode(folder: Path, wanted: int | None) -> dict[str, Any]:
-    files = sorted((folder / "meta" / "episodes").glob("*/*.parquet"))
+    files = tables(folder / "meta" / "episodes")
     if not files:
         raise CorruptError("no table of episodes", where=str(folder / "meta" / "episodes"), fix="copy it again")
     rows: list[dict[str, Any]] = []
@@ -287,6 +287,11 @@ def _episode(folder: Path, wanted: int | None) -> dict[str, Any]:
         if wanted in (None, row.get("episode_index")):
             return row
     raise NotFoundError(f"there is no episode {wanted}", where=str(folder), fix=f"there are {len(rows)}, from 0 on")
+
+
+def tables(folder: Path) -> list[Path]:
+    """The tables of a part of a data set, in order; not what an operating system put beside them."""
+    return sorted(path for path in folder.glob("*/*.parquet") if not is_beside(path.name))
 
 
 def read(path: Path, columns: list[str]) -> pa.Table:

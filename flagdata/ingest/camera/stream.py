@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flagdata.addresses import local_path
 from flagdata.errors import LimitError, RefusedError, UsageError
-from flagdata.files import is_folder, is_lerobot, is_mcap
+from flagdata.files import is_folder, is_lerobot
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera.chapters import chapter_of
 from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
@@ -26,6 +26,7 @@ from flagdata.ingest.camera.source import Picture, Source
 from flagdata.ingest.camera.stamps import StampRepair, nanoseconds
 from flagdata.ingest.camera.start import find_start
 from flagdata.ingest.camera.video import VideoSource
+from flagdata.ingest.mcap.bags import is_bag
 from flagdata.signals import CameraInfo, Frame
 from flagdata.timebase import NANOSECONDS
 
@@ -330,8 +331,8 @@ def open_camera(path: Path | str, options: CameraOptions | None = None) -> Camer
 
 
 def open_source(path: Path, options: CameraOptions) -> Source:
-    """The reader for `path`: a folder is a LeRobot data set or an image sequence, an MCAP file a topic of it, anything
-    else a video file.
+    """The reader for `path`: a folder is a LeRobot data set, a bag or an image sequence, an MCAP file a topic of it,
+    anything else a video file.
 
     Raises:
         UsageError: a topic or an episode of what has none, or what cannot be joined.
@@ -349,7 +350,7 @@ def open_source(path: Path, options: CameraOptions) -> Source:
         return EpisodeSource(path, options)
     if options.episode is not None:
         raise UsageError("an episode of what is no LeRobot data set", where=str(path), fix="leave out --episode")
-    if is_mcap(path):
+    if is_bag(path):
         from flagdata.ingest.mcap.pictures import TopicSource
 
         _no_stream(path, options)

@@ -1,8 +1,9 @@
-"""Messages of ROS 2 as values: the text of their definition (ros2msg) read, their bytes (CDR) decoded by it.
+"""Messages of ROS as values: the text of their definition read, their bytes decoded by it.
 
 Sources: the ROS 2 interface definition (https://docs.ros.org/en/rolling/Concepts/Basic/About-Interfaces.html); OMG,
 DDS-XTypes 1.3, section 7.4.3, plain CDR, version 1: values are aligned to their own size, counted from behind a header
-of four bytes, whose second states the order of bytes.
+of four bytes, whose second states the order of bytes. ROS 1 (https://wiki.ros.org/msg) has no header and no alignment,
+its values are little-endian, and its times are two numbers of 32 bits.
 """
 
 from __future__ import annotations
@@ -29,6 +30,12 @@ _BUILT_IN = {
     "builtin_interfaces/Time": "int32 sec\nuint32 nanosec",
     "builtin_interfaces/Duration": "int32 sec\nuint32 nanosec",
 }
+_ROS_1 = {
+    "builtin_interfaces/time": "uint32 sec\nuint32 nanosec",
+    "builtin_interfaces/duration": "int32 sec\nint32 nanosec",
+}
+_TIMES = frozenset({"time", "duration"})  # of ROS 1
+_ZSTD = b"\x28\xb5\x2f\xfd"
 _DEEPEST = 32  # messages within messages
 
 
@@ -41,18 +48,19 @@ class _Field:
     count: int | None
 
 
-def decoder(name: str, definition: str) -> Callable[[bytes], Mapping[str, Any]]:
+def decoder(name: str, definition: str, *, ros1: bool = False) -> Callable[[bytes], Mapping[str, Any]]:
     """What decodes messages of a type: to field → number, text, bytes (of uint8 arrays), list or mapping.
 
     Args:
         name: of the type, as "sensor_msgs/msg/Image".
         definition: its text, and behind lines of "=" those of the types that it uses.
+        ros1: whether the messages are of ROS 1.
 
     Raises:
         InputError: a definition that cannot be read, or one that uses a type which it does not define.
     """
     first, *others = re.split(r"^=+\s*$", definition, flags=re.MULTILINE)
-    texts = dict(_BUILT_IN)
+    texts = {**_BUILT_IN, **(_ROS_1 if ros1 else {})}
     for other in others:
         head, _, text = other.strip().partition("\n")
         texts[_plain(head.removeprefix("MSG:").strip())] = text
@@ -66,8 +74,12 @@ def decoder(name: str, definition: str) -> Callable[[bytes], Mapping[str, Any]]:
             if one not in texts:
                 raise InputError(f"the definition of {name} uses {one} and does not define it", fix="record it anew")
             types[one] = _fields(texts[one], package=one.rpartition("/")[0])
+            if ros1 and not types[one]:  # lists of messages of no bytes could be without end
+                raise InputError(
+                    f"the definition of {name} has a part {one} without fields", fix="choose another topic"
+                )
             waiting += [field.type for field in types[one] if field.type not in _NUMBERS and field.type != "string"]
-    return lambda data: _Reader(data, types, name).whole(root)
+    return lambda data: _Reader(data, types, name, ros1=ros1).whole(root)
 
 
 def _plain(name: str) -> str:
@@ -82,10 +94,11 @@ def _fields(text: str, *, package: str) -> list[_Field]:
             continue
         match = _FIELD.match(line)
         if match is None or match[1] == "wstring" or _NOTHING.fullmatch(match[2] or ""):
-            raise InputError(f"a line of a ROS 2 definition cannot be read: {line!r}", fix="convert the topic to JSON")
+            raise InputError(f"a line of a ROS definition cannot be read: {line!r}", fix="convert the topic to JSON")
         kind, brackets = match[1], match[2]
         if kind not in _NUMBERS and kind != "string":
             kind = "std_msgs/Header" if kind == "Header" else _plain(kind)
+            kind = f"builtin_interfaces/{kind}" if kind in _TIMES else kind
             kind = kind if "/" in kind else f"{package}/{kind}"
         count = None if brackets is None else -1 if brackets == "[]" or "<" in brackets else int(brackets[1:-1])
         found.append(_Field(name=match[3], type=kind, count=count))
@@ -95,11 +108,17 @@ def _fields(text: str, *, package: str) -> list[_Field]:
 class _Reader:
     """The values of one message, in the order of its bytes."""
 
-    def __init__(self, data: bytes, types: Mapping[str, list[_Field]], name: str) -> None:
-        if len(data) < 4 or data[0] != 0 or data[1] not in (0, 1):
+    def __init__(self, data: bytes, types: Mapping[str, list[_Field]], name: str, *, ros1: bool) -> None:
+        if not ros1 and data.startswith(_ZSTD):
+            raise InputError(
+                f"messages of {name} are compressed one by one, as by `ros2 bag record --compression-mode message`",
+                fix="write the bag anew without compression: ros2 bag convert",
+            )
+        if not ros1 and (len(data) < 4 or data[0] != 0 or data[1] not in (0, 1)):
             raise CorruptError(f"a message of {name} is no plain CDR", fix="record it with the usual middleware")
-        self._data = memoryview(data)[4:]
-        self._order = "<" if data[1] == 1 else ">"
+        self._data = memoryview(data) if ros1 else memoryview(data)[4:]
+        self._order = "<" if ros1 or data[1] == 1 else ">"
+        self._aligned = not ros1
         self._at = 0
         self._types = types
         self._name = name
@@ -108,7 +127,7 @@ class _Reader:
         if depth > _DEEPEST:
             raise InputError(f"messages of {self._name} lie deeper than {_DEEPEST}", fix="convert the topic to JSON")
         fields = self._types[kind]
-        if not fields:
+        if not fields and self._aligned:
             self._take(1)  # ROS 2 gives an empty message one byte
         return {field.name: self._field(field, depth) for field in fields}
 
@@ -138,7 +157,8 @@ class _Reader:
         return self.whole(kind, depth + 1)
 
     def _align(self, size: int) -> None:
-        self._at += -self._at % size
+        if self._aligned:
+            self._at += -self._at % size
 
     def _take(self, size: int) -> memoryview:
         taken = self._data[self._at : self._at + size]

@@ -22,13 +22,26 @@ from PIL import Image
 
 from flagdata.errors import InputError, LimitError, TimeError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.clock import restart, restarted
 from flagdata.ingest.camera.damage import resized, undecoded
 from flagdata.ingest.camera.geometry import Orientation
 from flagdata.ingest.camera.luma import BROKEN, STILLS, Luma, luma_of_frame, luma_of_image
 from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import survey
-from flagdata.ingest.mcap.topics import MOVING, PICTURES, RAW, STILL, Decoded, Topic, choose, instants, messages, topics
+from flagdata.ingest.mcap.bags import parts_of
+from flagdata.ingest.mcap.topics import (
+    MOVING,
+    RAW,
+    STILL,
+    Decoded,
+    Topic,
+    choose,
+    index,
+    messages,
+    topics,
+)
+from flagdata.timebase import NANOSECONDS
 
 _NANOSECOND = Fraction(1, 1_000_000_000)
 _VIDEO = {"h264": "h264", "h265": "hevc", "hevc": "hevc", "av1": "av1", "vp9": "vp9"}
@@ -41,13 +54,14 @@ _BYTES_OF = {"L": 1, "RGB": 3, "BGR": 3, "RGBX": 4, "BGRX": 4}
 
 def of_pictures(found: Sequence[Topic]) -> tuple[Topic, ...]:
     """Those topics that hold pictures."""
-    return tuple(topic for topic in found if topic.schema in PICTURES)
+    return tuple(topic for topic in found if topic.pictures)
 
 
 class TopicSource:
-    """The pictures of one topic. See `flagdata.ingest.camera.source.Source`.
+    """The pictures of one topic, of a file or of the parts of a bag. See `flagdata.ingest.camera.source.Source`.
 
-    A picture's instant is the one that its message states, else the one at which it was logged.
+    A picture's instant is the one that its message states, else the one at which it was logged. Pictures come in the
+    order of their instants; compressed video in that in which it was recorded, as its decoder needs it.
 
     Raises:
         InputError: no topic of pictures, several and none is named, or none that can be decoded.
@@ -57,24 +71,30 @@ class TopicSource:
     """
 
     def __init__(self, path: Path, options: CameraOptions) -> None:
-        self._path = path
         self._limits = options.limits
-        where = str(path)
+        self._where = where = str(path)
+        self._path = path
         present = topics(path)
         self._topic = choose(of_pictures(present), options.topic, where=where, noun="pictures")
         if options.sequence_fps is not None:
             raise TimeError("pictures of a topic have stamps of their own", where=where, fix="leave out --sequence-fps")
-        self._kind = PICTURES[self._topic.schema]
+        self._kind = self._topic.pictures
         self._broken = self._resized = 0
-        stamps, logged = self._instants()
-        self._log_times = logged
-        findings = list(_others(present, self._topic))
+        found = index(self._path, self._topic.name, limit=self._limits.frames, sort=self._kind != MOVING)
+        if not len(found.stamps):
+            raise InputError(f"{self._topic.name} has no messages", where=where, fix="choose another topic")
+        findings = [*_others(present, self._topic), *_joined(parts_of(path)), *found.findings]
+        end = None if found.in_time else restart(found.stamps, tick=_NANOSECOND)
+        if end is not None:
+            after = int(found.stamps[end - 1] - found.stamps[0]) / NANOSECONDS
+            findings.append(restarted(frame=end, after=after, count=len(found.stamps) - end))
+        self._places, stamps = found.places[:end], found.stamps[:end]
         timing = survey(np.sort(stamps), tick=_NANOSECOND, missing=0, fallback_rate=Fraction(1), where=where)
-        decoded = self._decoded(messages(path, self._topic.name))
+        decoded = self._decoded(messages(self._path, self._topic.name, places=self._places))
         first = next(decoded, None)
         if first is None:
             raise InputError(
-                f"none of {self._topic.count} pictures of {self._topic.name} can be decoded", where=where,
+                f"none of {len(self._places)} pictures of {self._topic.name} can be decoded", where=where,
                 fix="choose another topic: --topic NAME",
             )  # fmt: skip
         self._pictures = decoded
@@ -86,13 +106,6 @@ class TopicSource:
             sequence=False, findings=tuple(findings), stamped=timing.origin,
         )  # fmt: skip
 
-    def _instants(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) instants of the pictures and of their logging [UTC ns], in order of logging."""
-        both = instants(self._path, self._topic.name, limit=self._limits.frames)
-        if not len(both):
-            raise InputError(f"{self._topic.name} has no messages", where=str(self._path), fix="choose another topic")
-        return both[:, 0], both[:, 1]
-
     def pictures(self) -> Iterator[Picture]:
         yield _picture(self._head)
         for one in self._pictures:
@@ -102,14 +115,14 @@ class TopicSource:
             yield _picture(one)
 
     def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
-        length = len(self._log_times)
+        length = len(self._places)
         first = 0
         for run in range(runs):
             start = max(first, length * run // runs)
             first = min(start + count * stride, length)
             if start >= length:
                 return
-            part = messages(self._path, self._topic.name, since=int(self._log_times[start]))
+            part = messages(self._path, self._topic.name, places=self._places[start:])
             sound = (
                 one for one in self._decoded(part, tally=False) if one[1:3] == (self.facts.width, self.facts.height)
             )
@@ -118,13 +131,13 @@ class TopicSource:
                 yield pictures
 
     def damage(self) -> list[Finding]:
-        return undecoded(self._broken, total=len(self._log_times)) + resized(self._resized)
+        return undecoded(self._broken, total=len(self._places)) + resized(self._resized)
 
     def close(self) -> None:
         """The file is open only while pictures are read."""
 
     def _decoded(self, found: Iterator[Decoded], *, tally: bool = True) -> Iterator[_Shown]:
-        decode = {STILL: self._stills, MOVING: self._moving, RAW: self._plain}[self._kind]
+        decode = {STILL: self._stills, MOVING: self._moving, RAW: self._plain}[str(self._kind)]
         for one in decode(found):
             if one is None:
                 self._broken += tally
@@ -132,7 +145,7 @@ class TopicSource:
             if one[1] * one[2] > self._limits.frame_pixels:
                 raise LimitError(
                     f"a picture of {one[1]} × {one[2]} px is beyond the limit of {self._limits.frame_pixels} px",
-                    where=str(self._path), fix="raise the limit if the file is to be trusted",
+                    where=self._where, fix="raise the limit if the file is to be trusted",
                 )  # fmt: skip
             yield one
 
@@ -156,7 +169,7 @@ class TopicSource:
             encoding = str(values.get("encoding", "")).lower()
             if encoding not in _PLAIN:
                 raise InputError(
-                    f"pixels of the encoding {encoding!r} are not read", where=f"{self._path}, {self._topic.name}",
+                    f"pixels of the encoding {encoding!r} are not read", where=f"{self._where}, {self._topic.name}",
                     fix=f"record one of {', '.join(_PLAIN)}, or compressed images",
                 )  # fmt: skip
             mode, layout = _PLAIN[encoding]
@@ -183,7 +196,7 @@ class TopicSource:
                 if not name:
                     raise InputError(
                         f"video of the format {one.values.get('format')!r} is not read",
-                        where=f"{self._path}, {self._topic.name}", fix=f"record one of {', '.join(_VIDEO)}",
+                        where=f"{self._where}, {self._topic.name}", fix=f"record one of {', '.join(_VIDEO)}",
                     )  # fmt: skip
                 context = av.CodecContext.create(name, "r")
                 context.thread_count, context.flags = 1, context.flags | 0x00080000  # low delay
@@ -234,6 +247,17 @@ def _data(values: Mapping[str, Any]) -> bytes | None:
         return bytes(data) if data and isinstance(data, bytes | list) else None
     except (ValueError, TypeError):
         return None
+
+
+def _joined(files: Sequence[Path]) -> Iterator[Finding]:
+    if len(files) > 1:
+        yield Finding(
+            kind="chapters-joined",
+            severity=Severity.NOTE,
+            count=len(files),
+            what=f"{len(files)} parts of one recording were joined: {', '.join(one.name for one in files[:8])}"
+            + (", …" if len(files) > 8 else ""),
+        )
 
 
 def _others(present: tuple[Topic, ...], chosen: Topic) -> Iterator[Finding]:

@@ -1,66 +1,79 @@
-"""The topics of an MCAP file and their messages, decoded: field → number, text, bytes, list or mapping.
+"""The topics of MCAP files and their messages, decoded: field → number, text, bytes, list or mapping.
+
+A topic may be on several channels, each with a definition of its own: every message is decoded by that of its channel.
+Messages of different types are topics of their own, whatever their topic's name, since they are no one series.
 
 Source: the MCAP specification and its registry of encodings, https://mcap.dev/spec.
 """
 
 from __future__ import annotations
 
-import os
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
-import zstandard
-from google.protobuf.message import DecodeError, Message
+from google.protobuf import message as protobuf
 from mcap.exceptions import McapError
-from mcap.reader import McapReader, make_reader
 from mcap.records import Channel, Schema
-from mcap.summary import Summary
 from mcap_protobuf.decoder import DecoderFactory
 from numpy.typing import NDArray
 
 from flagdata.documents import from_stored_json
 from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError, UnknownNameError
-from flagdata.files import check_input
+from flagdata.findings import Finding, Severity
 from flagdata.ingest.mcap import cdr
-from flagdata.record.salvage import CHUNK_LIMIT
+from flagdata.ingest.mcap.bags import is_described, parts_of
+from flagdata.ingest.mcap.instants import Stamp, checked, clock_findings, order_of, stamp_of
+from flagdata.ingest.mcap.layout import Layout, Message, Messages, layout_of
+from flagdata.timebase import NANOSECONDS
 
 STILL, MOVING, RAW = "compressed images", "compressed video", "plain pixels"
-PICTURES = {
-    "foxglove.CompressedImage": STILL, "foxglove_msgs/msg/CompressedImage": STILL,
-    "sensor_msgs/msg/CompressedImage": STILL,
-    "foxglove.CompressedVideo": MOVING, "foxglove_msgs/msg/CompressedVideo": MOVING,
-    "foxglove.RawImage": RAW, "foxglove_msgs/msg/RawImage": RAW, "sensor_msgs/msg/Image": RAW,
+_PICTURES = {
+    "foxglove.CompressedImage": STILL, "foxglove_msgs/CompressedImage": STILL, "sensor_msgs/CompressedImage": STILL,
+    "foxglove.CompressedVideo": MOVING, "foxglove_msgs/CompressedVideo": MOVING,
+    "foxglove.RawImage": RAW, "foxglove_msgs/RawImage": RAW, "sensor_msgs/Image": RAW,
 }  # fmt: skip
-"""Types of messages that are pictures → what kind."""
-_UNREADABLE = (
-    McapError, EOFError, ValueError, RuntimeError, DecodeError, zstandard.ZstdError, struct.error, KeyError, TypeError
-)  # fmt: skip
-"""What libraries raise on damaged chunks and messages; also those that decompress."""
-
-_CHUNK_HEAD = struct.Struct("<BQQQQII")
-"""Opcode and length of a chunk's record; first and last time, unpacked size, checksum, length of the compression's
-name. The name, the length of the records (8 bytes) and the records follow."""
+"""Types of messages that are pictures, those of ROS 2 as ROS 1 names them → what kind."""
+_UNREADABLE = (McapError, EOFError, ValueError, protobuf.DecodeError, struct.error, KeyError, TypeError)
+"""What libraries raise on damaged records and messages."""
+_OVERLAP = 2.5
+"""s by which a part of a recording may begin before the end of the one before, by the log."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Topic:
-    """A topic of an MCAP file.
+    """The messages of one type on a topic.
 
     Attributes:
-        schema: name of its messages' type; "" where there is none.
+        name: of the topic; where messages of several types are on it, with the type behind a colon.
+        plain: the topic's name alone.
+        schema: name of the messages' type; "" where there is none.
         encoding: of its messages: "protobuf", "json", "cdr", …
         count: of its messages.
+        channels: on which they are: number of the file, and of the channel within it.
     """
 
     name: str
+    plain: str
     schema: str
     encoding: str
     count: int
+    channels: frozenset[tuple[int, int]]
+
+    @property
+    def type(self) -> str:
+        """Its messages' type; that of ROS 2 as ROS 1 names it: "sensor_msgs/Image" for "sensor_msgs/msg/Image"."""
+        return self.schema.replace("/msg/", "/")
+
+    @property
+    def pictures(self) -> str | None:
+        """What kind of pictures its messages are; `None` where they are none."""
+        return _PICTURES.get(self.type)
 
     def __str__(self) -> str:
         return f"{self.name} ({self.count} of {self.schema or self.encoding})"
@@ -71,12 +84,23 @@ class Decoded:
     """A message.
 
     Attributes:
+        place: number of its file, of its block there, and its offset in that.
         log_time: when it was recorded [UTC ns].
         values: of its fields.
     """
 
+    place: tuple[int, int, int] = (0, 0, 0)
     log_time: int
     values: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def said(self) -> Stamp:
+        """What it says of its instant.
+
+        Raises:
+            CorruptError: an instant beyond those that 64 bits hold.
+        """
+        return stamp_of(self.values)
 
     @property
     def stamp(self) -> int:
@@ -85,34 +109,68 @@ class Decoded:
         Raises:
             CorruptError: an instant beyond those that 64 bits hold.
         """
-        header = self.values.get("header")
-        for holder in (self.values, header if isinstance(header, Mapping) else {}):
-            for name in ("timestamp", "stamp"):
-                instant = _instant(holder.get(name))
-                if instant:
-                    return _checked(instant)
-        return _checked(self.log_time)
+        said = self.said.instant
+        return checked(self.log_time) if said is None else said
+
+
+@dataclass(frozen=True, kw_only=True)
+class Index:
+    """The messages of a topic in the order in which they are to be read.
+
+    Attributes:
+        places: (n, 3) as `Decoded.place`.
+        stamps, logged: (n,) when each was measured and when it was logged [UTC ns].
+        in_time: whether they are in the order of their instants, to within a slip where that of the file stands.
+        findings: what to report of their order, their clocks and of those that are missing.
+    """
+
+    places: NDArray[np.int64]
+    stamps: NDArray[np.int64]
+    logged: NDArray[np.int64]
+    in_time: bool
+    findings: tuple[Finding, ...]
 
 
 def profile(path: Path) -> str:
-    """What an MCAP file's header says its content is: "flagdata", "ros2", "" …
+    """What the header of an MCAP file, or of a folder's first, says its content is: "flagdata", "ros2", "" …
 
     Raises:
         CorruptError: it cannot be read.
     """
-    with _opened(path) as (reader, _):
-        return reader.get_header().profile
+    return _layouts(path)[0].profile
 
 
 def topics(path: Path) -> tuple[Topic, ...]:
-    """The topics of a file that have messages, by name.
+    """The topics that have messages, by name, of an MCAP file or of the parts of a folder.
 
     Raises:
-        CorruptError: a file that was cut off, or whose summary is damaged.
-        LimitError: a chunk that would unpack to more than `CHUNK_LIMIT`.
+        CorruptError: a file that was cut off or is damaged.
+        LimitError: a chunk that would unpack to more than the limit.
     """
-    with _opened(path) as (_, summary):
-        return _topics(summary)
+    layouts = _layouts(path)
+    found: dict[tuple[str, str], dict[tuple[int, int], int]] = {}
+    encodings: dict[tuple[str, str], str] = {}
+    for part, layout in enumerate(layouts):
+        for number, channel in layout.channels.items():
+            count = layout.counts.get(number, 0)
+            if not count and not layout.stated.get(number):
+                continue
+            schema = layout.schemas.get(channel.schema_id)
+            key = (channel.topic, schema.name if schema is not None else "")
+            found.setdefault(key, {})[part, number] = count
+            encodings[key] = channel.message_encoding
+    types = [plain for plain, _ in found]
+    return tuple(
+        Topic(
+            name=plain if types.count(plain) == 1 else f"{plain}:{schema or encodings[plain, schema]}",
+            plain=plain,
+            schema=schema,
+            encoding=encodings[plain, schema],
+            count=sum(channels.values()),
+            channels=frozenset(channels),
+        )
+        for (plain, schema), channels in sorted(found.items())
+    )
 
 
 def choose(found: Sequence[Topic], wanted: str | None, *, where: str, noun: str) -> Topic:
@@ -123,13 +181,17 @@ def choose(found: Sequence[Topic], wanted: str | None, *, where: str, noun: str)
 
     Raises:
         UnknownNameError: none of that name.
-        InputError: none, or several and none is named.
+        InputError: none, or several and none is named; or messages of several types on the topic.
     """
     if wanted is not None:
         for topic in found:
             if topic.name == wanted:
                 return topic
-        raise UnknownNameError.of(f"topic of {noun}", wanted, [topic.name for topic in found], where=where)
+        typed = [topic for topic in found if topic.plain == wanted]
+        if not typed:
+            raise UnknownNameError.of(f"topic of {noun}", wanted, [topic.name for topic in found], where=where)
+        what = f"messages of several types are on {wanted}, which are no one series: {', '.join(map(str, typed))}"
+        raise InputError(what, where=where, fix=f"choose one by its type: --topic {typed[0].name}")
     if len(found) == 1:
         return found[0]
     listed = ", ".join(map(str, found))
@@ -137,90 +199,141 @@ def choose(found: Sequence[Topic], wanted: str | None, *, where: str, noun: str)
     raise InputError(what, where=where, fix="choose one: --topic NAME" if found else "see flagdata doctor FILE")
 
 
-def messages(path: Path, topic: str, *, since: int = 0) -> Iterator[Decoded]:
-    """The messages of a topic in order of log time, from an instant on [UTC ns].
+def messages(path: Path, topic: str, *, places: NDArray[np.int64] | None = None) -> Iterator[Decoded]:
+    """The messages of a topic in the order of the file, or those at some places in theirs.
+
+    Args:
+        topic: its name, as `topics` gives it.
+        places: (n, 3) as `Decoded.place`; `None` for all.
 
     Raises:
         InputError: an encoding that is not read.
         CorruptError: a chunk or message that is damaged; those before it have been given.
     """
-    with _opened(path) as (reader, _):
-        decode: Callable[[bytes], Mapping[str, Any]] | None = None
-        for schema, channel, message in reader.iter_messages(topics=[topic], starting_at=since or None):
-            decode = decode or _decoder(schema, channel)
-            yield Decoded(log_time=message.log_time, values=decode(message.data))
+    layouts = _layouts(path)
+    channels = {channel for one in topics(path) if one.name == topic for channel in one.channels}
+    with ExitStack() as stack:
+        opened = [stack.enter_context(closing(Messages(layout))) for layout in layouts]
+        decoders: dict[tuple[int, int], Callable[[bytes], Mapping[str, Any]]] = {}
+
+        def decoded(part: int, message: Message) -> Decoded:
+            key = (part, message.channel)
+            if key not in decoders:
+                channel = layouts[part].channels[message.channel]
+                decoders[key] = _decoder(layouts[part].schemas.get(channel.schema_id), channel)
+            place = (part, message.block, message.offset)
+            return Decoded(place=place, log_time=message.log_time, values=decoders[key](message.data))
+
+        if places is not None:
+            for part, block, offset in places.tolist():
+                with _readable(layouts[part].path):
+                    one = decoded(part, opened[part].at(block, offset))
+                yield one
+            return
+        for part, file in enumerate(opened):
+            walk = file.of({number for of_part, number in channels if of_part == part})
+            while True:
+                with _readable(layouts[part].path):
+                    message = next(walk, None)
+                    one = None if message is None else decoded(part, message)
+                if one is None:
+                    break
+                yield one
 
 
-def instants(path: Path, topic: str, *, limit: int | None = None) -> NDArray[np.int64]:
-    """(n, 2) when each message of a topic was measured and when it was logged [UTC ns], in order of logging.
+def index(path: Path, topic: str, *, limit: int | None = None, sort: bool = True) -> Index:
+    """The messages of a topic in the order of their instants.
+
+    Args:
+        sort: whether to put messages in order that are a slip late; else they stay in that of the file or the log.
 
     Raises:
         LimitError: more messages than `limit`, whatever the file's summary states.
         InputError, CorruptError: as `messages`; or an instant beyond those that 64 bits hold.
     """
-    pairs: list[tuple[int, int]] = []
+    rows: list[tuple[int, int, int, int, int]] = []
+    unset = unstated = 0
     for one in messages(path, topic):
-        if len(pairs) == limit:
+        if len(rows) == limit:
             raise LimitError(
                 f"more than {limit} messages in {topic}", where=str(path), fix="cut the file, or raise the limit"
             )
-        pairs.append((one.stamp, _checked(one.log_time)))
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        said = one.said
+        unset += said.instant is None and said.field
+        unstated += said.instant is None and not said.field
+        logged = checked(one.log_time)
+        rows.append((*one.place, logged if said.instant is None else said.instant, logged))
+    table = np.array(rows, dtype=np.int64).reshape(-1, 5)
+    if not is_described(path):
+        _check_successive(path, topic, table[:, :3], table[:, 4])
+    order = order_of(table[:, 3], table[:, 4], sort=sort, where=topic)
+    found = clock_findings(table[:, 3], table[:, 4], unset=unset, unstated=unstated, where=topic)
+    table = table[order.rows]
+    return Index(
+        places=table[:, :3],
+        stamps=table[:, 3],
+        logged=table[:, 4],
+        in_time=order.in_time,
+        findings=(*_missing(path, topic), *order.findings, *found),
+    )
+
+
+def _check_successive(path: Path, topic: str, places: NDArray[np.int64], logged: NDArray[np.int64]) -> None:
+    """Refuse the files of a folder that were recorded at the same time: their messages are no one series.
+
+    Raises:
+        InputError: one begins, by the log, before the end of another.
+    """
+    parts = parts_of(path)
+    spans = []
+    for part in range(len(parts)):
+        own = logged[places[:, 0] == part]
+        if len(own):
+            spans.append((int(own.min()), int(own.max()), part))
+    for before, after in pairwise(sorted(spans)):
+        overlap = (before[1] - after[0]) / NANOSECONDS
+        if overlap > _OVERLAP:
+            raise InputError(
+                f"{topic} begins there {overlap:.1f} s before its end in {parts[before[2]].name}: not successive parts "
+                "of one recording",
+                where=str(parts[after[2]]), fix=f"ingest each by itself: flagdata ingest {path}/*.mcap",
+            )  # fmt: skip
+
+
+def _missing(path: Path, topic: str) -> Iterator[Finding]:
+    """Findings of messages that are not where files say that they are."""
+    layouts = _layouts(path)
+    chosen = next((one.channels for one in topics(path) if one.name == topic), frozenset())
+    lost = sum(layouts[part].missing([number]) for part, number in chosen)
+    if lost:
+        count = sum(layouts[part].counts.get(number, 0) for part, number in chosen)
+        yield Finding(
+            kind="messages-missing", severity=Severity.ERROR, where=topic, count=lost,
+            what=f"the summary counts {count + lost} messages of {topic}, {count} are there: {lost} are lost",
+            fix="copy the file again, or record it again",
+        )  # fmt: skip
+    for layout in layouts:
+        yield from layout.undefined()
+
+
+def _layouts(path: Path) -> list[Layout]:
+    found: list[Layout] = []
+    for part in parts_of(path):
+        with _readable(part):
+            found.append(layout_of(part))
+    return found
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[tuple[McapReader, Summary]]:
-    check_input(path)
-    where = str(path)
+def _readable(path: Path) -> Iterator[None]:
+    """Turn what libraries raise on damage of a file into `CorruptError`."""
     try:
-        with path.open("rb") as stream:
-            reader = make_reader(stream, validate_crcs=True)
-            summary = reader.get_summary()
-            if summary is None or summary.statistics is None:
-                raise CorruptError(
-                    "an MCAP file without a summary: it was cut off, or written by a program that adds none",
-                    where=where, fix="write one: flagdata recover FILE NEW.mcap, or mcap recover",
-                )  # fmt: skip
-            _check_chunks(stream, summary, where=where)
-            yield reader, summary
+        yield
     except FlagdataError:
         raise
     except _UNREADABLE as error:
         what = f"the MCAP file is damaged or cut off: {type(error).__name__} {error}".strip()
-        raise CorruptError(what, where=where, fix="salvage what is whole: flagdata recover FILE NEW.mcap") from None
-
-
-def _check_chunks(stream: IO[bytes], summary: Summary, *, where: str) -> None:
-    """Whether all chunks are small enough to be unpacked, by what they state and by what their zstd frames state.
-
-    Raises:
-        LimitError: one is not.
-    """
-    for index in summary.chunk_indexes:
-        stream.seek(index.chunk_start_offset)
-        head = stream.read(_CHUNK_HEAD.size)
-        *_, size, _, named = _CHUNK_HEAD.unpack(head)
-        if named == len("zstd") and stream.read(named) == b"zstd":
-            stream.seek(8, os.SEEK_CUR)
-            size = max(size, zstandard.frame_content_size(stream.read(18)))
-        if size > CHUNK_LIMIT:
-            raise LimitError(
-                f"a chunk claims to unpack to {size} bytes", where=where,
-                fix=f"at most {CHUNK_LIMIT} are unpacked at once: write smaller chunks",
-            )  # fmt: skip
-
-
-def _topics(summary: Summary) -> tuple[Topic, ...]:
-    counts = summary.statistics.channel_message_counts if summary.statistics is not None else {}
-    found: dict[str, Topic] = {}
-    for number, channel in summary.channels.items():
-        schema = summary.schemas.get(channel.schema_id)
-        before = found[channel.topic].count if channel.topic in found else 0
-        found[channel.topic] = Topic(
-            name=channel.topic, schema=schema.name if schema is not None else "", encoding=channel.message_encoding,
-            count=before + counts.get(number, 0),
-        )  # fmt: skip
-    return tuple(found[name] for name in sorted(found) if found[name].count)
+        raise CorruptError(what, where=str(path), fix="salvage what is whole: flagdata recover FILE NEW.mcap") from None
 
 
 def _decoder(schema: Schema | None, channel: Channel) -> Callable[[bytes], Mapping[str, Any]]:
@@ -231,12 +344,12 @@ def _decoder(schema: Schema | None, channel: Channel) -> Callable[[bytes], Mappi
             return lambda data: _values(made(data))
     if encoding == "json":
         return _from_json
-    if encoding == "cdr" and schema is not None and schema.encoding == "ros2msg":
-        return cdr.decoder(schema.name, schema.data.decode(errors="replace"))
+    if schema is not None and (encoding, schema.encoding) in (("cdr", "ros2msg"), ("ros1", "ros1msg")):
+        return cdr.decoder(schema.name, schema.data.decode(errors="replace"), ros1=encoding == "ros1")
     described = f" described by {schema.encoding}" if schema is not None and schema.encoding else ""
     raise InputError(
         f"messages in {encoding}{described} are not read", where=channel.topic,
-        fix="give protobuf, JSON or ROS 2 (CDR with ros2msg); ROS 1 bags: mcap convert, or rosbags-convert",
+        fix="record the topic in protobuf, JSON, ROS 2 (CDR with ros2msg) or ROS 1 (ros1msg)",
     )  # fmt: skip
 
 
@@ -245,7 +358,7 @@ def _from_json(data: bytes) -> Mapping[str, Any]:
     return value if isinstance(value, dict) else {"value": value}
 
 
-def _values(message: Message) -> dict[str, Any]:
+def _values(message: protobuf.Message) -> dict[str, Any]:
     """The fields of a protobuf message; those that may be absent and are, are not there."""
     found: dict[str, Any] = {}
     for one in message.DESCRIPTOR.fields:
@@ -253,31 +366,10 @@ def _values(message: Message) -> dict[str, Any]:
         if one.message_type is not None and one.message_type.GetOptions().map_entry:
             continue
         if isinstance(value, Sequence) and not isinstance(value, str | bytes):
-            found[one.name] = [_values(part) if isinstance(part, Message) else part for part in value]
-        elif isinstance(value, Message):
+            found[one.name] = [_values(part) if isinstance(part, protobuf.Message) else part for part in value]
+        elif isinstance(value, protobuf.Message):
             if message.HasField(one.name):
                 found[one.name] = _values(value)
         elif not one.has_presence or message.HasField(one.name):
             found[one.name] = value
     return found
-
-
-def _checked(instant: int) -> int:
-    """An instant, unless 64 bits do not hold it.
-
-    Raises:
-        CorruptError: they do not.
-    """
-    if not -(1 << 63) <= instant < 1 << 63:
-        raise CorruptError(f"a message states an instant of {instant} ns", fix="mend the recorder's clock")
-    return instant
-
-
-def _instant(stamp: object) -> int | None:
-    """UTC nanoseconds of a time as protobuf, ROS 2 or Foxglove's JSON state it."""
-    if isinstance(stamp, Mapping):
-        seconds = stamp.get("seconds", stamp.get("sec"))
-        part = stamp.get("nanos", stamp.get("nanosec", stamp.get("nsec")))
-        if isinstance(seconds, int) and isinstance(part, int):
-            return seconds * 1_000_000_000 + part
-    return None

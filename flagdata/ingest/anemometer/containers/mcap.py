@@ -1,7 +1,8 @@
 """One topic of numbers in an MCAP file as a table of text: a row a message, a column a number, its path as the heading.
 
-A message's time is the one that it states, else the one at which it was logged. Messages of flagdata's own type, and
-those of ROS 2 whose type has one unit, get headings that name quantity and unit; other units are the user's to give.
+A message's time is the one that it states, else the one at which it was logged; messages come in that order. Messages
+of flagdata's own type, and those of ROS whose type has one unit, get headings that name quantity and unit; other units
+are the user's to give.
 """
 
 from __future__ import annotations
@@ -10,11 +11,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from flagdata.errors import LimitError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.text.source import TableText
-from flagdata.ingest.mcap.topics import PICTURES, Topic, choose, messages, topics
+from flagdata.ingest.mcap.topics import Topic, choose, index, messages, topics
 from flagdata.record.messages import WIND_FIELDS
 from flagdata.schema import CHANNELS
 from flagdata.timebase import iso
@@ -28,18 +28,18 @@ _HEADINGS: dict[str, dict[str, str]] = {
     "flagdata.WindSample": {
         name: f"{channel} ({CHANNELS[channel].unit})" for channel, (name, _) in WIND_FIELDS.items()
     },
-    "sensor_msgs/msg/Temperature": {"temperature": "air_temperature (degC)"},
-    "sensor_msgs/msg/FluidPressure": {"fluid_pressure": "air_pressure (Pa)"},
-    "sensor_msgs/msg/RelativeHumidity": {"relative_humidity": "relative_humidity (1)"},
+    "sensor_msgs/Temperature": {"temperature": "air_temperature (degC)"},
+    "sensor_msgs/FluidPressure": {"fluid_pressure": "air_pressure (Pa)"},
+    "sensor_msgs/RelativeHumidity": {"relative_humidity": "relative_humidity (1)"},
 }  # fmt: skip
-"""Type of messages → field → heading."""
+"""Type of messages, as ROS 1 names it → field → heading."""
 
 
 def of_numbers(path: Path, found: Sequence[Topic]) -> tuple[Topic, ...]:
     """Those topics, not of pictures, whose first message can be read and holds a number beside its time."""
     kept: list[Topic] = []
     for topic in found:
-        if topic.schema in PICTURES:
+        if topic.pictures:
             continue
         try:
             first = next(messages(path, topic.name), None)
@@ -64,12 +64,11 @@ def open_topic(path: Path, name: str | None, *, limits: Limits) -> TableText:
     """
     where = str(path)
     topic = choose(of_numbers(path, topics(path)), name, where=where, noun="numbers")
-    headings = _HEADINGS.get(topic.schema, {})
+    headings = _HEADINGS.get(topic.type, {})
     names: dict[str, int] = {}
     rows: list[tuple[int, dict[str, str]]] = []
-    for message in messages(path, topic.name):
-        if len(rows) == limits.rows:
-            raise LimitError(f"more than {limits.rows} messages", where=where, fix="cut the file")
+    found = index(path, topic.name, limit=limits.rows)
+    for message in messages(path, topic.name, places=found.places):
         row = dict(_numbers(message.values))
         for one in row:
             if one not in names and len(names) < _WIDEST:
@@ -78,8 +77,8 @@ def open_topic(path: Path, name: str | None, *, limits: Limits) -> TableText:
     lines = [",".join(["time", *(headings.get(one, one) for one in names)])]
     lines += [",".join([iso(stamp), *(row.get(one, "") for one in names)]) for stamp, row in rows]
     what = f"the topic {topic.name}: {len(rows)} messages of {topic.schema or topic.encoding}, a row each"
-    found = (Finding(kind="topic-read", severity=Severity.NOTE, what=what, count=len(rows)),)
-    return TableText(path=path, encoding="utf-8", lines=len(lines), findings=found, text=tuple(lines))
+    read = Finding(kind="topic-read", severity=Severity.NOTE, what=what, count=len(rows))
+    return TableText(path=path, encoding="utf-8", lines=len(lines), findings=(read, *found.findings), text=tuple(lines))
 
 
 def _numbers(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:

@@ -23,6 +23,7 @@ from flagdata.errors import InputError, LimitError, UsageError
 from flagdata.files import MCAP, check_input
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.options import Limits
+from flagdata.ingest.mcap.bags import is_bag
 
 GZIP = b"\x1f\x8b"
 """First bytes of a file compressed by gzip (RFC 1952); a log may be: it is read as what is in it."""
@@ -148,7 +149,7 @@ _SIGNATURES: tuple[tuple[int, bytes, str, str], ...] = (
     (0, b"\xfd7zXZ\x00", "xz-compressed", "unpack it first: unxz FILE"),
     (0, b"BZh", "bzip2-compressed", "unpack it first: bunzip2 FILE"),
     (0, b"7z\xbc\xaf\x27\x1c", "a 7-Zip archive", "unpack it first"),
-    (0, b"\x28\xb5\x2f\xfd", "zstd-compressed", "unpack it first: unzstd FILE"),
+    (0, b"\x28\xb5\x2f\xfd", "zstd-compressed", "unpack it first: zstd -d FILE -o NEW"),
     (0, b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook", "save the sheet as CSV"),
     (0, b"{\\rtf", "rich text (RTF), whose marks stand among the readings", "save it as plain text, and ingest that"),
     (0, b"%PDF", "a PDF document", "export the readings as CSV"),
@@ -235,6 +236,10 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None, topic:
         NotFoundError, InputError: see `first_bytes`; not text, or not in the encoding named.
         LimitError: larger than `limits` allow.
     """
+    if is_bag(path):
+        from flagdata.ingest.anemometer.containers import mcap
+
+        return mcap.open_topic(path, topic, limits=limits)
     head = first_bytes(path)
     where = str(path)
     size = path.stat().st_size
@@ -252,10 +257,6 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None, topic:
         from flagdata.ingest.anemometer.containers import netcdf
 
         return netcdf.open_dataset(path, limits=limits)
-    if head.startswith(MCAP):
-        from flagdata.ingest.anemometer.containers import mcap
-
-        return mcap.open_topic(path, topic, limits=limits)
     if topic is not None:
         raise UsageError("a topic of what is no MCAP file", where=where, fix="leave out --topic")
     other = signature(head)
