@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import base64
 import io
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 from itertools import islice
@@ -49,6 +51,11 @@ _PLAIN = {  # encoding → (mode for Pillow, how the bytes of a pixel lie)
     "mono8": ("L", "L"), "8uc1": ("L", "L"), "rgb8": ("RGB", "RGB"), "8uc3": ("RGB", "BGR"), "bgr8": ("RGB", "BGR"),
     "rgba8": ("RGB", "RGBX"), "bgra8": ("RGB", "BGRX"),
 }  # fmt: skip
+_DEPTH = re.compile(r"\b(?:16UC1|16SC1|32SC1|32FC1|64FC1|compressedDepth)\b", re.IGNORECASE)
+_LOOKED = (5, 4, 1)
+"""Runs of pictures, and pictures of each, that are looked at for their brightest gray; see `TopicSource.samples`."""
+_FAINT = 4
+"""Words of 16 bits of which not a quarter is used hold 14 bits or fewer."""
 _BYTES_OF = {"L": 1, "RGB": 3, "BGR": 3, "RGBX": 4, "BGRX": 4}
 
 
@@ -97,22 +104,58 @@ class TopicSource:
                 f"none of {len(self._places)} pictures of {self._topic.name} can be decoded", where=where,
                 fix="choose another topic: --topic NAME",
             )  # fmt: skip
+        _, width, height, codec, pixel_format, _ = first
+        self._size = (width, height)
+        self._white: float | None = None
+        findings += self._stretched(pixel_format)
         self._pictures = decoded
         self._head = first
-        _, width, height, codec, pixel_format, _ = first
         self.facts = SourceFacts(
             container=f"mcap {self._topic.schema}", codec=codec, pixel_format=pixel_format, width=width, height=height,
             aspect=Fraction(1), orientation=Orientation(), interlaced=False, timing=timing, metadata={}, recorded=None,
             sequence=False, findings=tuple(findings), stamped=timing.origin,
         )  # fmt: skip
 
+    def _stretched(self, pixel_format: str) -> Iterator[Finding]:
+        """Take the brightest gray for white, where pictures of 16 bits would be next to black.
+
+        Raises:
+            InputError: such pictures in colour, of which Pillow keeps 8 bits.
+        """
+        if "16" not in pixel_format:
+            return
+        looked = [picture.luma() for run in self.samples(*_LOOKED) for picture in run]
+        brightest = max((float(np.asarray(one.image).max()) for one in looked), default=0.0)
+        white = looked[0].white if looked else 0.0
+        if not 0 < brightest < white / _FAINT:
+            return
+        what = f"the pictures of 16 bits reach {brightest / white:.1%} of white at most in {len(looked)} looked at"
+        if pixel_format != "I;16":
+            raise InputError(
+                f"{what}: they would be next to black", where=self._where, fix="write them with 8 bits a colour"
+            )
+        self._white = brightest
+        yield Finding(
+            kind="depth-by-content",
+            severity=Severity.WARNING,
+            value=brightest / white,
+            what=f"{what}: gray {brightest:.0f} was taken as white, and what is brighter is cut off",
+            fix="none needed for a camera of 10 to 14 bits; if these are depths, choose another topic",
+        )
+
+    def _picture(self, one: _Shown) -> Picture:
+        if self._white is None:
+            return Picture(stamp=one[0], luma=one[5])
+        white = self._white
+        return Picture(stamp=one[0], luma=lambda: replace(one[5](), white=white))
+
     def pictures(self) -> Iterator[Picture]:
-        yield _picture(self._head)
+        yield self._picture(self._head)
         for one in self._pictures:
-            if one[1:3] != (self.facts.width, self.facts.height):
+            if one[1:3] != self._size:
                 self._resized += 1
                 continue
-            yield _picture(one)
+            yield self._picture(one)
 
     def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
         length = len(self._places)
@@ -123,10 +166,8 @@ class TopicSource:
             if start >= length:
                 return
             part = messages(self._path, self._topic.name, places=self._places[start:])
-            sound = (
-                one for one in self._decoded(part, tally=False) if one[1:3] == (self.facts.width, self.facts.height)
-            )
-            pictures = [_picture(one) for one in islice(sound, 0, count * stride, stride)]
+            sound = (one for one in self._decoded(part, tally=False) if one[1:3] == self._size)
+            pictures = [self._picture(one) for one in islice(sound, 0, count * stride, stride)]
             if pictures:
                 yield pictures
 
@@ -151,6 +192,7 @@ class TopicSource:
 
     def _stills(self, found: Iterator[Decoded]) -> Iterator[_Shown | None]:
         for one in found:
+            self._check_no_depth(str(one.values.get("format", "")))
             try:
                 image = Image.open(io.BytesIO(_data(one.values) or b""), formats=STILLS)
                 if image.width * image.height <= self._limits.frame_pixels:
@@ -162,6 +204,15 @@ class TopicSource:
                 one.stamp, image.width, image.height, str(image.format).lower(), image.mode,
                 partial(luma_of_image, image),
             )  # fmt: skip
+
+    def _check_no_depth(self, stated: str) -> None:
+        """Refuse pictures whose format says that their values are distances, as image_transport writes it."""
+        if _DEPTH.search(stated):
+            raise InputError(
+                f"pictures of the format {stated!r} are depths, not grays",
+                where=f"{self._where}, {self._topic.name}",
+                fix="choose a topic of grays or colours: --topic NAME",
+            )
 
     def _plain(self, found: Iterator[Decoded]) -> Iterator[_Shown | None]:
         for one in found:
@@ -232,10 +283,6 @@ class TopicSource:
 
 _Shown = tuple[int, int, int, str, str, Callable[[], Luma]]
 """A picture: stamp [UTC ns], width, height, codec, pixel format, and what gives its luma."""
-
-
-def _picture(one: _Shown) -> Picture:
-    return Picture(stamp=one[0], luma=one[5])
 
 
 def _data(values: Mapping[str, Any]) -> bytes | None:

@@ -14,12 +14,11 @@ from mcap.writer import CompressionType, Writer
 from flagdata.errors import CorruptError, InputError, LimitError, UnknownNameError, UsageError
 from flagdata.ingest.camera import CameraOptions, open_camera
 from flagdata.ingest.classify import classify, guesses
-from flagdata.ingest.mcap import topics as mcap_topics
 from flagdata.ingest.mcap.pictures import TopicSource
-from flagdata.ingest.mcap.topics import instants
+from flagdata.ingest.mcap.topics import index, messages, topics
 from flagdata.ingest.store import CameraIngest, ingest_camera
 from flagdata.lake import Lake
-from flagdata.record import salvage
+from flagdata.record import salvage, unpacking
 from tests.flagdata.ingest.mcap.conftest import FRAMES, NOON, STEP
 
 zstd_compress = zstandard.compress
@@ -129,21 +128,19 @@ def test_plain_pixels_whose_numbers_or_bytes_make_no_sense_are_left_out(
 
 def test_more_pictures_than_the_summary_states_are_counted_as_they_are_read(drive: Path) -> None:
     with pytest.raises(LimitError, match="more than 3 messages"):
-        instants(drive, "/png", limit=3)
-    assert instants(drive, "/png", limit=FRAMES).shape == (FRAMES, 2)
+        index(drive, "/png", limit=3)
+    assert index(drive, "/png", limit=FRAMES).places.shape == (FRAMES, 3)
 
 
 def test_a_chunk_that_would_unpack_to_more_than_the_limit_is_refused_before_it_is_read(
-    drive: Path, monkeypatch: pytest.MonkeyPatch
+    write_json: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mcap_topics, "CHUNK_LIMIT", 1000)
+    monkeypatch.setattr(unpacking, "UNPACKED_LIMIT", 20)
     with pytest.raises(LimitError, match="claims to unpack"):
-        mcap_topics.topics(drive)
+        topics(write_json({"/a": [{"x": 1.0}]}))
 
 
-def test_the_size_that_a_zstd_frame_states_counts_whatever_its_chunk_states(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_chunk_that_unpacks_to_more_than_it_states_is_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "bomb.mcap"
     monkeypatch.setattr(zstandard, "compress", lambda data: zstd_compress(bytes(5000) + data))
     with path.open("wb") as stream:
@@ -152,6 +149,5 @@ def test_the_size_that_a_zstd_frame_states_counts_whatever_its_chunk_states(
         channel = writer.register_channel(topic="/a", message_encoding="json", schema_id=0)
         writer.add_message(channel, log_time=NOON, publish_time=NOON, data=b"{}")
         writer.finish()
-    monkeypatch.setattr(mcap_topics, "CHUNK_LIMIT", 4000)
-    with pytest.raises(LimitError, match="claims to unpack"):
-        mcap_topics.topics(path)
+    with pytest.raises(CorruptError, match="unpacks to more than"):
+        next(messages(path, "/a"))
