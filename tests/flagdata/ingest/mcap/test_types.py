@@ -57,7 +57,7 @@ def test_channels_of_one_topic_and_type_are_one_series(tmp_path: Path) -> None:
     np.testing.assert_allclose(series.channels["wind_speed"], SPEED)
 
 
-def test_readings_of_two_types_on_a_topic_are_told_apart_and_chosen_by_their_type(tmp_path: Path) -> None:
+def test_readings_of_two_types_on_a_topic_are_chosen_by_their_type(tmp_path: Path) -> None:
     path = mast(tmp_path / "a.mcap", ("my/msg/WindKmh", WIND), later=lambda at, speed: wind(at, 3.6 * speed))
     with pytest.raises(InputError, match="several types") as raised:
         read_log(path, WindOptions(topic="/mast", columns=COLUMNS))
@@ -66,7 +66,7 @@ def test_readings_of_two_types_on_a_topic_are_told_apart_and_chosen_by_their_typ
     np.testing.assert_allclose(series.channels["wind_speed"], SPEED[30:])
 
 
-def test_pictures_of_two_types_on_a_topic_are_told_apart_and_chosen_by_their_type(tmp_path: Path) -> None:
+def test_pictures_of_two_types_on_a_topic_are_chosen_by_their_type(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     with bag(path) as writer:
         one = channel(writer, "/cam", "sensor_msgs/msg/CompressedImage", COMPRESSED)
