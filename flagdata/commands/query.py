@@ -16,6 +16,7 @@ import click
 from flagdata.console import LocalPath, at_option, document, json_option, lake_option, say, table
 from flagdata.errors import UsageError
 from flagdata.printable import SHORT
+from flagdata.sql_process import sql_process
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -93,6 +94,7 @@ def query(
     if describe:
         _describe(as_json=as_json)
         return
+    sql_process()  # starts while the lake is read
     from flagdata.lake import Lake
     from flagdata.outputs import check_file
     from flagdata.selection import Request, Selection

@@ -9,21 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from flagdata.catalog_sql import dataset_of
 from flagdata.errors import CorruptError
 from flagdata.files import open_regular
 from flagdata.lake.older_rows import SINCE, with_data_sets
 from flagdata.schema import catalog_schema
 from flagdata.storage import Place
-
-if TYPE_CHECKING:
-    import pyarrow.dataset as ds
 
 ROW_ORDER = ("created", "start", "frame_first", "artifact")
 _NUMBERS = ROW_ORDER[:-1]
@@ -57,11 +54,8 @@ class RowFiles:
         Raises:
             CorruptError: a file cannot be read.
         """
-        import pyarrow.dataset as ds  # loads pandas where that is installed
-
         self._contents = {name: self._content(name) for name in names}
-        form = ds.ParquetFileFormat()
-        found: list[tuple[int, ds.Fragment]] = []
+        found: list[tuple[int, pa.Buffer]] = []
         count = size = 0
         for name, content in self._contents.items():
             with self._reading(name):
@@ -71,12 +65,11 @@ class RowFiles:
                 oldest, created = _statistics(file)
                 if oldest < SINCE:
                     return None
-                found.append((created, form.make_fragment(content)))
+                found.append((created, content))
             count += file.num_rows
             size += sum(file.row_group(number).total_byte_size for number in range(file.num_row_groups))
-        fragments = [fragment for _, fragment in sorted(found, key=lambda pair: pair[0])]
-        dataset = ds.FileSystemDataset(fragments, catalog_schema(), form)
-        return Scan(dataset=dataset, count=count, size=size, check=lambda: self.table(names))
+        contents = tuple(content for _, content in sorted(found, key=lambda pair: pair[0]))
+        return Scan(contents=contents, count=count, size=size, check=lambda: self.table(names))
 
     def holding(self, names: Sequence[str], condition: pc.Expression) -> list[str]:
         """Those of the files of which some rows meet a condition.
@@ -136,20 +129,23 @@ class Scan:
     """Rows that are decoded as a query asks for them.
 
     Attributes:
-        dataset: the rows, with the catalog's columns.
+        contents: of Parquet files with rows of the catalog's columns.
+        condition: that those of them meet which count.
         count: how many they are, at most.
         size: of all columns, decoded [B], about.
         check: reads all of it at once; raises CorruptError where a file is damaged.
     """
 
-    dataset: ds.Dataset
+    contents: tuple[pa.Buffer, ...]
     count: int
     size: int
     check: Callable[[], object]
+    condition: pc.Expression | None = None
 
     def matching(self, condition: pc.Expression) -> Scan:
         """Those of the rows that meet a condition."""
-        return replace(self, dataset=self.dataset.filter(condition))
+        both = condition if self.condition is None else self.condition & condition
+        return replace(self, condition=both)
 
     def table(self, columns: Iterable[str]) -> pa.Table:
         """Some columns of the rows.
@@ -158,7 +154,7 @@ class Scan:
             CorruptError: a file cannot be read.
         """
         try:
-            return self.dataset.to_table(columns=list(columns))
+            return dataset_of(self.contents, self.condition).to_table(columns=list(columns))
         except (OSError, pa.ArrowException):
             self.check()
             raise

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import time
 
 import pyarrow as pa
 import pytest
 
 from flagdata import selection
+from flagdata.catalog_sql import PART
 from flagdata.commands.query import as_document
 from flagdata.commands.query import query as command
 from flagdata.errors import LimitError, UsageError
@@ -30,6 +34,84 @@ def test_sql_without_an_end_is_stopped(sql: str) -> None:
     with pytest.raises(LimitError, match=r"longer than 0\.2 s.*--time-limit"):
         Selection(EMPTY, Request(sql=sql, time_limit=0.2)).table()
     assert time.process_time() - begun < LATE
+
+
+UNINTERRUPTED = {
+    "comparison": "select levenshtein(repeat('a', 300000), repeat('b', 300000))",
+    "comparisons": "select max(levenshtein(repeat('a', 30000 + range), repeat('b', 30000))) from range(2048)",
+}
+"""One step of each takes minutes, and heeds no interrupt."""
+
+
+@pytest.mark.parametrize("sql", UNINTERRUPTED.values(), ids=UNINTERRUPTED)
+def test_sql_that_heeds_no_interrupt_is_stopped(sql: str) -> None:
+    begun = time.monotonic()
+    with pytest.raises(LimitError, match=r"longer than 0\.5 s"):
+        Selection(EMPTY, Request(sql=sql, time_limit=0.5)).table()
+    assert time.monotonic() - begun < 3 * LATE  # starting a process is no part of the limit
+
+
+LARGE = {
+    "list": "select list(range(100000000))",
+    "text": "select repeat('x', 1900000000)",
+    "texts": "select repeat('x', 1000000) from range(100000)",
+    "joined text": "select string_agg(repeat('x', 100000), '') from range(1000000)",
+    "nested": "select [range(1000000) for x in range(1000)]",
+    "structure": "select {'a': list(range), 'b': list(range)} from range(100000000)",
+    "array": "select array_agg(r) from (select range(100) r from range(10000000))",
+    "window": "select list(range) over () from range(100000)",
+    "recursive": "with recursive t(n) as (select 'x' union all select n || n from t) select max(n) from t",
+}
+"""SQL whose result, or a step towards it, has many times the memory that a query may take."""
+
+
+@pytest.mark.parametrize("sql", LARGE.values(), ids=LARGE)
+def test_sql_takes_no_more_memory_than_it_may(sql: str) -> None:
+    code = f"""
+import resource, sys
+from flagdata.errors import LimitError, UsageError
+from flagdata.schema import catalog_schema
+from flagdata.selection import Request, Selection
+try:
+    for batch in Selection(catalog_schema().empty_table(), Request(sql={sql!r}, time_limit=30)).batches():
+        if batch.nbytes > 300 << 20:
+            sys.exit("a batch of " + str(batch.nbytes))
+    print("read")
+except (LimitError, UsageError) as error:
+    print(error.kind)
+from flagdata.sql_process import sql_process
+sql_process().close()
+print(max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) >> 10)
+"""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, env=environment
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    outcome, peak = done.stdout.split()
+    assert outcome in ("read", "usage", "limit")
+    assert int(peak) < 2300  # MiB: the limit, and what the process has with its modules
+
+
+def test_a_row_of_more_values_than_can_be_held_is_refused_and_parts_are_small() -> None:
+    with pytest.raises(LimitError, match="one row of the result has more than"):
+        list(Selection(EMPTY, Request(sql="select list(range(5000001))")).batches())
+    many = Selection(EMPTY, Request(sql="select range(10000) r, range i from range(4000)")).batches()
+    parts = list(many)
+    assert [row for part in parts for row in part["i"].to_pylist()] == list(range(4000))
+    assert len(parts) > 1
+    assert max(part.nbytes for part in parts) <= PART
+    assert {len(row) for row in parts[-1]["r"]} == {10_000}
+
+
+def test_a_query_after_one_that_was_ended_has_a_process_of_its_own() -> None:
+    with pytest.raises(UsageError, match="more memory"):
+        Selection(EMPTY, Request(sql="select list(range(200000000))")).table()
+    first = Selection(EMPTY, Request(sql="select 1 a"))
+    second = Selection(EMPTY, Request(sql="select range a from range(3)"))
+    assert first.table()["a"].to_pylist() == [1]
+    assert second.table()["a"].to_pylist() == [0, 1, 2]
+    assert first.total() == 1
 
 
 def test_a_filter_without_an_end_is_stopped() -> None:

@@ -79,7 +79,7 @@ def test_a_query_too_large_for_memory_is_an_error_and_leaves_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setitem(selection._SEALED, "memory_limit", "50MB")
+    monkeypatch.setattr(selection, "MEMORY", 50_000_000)
     with pytest.raises(UsageError, match="more memory"):
         select(HandWritten(), sql="select count(distinct hash(range)) from range(20_000_000)")
     assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,107 @@
+"""A child's memory and time are limited; its caller learns which it was, and outlives it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from flagdata.bounded import Child, EndedError
+from flagdata.errors import InputError
+
+MEMORY = 256 << 20
+LONG = 60.0  # s: far more than any of these takes
+
+
+def _act(message: tuple[str, Any]) -> Any:
+    what, value = message
+    if what == "take":
+        return len(bytes(value))
+    if what == "abort":
+        os.abort()
+    if what == "sleep":
+        time.sleep(value)
+    if what == "print":
+        print("no answer")  # noqa: T201
+        os.write(1, b"nor this")
+    if what == "refuse":
+        raise InputError("bad", where="here", fix="mend it")
+    if what == "raise":
+        raise ValueError("unheard of")
+    return os.getpid()
+
+
+def answers() -> Callable[[tuple[str, Any]], Any]:
+    return _act
+
+
+def _child() -> Child:
+    return Child(f"{__name__}:answers", memory=MEMORY)
+
+
+def _is_running(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_a_child_answers_until_it_is_closed() -> None:
+    child = _child()
+    assert child.ask(("take", 1000), seconds=LONG) == 1000
+    pid = child.ask(("print", None), seconds=LONG)
+    assert pid == child.ask(("", None), seconds=LONG) != os.getpid()
+    child.close()
+    assert not child.usable
+    assert not _is_running(pid)
+
+
+@pytest.mark.parametrize("message", [("take", MEMORY + (64 << 20)), ("abort", None)])
+def test_a_child_that_takes_too_much_memory_or_aborts_has_ended(message: tuple[str, Any]) -> None:
+    child = _child()
+    with pytest.raises(EndedError) as caught:
+        child.ask(message, seconds=LONG)
+    assert not caught.value.late
+    assert not child.usable
+    with pytest.raises(EndedError):
+        child.ask(("", None), seconds=LONG)
+
+
+def test_a_child_is_ended_when_its_time_is_up_whatever_it_does() -> None:
+    child = _child()
+    child.ask(("", None), seconds=LONG)
+    begun = time.monotonic()
+    with pytest.raises(EndedError) as caught:
+        child.ask(("sleep", LONG), seconds=0.2)
+    assert caught.value.late
+    assert time.monotonic() - begun < LONG / 2
+
+
+def test_what_a_child_raises_is_raised_here_and_it_goes_on() -> None:
+    child = _child()
+    with pytest.raises(InputError, match="here: bad; mend it"):
+        child.ask(("refuse", None), seconds=LONG)
+    with pytest.raises(RuntimeError, match="ValueError: unheard of"):
+        child.ask(("raise", None), seconds=LONG)
+    assert child.ask(("take", 1), seconds=LONG) == 1
+
+
+def test_a_child_leaves_with_a_parent_that_was_killed() -> None:
+    code = (
+        f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import _child, os\n"
+        "child = _child(); print(child.ask(('', None), seconds=60), flush=True)\n"
+        "import threading; threading.Thread(target=child.ask, args=[('sleep', 60)], kwargs={'seconds': 60}).start()\n"
+        "import time; time.sleep(0.2); os.kill(os.getpid(), 9)"
+    )
+    parent = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    pid = int(parent.stdout)
+    until = time.monotonic() + LONG / 2
+    while _is_running(pid) and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not _is_running(pid)
