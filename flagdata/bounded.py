@@ -1,4 +1,4 @@
-"""Work on what strangers wrote, in a process of its own: its memory is limited, and it is ended when its time is up.
+"""Work on files and queries of other users, in a process of its own with limited memory, which is ended in time.
 
 A library of C++ or Rust may ask for any memory that one number of a file or a query states; where it gets none it may
 end its process, and it may heed no interrupt. So it works in a child, which the caller outlives.

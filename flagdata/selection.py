@@ -1,7 +1,7 @@
 """Rows of the catalog by filter or SQL, at any ref. DuckDB over the Arrow catalog, in a process of its own.
 
-What SQL sees, and may do, is said in `flagdata.catalog_sql`. Its process is ended when the time limit is over, and may
-take 2 GB; where the rows are to be held at once, these are limited too. The process stays for the next question.
+`flagdata.catalog_sql` describes what SQL sees and may do. Its process is ended when the time limit is over, and may take
+2 GB; where the rows are to be held at once, these are limited too. The process stays for the next question.
 """
 
 from __future__ import annotations

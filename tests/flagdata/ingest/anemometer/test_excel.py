@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import importlib
+import resource
 import sys
 import zipfile
 from collections.abc import Callable, Sequence
@@ -14,7 +15,10 @@ import pytest
 
 from flagdata.errors import InputError, LimitError
 from flagdata.ingest.anemometer import Limits, WindOptions, read_log, sniff
+from flagdata.ingest.anemometer.text.source import open_text
+from flagdata.lake import Lake
 from flagdata.timebase import iso
+from tests.hostile.campaign import command
 
 Book = Callable[..., Path]
 
@@ -145,3 +149,48 @@ def test_a_zip_archive_that_is_no_workbook_stays_one(tmp_path: Path) -> None:
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("a.csv", "time,wind_speed\n")
     assert sniff(path)[0].format == "a zip archive or an Excel workbook"
+
+
+def _with_cells(path: Path, cells: str, *, sheet: str = "sheet1.xml") -> Path:
+    """The workbook with more cells written behind the others of a sheet."""
+    whole = {name: zipfile.ZipFile(path).read(name) for name in zipfile.ZipFile(path).namelist()}
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in whole.items():
+            more = f"{cells}</sheetData>".encode() if name.endswith(sheet) else b"</sheetData>"
+            archive.writestr(name, data.replace(b"</sheetData>", more))
+    return path
+
+
+FAR = {
+    "last cell": '<row r="1048576"><c r="XFD1048576"><v>1</v></c></row>',
+    "last row and a column": '<row r="1048576"><c r="CV1048576"><v>1</v></c></row>',
+    "beyond Excel": '<row r="99999999"><c r="ZZZ99999999"><v>1</v></c></row>',
+    "formula": '<row r="1048576"><c r="XFD1048576"><f>1+1</f><v>2</v></c></row>',
+    "text": '<row r="1048576"><c r="XFD1048576" t="inlineStr"><is><t>x</t></is></c></row>',
+}
+
+
+@pytest.mark.parametrize("cells", FAR.values(), ids=FAR)
+def test_a_cell_far_from_the_table_is_refused_with_bounded_memory(book: Book, cells: str) -> None:
+    path = _with_cells(book(Log=PLAIN), cells)
+    with pytest.raises((LimitError, InputError), match=r"MiB|columns|cannot be read"):
+        read_log(path, WindOptions(zone="UTC"))
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 1 << 20  # KiB
+
+
+def test_a_workbook_that_is_refused_for_its_size_loses_no_other_source(book: Book, tmp_path: Path) -> None:
+    path = _with_cells(book(Log=PLAIN), FAR["last cell"])
+    (tmp_path / "log.csv").write_text("time,wind_speed (m/s)\n2026-05-01T12:00:00Z,5.0\n2026-05-01T12:00:01Z,5.1\n")
+    lake = Lake.create(tmp_path / "lake")
+    command("ingest", path, tmp_path / "log.csv", "--lake", lake.path)  # ends with a code of its own
+    assert lake.table(lake.view(None))["kind"].to_pylist() == ["wind"]
+
+
+def test_a_workbook_of_many_sheets_is_read(book: Book) -> None:
+    log = read_log(book(**{f"n{k}": PLAIN for k in range(300)}), WindOptions(recipe="generic-csv", zone="UTC"))
+    assert next(finding for finding in log.findings if finding.kind == "several-sheets").count == 300
+
+
+def test_rows_and_columns_before_the_table_stay_where_they_are(book: Book) -> None:
+    path = book(Log=[[], [], *([None, None, *row] for row in PLAIN)])
+    assert open_text(path, limits=Limits()).head()[:3] == [",,,,", ",,,,", ",,time,wind_speed,air_temperature"]
