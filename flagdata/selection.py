@@ -1,6 +1,6 @@
 """Rows of the catalog by filter or SQL, at any ref. DuckDB over the Arrow catalog, in a process of its own.
 
-`flagdata.catalog_sql` describes what SQL sees and may do. Its process is ended when the time limit is over, and may take
+`flagdata.catalog_sql` describes what SQL sees and may do. Its process is ended when the time limit is over and may take
 2 GB; where the rows are to be held at once, these are limited too. The process stays for the next question.
 """
 
