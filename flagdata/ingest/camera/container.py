@@ -21,6 +21,7 @@ from av.video.stream import VideoStream
 from flagdata.errors import InputError, LimitError, TimeError, UsageError
 from flagdata.files import check_input
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.boxes import edited, edits, is_cut, is_mp4, whole_part
 from flagdata.ingest.camera.clock import COUNTERS, Counter, restart, restarted
 from flagdata.ingest.camera.options import CameraOptions, Limits, exact
 from flagdata.ingest.camera.stamps import Timing, survey
@@ -36,6 +37,12 @@ _FORMATS = (
 UNTIMED = frozenset({"h264", "hevc", "mjpeg", "m4v", "mpegvideo"})
 # Containers that number packets in decoding order.
 BY_DECODE_ORDER = frozenset({"avi"})
+
+
+_UNFINISHED = (
+    "an MP4 or MOV whose index (moov) is missing was cut off or not closed by the camera: repair it with a recovery "
+    "tool and an intact file of the same camera"
+)
 
 
 @contextmanager
@@ -57,10 +64,7 @@ def _advice(path: Path) -> str:
     except OSError:
         return "check that the file is still there and readable"
     if head[4:8] in (b"ftyp", b"mdat", b"wide", b"free"):
-        return (
-            "an MP4 or MOV whose index (moov) is missing was cut off or not closed by the camera: repair it with a "
-            "recovery tool and an intact file of the same camera"
-        )
+        return _UNFINISHED
     return "give a video that a player opens: MP4, MOV, MTS, AVI or MKV, or a folder of PNG or JPEG images"
 
 
@@ -107,20 +111,13 @@ def open_container(
         UsageError: no such stream of pictures that can be decoded.
         LimitError: its header states frames beyond the limit.
     """
-    with _reading(path):
-        container = av.open(
-            f"file:{path.resolve()}",
-            options={
-                "protocol_whitelist": "file",
-                "format_whitelist": _FORMATS,
-                "max_pixels": str(2 * limits.frame_pixels),
-                # Counters that pass their end are judged by `Counter`.
-                "correct_ts_overflow": "0",
-            },
-            metadata_errors="replace",
-        )
+    container = _opened(path, limits)
     try:
         stream = _choose(container, path, wanted)
+        if stream.id and edited(edits(path, stream.id)) is not None:
+            container.close()
+            container = _opened(path, limits, ignore_editlist="1")
+            stream = _choose(container, path, wanted)
         context = stream.codec_context
         if context.width * context.height > limits.frame_pixels:
             raise _too_large(context.width, context.height, limits, path)
@@ -132,6 +129,25 @@ def open_container(
         container.close()
         raise
     return container, stream
+
+
+def _opened(path: Path, limits: Limits, **more: str) -> InputContainer:
+    """The container; of a file that is cut off, what is whole."""
+    with _reading(path):
+        end = whole_part(path)
+        part = "" if end is None else f"subfile,,start,0,end,{end},,:"
+        return av.open(
+            f"{part}file:{path.resolve()}",
+            options={
+                "protocol_whitelist": "file" if end is None else "file,subfile",
+                "format_whitelist": _FORMATS,
+                "max_pixels": str(2 * limits.frame_pixels),
+                # Counters that pass their end are judged by `Counter`.
+                "correct_ts_overflow": "0",
+                **more,
+            },
+            metadata_errors="replace",
+        )
 
 
 def _choose(container: InputContainer, path: Path, wanted: int | None) -> VideoStream:
@@ -153,11 +169,13 @@ def _choose(container: InputContainer, path: Path, wanted: int | None) -> VideoS
             f"stream {wanted} is no video that can be decoded", where=str(path),
             fix=f"give --stream {' or '.join(there)}",
         )  # fmt: skip
-    kinds = sorted({stream.type for stream in container.streams}) or ["nothing"]
+    kinds = sorted({stream.type for stream in container.streams if stream.type != "video"})
     raise InputError(
-        f"the file holds {', '.join(kinds)} but no video that can be decoded",
+        f"the file holds {', '.join(kinds)} but no video that can be decoded"
+        if kinds
+        else "the file holds no video that can be decoded",
         where=str(path),
-        fix="give the video file",
+        fix=_UNFINISHED if is_cut(path) and is_mp4(path) else "give the video file",
     )
 
 
@@ -202,11 +220,23 @@ def survey_file(path: Path, options: CameraOptions) -> tuple[Timing, list[Findin
         tally = _tally(container, stream, path, options.limits)
         own = tally if container.format.name in UNTIMED else _before_restart(tally, tick=_tick(stream))
         timing = replace(_timing(path, options, container, stream, own), end=own.end)
+        passed_over = edited(edits(path, stream.id)) if stream.id else None
         found = [tally.problem] if tally.problem is not None else []
         if own.end is not None:
             after = timing.duration + 1 / float(timing.rate)
             found.append(restarted(frame=own.frames, after=after, count=tally.frames - own.frames))
-        return timing, found or truncation(path, container, stream, timing, read=tally.frames + tally.discarded)
+        found = found or truncation(path, container, stream, timing, read=tally.frames + tally.discarded)
+        return timing, found + ([_edit_list(passed_over)] if passed_over is not None else [])
+
+
+def _edit_list(shows: str) -> Finding:
+    return Finding(
+        kind="edit-list-passed-over",
+        severity=Severity.WARNING,
+        what=f"the file's edit list shows {shows}; it was left aside, and each frame is read once, at the time at "
+        "which it was recorded",
+        fix="to measure what the edit list shows, export the film from the program that made it",
+    )
 
 
 @dataclass(kw_only=True)

@@ -365,12 +365,12 @@ def _findings(
     if instants is None:
         return
     stated, taken = instants[-1] - instants[0], reading.places[-1] / rate * NANOSECONDS
-    if abs(stated - taken) > _PACE * max(stated, taken) + resolution:
+    if stated > 0 and abs(stated - taken) > _PACE * max(stated, taken) + resolution:
         yield Finding(
             kind="rate-unlike-names",
             severity=Severity.WARNING,
             value=stated / NANOSECONDS,
             what=f"by the times in their names the pictures span {stated / NANOSECONDS:.6g} s, at the rate that was "
             f"given {float(taken) / NANOSECONDS:.6g} s",
-            fix="give the rate at which they were taken: --sequence-fps HZ",
+            fix=f"if the times are right, the rate is {reading.places[-1] / stated * NANOSECONDS:.4g} Hz",
         )

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from os import SEEK_CUR
 from pathlib import Path
 
 from av.container import InputContainer
 from av.video.stream import VideoStream
 
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.boxes import is_cut
 from flagdata.ingest.camera.stamps import Timing
+
+_EBML, _SEGMENT = b"\x1a\x45\xdf\xa3", b"\x18\x53\x80\x67"
 
 
 def truncation(
@@ -26,7 +30,7 @@ def truncation(
     if name.startswith("mov"):
         return _of_mp4(path, stream, read)
     if name.startswith("matroska"):
-        return _of_matroska(container, timing, read)
+        return _of_matroska(path, container, timing, read)
     if name == "mpegts":
         return _of_transport_stream(path)
     if stream.frames > read:
@@ -57,7 +61,7 @@ def cut_off(what: str, read: int, lost: int) -> Finding:
 
 def _of_mp4(path: Path, stream: VideoStream, read: int) -> list[Finding]:
     missing = stream.frames - read
-    if _box_is_cut(path):
+    if is_cut(path):
         said = f"; {read} of {stream.frames} frames are there" if missing > 0 else ""
         return [cut_off(f"the file ends inside one of its boxes: it is cut off{said}", read, max(1, missing))]
     if missing > 0:
@@ -71,37 +75,41 @@ def _of_mp4(path: Path, stream: VideoStream, read: int) -> list[Finding]:
     return []
 
 
-def _box_is_cut(path: Path) -> bool:
-    """Whether the last box of an MP4 or MOV reaches beyond the file's end (ISO/IEC 14496-12, 4.2)."""
-    end = path.stat().st_size
-    at = 0
+def _of_matroska(path: Path, container: InputContainer, timing: Timing, read: int) -> list[Finding]:
+    """By the stated duration, which is the longest stream's, where the video is alone; else by the stated length."""
+    if container.duration is not None and len(container.streams) == 1:
+        stated = Fraction(container.duration, 1_000_000)
+        held = (timing.span + timing.period) * timing.tick
+        # The last frame's own length is not known where the rate varies.
+        step = timing.longest if timing.variable else timing.period
+        if stated - held > Fraction(3, 4) * step * timing.tick:
+            lost = max(1, round((stated - held) / (timing.period * timing.tick)))
+            return [cut_off(f"the file states {float(stated):.2f} s and holds {float(held):.2f} s", read, lost)]
+    stated_end, end = _segment_end(path), path.stat().st_size
+    if stated_end is None or stated_end <= end:
+        return []
+    return [cut_off(f"the file states a length of {stated_end} B and has {end} B: it is cut off", read, 1)]
+
+
+def _segment_end(path: Path) -> int | None:
+    """Where a Matroska file ends by its own statement; None where it makes none, as of a live recording.
+
+    Elements are an identifier and a length, each as long as the zeros before its first one bit say (RFC 8794, 4).
+    """
     with path.open("rb") as stream:
-        while at + 8 <= end:
-            stream.seek(at)
-            head = stream.read(16)
-            size = int.from_bytes(head[:4], "big")
-            if size == 1:
-                size = int.from_bytes(head[8:16], "big")
-            if size == 0:
-                return False
-            if size < 8:
-                return True
-            at += size
-    return at != end
-
-
-def _of_matroska(container: InputContainer, timing: Timing, read: int) -> list[Finding]:
-    """By the stated duration, which is the longest stream's: only where the video is alone."""
-    if container.duration is None or len(container.streams) != 1:
-        return []
-    stated = Fraction(container.duration, 1_000_000)
-    held = (timing.span + timing.period) * timing.tick
-    # The last frame's own length is not known where the rate varies.
-    step = timing.longest if timing.variable else timing.period
-    if stated - held <= Fraction(3, 4) * step * timing.tick:
-        return []
-    lost = max(1, round((stated - held) / (timing.period * timing.tick)))
-    return [cut_off(f"the file states {float(stated):.2f} s and holds {float(held):.2f} s", read, lost)]
+        for identifier in (_EBML, _SEGMENT):
+            if stream.read(4) != identifier:
+                return None
+            first = stream.read(1)
+            if first in (b"", b"\0"):
+                return None
+            width = 9 - first[0].bit_length()
+            size = int.from_bytes(first + stream.read(width - 1), "big") - (1 << 7 * width)
+            if size == (1 << 7 * width) - 1:
+                return None
+            if identifier == _EBML:
+                stream.seek(size, SEEK_CUR)
+        return stream.tell() + size
 
 
 def _of_transport_stream(path: Path) -> list[Finding]:

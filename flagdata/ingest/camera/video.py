@@ -23,6 +23,7 @@ from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import gif
 from flagdata.ingest.camera.avchd import recording_time
+from flagdata.ingest.camera.boxes import edits, is_cut
 from flagdata.ingest.camera.clock import COUNTERS
 from flagdata.ingest.camera.container import (
     BY_DECODE_ORDER,
@@ -40,6 +41,9 @@ from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import Timing
 
+_CAPTURE_RATE = "com.android.capture.fps"
+_RATES_AGREE = 0.1
+"""Part by which the rate that a phone states and that of the stamps differ where neither is slow motion."""
 _FARTHEST = 1000  # frames decoded in vain to reach a place between key frames
 
 
@@ -66,15 +70,25 @@ class VideoSource:
             self._decoded = self._decode()
             first = next(self._decoded, None)
             if first is None:
-                raise InputError(
-                    f"not one frame could be decoded of {timing.count + timing.missing} packets",
-                    where=str(path), fix="the file is damaged beyond reading; copy it from the camera again",
-                )  # fmt: skip
+                raise self._frameless()
             self._first = first
             self.facts = self._describe(first[1], [*surveyed, *self._stream_findings(first[1])])
         except BaseException:
             self._container.close()
             raise
+
+    def _frameless(self) -> InputError:
+        """The error of a file of which no frame came."""
+        packets_there, damaged = self._timing.count + self._timing.missing, "copy it from the camera again"
+        if packets_there:
+            what = f"not one frame could be decoded of {packets_there} packets"
+            fix = f"the file is damaged beyond reading; {damaged}"
+        elif self._stream.frames and edits(self._path, self._stream.id) and not is_cut(self._path):
+            what = f"the file's edit list shows none of its {self._stream.frames} frames"
+            fix = "write the film without it: ffmpeg -ignore_editlist 1 -i IN -c copy OUT"
+        else:
+            what, fix = "the file ends before its first frame", f"the rest of it is missing; {damaged}"
+        return InputError(what, where=str(self._path), fix=fix)
 
     def _open(self) -> tuple[InputContainer, VideoStream]:
         options = self._options
@@ -90,7 +104,6 @@ class VideoSource:
 
     def _describe(self, first: av.VideoFrame, findings: list[Finding]) -> SourceFacts:
         context = self._stream.codec_context
-        metadata = {k.lower(): v for k, v in {**self._container.metadata, **self._stream.metadata}.items()}
         return SourceFacts(
             container=self._container.format.name,
             codec=context.name,
@@ -101,12 +114,16 @@ class VideoSource:
             orientation=_orientation(first),
             interlaced=bool(first.interlaced_frame),
             timing=self._timing,
-            metadata=metadata,
+            metadata=self._metadata(),
             recorded=_recorded(first),
             sequence=self._container.format.name in UNTIMED,
             findings=tuple(findings),
             gps=self._gps,
         )
+
+    def _metadata(self) -> dict[str, str]:
+        """What the container and the stream state, keys lower-cased; the stream's win."""
+        return {k.lower(): v for k, v in {**self._container.metadata, **self._stream.metadata}.items()}
 
     def _stream_findings(self, first: av.VideoFrame) -> list[Finding]:
         found = []
@@ -136,8 +153,14 @@ class VideoSource:
                     what="the video is HDR (PQ or HLG): its grays are not those of an ordinary camera",
                 )
             )  # fmt: skip
-        if any(c.is_alpha for c in first.format.components):
-            found.append(Finding(kind="alpha-ignored", severity=Severity.WARNING, what="transparency was left aside"))
+        if _has_alpha(first) or self._metadata().get("alpha_mode") == "1":  # VP8 and VP9 code it beside
+            found.append(
+                Finding(
+                    kind="alpha-ignored", severity=Severity.WARNING,
+                    what="transparency was left aside: the picture below it is read",
+                )
+            )  # fmt: skip
+        found += self._capture_findings()
         others = len(self._container.streams.video) - 1
         if others:
             found.append(
@@ -157,6 +180,26 @@ class VideoSource:
                 )
             )  # fmt: skip
         return found
+
+    def _capture_findings(self) -> list[Finding]:
+        """A phone's statement of the rate at which it took the frames, where it is not that of the stamps."""
+        if self._options.true_fps is not None:
+            return []
+        try:
+            taken = float(self._metadata().get(_CAPTURE_RATE, "nan"))
+        except ValueError:
+            return []
+        stated = float(self._timing.rate)
+        if not math.isfinite(taken) or taken <= 0 or abs(taken / stated - 1) <= _RATES_AGREE:
+            return []
+        return [
+            Finding(
+                kind="capture-rate", severity=Severity.WARNING, value=taken,
+                what=f"the file says that the camera took {taken:g} frames a second, its time stamps say {stated:.4g}: "
+                f"time runs {taken / stated:.3g} times too slow in it",
+                fix=f"give the camera's rate: --true-fps {taken:g}",
+            )
+        ]  # fmt: skip
 
     def pictures(self) -> Iterator[Picture]:
         codec = self.facts.codec
@@ -283,6 +326,13 @@ class _DecodeOrderStamps:
         while self._waiting and own is not None and self._waiting[0] < own - self._reach:
             heapq.heappop(self._waiting)
         return heapq.heappop(self._waiting) if self._waiting else own
+
+
+def _has_alpha(frame: av.VideoFrame) -> bool:
+    """Whether a frame states transparency: in a component of its own, or in its palette."""
+    if frame.format.has_palette and len(frame.planes) > 1:
+        return bool((np.frombuffer(memoryview(frame.planes[1]), dtype=np.uint8)[3::4] < 255).any())
+    return any(component.is_alpha for component in frame.format.components)
 
 
 def _pixel_aspect(stream: VideoStream) -> Fraction:

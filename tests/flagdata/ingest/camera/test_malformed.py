@@ -13,6 +13,7 @@ from fractions import Fraction
 from itertools import pairwise, product
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 from PIL import Image
@@ -20,6 +21,7 @@ from PIL import Image
 from flagdata.errors import FlagdataError, InputError, LimitError, NotFoundError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import CameraOptions, Limits, open_camera, probe
+from flagdata.ingest.camera.boxes import top
 from flagdata.signals import Frame
 
 FRAMES = 50
@@ -102,6 +104,89 @@ def test_an_mp4_without_index_says_that_it_was_not_closed(
     outcome = kept_or_refused(path, plain)
     assert isinstance(outcome, InputError)
     assert "moov" in outcome.fix
+
+
+@pytest.mark.parametrize("movflags", ["frag_keyframe", "frag_keyframe+empty_moov+default_base_moof",
+                                      "dash+frag_keyframe+global_sidx"])  # fmt: skip
+def test_of_a_fragmented_film_cut_in_any_box_all_whole_fragments_are_kept_and_the_cut_is_reported(
+    movflags: str, tmp_path: Path, plain: CameraOptions, write_video: Callable[..., Path],
+    number_of: Callable[..., int], start: int,
+) -> None:  # fmt: skip
+    whole = write_video(
+        tmp_path / "whole.mp4", range(FRAMES), tick=Fraction(1, 25), muxer={"movflags": movflags},
+        encoder={"preset": "veryfast", "bf": "2", "g": "10"},
+    )  # fmt: skip
+    data, path = whole.read_bytes(), tmp_path / "cut.mp4"
+    found, _ = top(whole)
+    first = next(box.end for box in found if box.kind == b"mdat")
+    later = [box for box in found if box.at >= first]
+    assert len(later) >= 8
+    for box in later:
+        complete = 10 * sum(one.kind == b"mdat" and one.end <= box.at for one in found)
+        middle = (box.at + box.end) // 2
+        for cut in (box.at + 3, box.body, middle, box.end - 1, *([box.end] if box.kind == b"moof" else [])):
+            path.write_bytes(data[:cut])
+            outcome = kept_or_refused(path, replace(plain, rate="native"))
+            assert not isinstance(outcome, FlagdataError), (box, cut, outcome)
+            frames, findings = outcome
+            numbers = [number_of(frame.image) for frame in frames]
+            # Within a fragment that is cut, what comes before the cut may be shown with traces of it.
+            assert numbers[:complete] == list(range(complete)), (box, cut)
+            assert [(frame.time - start) // 40_000_000 for frame in frames[:complete]] == numbers[:complete]
+            assert "truncated" in {finding.kind for finding in findings}, (box, cut)
+
+
+@pytest.mark.parametrize("movflags", ["frag_keyframe", "frag_keyframe+empty_moov", "faststart", "empty_moov"])
+def test_a_film_cut_before_its_first_frame_is_refused_with_what_is_missing(
+    movflags: str, tmp_path: Path, plain: CameraOptions, write_video: Callable[..., Path]
+) -> None:
+    whole = write_video(tmp_path / "whole.mp4", range(20), tick=Fraction(1, 25), muxer={"movflags": movflags})
+    data, path = whole.read_bytes(), tmp_path / "cut.mp4"
+    end = next(box.at for box in top(whole)[0] if box.kind == b"mdat") + 40
+    for cut in range(10, end, 17):
+        path.write_bytes(data[:cut])
+        outcome = kept_or_refused(path, plain)
+        assert isinstance(outcome, FlagdataError)
+        assert "moov" in outcome.fix or "copy it from the camera again" in outcome.fix, (cut, outcome)
+
+
+@pytest.mark.parametrize("container", ["matroska", "webm", "mov", "avi", "mpegts"])
+def test_a_film_with_sound_that_is_cut_is_reported_as_cut_where_frames_are_missing(
+    container: str, tmp_path: Path, plain: CameraOptions, numbered: Callable[..., np.ndarray],
+    number_of: Callable[..., int],
+) -> None:  # fmt: skip
+    path = tmp_path / "sound"
+    codecs = {"webm": ("libvpx", "libopus")}.get(container, ("mpeg4", "mp2"))
+    with av.open(
+        str(path), "w", format=container, options={"movflags": "faststart"} if container == "mov" else {}
+    ) as out:
+        picture = out.add_stream(codecs[0], rate=25, options={"g": "5"})
+        picture.width, picture.height, picture.pix_fmt = 96, 96, "yuv420p"
+        sound = out.add_stream(codecs[1], rate=48_000)
+        noise = np.random.default_rng(1).integers(-9000, 9000, (FRAMES, 1, 1920), dtype=np.int16)
+        for k in range(FRAMES):
+            frame = av.VideoFrame.from_ndarray(numbered(k), format="gray").reformat(format="yuv420p", threads=1)
+            frame.pts, frame.time_base = k, Fraction(1, 25)
+            out.mux(picture.encode(frame))
+            heard = av.AudioFrame.from_ndarray(noise[k], format="s16", layout="mono")
+            heard.sample_rate, heard.pts = 48_000, 1920 * k
+            out.mux(sound.encode(heard))
+        out.mux(picture.encode())
+        out.mux(sound.encode())
+    data = path.read_bytes()
+    whole = kept_or_refused(path, plain)
+    assert not isinstance(whole, FlagdataError)
+    assert len(whole[0]) == FRAMES
+    assert "truncated" not in {finding.kind for finding in whole[1]}
+    for share in (0.3, 0.5, 0.7, 0.9):
+        # A transport stream that is cut between its packets of 188 bytes betrays nothing.
+        path.write_bytes(data[: int(len(data) * share) // 188 * 188 + 94])
+        outcome = kept_or_refused(path, plain)
+        assert not isinstance(outcome, FlagdataError)
+        numbers = [number_of(frame.image) for frame in outcome[0]]
+        assert numbers == sorted(set(numbers))
+        assert len(numbers) < FRAMES
+        assert "truncated" in {finding.kind for finding in outcome[1]}
 
 
 def test_flipped_bytes_anywhere_never_end_in_a_traceback(
