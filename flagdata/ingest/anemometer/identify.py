@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,9 +17,10 @@ from flagdata.ingest.anemometer.options import Limits, WindOptions
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, NAMED, SURE, Guess, GuessKind, Head
 from flagdata.ingest.anemometer.table.delimited import Delimited, drafted
 from flagdata.ingest.anemometer.text.source import TextFile, first_bytes, is_workbook, open_text, signature
+from flagdata.ingest.meshes import others
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"}
-_MESHES = {".obj", ".ply", ".stl", ".off"}
+_MESHES = {".obj"}
 
 
 def opened(path: Path, options: WindOptions, encoding: str | None = None) -> TextFile:
@@ -85,6 +87,8 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
     if path.is_dir():
         return (_folder(path),)
     head = first_bytes(path)
+    if mesh := others.format_of(path.name, head):
+        return (_other_mesh(f"the file is a {mesh} mesh"),)
     other = None if is_workbook(path, head) else signature(head)
     if other is not None:
         what, fix = other
@@ -144,6 +148,10 @@ def unknown(source: TextFile) -> Guess:
     return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix)
 
 
+def _other_mesh(reason: str) -> Guess:
+    return Guess(format="mesh", score=0.9, reasons=(reason,), kind="other", fix=others.FIX)
+
+
 def _folder(path: Path) -> Guess:
     names = [item.name for item in sorted(path.iterdir()) if not is_beside(item.name)]
     meshes = [name for name in names if Path(name).suffix.lower() in _MESHES]
@@ -155,6 +163,10 @@ def _folder(path: Path) -> Guess:
     if pictures:
         reason = f"a folder of {len(pictures)} pictures, the first {pictures[0]}"
         return Guess(format="image sequence", score=0.9, reasons=(reason,), kind="camera", fix="ingest it as a camera")
+    foreign = Counter(filter(None, map(others.format_of, names)))
+    if foreign:
+        (mesh, count), *_ = foreign.most_common(1)
+        return _other_mesh(f"a folder of {count} {mesh} meshes")
     return Guess(
         format="folder", score=0.0, reasons=(f"a folder of {len(names)} files, neither meshes nor pictures",),
         kind="other", fix="give one file, or a folder of PNG, JPEG, TIFF, BMP or WebP pictures",

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.meshes.continuity import continuity
 from flagdata.ingest.meshes.joints import t_joints
-from flagdata.ingest.meshes.pieces import in_pieces
+from flagdata.ingest.meshes.pieces import in_pieces, slits
 from flagdata.lake.meshes import Mesh, MeshSequence, RaggedMeshSequence
 
 # Median edge length in space over that in the material. Cloth stretches and crumples by some per cent; a factor of two
@@ -43,15 +44,16 @@ def check_units(sequence: MeshSequence | RaggedMeshSequence, *, where: str) -> N
 
 
 def findings(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
-    """What is odd and was kept: faces turned over or without area in the material, vertices of no face, and pieces."""
+    """What is odd and was kept: faces turned over or without area in the material, vertices of no face, vertices that
+    change places, pieces and slits."""
     flipped = degenerate = loose = 0
     first: dict[str, int] = {}
     frames = range(1) if isinstance(sequence, MeshSequence) else range(len(sequence))
-    for index in frames:
+    areas = [_doubled_areas(mesh.rest.astype(np.float64), mesh.faces) for mesh in map(sequence.frame, frames)]
+    main = np.sign(np.median([np.median(doubled) for doubled in areas])) or 1.0
+    for index, doubled in zip(frames, areas, strict=True):
         mesh = sequence.frame(index)
-        doubled = _doubled_areas(mesh.rest.astype(np.float64), mesh.faces)
         scale = float(np.abs(doubled).mean()) or 1.0
-        main = np.sign(np.median(doubled)) or 1.0
         counts = {
             "faces-turned-over": int((doubled * main < -1e-6 * scale).sum()),
             "faces-without-area": int((np.abs(doubled) <= 1e-6 * scale).sum()),
@@ -76,7 +78,7 @@ def findings(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
         for kind, count, what in kinds
         if count
     )  # fmt: skip
-    return (*odd, *in_pieces(sequence), *t_joints(sequence))
+    return (*odd, *continuity(sequence), *in_pieces(sequence), *slits(sequence), *t_joints(sequence))
 
 
 def _edge_ratio(mesh: Mesh) -> float:

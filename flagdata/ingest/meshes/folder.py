@@ -10,11 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flagdata.documents import SIZE_LIMIT, from_json
 from flagdata.errors import InputError, LimitError, NotFoundError
 from flagdata.files import check_input, is_beside
 from flagdata.ingest.meshes.obj import Obj, obj_text, read_obj
+from flagdata.ingest.meshes.others import FIX
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
 from flagdata.timebase import NANOSECONDS
 
@@ -120,18 +122,29 @@ def frame_files(path: Path) -> list[tuple[int, Path]]:
 
 
 def _numbered(entries: list[Path], path: Path) -> list[tuple[int, int, Path]]:
-    """Frames of other programs: one stem with a number at its end."""
+    """Frames of other programs: names that differ in one number."""
     if not entries:
-        raise NotFoundError("no .obj files", where=str(path), fix="name a folder with a mesh for each frame")
-    matches = [(re.fullmatch(r"(.*?)(\d+)", entry.stem), entry) for entry in entries]
-    loose = [entry.name for match, entry in matches if match is None]
-    stems = sorted({match[1] for match, _ in matches if match is not None})
-    if loose or len(stems) != 1:
-        odd = loose[0] if loose else f"{stems[0]}… and {stems[1]}…"
+        raise NotFoundError("no .obj files", where=str(path), fix=FIX)
+    split = [re.split(r"(\d+)", entry.stem) for entry in entries]
+    texts = {tuple(parts[::2]): entry.name for parts, entry in zip(split, entries, strict=True)}
+    numbers = np.array([len(parts) // 2 for parts in split])
+    if len(texts) > 1 or not numbers.all():
+        odd = " and ".join(list(texts.values())[:2])
         raise InputError(
-            f"the .obj files are no sequence: {odd}", where=str(path), fix="name them alike, with the frame's number"
+            f"the names of the .obj files are no sequence: {odd}",
+            where=str(path),
+            fix="name them alike, with one number that counts the frames",
         )
-    return [(int(match[2]), 0, entry) for match, entry in matches if match is not None]
+    columns = list(zip(*(map(int, parts[1::2]) for parts in split), strict=True))
+    varying = [column for column in columns if len(set(column)) > 1] or columns[-1:]
+    if len(varying) > 1:
+        raise InputError(
+            f"{len(varying)} numbers vary in the names, as in {entries[0].name} and {entries[-1].name}: which of them "
+            "counts the frames is not known",
+            where=str(path),
+            fix="name the files of one cloth alike, with one number that counts the frames",
+        )
+    return [(number, 0, entry) for number, entry in zip(varying[0], entries, strict=True)]
 
 
 def _frame_time(configuration: Mapping[str, Any], path: Path) -> float:
@@ -149,7 +162,9 @@ def _sequence(
     time = np.array([round(n * frame_time * NANOSECONDS) for n in numbers], dtype=np.int64)
     attributes = {"source": "obj"} if configuration is None else {"source": "arcsim", "scene": configuration}
     first = frames[0]
-    if all(np.array_equal(f.faces, first.faces) and np.array_equal(f.rest, first.rest) for f in frames):
+    if all(
+        np.array_equal(_listed(f.faces), _listed(first.faces)) and np.array_equal(f.rest, first.rest) for f in frames
+    ):
         return MeshSequence(
             time=time,
             positions=(np.stack([f.positions for f in frames]) * metre).astype(np.float32),
@@ -166,6 +181,13 @@ def _sequence(
         face_offset=np.cumsum([0, *(len(f.faces) for f in frames)]).astype(np.int64),
         attributes=attributes,
     )
+
+
+def _listed(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Faces (face, 3) in one order, each from its least vertex on, with its orientation."""
+    begin = faces.argmin(axis=1)[:, None]
+    turned = np.take_along_axis(faces, (begin + np.arange(3)) % 3, axis=1)
+    return turned[np.lexsort(turned.T[::-1])]
 
 
 def write_folder(path: Path, sequence: MeshSequence | RaggedMeshSequence, *, scene: Mapping[str, Any]) -> None:

@@ -13,9 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from flagdata.findings import Finding, Severity
 from flagdata.lake.meshes import Mesh, MeshSequence, RaggedMeshSequence
+
+_NEXT = 1e-2
+"""Distance of two vertices at one place, in edge lengths; exporters keep four digits or more."""
 
 
 def welded(
@@ -69,6 +73,47 @@ def in_pieces(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...
             fix="merge vertices by distance before the export, or export one sheet",
         ),
     )  # fmt: skip
+
+
+def slits(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
+    """A finding where vertices of one piece lie at or next to others that no edge joins them to, of the frame with most
+    of them: a slit, or a seam that an exporter left open."""
+    frames = range(1) if isinstance(sequence, MeshSequence) else range(len(sequence))
+    open_vertices = [_unjoined(sequence.frame(index)) for index in frames]
+    worst = max(frames, key=lambda index: len(open_vertices[index]))
+    found = open_vertices[worst]
+    if not len(found):
+        return ()
+    return (
+        Finding(
+            kind="cloth-slit",
+            severity=Severity.WARNING,
+            count=len(found),
+            where=f"frame {worst}",
+            what=f"{len(found)} vertices lie within {100 * _NEXT:g} % of an edge's length of another one that they "
+            f"are not joined to, in the material or in space (the first is vertex {found[0]}): the cloth has a slit "
+            "there, or a seam that is not closed",
+            fix="if it is a seam, merge its vertices by distance before the export; a slit may stay",
+        ),
+    )
+
+
+def _unjoined(mesh: Mesh) -> NDArray[np.int64]:
+    """Vertices at open edges that lie next to another such one of their piece, without an edge between them."""
+    edges = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
+    edges, counts = np.unique(edges, axis=0, return_counts=True)
+    border = np.unique(edges[counts == 1]).astype(np.int64)
+    if not len(border):
+        return border
+    piece, joined = _piece(mesh), {tuple(edge) for edge in edges.tolist()}
+    found: set[int] = set()
+    for points in (mesh.rest.astype(np.float64), mesh.positions.astype(np.float64)):
+        lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+        near = KDTree(points[border]).query_pairs(_NEXT * float(np.median(lengths)), output_type="ndarray")
+        pairs = np.sort(border[near].reshape(-1, 2), axis=1)
+        pairs = pairs[piece[pairs[:, 0]] == piece[pairs[:, 1]]]
+        found.update(vertex for pair in pairs.tolist() if tuple(pair) not in joined for vertex in pair)
+    return np.array(sorted(found), dtype=np.int64)
 
 
 def _piece(mesh: Mesh) -> NDArray[np.int64]:

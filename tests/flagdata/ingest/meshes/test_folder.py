@@ -69,8 +69,8 @@ def test_what_is_wrong_is_refused(make_folder: Callable[..., Path]) -> None:
     cases = [
         ({"0000_00.obj": UNIT, "0002_00.obj": UNIT, "0005_00.obj": UNIT}, None, InputError, "3 frames are missing"),
         ({"0000_00.obj": UNIT, "0000_01.obj": UNIT}, None, InputError, "2 cloths"),
-        ({"a_1.obj": UNIT, "b_2.obj": UNIT}, None, InputError, "no sequence: a_… and b_…"),
-        ({"a_1.obj": UNIT, "flag.obj": UNIT}, None, InputError, r"no sequence: flag\.obj"),
+        ({"a_1.obj": UNIT, "b_2.obj": UNIT}, None, InputError, "no sequence: a_1.obj and b_2.obj"),
+        ({"a_1.obj": UNIT, "flag.obj": UNIT}, None, InputError, "no sequence: a_1.obj and flag.obj"),
         ({"a_1.obj": UNIT, "a_01.obj": UNIT}, None, InputError, "two files for one frame"),
         ({"notes.txt": "none"}, None, NotFoundError, r"no \.obj"),
         ({"0000_00.obj": UNIT}, {}, InputError, "frame_time is None"),
@@ -154,7 +154,7 @@ def test_a_written_folder_is_read_as_it_was(make_folder: Callable[..., Path], tm
 def test_arcsims_own_folders_come_back_from_a_written_one(name: str, reference_data: Path, tmp_path: Path) -> None:
     sequence = read_folder(reference_data / "arcsim" / name)
     check_units(sequence, where=name)
-    assert findings(sequence) == ()
+    assert {one.kind for one in findings(sequence)} == ({"topology-changes"} if "remeshed" in name else set())
     write_folder(tmp_path / name, sequence, scene=sequence.attributes["scene"])
     back = read_folder(tmp_path / name)
     for index in range(len(sequence)):

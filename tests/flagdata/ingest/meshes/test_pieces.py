@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flagdata.ingest.meshes.pieces import in_pieces, welded
+from flagdata.ingest.meshes.pieces import in_pieces, slits, welded
 from flagdata.ingest.meshes.store import MeshIngest, ingest_meshes
 from flagdata.lake import Lake
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, read_meshes
@@ -143,3 +144,60 @@ def test_both_reach_the_report_and_pieces_the_quality_of_the_artifact(tmp_path: 
     split = ingest_meshes(lake, _folder(tmp_path / "split", soup(sheet(), rest=rest)), MeshIngest(rate=25.0))
     assert [f["kind"] for f in split.report["findings"]] == ["cloth-in-pieces"]
     assert list(split.artifact.quality) == ["cloth-in-pieces"]
+
+
+def parted(*, below: int, apart: float = 0.0, texture: float = 0.0, opens: float = 0.0) -> MeshSequence:
+    """The sheet with a row of vertices twice, up to a place: a slit from the border, or a seam across the sheet.
+
+    Args:
+        below: how many vertices are there twice; fewer than all of the row make a slit.
+        apart: their distance in space [m], in all frames.
+        texture: the same in the material.
+        opens: by how much more in each frame.
+    """
+    whole = sheet()
+    middle = N // 2
+    row = middle * (N + 1) + np.arange(below)
+    second = len(whole.rest) + np.arange(below)
+    faces = whole.faces.copy()
+    beyond = (whole.rest[faces].mean(axis=1)[:, 0] > middle / N)[:, None]
+    for old, new in zip(row, second, strict=True):
+        faces[beyond & (faces == old)] = new
+    moved = whole.positions[:, row].copy()
+    moved[..., 0] += apart + opens * np.arange(FRAMES)[:, None]
+    rest = whole.rest[row] + np.array([texture, 0.0], dtype=np.float32)
+    return MeshSequence(
+        time=whole.time,
+        positions=np.concatenate([whole.positions, moved], axis=1),
+        faces=faces,
+        rest=np.concatenate([whole.rest, rest]),
+    )
+
+
+@pytest.mark.parametrize(
+    "change", [{"apart": 1e-5}, {"texture": 1e-4}, {"opens": 0.02}, {"apart": 1e-3, "texture": 0.1}]
+)
+def test_a_slit_whose_sides_are_next_to_each_other_is_reported(change: dict[str, float]) -> None:
+    joined, merged = welded(parted(below=N - 1, **change))
+    assert merged == ()
+    (found,) = slits(joined)
+    assert (found.kind, found.count) == ("cloth-slit", 2 * (N - 1))
+
+
+def test_what_is_merged_or_apart_is_no_slit() -> None:
+    assert slits(sheet()) == ()
+    joined, _ = welded(parted(below=N - 1))
+    assert slits(joined) == ()
+    gaping = parted(below=N - 1, apart=0.05, texture=0.05)
+    assert slits(gaping) == ()
+
+
+def test_a_cloth_that_touches_itself_in_a_fold_has_no_slit() -> None:
+    # Folded once, the halves a twentieth of an edge apart, as contact holds them.
+    whole = sheet()
+    folded = whole.positions.copy()
+    folded[..., 2] = 0.0
+    over = whole.rest[:, 0] > 0.5
+    folded[:, over, 0] = 1.0 - folded[:, over, 0]
+    folded[:, over, 2] += 0.05 / N
+    assert slits(replace(whole, positions=folded)) == ()
