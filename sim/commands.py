@@ -77,13 +77,18 @@ def _cores(device: str) -> int:
 
 
 def _print(report: RunReport) -> None:
+    from flagdata.lake.healing import said
+
     for artifact in report.added:
         click.echo(artifact)
+    for artifact, how in report.healed.items():
+        click.echo(said(artifact, how))
     for failure in report.failed:
         say(f"member {failure['index']} is not stored: {failure['kind']}: {failure['what']}")
     steps = [f"{step * 1e3:.3g}" for step in sorted(report.steps.values())]
     speed = f"{report.rate:.2f} flags/s, steps of {'–'.join(dict.fromkeys((steps[0], steps[-1])))} ms"
     say(
-        f"{len(report.added)} simulated in {report.seconds:.1f} s ({speed}), "
+        f"{len(report.added) + len(report.healed)} simulated in {report.seconds:.1f} s ({speed}), "
         f"{len(report.existing)} in the lake already, {len(report.failed)} failed"
+        f"{f', {len(report.healed)} damaged or missing objects replaced' if report.healed else ''}"
     )

@@ -73,13 +73,13 @@ def _without_wind(
     there = find_made(
         lake, Kind.RECORDING, parents, recipe, what="recording", name=camera.name, session=cloth.fabric, branch=branch
     )
-    if there is not None:
-        rows = lake.rows({"kind": Kind.CLIP, "recording": there.id}, at=branch, columns=["artifact"])
-        return RecordingResult(recording=there, clips=tuple(rows["artifact"].to_pylist()), created=False)
+    if there.whole is not None:
+        rows = lake.rows({"kind": Kind.CLIP, "recording": there.whole.id}, at=branch, columns=["artifact"])
+        return RecordingResult(recording=there.whole, clips=tuple(rows["artifact"].to_pylist()), created=False)
     source = open_parent(lake, str(camera.object))
     times = source.device_frame_times
     start, end = int(times[0]), int(times[-1])
-    metadata = {PROVENANCE: provenance(parents, recipe)}
+    metadata = {PROVENANCE: provenance(parents, recipe, code=there.code)}
     if CAMERA in source.metadata:
         metadata[CAMERA] = dict(source.metadata[CAMERA])
     report = {

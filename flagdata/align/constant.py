@@ -119,26 +119,28 @@ def declared_recording(
             details={"method": clock.method, "offset": 0.0, "sigma": SAME_CLOCK, "confidence": 1.0},
         )  # fmt: skip
 
-    stated = find_made(
+    there = find_made(
         lake, Kind.WIND, {"camera": camera}, wind.recipe(), what="declared wind", name=None, session=None, branch=branch
     )
-    if stated is not None:
-        pair = Pair.opened(lake, camera, stated)
+    if there.whole is not None:
+        pair = Pair.opened(lake, camera, there.whole)
         made = make_recording(
             lake, pair, alignment(pair), name=name, session=session, branch=branch, progress=progress
         )  # fmt: skip
-        return stated, made
+        return there.whole, made
     with lake.transaction(f"declare the wind of {camera.name}", branch=branch) as transaction:
-        stated = _add_wind(transaction, camera, wind, session=session or camera.session)
+        stated = _add_wind(transaction, camera, wind, session=session or camera.session, code=there.code)
         pair = Pair.opened(lake, camera, stated)
         recording = add_recording(
             lake, transaction, pair, alignment(pair), name=name, session=session_of(pair, named=session),
-            progress=progress,
+            code=there.code, progress=progress,
         )  # fmt: skip
     return transaction.result.artifacts[stated.id], recorded(transaction, recording)
 
 
-def _add_wind(transaction: Transaction, camera: Artifact, wind: ConstantWind, *, session: str | None) -> Artifact:
+def _add_wind(
+    transaction: Transaction, camera: Artifact, wind: ConstantWind, *, session: str | None, code: str
+) -> Artifact:
     """Write the wind artifact of a film in a declared wind for a transaction."""
     recipe = wind.recipe()
     before, after = round(MARGIN_BEFORE * NANOSECONDS), round(MARGIN_AFTER * NANOSECONDS)
@@ -153,7 +155,7 @@ def _add_wind(transaction: Transaction, camera: Artifact, wind: ConstantWind, *,
         "start": iso(start), "end": iso(end), "findings": [stated.as_dict()],
     }  # fmt: skip
     staged = transaction.staging(".mcap")
-    with RecordWriter(staged, metadata={PROVENANCE: provenance({"camera": camera}, recipe)}) as record:
+    with RecordWriter(staged, metadata={PROVENANCE: provenance({"camera": camera}, recipe, code=code)}) as record:
         record.wind(series)
     artifact = Artifact(
         kind=Kind.WIND, name=f"{camera.name} declared wind", object=transaction.put(staged),

@@ -7,7 +7,8 @@ from typing import Any
 
 from flagdata.errors import ConflictError
 from flagdata.lake import Artifact, Lake
-from flagdata.provenance import canonical, code_version, recipe_hash
+from flagdata.lake.healing import ABSENT, Present, present
+from flagdata.provenance import canonical, recipe_hash
 from flagdata.schema import Kind
 
 
@@ -21,8 +22,8 @@ def find_made(
     name: str | None,
     session: str | None,
     branch: str,
-) -> Artifact | None:
-    """The artifact that these parents and this recipe make, if it is on the branch.
+) -> Present:
+    """What the branch has of the artifact that these parents and this recipe make.
 
     Args:
         parents: in their order, by what each is.
@@ -44,14 +45,18 @@ def find_made(
                     f"the {what} is there already with the {label} {kept!r}", where=artifact.id,
                     fix=f"leave out --{label}, or take the old one off with flagdata withdraw first",
                 )  # fmt: skip
-        return artifact
-    return None
+        return present(lake, artifact)
+    return ABSENT
 
 
-def provenance(parents: Mapping[str, Artifact], recipe: Mapping[str, Any]) -> dict[str, str]:
-    """What a record says of where it comes from."""
+def provenance(parents: Mapping[str, Artifact], recipe: Mapping[str, Any], *, code: str) -> dict[str, str]:
+    """What a record says of where it comes from.
+
+    Args:
+        code: version of the code that made it.
+    """
     return {role: parent.id for role, parent in parents.items()} | {
         "recipe": canonical(recipe),
         "recipe_hash": recipe_hash(recipe),
-        "code_version": code_version(),
+        "code_version": code,
     }

@@ -11,7 +11,7 @@ import json
 import math
 import mimetypes
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from flagdata.dataset.clips import clip_rows
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, quality_flags
 from flagdata.lake import Artifact, Lake, Transaction
+from flagdata.lake.healing import Healing, Present
 from flagdata.provenance import canonical
 from flagdata.record import Record, RecordWriter
 from flagdata.record.metadata import CAMERA, CLOCK, PROVENANCE
@@ -147,12 +148,26 @@ class RecordingResult:
     Attributes:
         recording: as it is in the lake.
         clips: identities of its clips.
-        created: false when it was there already, and nothing was written.
+        created: false when it was there already, and its row stayed.
+        healed: what was done where its object was damaged or missing.
     """
 
     recording: Artifact
     clips: tuple[str, ...]
     created: bool
+    healed: Healing | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "recording": self.recording.id, "clips": list(self.clips), "created": self.created,
+            "healed": None if self.healed is None else asdict(self.healed),
+        }  # fmt: skip
+
+    @property
+    def line(self) -> str:
+        """What was made, for people."""
+        done = f"recording {self.recording.id}, {len(self.clips)} clips"
+        return done if self.healed is None else f"{done}; {self.healed.sentence}"
 
 
 def truth_recipe(window: float) -> dict[str, Any]:
@@ -195,17 +210,23 @@ def session_of(pair: Pair, *, named: str | None) -> str | None:
 def find_recording(
     lake: Lake, pair: Pair, recipe: Mapping[str, Any], *, name: str | None, session: str | None, branch: str
 ) -> RecordingResult | None:
-    """The recording that these parents and options make, if it is on the branch.
+    """The recording that these parents and options make, if it is on the branch and its object is sound.
 
     Raises:
         ConflictError: it is, under another name or session than the one asked for.
     """
-    artifact = find_made(
-        lake, Kind.RECORDING, pair.parents, recipe, what="recording", name=name, session=session, branch=branch
-    )
+    artifact = _present(lake, pair, recipe, name=name, session=session, branch=branch).whole
     if artifact is None:
         return None
     return RecordingResult(recording=artifact, clips=_clips_of(lake, artifact, branch), created=False)
+
+
+def _present(
+    lake: Lake, pair: Pair, recipe: Mapping[str, Any], *, name: str | None, session: str | None, branch: str
+) -> Present:
+    return find_made(
+        lake, Kind.RECORDING, pair.parents, recipe, what="recording", name=name, session=session, branch=branch
+    )
 
 
 def make_recording(
@@ -235,8 +256,10 @@ def make_recording(
         return present
     with lake.transaction(f"align {pair.camera.name} with {pair.wind.name}", branch=branch) as transaction:
         recording = add_recording(
-            lake, transaction, pair, alignment, name=name, session=session_of(pair, named=session), progress=progress
-        )
+            lake, transaction, pair, alignment, name=name, session=session_of(pair, named=session),
+            code=_present(lake, pair, alignment.recipe, name=name, session=session, branch=branch).code,
+            progress=progress,
+        )  # fmt: skip
     return recorded(transaction, recording)
 
 
@@ -248,16 +271,21 @@ def add_recording(
     *,
     name: str | None,
     session: str | None,
+    code: str,
     progress: Progress | None,
 ) -> Artifact:
-    """Write the recording and its clips for a transaction; see `make_recording`."""
+    """Write the recording and its clips for a transaction; see `make_recording`.
+
+    Args:
+        code: version of the code that made it, for its record.
+    """
     clock = alignment.clock
     frames = clock.to_common(pair.camera_record.device_frame_times)
     window = truth_window(alignment.recipe)
     before = max(MARGIN_BEFORE, window)
     wind = _near(pair.series(), int(frames[0]), int(frames[-1]), before=before, where=pair.wind.id)
     staged = transaction.staging(".mcap")
-    _write(staged, pair, alignment, wind, first=int(frames[0]), progress=progress)
+    _write(staged, pair, alignment, wind, first=int(frames[0]), code=code, progress=progress)
     recording = _artifact(pair, alignment, frames, stored=transaction.put(staged), name=name, session=session)
     transaction.add(recording)
     for clip in clip_rows(Record.open(lake.record_place(str(recording.object))), recording, window=window):
@@ -270,6 +298,7 @@ def recorded(transaction: Transaction, recording: Artifact) -> RecordingResult:
     result = transaction.result
     return RecordingResult(
         recording=result.artifacts[recording.id], created=recording.id in result.added,
+        healed=result.healed.get(recording.id),
         clips=tuple(made.id for made in result.artifacts.values() if made.recording == recording.id),
     )  # fmt: skip
 
@@ -301,11 +330,12 @@ def _write(
     wind: WindSeries,
     *,
     first: int,
+    code: str,
     progress: Progress | None,
 ) -> None:
     source, clock = pair.camera_record, alignment.clock
     metadata: dict[str, Mapping[str, str]] = {
-        PROVENANCE: provenance(pair.parents, alignment.recipe),
+        PROVENANCE: provenance(pair.parents, alignment.recipe, code=code),
         f"{CLOCK}/{clock.device}": {"model": clock.to_json()},
     }
     if CAMERA in source.metadata:

@@ -17,6 +17,7 @@ from flagdata.align.logs import LogClock
 from flagdata.align.present import find_made, provenance
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact, Lake
+from flagdata.lake.healing import Healing, Present
 from flagdata.record import Record, RecordWriter
 from flagdata.record.metadata import PROVENANCE
 from flagdata.schema import Kind
@@ -72,8 +73,8 @@ class WindPair:
 
 def find_aligned(
     lake: Lake, pair: WindPair, recipe: Mapping[str, Any], *, name: str | None, session: str | None, branch: str
-) -> Artifact | None:
-    """The artifact that these parents and options make, if it is on the branch.
+) -> Present:
+    """What the branch has of the artifact that these parents and options make.
 
     Raises:
         ConflictError: it is, under another name or session than the one asked for.
@@ -92,15 +93,20 @@ def make_aligned(
     name: str | None,
     session: str | None,
     branch: str,
-) -> Artifact:
+    code: str,
+) -> tuple[Artifact, Healing | None]:
     """Write the sensor's log on the reference's clock and publish it in one commit.
 
     Args:
+        code: version of the code that made it, for its record.
         name: what people call it; the sensor's name if `None`.
         session: one set-up at one place; the sensor's if `None`.
+
+    Returns:
+        its row, and what was done where its object was damaged or missing.
     """
     clock, own = found.model, pair.sensor_series.time
-    metadata = {PROVENANCE: provenance(pair.parents, recipe)}
+    metadata = {PROVENANCE: provenance(pair.parents, recipe, code=code)}
     with lake.transaction(f"align {pair.sensor.name} with {pair.reference.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
         with RecordWriter(staged, metadata=metadata) as record:
@@ -125,7 +131,7 @@ def make_aligned(
             report=json.dumps(report, allow_nan=False, ensure_ascii=False),
         )  # fmt: skip
         transaction.add(artifact)
-    return transaction.result.artifacts[artifact.id]
+    return transaction.result.artifacts[artifact.id], transaction.result.healed.get(artifact.id)
 
 
 def summary(found: LogClock) -> dict[str, Any]:

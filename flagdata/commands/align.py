@@ -246,7 +246,7 @@ def _report(made: RecordingResult | None, outcome: Outcome | None, *, as_json: b
     if as_json:
         content: dict[str, Any] = {"recording": None, "clips": [], "created": False}
         if made is not None:
-            content = {"recording": made.recording.id, "clips": list(made.clips), "created": made.created}
+            content = made.as_dict()
         if outcome is not None:
             content["clock"] = dict(outcome.alignment.details)
         document("align", content)
@@ -254,7 +254,7 @@ def _report(made: RecordingResult | None, outcome: Outcome | None, *, as_json: b
     if outcome is not None:
         click.echo(_sentence(outcome))
     if made is not None:
-        click.echo(f"recording {made.recording.id}, {len(made.clips)} clips")
+        click.echo(made.line)
 
 
 def _sentence(outcome: Outcome) -> str:

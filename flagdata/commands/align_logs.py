@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from flagdata.align.logs import LogClock
     from flagdata.align.methods import ClockOptions
     from flagdata.lake import Artifact, Lake
+    from flagdata.lake.healing import Healing
 
 
 def align_logs(
@@ -34,6 +35,7 @@ def align_logs(
     from flagdata.align.methods import Method
     from flagdata.align.windpair import WindPair, find_aligned, make_aligned
     from flagdata.errors import UsageError
+    from flagdata.lake.healing import ABSENT
     from flagdata.rng import stream
     from flagdata.timebase import NANOSECONDS
 
@@ -46,10 +48,10 @@ def align_logs(
         "align": {"by": "logs", "centre": search.centre, "window": search.window, "sigma": search.sigma}
     }
     pair = WindPair.of(lake, reference, sensor, at=branch)
-    present = None if dry_run else find_aligned(lake, pair, recipe, name=name, session=session, branch=branch)
-    if present is not None:
+    there = ABSENT if dry_run else find_aligned(lake, pair, recipe, name=name, session=session, branch=branch)
+    if there.whole is not None:
         say("this log is aligned already; nothing was written")
-        _report(present, None, created=False, as_json=as_json)
+        _report(there.whole, None, created=False, healed=None, as_json=as_json)
         return
     shift = round(search.centre * NANOSECONDS)
     own, other = pair.sensor_series.time, pair.reference_series.time
@@ -64,17 +66,26 @@ def align_logs(
             pair.reference_series, pair.sensor_series, names=pair.names, search=search,
             generator=stream(0, "align", pair.reference.id, pair.sensor.id), progress=advance,
         )  # fmt: skip
-    made = None
-    if not dry_run:
-        made = make_aligned(lake, pair, found, recipe=recipe, name=name, session=session, branch=branch)
-    _report(made, found, created=made is not None, as_json=as_json)
+    if dry_run:
+        _report(None, found, created=False, healed=None, as_json=as_json)
+        return
+    made, healed = make_aligned(
+        lake, pair, found, recipe=recipe, name=name, session=session, branch=branch, code=there.code
+    )
+    _report(made, found, created=there.artifact is None, healed=healed, as_json=as_json)
 
 
-def _report(made: Artifact | None, found: LogClock | None, *, created: bool, as_json: bool) -> None:
+def _report(
+    made: Artifact | None, found: LogClock | None, *, created: bool, healed: Healing | None, as_json: bool
+) -> None:
+    from dataclasses import asdict
+
     from flagdata.align.windpair import summary
+    from flagdata.lake.healing import said
 
     if as_json:
         content: dict[str, Any] = {"wind": made.id if made is not None else None, "created": created}
+        content["healed"] = None if healed is None else asdict(healed)
         if found is not None:
             content["clock"] = summary(found)
         document("align-logs", content)
@@ -83,6 +94,8 @@ def _report(made: Artifact | None, found: LogClock | None, *, created: bool, as_
         click.echo(sentence(found))
     if made is not None:
         click.echo(f"wind {made.id}, on the clock of {made.parents[0]}")
+        if healed is not None:
+            click.echo(said(made.id, healed))
 
 
 def sentence(found: LogClock) -> str:

@@ -38,8 +38,8 @@ def declare(
     if as_json:
         document(
             "declare",
-            {"wind": stated.id, "recording": made.recording.id, "clips": list(made.clips), "created": made.created},
+            {"wind": stated.id, **made.as_dict()},
         )
         return
     click.echo(f"wind {speed:g} ± {sigma:g} m/s declared: {stated.id}")
-    click.echo(f"recording {made.recording.id}, {len(made.clips)} clips")
+    click.echo(made.line)

@@ -53,8 +53,7 @@ def declare_cloths(table: Path, crop: str, branch: str, as_json: bool, lake_path
             {
                 "recordings": [
                     {
-                        "recording": one.recording.id, "clips": list(one.clips), "created": one.created,
-                        "parameters": cloth.parameters, "wind": cloth.wind,
+                        **one.as_dict(), "parameters": cloth.parameters, "wind": cloth.wind,
                     }
                     for cloth, one in made
                 ]
@@ -62,4 +61,5 @@ def declare_cloths(table: Path, crop: str, branch: str, as_json: bool, lake_path
         )  # fmt: skip
         return
     for cloth, one in made:
-        click.echo(f"{one.recording.id}  {cloth.fabric}, {cloth.density:g} kg/m², {len(one.clips)} clips")
+        healed = "" if one.healed is None else f"; {one.healed.sentence}"
+        click.echo(f"{one.recording.id}  {cloth.fabric}, {cloth.density:g} kg/m², {len(one.clips)} clips{healed}")

@@ -268,19 +268,25 @@ def _erase(lake: Lake, artifacts: tuple[str, ...], message: str, *, with_descend
 
 
 def _anywhere(lake: Lake, artifact: str) -> str:
-    """The full id of an artifact that a branch or tag shows.
+    """The full id of an artifact that a branch or tag shows, or that was erased from all.
 
     Raises:
-        NotFoundError: no branch or tag does.
+        NotFoundError: no branch or tag does, and none did.
     """
     from flagdata.errors import NotFoundError
+    from flagdata.lake.erasure import erased_as
 
     for ref in (*lake.refs.branches(), *lake.refs.tags()):
         try:
             return lake.identity(artifact, at=ref)
         except NotFoundError:
             continue
-    return lake.identity(artifact)
+    try:
+        return lake.identity(artifact)
+    except NotFoundError:
+        if found := erased_as(lake, artifact):
+            return found
+        raise
 
 
 def _report_deletion(noun: str, name: str, version: int, *, as_json: bool) -> None:

@@ -62,7 +62,7 @@ def verify(sample: int | None, as_json: bool, lake_path: str) -> None:
     names = object_names(lake, refs)
     chosen = names if sample is None else sampled(names, sample)
     with progress(len(chosen), label="verify", unit="object") as advance:
-        findings += verified(lake, chosen, advance=advance)
+        findings += verified(lake, chosen, refs, advance=advance)
     hashed = len(chosen) - sum(finding.kind == "object-missing" for finding in findings)
     _conclude("verify", findings, f"{hashed} of {counted(len(names), 'object')} re-hashed", as_json=as_json)
 
@@ -86,7 +86,7 @@ def doctor(source: Path | None, deep: bool, grace: timedelta, as_json: bool, lak
         return
     from flagdata.ingest.before import unconfirmed
     from flagdata.lake import Artifact, Lake
-    from flagdata.lake.health import catalog_files
+    from flagdata.lake.health import catalog_files, read_refs
     from flagdata.lake.health import doctor as examined
     from flagdata.lake.health import verify as verified
     from flagdata.schema import Kind
@@ -102,7 +102,8 @@ def doctor(source: Path | None, deep: bool, grace: timedelta, as_json: bool, lak
         names = [stored.name for stored in lake.objects]
         with progress(len(names), label="re-hash", unit="object") as advance:
             known = {(f.kind, f.where) for f in findings}
-            findings += tuple(f for f in verified(lake, names, advance=advance) if (f.kind, f.where) not in known)
+            found = verified(lake, names, read_refs(lake), advance=advance)
+            findings += tuple(f for f in found if (f.kind, f.where) not in known)
         checked = f"structure checked, {counted(len(names), 'object')} re-hashed"
     _conclude("doctor", findings, checked, as_json=as_json)
 

@@ -28,7 +28,7 @@ from flagdata.export.mcap import ROWS, SAMPLE
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.report import REPORT_SCHEMA
 from flagdata.ingest.source import Source
-from flagdata.ingest.store import IngestResult, Labels, find_same, result_of
+from flagdata.ingest.store import IngestResult, Labels, find_same, kept, result_of
 from flagdata.lake import Artifact, Lake
 from flagdata.printable import SHORT
 from flagdata.record import Record
@@ -78,9 +78,9 @@ def ingest_record(lake: Lake, path: Path, *, labels: Labels | None = None, branc
     report = _report(artifact, record, findings)
     if artifact.report is None:
         artifact = replace(artifact, report=json.dumps(report, allow_nan=False, ensure_ascii=False))
-    present = find_same(lake, artifact.id, labels, branch=branch)
-    if present is not None:
-        return replace(present, report=report)
+    there = find_same(lake, artifact.id, labels, branch=branch).whole
+    if there is not None:
+        return replace(kept(there), report=report)
     with lake.transaction(f"ingest record {source.name}", branch=branch) as transaction:
         artifact = replace(artifact, object=transaction.put(path))
         source.check_unchanged()

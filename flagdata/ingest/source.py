@@ -10,7 +10,7 @@ from typing import Any
 
 from flagdata.errors import ConflictError, InputError
 from flagdata.files import check_input, is_beside, is_folder, is_lerobot
-from flagdata.provenance import canonical, code_version, digest, file_hash, recipe_hash
+from flagdata.provenance import canonical, digest, file_hash, recipe_hash
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,14 +76,18 @@ class Source:
                     "the file changed while it was read", where=str(path), fix="ingest it when it is complete"
                 )
 
-    def provenance(self, recipe: Mapping[str, Any]) -> dict[str, str]:
-        """For the metadata of a record."""
+    def provenance(self, recipe: Mapping[str, Any], *, code: str) -> dict[str, str]:
+        """For the metadata of a record.
+
+        Args:
+            code: version of the code that made it.
+        """
         return {
             "source_name": self.name,
             "source_hash": self.hash,
             "recipe": canonical(recipe),
             "recipe_hash": recipe_hash(recipe),
-            "code_version": code_version(),
+            "code_version": code,
         }
 
 

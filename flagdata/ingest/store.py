@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from flagdata.ingest.mcap.bags import is_bag
 from flagdata.ingest.report import FrameTimes, camera_report, wind_report
 from flagdata.ingest.source import Source
 from flagdata.lake import Artifact, Lake, Transaction
+from flagdata.lake.healing import ABSENT, Healing, Present, present
 from flagdata.provenance import digest, recipe_hash
 from flagdata.record import Coding, Record, RecordWriter
 from flagdata.record.metadata import CAMERA, PROVENANCE, camera_metadata
@@ -91,13 +92,15 @@ class IngestResult:
 
     Attributes:
         artifact: as it is in the lake.
-        created: false when it was there already, and nothing was written.
+        created: false when it was there already, and its row stayed.
         report: what was found, see `flagdata.ingest.report`.
+        healed: what was done where its object was damaged or missing.
     """
 
     artifact: Artifact
     created: bool
     report: Mapping[str, Any]
+    healed: Healing | None = None
 
     def as_dict(self) -> dict[str, Any]:
         return {
@@ -105,6 +108,7 @@ class IngestResult:
             "kind": self.artifact.kind.value,
             "name": self.artifact.name,
             "created": self.created,
+            "healed": None if self.healed is None else asdict(self.healed),
             "object": self.artifact.object,
             "source_name": self.artifact.source_name,
             "source_hash": self.artifact.source_hash,
@@ -148,16 +152,16 @@ def ingest_camera(
     chapter = chapter_of(path) if options.camera.start is None else None
     if chapter is not None and chapter.before:
         recipe["chapter_before"] = chapter.before  # it comes from other files, and shapes the result
-    present = find(lake, Kind.CAMERA, source, recipe, labels, branch=branch)
-    if present is not None:
+    there = find(lake, Kind.CAMERA, source, recipe, labels, branch=branch)
+    if there.whole is not None:
         if crop_picture is not None:
-            crop_picture(Record.open(lake.record_place(str(present.artifact.object))).attachment(CROP_PICTURE))
-        return present
+            crop_picture(Record.open(lake.record_place(str(there.whole.object))).attachment(CROP_PICTURE))
+        return kept(there.whole)
     with lake.transaction(f"ingest camera {source.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
         times = FrameTimes()
         with open_camera(path, options.camera) as stream:
-            metadata = {CAMERA: camera_metadata(stream.info), PROVENANCE: source.provenance(recipe)}
+            metadata = {CAMERA: camera_metadata(stream.info), PROVENANCE: source.provenance(recipe, code=there.code)}
             with RecordWriter(staged, metadata=metadata, coding=options.coding, quality=JPEG_QUALITY) as record:
                 if stream.proposal is not None:
                     if crop_picture is not None:
@@ -235,7 +239,8 @@ def ingest_winds(
     new = [one for one in read if isinstance(one, _Read)]
     if not new:
         return tuple(one for one in read if not isinstance(one, _Read))
-    how = confirmed(path, source.hash, [(one.log, one.options.wind) for one in new], confirm)
+    unseen = [(one.log, one.options.wind) for one in new if one.there.artifact is None]
+    how = confirmed(path, source.hash, unseen, confirm) if unseen else None
     with lake.transaction(f"ingest wind {source.name}", branch=branch) as transaction:
         staged = [_staged(transaction, path, source, one, how) for one in new]
         for artifact, _ in staged:
@@ -249,9 +254,10 @@ def ingest_winds(
 
 @dataclass(frozen=True, kw_only=True)
 class _Read:
-    """A log that was read and is not in the lake yet.
+    """A log that was read, and is to be written.
 
     Attributes:
+        there: what the lake has of it: nothing, or an artifact whose object is damaged or missing.
         log: what was read.
         options, labels: of it.
         recipe: of its artifact.
@@ -265,6 +271,7 @@ class _Read:
     recipe: Mapping[str, Any]
     findings: tuple[Finding, ...]
     paired: PairedClocks | None
+    there: Present
 
 
 def _read(
@@ -276,19 +283,19 @@ def _read(
     except NothingMeasuredError as error:
         return error
     recipe = {**options.recipe(), "plan": dict(log.plan)}
-    present = find(lake, Kind.WIND, source, recipe, labels, branch=branch)
-    if present is not None:
-        return present
+    there = find(lake, Kind.WIND, source, recipe, labels, branch=branch)
+    if there.whole is not None:
+        return kept(there.whole)
     paired = host_clock(log.series)
     findings = (*log.findings, *(paired.findings if paired is not None else ()))
     others = _present(lake, Kind.WIND, branch)
-    same = None if log.drafted else earlier(lake, others, source.hash, recipe, log.series)
+    same = None if log.drafted or there.artifact is not None else earlier(lake, others, source.hash, recipe, log.series)
     if same is not None:
         _check_labels(same, labels)
-        return IngestResult(artifact=same, created=False, report=json.loads(same.report or "{}"))
+        return kept(same)
     findings = (*findings, *_beside(lake, log.series, labels.session, others))
     findings = (*findings, *other_readings(others, source.hash, recipe))
-    return _Read(log=log, options=options, labels=labels, recipe=recipe, findings=findings, paired=paired)
+    return _Read(log=log, options=options, labels=labels, recipe=recipe, findings=findings, paired=paired, there=there)
 
 
 def _present(lake: Lake, kind: Kind, branch: str) -> list[Artifact]:
@@ -311,7 +318,7 @@ def _staged(
     log, findings, recipe = one.log, one.findings, one.recipe
     time = log.series.time
     staged = transaction.staging(".mcap")
-    with RecordWriter(staged, metadata={PROVENANCE: source.provenance(recipe)}) as record:
+    with RecordWriter(staged, metadata={PROVENANCE: source.provenance(recipe, code=one.there.code)}) as record:
         record.wind(log.series)
         if is_bag(path):
             findings = (*findings, _left_whole(path))
@@ -328,8 +335,9 @@ def _staged(
             record.attach("drafted.recipe.toml", drafted, media_type="application/toml", log_time=int(time[0]))
     source.check_unchanged()
     report = wind_report(log, findings, named=one.options.wind.recipe)
-    if how is not None:
-        report["confirmed"] = how
+    before = {} if one.there.artifact is None else json.loads(one.there.artifact.report or "{}")
+    if (confirmed_by := before.get("confirmed", how)) is not None:
+        report["confirmed"] = confirmed_by
     if one.paired is not None:
         report["host_clock"] = json.loads(one.paired.model.to_json())
     artifact = _artifact(
@@ -362,39 +370,40 @@ def _beside(
     return tuple(found)
 
 
-def find(
-    lake: Lake, kind: Kind, source: Source, recipe: Mapping[str, Any], labels: Labels, *, branch: str
-) -> IngestResult | None:
-    """The artifact that this ingest would make, if it is on the branch.
+def find(lake: Lake, kind: Kind, source: Source, recipe: Mapping[str, Any], labels: Labels, *, branch: str) -> Present:
+    """What the branch has of the artifact that this ingest would make.
 
     Raises:
-        ConflictError: it is, under another name or session than the one asked for.
+        ConflictError: it is there, under another name or session than the one asked for.
     """
     same = (
         (pc.field("kind") == kind.value)
         & (pc.field("source_hash") == source.hash)
         & (pc.field("recipe_hash") == recipe_hash(recipe))
     )
-    rows = lake.rows(at=branch).filter(same).to_pylist()
-    if not rows:
-        return None
-    artifact = Artifact.from_row(rows[0])
-    _check_labels(artifact, labels)
+    return _found(lake, lake.rows(at=branch).filter(same).to_pylist(), labels)
+
+
+def find_same(lake: Lake, artifact: str, labels: Labels, *, branch: str) -> Present:
+    """What the branch has of the artifact of an identity.
+
+    Raises:
+        ConflictError: it is there, under another name or session than the one asked for.
+    """
+    return _found(lake, lake.rows({"artifact": artifact}, at=branch).to_pylist(), labels)
+
+
+def kept(artifact: Artifact) -> IngestResult:
+    """The result of an ingest that found its artifact in the lake."""
     return IngestResult(artifact=artifact, created=False, report=json.loads(artifact.report or "{}"))
 
 
-def find_same(lake: Lake, artifact: str, labels: Labels, *, branch: str) -> IngestResult | None:
-    """The artifact of an identity, if it is on the branch.
-
-    Raises:
-        ConflictError: it is, under another name or session than the one asked for.
-    """
-    rows = lake.rows({"artifact": artifact}, at=branch).to_pylist()
+def _found(lake: Lake, rows: Sequence[Mapping[str, Any]], labels: Labels) -> Present:
     if not rows:
-        return None
-    found = Artifact.from_row(rows[0])
-    _check_labels(found, labels)
-    return IngestResult(artifact=found, created=False, report=json.loads(found.report or "{}"))
+        return ABSENT
+    artifact = Artifact.from_row(rows[0])
+    _check_labels(artifact, labels)
+    return present(lake, artifact)
 
 
 def _check_labels(artifact: Artifact, labels: Labels) -> None:
@@ -447,11 +456,11 @@ def result_of(transaction: Transaction, artifact: Artifact, report: Mapping[str,
     Raises:
         ConflictError: another process published it meanwhile, under another name or session than the one asked for.
     """
-    kept = transaction.result.artifacts[artifact.id]
+    there = transaction.result.artifacts[artifact.id]
     if artifact.id in transaction.result.added:
-        return IngestResult(artifact=kept, created=True, report=report)
-    _check_labels(kept, labels)
-    return IngestResult(artifact=kept, created=False, report=json.loads(kept.report or "{}"))
+        return IngestResult(artifact=there, created=True, report=report)
+    _check_labels(there, labels)
+    return replace(kept(there), healed=transaction.result.healed.get(artifact.id))
 
 
 def _left_whole(path: Path) -> Finding:

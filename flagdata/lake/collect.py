@@ -2,9 +2,9 @@
 
 Kept are all objects that a branch or tag shows, that a row withdrawn less than the grace period ago points to, that a
 living transaction has put or looked up, and whatever is younger than the grace period by the clock that gave it its
-time. Unfinished uploads in parts to a bucket go by the same rules. Staging folders go as soon as
-their owner is dead, which its lock proves; what lies there without a lease, after the grace period. All files of the
-catalog that some version is made of stay.
+time. Unfinished uploads in parts to a bucket go by the same rules. What the log says was erased goes at any age: its
+erasure was not finished. Staging folders go as soon as their owner is dead, which its lock proves; what lies there
+without a lease, after the grace period. All files of the catalog that some version is made of stay.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from datetime import timedelta
 from flagdata.errors import CorruptError
 from flagdata.findings import Severity
 from flagdata.lake.durable import disk_errors
+from flagdata.lake.erasure import unfinished
 from flagdata.lake.lake import Lake
 from flagdata.lake.layout import check_own
 from flagdata.lake.leases import LeaseState, collecting, last_written, leases, looking, unleased
@@ -68,7 +69,7 @@ def collect(lake: Lake, *, grace: timedelta) -> Garbage:
         found = _find(lake, grace)
         for name in found.objects:
             check()
-            lake.objects.remove(lake.objects.path(name))
+            lake.objects.delete(name)
         for path in found.leftovers:
             check()
             Objects.remove(path)
@@ -119,9 +120,10 @@ def unneeded(lake: Lake, marked: Marked, states: Sequence[LeaseState], *, grace:
         states: of all staging folders. Without the lock of `collecting`, what a transaction has put since, and which is
             not younger than the grace period, may be among what is found.
     """
-    held = {name for state in states if state.alive for name in state.objects}
+    needed = marked.objects.union(*(state.objects for state in states if state.alive))
     limit = lake.now() - grace.total_seconds()
-    objects = [o for o in lake.objects if o.name not in marked.objects and o.name not in held and o.modified <= limit]
+    erased = unfinished(lake, needed)
+    objects = [o for o in lake.objects if o.name not in needed and (o.modified <= limit or o.name in erased)]
     leftovers: list[Place] = [state.folder for state in states if state.leased and not state.alive]
     leftovers += [path for path in unleased(lake.staging) if last_written(path) <= limit]
     leftovers += [path for path in lake.unpublished_files() if path.lstat().st_mtime <= limit]

@@ -87,7 +87,7 @@ def _expire(lake: Store, up_to: int, message: str | None) -> Expiry:
         version = persist(attempt, where=lake.catalog.path)
         for name in found.objects:
             check()
-            lake.objects.remove(lake.objects.path(name))
+            lake.objects.delete(name)
     return Expiry(up_to=up_to, objects=found.objects, size=found.size, version=version)
 
 

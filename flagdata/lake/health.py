@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from datetime import timedelta
 from pathlib import Path
 
@@ -11,16 +12,18 @@ import pyarrow as pa
 
 from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
+from flagdata.lake.again import made_again
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.collect import left_uploads
+from flagdata.lake.erasure import unfinished
 from flagdata.lake.lake import Lake
 from flagdata.lake.layout import STORES, foreign_entries
 from flagdata.lake.leases import LeaseState, last_written, leases, looking, unleased
 from flagdata.lake.log import LogGapError
 from flagdata.lake.marking import Marked, catalog_files, mark
-from flagdata.lake.objects import StoredObject
+from flagdata.lake.objects import DAMAGED, StoredObject
 from flagdata.lake.removals import erased, expirations, removals
-from flagdata.schema import FORMAT_VERSION
+from flagdata.schema import FORMAT_VERSION, Kind
 from flagdata.storage import Place, StoreError
 from flagdata.storage.uploads import Upload
 
@@ -57,7 +60,9 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
         findings += _expired(lake, marked, {found.name for found in stored})
         findings += _collected(lake, marked, {found.name for found in stored})
         needed = marked.objects | held
-        findings += [_orphan(found, limit, grace) for found in stored if found.name not in needed]
+        left = unfinished(lake, needed)
+        findings += [_unfinished(lake, name, *why) for name, why in left.items()]
+        findings += [_orphan(found, limit, grace) for found in stored if found.name not in needed | left.keys()]
         findings += _left_uploads(lake, states, limit, grace)
     findings += _strays(lake, foreign)
     findings += [_abandoned(state) for state in states if state.leased and not state.alive]
@@ -71,23 +76,42 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
     return tuple(dict.fromkeys(findings))  # an entry that cannot be read stops more than one check
 
 
-def verify(lake: Lake, names: Sequence[str], *, advance: Callable[[int], None] = lambda _: None) -> tuple[Finding, ...]:
-    """Re-hash the objects called `names`; a finding for each that is missing or has changed.
+def verify(
+    lake: Lake, names: Sequence[str], marked: Marked | None = None, *, advance: Callable[[int], None] = lambda _: None
+) -> tuple[Finding, ...]:
+    """Re-hash the objects called `names`; a finding for each that is missing or has changed. Damage is noted beside the
+    object, so that what makes it again replaces it without comparing all its bytes, see `Objects.note_damage`.
 
     Args:
+        marked: what every ref shows: of what they are, the findings say how it is made again.
         advance: called with the size [B] of each object done.
     """
     findings = []
+    rows = _by_object(marked) if marked is not None else {}
     for name in names:
         try:
             lake.objects.check(name)
         except FlagdataError as error:
             kind = {"not-found": "object-missing", "link": "link"}.get(error.kind, "object-changed")
-            findings.append(
-                Finding(kind=kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
-            )
+            if kind == "object-changed":
+                lake.objects.note_damage(name)
+            fix = made_again(rows[name]) if name in rows else error.fix
+            findings.append(Finding(kind=kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=fix))
+        else:
+            lake.objects.note_whole(name)
         advance(1)
     return tuple(findings)
+
+
+def _by_object(marked: Marked) -> dict[str, Artifact]:
+    """Object → the artifact that it was made as, and not a part of it."""
+    found: dict[str, Artifact] = {}
+    for table in marked.refs.values():
+        for row in table.to_pylist():
+            if row["object"] is not None and (row["object"] not in found or row["kind"] != Kind.CLIP):
+                with suppress(FlagdataError):  # of a malformed row doctor says more
+                    found[row["object"]] = Artifact.from_row(row)
+    return found
 
 
 def read_refs(lake: Lake) -> Marked:
@@ -190,7 +214,7 @@ def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign:
     if artifact.recording is not None and artifact.recording not in known:
         findings.append(error("parent-missing", f"its recording {artifact.recording} is not there", "align it again"))
     if artifact.object is not None:
-        again = "ingest its source again, or restore the object from a copy"
+        again = made_again(artifact)
         if not lake.objects.has(artifact.object):
             findings.append(error("dangling-row", f"its object {artifact.object} is missing", again))
         elif (
@@ -200,7 +224,7 @@ def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign:
         ):
             what = f"its object has {size} bytes instead of {artifact.object_bytes}"
             findings.append(
-                error("object-size", what, f"{again}; flagdata recover saves what a cut-off record still has")
+                error("object-size", what, f"{again}. flagdata recover saves what a cut-off record still has")
             )
     return findings
 
@@ -222,6 +246,15 @@ def _erased(lake: Lake, marked: Marked) -> list[Finding]:
                 )
             )  # fmt: skip
     return findings
+
+
+def _unfinished(lake: Lake, name: str, version: int, message: str) -> Finding:
+    return Finding(
+        kind="erasure-unfinished", severity=Severity.ERROR, where=str(lake.objects.path(name)),
+        what=f"version {version} erased what {name} holds ({message}), and its bytes are still there: the erasure was "
+        "interrupted, or the disk refused it",
+        fix="run flagdata gc, which deletes it at once; or the same flagdata withdraw --everywhere again",
+    )  # fmt: skip
 
 
 def _expired(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
@@ -313,7 +346,8 @@ def _later(grace: timedelta) -> str:
 
 def _strays(lake: Lake, foreign: Collection[Path]) -> list[Finding]:
     known: set[Place] = {stored.path for stored in lake.objects} | set(foreign)
-    strays = [p for store in STORES for p in (lake.path / store).glob("*") if p not in known]
+    noted = {path.parent / f"{path.name}{DAMAGED}" for path in known}
+    strays = [p for store in STORES for p in (lake.path / store).glob("*") if p not in known and p not in noted]
     return [
         Finding(
             kind="stray-file",

@@ -22,7 +22,7 @@ from flagdata.lake.durable import disk_errors, put_if_absent
 from flagdata.lake.erasure import Erasure, erase
 from flagdata.lake.expiry import check_whole
 from flagdata.lake.labels import Value, put
-from flagdata.lake.layout import FOLDERS, STORES, scratch_files
+from flagdata.lake.layout import FOLDERS, STAGING, STORES, scratch_files
 from flagdata.lake.leases import collecting
 from flagdata.lake.merging import MergeResult, merge
 from flagdata.lake.objects import Objects
@@ -63,10 +63,7 @@ class Lake(Store):
         with disk_errors("creating a lake", lake.path):
             there = lake.path.exists() and not lake.path.is_dir()
             if there or (lake.path.is_dir() and any(True for _ in lake.path.iterdir())):
-                what = "a lake" if (lake.path / _MARKER).exists() else "something else"
-                raise ConflictError(
-                    f"there is {what} already", where=str(lake.path), fix="choose an empty or new folder"
-                )
+                raise lake._taken()
             if not lake._claim():
                 raise ConflictError("another process is making a lake there", where=str(lake.path), fix="open that one")
             try:
@@ -76,6 +73,19 @@ class Lake(Store):
                     Objects.remove(entry)
                 raise
         return lake
+
+    def _taken(self) -> ConflictError:
+        """The error for a lake that cannot be made since something is there."""
+        where = str(self.path)
+        if (self.path / _MARKER).exists():
+            return ConflictError("there is a lake already", where=where, fix="choose an empty or new folder")
+        inside = {path.name for path in self.path.iterdir()} if self.path.is_dir() else set()
+        if STAGING in inside and inside <= {*FOLDERS, _MARKER}:
+            return ConflictError(
+                "a lake is being made there, or its making was stopped", where=where,
+                fix="wait for it; where no process is making it, delete what is there and give the command again",
+            )  # fmt: skip
+        return ConflictError("there is something else already", where=where, fix="choose an empty or new folder")
 
     def _claim(self) -> bool:
         """Whether this process makes the lake: the one that succeeds in making its staging."""

@@ -69,7 +69,7 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
         except FlagdataError as error:
             findings.append(_unreadable(error, f"ref {name}"))
     try:
-        findings += _lost(lake.catalog.rows(lake.catalog.head()), names)
+        findings += _lost(lake.catalog.rows(lake.catalog.head()), names, str(lake.path))
         recent = list(_withdrawn(lake, since=lake.now() - grace.total_seconds() if grace else inf, first=first))
     except FlagdataError as error:
         findings.append(_unreadable(error, "recent versions"))
@@ -119,7 +119,7 @@ def _damaged(kind: str, what: str, path: Place) -> Finding:
     return Finding(kind=kind, severity=Severity.ERROR, what=what, where=str(path), fix="restore it from a copy")
 
 
-def _lost(head: pa.Table, known: list[str]) -> list[Finding]:
+def _lost(head: pa.Table, known: list[str], where: str) -> list[Finding]:
     rows = Counter(head["branch"].to_pylist())
     return [
         Finding(
@@ -128,7 +128,8 @@ def _lost(head: pa.Table, known: list[str]) -> list[Finding]:
             what=f"{count} rows are on branch {name!r}, which is not among the refs: no ref shows them",
             where=f"ref {name}",
             count=count,
-            fix=f"restore refs/branches/{name}.json from a copy",
+            fix="give the flagdata push or pull that was stopped again, which goes on with it (for a clone: flagdata "
+            f"pull SOURCE --lake {where}); where there was none, restore refs/branches/{name}.json from a copy",
         )
         for name, count in sorted(rows.items())
         if name not in known

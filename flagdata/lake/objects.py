@@ -5,20 +5,29 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from flagdata.checksums import content_hash, files_of, size_of
-from flagdata.errors import CorruptError, InputError, NotFoundError
+from flagdata.errors import CorruptError, FlagdataError, InputError, NotFoundError
 from flagdata.lake.artifact import OBJECT_NAME
 from flagdata.lake.durable import flush_file, flush_folder
 from flagdata.lake.layout import STORES, LinkError
 from flagdata.storage import Place, RemotePath
 
 _READ_ONLY = 0o444
+DAMAGED = ".damaged"
+"""Ends the name of the note that an object was found damaged, which lies beside it."""
+REMEDY = (
+    "do again what made it: flagdata doctor says what that is, and the damaged object is replaced; or flagdata pull a"
+    " clone of this lake, or restore the object from a copy"
+)
+_AT_ONCE = 8
+"""Objects that are compared with their names at the same time."""
 _ATTEMPTS = 5
 """How often an object is moved to its place while other writers publish the same one."""
 
@@ -108,12 +117,15 @@ class Objects:
         store = "mcap" if staged.is_file() else "model" if staged.suffix == STORES["model"] else "zarr"
         return f"{store}/{content_hash(staged)}"
 
-    def publish(self, staged: Path, name: str) -> None:
+    def publish(self, staged: Path, name: str) -> bool:
         """Move `staged`, whose name was computed by `name_of`, to its place; durable when it returns.
 
         An object of that name that is there and whole is kept and `staged` removed; one that does not hash to its
         name is replaced, so that ingesting again heals a damaged lake. So it is with one that another writer publishes
         in the same moment.
+
+        Returns:
+            whether a whole object is there now that was not before.
         """
         os.utime(staged)  # age counts from here
         for entry in files_of(staged):
@@ -129,7 +141,8 @@ class Objects:
                 if self.is_whole(name):
                     os.utime(target)
                     self.remove(staged)
-                    return
+                    self._mended(name)
+                    return False
                 if target.is_dir() or target.is_symlink():
                     with suppress(FileNotFoundError):  # another writer has moved it away
                         target.rename(staged.with_name(f"damaged-{attempt}-{target.name}"))
@@ -140,6 +153,54 @@ class Objects:
                 if error.errno not in (errno.ENOTEMPTY, errno.EEXIST) or attempt == _ATTEMPTS - 1:
                     raise
         flush_folder(target.parent)
+        self._mended(name)
+        return True
+
+    def is_there(self, name: str, size: int | None) -> bool:
+        """Whether the object is there, has `size` bytes if that is known, and was not found damaged before."""
+        try:
+            found = self.size(name)
+        except (NotFoundError, InputError):  # a link in its place
+            return False
+        return size in (None, found) and not self._note(name).exists()
+
+    def is_sound(self, name: str, size: int | None) -> bool:
+        """As `is_there`, and its bytes are those that its name says."""
+        return self.is_there(name, size) and self.is_whole(name)
+
+    def unsound(self, sizes: Mapping[str, int | None]) -> frozenset[str]:
+        """Those of many objects, by name with their sizes, that are not as `is_sound` has it."""
+        with ThreadPoolExecutor(_AT_ONCE) as pool:
+            sound = pool.map(lambda name: self.is_sound(name, sizes[name]), sizes)
+            return frozenset(name for name, found in zip(sizes, sound, strict=True) if not found)
+
+    def note_damage(self, name: str) -> None:
+        """Note beside an object that it was found damaged, so that what makes it again, or has it, replaces it; where
+        the lake can only be read, nothing is noted."""
+        with suppress(OSError, FlagdataError):
+            self._note(name).write_bytes(b"")
+
+    def note_whole(self, name: str) -> None:
+        """Take the note away that an object is damaged, if there is one and the lake can be written."""
+        with suppress(OSError, FlagdataError):
+            if self._note(name).exists():
+                self._mended(name)
+
+    def delete(self, name: str) -> None:
+        """Delete an object, and what is noted of it.
+
+        Raises:
+            OSError: what the disk refused.
+        """
+        self.remove(self.path(name))
+        self._mended(name)
+
+    def _mended(self, name: str) -> None:
+        self._note(name).unlink(missing_ok=True)
+
+    def _note(self, name: str) -> Place:
+        path = self.path(name)
+        return path.parent / f"{path.name}{DAMAGED}"
 
     def is_whole(self, name: str) -> bool:
         """Whether the object is there and its content hashes to its name."""
@@ -158,13 +219,12 @@ class Objects:
             CorruptError: its bytes are not what its name says.
         """
         path = self.existing(name)
-        fix = "ingest the source again (it replaces the object), or restore it from a copy"
         try:
             whole = content_hash(path) == name.partition("/")[2]
         except InputError:
-            raise LinkError(f"{name} is, or holds, a link or special file", where=str(path), fix=fix) from None
+            raise LinkError(f"{name} is, or holds, a link or special file", where=str(path), fix=REMEDY) from None
         if not whole:
-            raise CorruptError(f"the bytes of {name} have changed since they were written", where=str(path), fix=fix)
+            raise CorruptError(f"the bytes of {name} have changed since they were written", where=str(path), fix=REMEDY)
 
     def whole(self, name: str) -> Path:
         """Where the object is, once its bytes have been compared with its name; raises as `check`."""

@@ -8,16 +8,16 @@ parts that are needed are fetched, see `flagdata.storage.ranges`.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
-from flagdata.checksums import content_hash, files_of, read_sums, sums_of
+from flagdata.checksums import content_hash, files_of, read_sums, size_of, sums_of
 from flagdata.errors import CorruptError
 from flagdata.lake.artifact import OBJECT_NAME
 from flagdata.lake.layout import STORES
-from flagdata.lake.objects import Objects, StoredObject, path_in_lake
+from flagdata.lake.objects import DAMAGED, REMEDY, Objects, StoredObject, path_in_lake
 from flagdata.storage import Place, RemotePath
 from flagdata.storage.cache import copy_of, fetched, forget, kept
 
@@ -26,6 +26,8 @@ WHOLE = 8 << 20
 """Records of at most so many bytes are fetched whole, and compared with their hash."""
 _AT_ONCE = 8
 """Files of a folder that are moved at the same time."""
+_FEW = 16
+"""Objects at most that are asked for one by one, in place of a list of all."""
 
 
 class RemoteObjects(Objects):
@@ -56,7 +58,11 @@ class RemoteObjects(Objects):
         if (copy := copy_of(name, place.suffix)) is not None:
             return copy
         size = self.size(name)
-        return fetched(name, place.suffix, size=size, fetch=partial(self._fetch, name), where=str(place))
+        try:
+            return fetched(name, place.suffix, size=size, fetch=partial(self._fetch, name), where=str(place))
+        except CorruptError:
+            self.note_damage(name)
+            raise
 
     def readable(self, name: str) -> Place:
         """A local copy, or the place in the bucket of a record that is larger than `WHOLE`: of it only what is needed
@@ -104,13 +110,32 @@ class RemoteObjects(Objects):
             raise self.missing(name)
         return sum(found.values())
 
-    def publish(self, staged: Path, name: str) -> None:
+    def is_sound(self, name: str, size: int | None) -> bool:
+        """As `is_there`: to compare the bytes would fetch all of them. What verify or a reader found damaged counts."""
+        return self.is_there(name, size)
+
+    def unsound(self, sizes: Mapping[str, int | None]) -> frozenset[str]:
+        if len(sizes) <= _FEW:
+            return super().unsound(sizes)
+        found = {stored.name: stored.size for stored in self}
+        noted = {path.name for store in STORES for path in (self._root / store).glob(f"*{DAMAGED}")}
+        return frozenset(
+            name
+            for name, size in sizes.items()
+            if name not in found or size not in (None, found[name]) or self._note(name).name in noted
+        )
+
+    def publish(self, staged: Path, name: str) -> bool:
         """Put `staged`, whose name was computed by `name_of`; durable when it returns.
 
         What is there under that name has the same bytes, unless it was damaged, and is put anew: so it counts as young,
         and ingesting again heals a lake.
+
+        Returns:
+            whether nothing that `is_sound` was there before.
         """
         place = self.path(name)
+        fresh = not self.is_sound(name, size_of(staged))
         if staged.is_file():
             place.upload(staged)
         else:
@@ -119,7 +144,10 @@ class RemoteObjects(Objects):
                 for upload in uploads:
                     upload.result()
             (place / SUMS).write_bytes(sums_of(staged).encode())
+        if fresh:
+            self._mended(name)
         kept(name, place.suffix, staged)
+        return fresh
 
     def check(self, name: str) -> None:
         place = self.path(name)
@@ -131,9 +159,8 @@ class RemoteObjects(Objects):
             whole = False
         if not whole:
             raise CorruptError(
-                f"the bytes of {name} have changed since they were written", where=str(place),
-                fix="ingest the source again (it replaces the object), or restore it from a copy",
-            )  # fmt: skip
+                f"the bytes of {name} have changed since they were written", where=str(place), fix=REMEDY
+            )
 
     def __iter__(self) -> Iterator[StoredObject]:
         for store, suffix in STORES.items():
@@ -191,9 +218,7 @@ class RemoteObjects(Objects):
             or hashlib.sha256(stated).hexdigest() != place.stem
             or any("\0" in file or file.startswith("/") or ".." in Path(file).parts for file in sums)
         ):
-            raise CorruptError(
-                "the sums of its files are damaged", where=str(place / SUMS), fix="ingest the source again"
-            )
+            raise CorruptError("the sums of its files are damaged", where=str(place / SUMS), fix=REMEDY)
         return sums
 
     def _hash(self, name: str) -> str:

@@ -15,6 +15,7 @@ from pathlib import Path
 import pyarrow.compute as pc
 
 from flagdata.lake.artifact import Artifact
+from flagdata.lake.healing import Healing, present
 from flagdata.lake.lake import Lake
 from flagdata.lake.refs import MAIN
 from flagdata.lake.revisions import REVISION, revised
@@ -31,11 +32,13 @@ class Placed:
         artifact: its row; without its object where it was not on the branch.
         others: versions that were on the branch, in the order of their commits; `artifact` itself where it was.
         new: whether it was not there.
+        healed: what was done where it was there, and its object damaged or missing.
     """
 
     artifact: Artifact
     others: tuple[Artifact, ...]
     new: bool
+    healed: Healing | None = None
 
     @property
     def version(self) -> int:
@@ -52,8 +55,10 @@ class Placed:
         if self.new:
             return f"committed as version {self.version} of {self.artifact.name!r}; {by}"
         if newest.id == self.artifact.id:
-            return "there already"
-        return f"there already as version {self.version} of {self.artifact.name!r}; {by}"
+            there = "there already"
+        else:
+            there = f"there already as version {self.version} of {self.artifact.name!r}; {by}"
+        return there if self.healed is None else f"{there}; {self.healed.sentence}"
 
 
 def versions(lake: Store, result: Artifact, *, at: str | None = None) -> tuple[Artifact, ...]:
@@ -86,7 +91,7 @@ def keep(
     lake: Lake, result: Artifact, write: Callable[[Path], object], message: str, *, branch: str = MAIN,
     left: Callable[[Artifact], Iterable[Artifact]] = lambda kept: (),
 ) -> Placed:  # fmt: skip
-    """Commit a result where it is new (see `placed`), with what it left.
+    """Commit a result where it is new (see `placed`), or its object damaged or missing, with what it left.
 
     Args:
         result: its row as a first version, without its object.
@@ -98,7 +103,7 @@ def keep(
     """
     with lake.transaction(message, branch=branch) as transaction:
         found = placed(lake, result, branch=branch)
-        if found.new:
+        if found.new or present(lake, found.artifact).whole is None:
             staged = transaction.staging(".zarr")
             write(staged)
             transaction.add(replace(found.artifact, object=transaction.put(staged)))
@@ -106,4 +111,4 @@ def keep(
                 transaction.add(one)
     if found.new and found.artifact.id not in transaction.result.added:  # another process was faster
         return placed(lake, result, branch=branch)
-    return found
+    return replace(found, healed=transaction.result.healed.get(found.artifact.id))

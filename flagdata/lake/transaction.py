@@ -23,8 +23,10 @@ from flagdata.errors import ConflictError, FlagdataError, NotFoundError, UsageEr
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.catalog import Moved, persist
 from flagdata.lake.durable import disk_errors
+from flagdata.lake.healing import Healing, healing
 from flagdata.lake.leases import Lease, RemoteLease, collecting, open_lease
 from flagdata.lake.store import Store
+from flagdata.lake.withdrawal import take_off
 from flagdata.provenance import code_version
 from flagdata.schema import catalog_schema
 
@@ -39,6 +41,7 @@ class CommitResult:
         added: ids of rows it published, in order.
         existing: ids that were on the branch already, so nothing was published for them.
         artifacts: all of these by id, as the branch has them; none of it is read after publication.
+        healed: of the existing ones, by id, those whose object was damaged or missing, and is not any more.
     """
 
     version: int
@@ -46,6 +49,7 @@ class CommitResult:
     added: tuple[str, ...]
     existing: tuple[str, ...]
     artifacts: Mapping[str, Artifact] = field(default_factory=dict)
+    healed: Mapping[str, Healing] = field(default_factory=dict)
 
 
 class Transaction:
@@ -59,6 +63,9 @@ class Transaction:
     Idempotence holds in a race too: an append is accepted only at the version whose identities were checked. When two
     processes add the same identity at once, one publishes it; the other is refused, looks again, and reports it as
     existing. No reader ever sees an identity twice on one branch.
+
+    Where the branch has an identity whose object is damaged or missing, what was put for it takes its place, see
+    `flagdata.lake.healing`.
 
     Raises:
         UsageError: no message; or anything but `result` used outside the block.
@@ -75,6 +82,9 @@ class Transaction:
         self._seen: int | None = None  # the head that these are of
         self._pending: dict[str, Artifact] = {}
         self._existing: dict[str, None] = {}
+        self._fresh: set[str] = set()  # objects that were not there, or damaged, before they were put
+        self._restored: dict[str, str] = {}  # id of an existing artifact whose object was put back → that
+        self._moved: dict[str, tuple[str, Artifact]] = {}  # id of one that has another object now → the one before, row
         self._sizes: dict[str, int] = {}  # of the objects that the lease holds
         self._held: Lease | RemoteLease | None = None
 
@@ -117,9 +127,16 @@ class Transaction:
         with disk_errors("committing", self._lake.catalog.path):
             try:
                 self._result = self._publish()
+                self._result = replace(self._result, healed=self._healed())
             except (OSError, FlagdataError):
                 if self._result is None:
                     raise
+
+    def _healed(self) -> dict[str, Healing]:
+        objects = {identity: (name, name) for identity, name in self._restored.items()}
+        objects |= {identity: (before, str(row.object)) for identity, (before, row) in self._moved.items()}
+        each = {pair: healing(self._lake, before=pair[0], now=pair[1]) for pair in set(objects.values())}
+        return {identity: each[pair] for identity, pair in objects.items()}
 
     def staging(self, suffix: str) -> Path:
         """A fresh path with `suffix` (".mcap", ".zarr", ".model"), nothing at it yet; removed with the transaction."""
@@ -141,7 +158,8 @@ class Transaction:
                 path = self._copy(path)
             name = self._lake.objects.name_of(path)
             lease.hold(name)
-            self._lake.objects.publish(path, name)  # a collection leaves alone what a lease holds
+            if self._lake.objects.publish(path, name):  # a collection leaves alone what a lease holds
+                self._fresh.add(name)
             self._sizes[name] = self._lake.objects.size(name)
         return name
 
@@ -173,6 +191,7 @@ class Transaction:
             return False
         if identity in self._known:
             self._existing.setdefault(identity)
+            self._heal(identity, artifact)
             return False
         size = None
         if artifact.object is not None:
@@ -180,6 +199,24 @@ class Transaction:
         self._check_parents([artifact], self._known)
         self._pending[identity] = replace(artifact, branch=self.branch, object_bytes=size)
         return True
+
+    def _heal(self, identity: str, made: Artifact) -> None:
+        """Note what the object that was put for an existing artifact mends.
+
+        Args:
+            made: the artifact as it was made now.
+        """
+        kept = self._lake.artifact(identity, at=self.branch)
+        if made.object is None or kept.object is None:
+            return
+        if made.object == kept.object:
+            if made.object in self._fresh:
+                self._restored[identity] = made.object
+        elif not self._lake.objects.is_sound(kept.object, kept.object_bytes):
+            row = replace(
+                made, branch=self.branch, object_bytes=self.hold(made.object), name=kept.name, session=kept.session
+            )
+            self._moved[identity] = (kept.object, row)
 
     def find(self, artifact_id: str) -> Artifact | None:
         """The artifact of that full id if it is in this transaction or on the branch, else `None`."""
@@ -224,20 +261,24 @@ class Transaction:
                     f"{gone[0]} was withdrawn from branch {self.branch!r} meanwhile", where=str(self._lake.path),
                     fix="do it again",
                 )  # fmt: skip
-            artifacts = self._there(version, existing) | fresh
-            if not fresh:
+            moved = {i: replace(row, created=created) for i, (_, row) in self._moved.items()}
+            artifacts = self._there(version, existing) | fresh | moved
+            if not fresh and not moved:
                 return CommitResult(version=version, commit=None, added=(), existing=existing, artifacts=artifacts)
             self._check_parents(fresh.values(), known)
-            rows = pa.Table.from_pylist([artifact.row() for artifact in fresh.values()], schema=catalog_schema())
+            written = [artifact.row() for artifact in (*fresh.values(), *moved.values())]
+            rows = pa.Table.from_pylist(written, schema=catalog_schema())
             info = {
                 "commit": commit,
                 "message": self.message,
                 "branch": self.branch,
-                "rows": str(len(fresh)),
+                "rows": str(len(rows)),
                 "code_version": code_version(),
             }
+            if moved:
+                info["withdrawn"] = str(len(moved))
             with self.keeping_collectors_out():
-                version = self._lake.catalog.append(rows, base=version, info=info)
+                version = take_off(self._lake, moved, branch=self.branch, base=version, info=info, fresh=rows)
                 self._result = CommitResult(
                     version=version, commit=commit, added=tuple(fresh), existing=existing, artifacts=artifacts
                 )

@@ -3,8 +3,8 @@
 A clone has the log of its source, entry by entry, so that versions, commits, tags and branches mean the same in both.
 Each entry states the hash of the one before it: where two lakes have the same entry, they have the same history up to
 it. Versions are only added, in order, each by the conditional put that publishes a commit, after the objects that refs
-need; what is there is not moved again. So a transfer that was stopped goes on where it was, and of two at once one
-finds the work done, or is refused.
+need; what is there, of its size and not found damaged, is not moved again. So a transfer that was stopped goes on where
+it was, and of two at once one finds the work done, or is refused.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from datetime import timedelta
+from datetime import datetime, timedelta
 
-from flagdata.errors import ConflictError, CorruptError
+from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.findings import Severity
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.lake import Lake
-from flagdata.lake.marking import mark
+from flagdata.lake.marking import Marked, mark
 from flagdata.lake.transaction import Transaction
 from flagdata.storage import Place
 
@@ -54,8 +54,26 @@ def clone(source: Lake, target: Place | str, *, bars: Bars) -> tuple[Lake, Trans
         ConflictError: something is there already.
     """
     source.catalog.head()
-    lake = Lake.adopt(target, source)
+    try:
+        lake = Lake.adopt(target, source)
+    except ConflictError as error:
+        raise _with_push(error, source, target) from None
     return lake, transfer(source, lake, bars=bars)
+
+
+def _with_push(error: ConflictError, source: Lake, target: Place | str) -> ConflictError:
+    """The refusal to clone to where something is; how to go on, where that is a clone of the source."""
+    try:
+        lake = Lake.open(target)
+        same = source.catalog.entry(0)[0] == lake.catalog.entry(0)[0]
+    except FlagdataError:
+        return error
+    if not same:
+        return error
+    return ConflictError(
+        "there is a clone of this lake already", where=str(lake.path),
+        fix=f"flagdata push {lake.path} --lake {source.path} brings it up to date, also where a clone was stopped",
+    )  # fmt: skip
 
 
 def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
@@ -75,7 +93,8 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
     head, there = source.catalog.head(), target.catalog.head()
     _check_history(source, target, head=head, there=there)
     refs = _missing_refs(source, target)
-    missing = [name for name in sorted(marked.objects) if not target.objects.has(name)]
+    sizes = _sizes(marked)
+    missing = [name for name in sorted(marked.objects) if not target.objects.is_there(name, sizes.get(name))]
     size = 0
     with (
         disk_errors("moving versions", target.path),
@@ -92,14 +111,24 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
             size += transaction.hold(name)
             advance(1)
         _adopt(source, target, transaction, versions=range(there + 1, head + 1), bars=bars)
+        _delete_refs(source, target)
         for (kind, name), stored in refs.items():
             target.refs.adopt(kind, name, stored)
     names = tuple(sorted(name for _, name in refs))
     return Transfer(versions=head - there, head=head, objects=tuple(missing), size=size, refs=names)
 
 
+def _sizes(marked: Marked) -> dict[str, int]:
+    """Bytes of the objects that the rows of refs point to."""
+    return {
+        row["object"]: row["object_bytes"]
+        for table in marked.refs.values()
+        for row in table.select(["object", "object_bytes"]).to_pylist()
+        if row["object_bytes"] is not None
+    }
+
+
 def _adopt(source: Lake, target: Lake, transaction: Transaction, *, versions: range, bars: Bars) -> None:
-    deleted = [entry["deleted"] for entry in source.catalog.history(len(versions)) if "deleted" in entry]
     with bars(len(versions), "versions", "version") as advance:
         for version in versions:
             with transaction.keeping_collectors_out():
@@ -107,11 +136,21 @@ def _adopt(source: Lake, target: Lake, transaction: Transaction, *, versions: ra
             advance(1)
     if versions:
         target.catalog.acknowledge(versions[-1])
-    for kind, noun, there in (("tags", "tag", target.refs.tags()), ("branches", "branch", target.refs.branches())):
-        known = source.refs.tags() if kind == "tags" else source.refs.branches()
-        for name in there:
-            if f"{noun} {name}" in deleted and name not in known:
+
+
+def _delete_refs(source: Lake, target: Lake) -> None:
+    """Delete the target's refs that the source lacks and that the log says were deleted since they were made: also
+    where an earlier transfer brought that entry, and was stopped."""
+    for kind, noun, known in (
+        ("tags", "tag", source.refs.tags()), ("branches", "branch", source.refs.branches()),
+    ):  # fmt: skip
+        there = target.refs.tags() if kind == "tags" else target.refs.branches()
+        for entry in source.catalog.history():
+            name = entry.get("deleted", "").removeprefix(f"{noun} ")
+            ref = there.get(name) if entry.get("deleted") == f"{noun} {name}" and name not in known else None
+            if ref is not None and datetime.fromisoformat(ref.created).timestamp() * 1000 <= entry["timestamp"]:
                 target.refs.remove(kind, name)
+                del there[name]
 
 
 def _check_history(source: Lake, target: Lake, *, head: int, there: int) -> None:

@@ -33,7 +33,7 @@ from flagdata.schema import TOPIC_IMAGE
 CHECKSUMS = "flagdata.checksums"
 """Name of the metadata record."""
 SCHEMA = "flagdata.checksums/1"
-FIX = "restore it from a copy, or ingest the source again; flagdata verify lists all that is damaged"
+FIX = "run flagdata verify: it lists all that is damaged, and what replaces it; or restore the record from a copy"
 _HEAD = struct.Struct("<HIQQ")
 HEAD_BYTES = _HEAD.size
 """Bytes of a message's head that `heads` covers: all but the record's opcode and length."""

@@ -66,7 +66,7 @@ def fetched(name: str, suffix: str, *, size: int, fetch: Callable[[Path], None],
         if content_hash(part) != name.partition("/")[2]:
             raise CorruptError(
                 f"the bytes of {name} have changed since they were written", where=where,
-                fix="ingest the source again (it replaces the object), or restore it from a copy",
+                fix="run flagdata verify: it names what replaces the object; or restore it from a copy",
             )  # fmt: skip
         try:
             part.rename(path)

@@ -112,6 +112,7 @@ def trained(
     from torch import distributed as ranks
 
     import flagdata
+    from flagdata.lake.healing import present, said
     from flagdata.locks import alone_in
     from flagdata.provenance import digest
     from models.storage import read_card
@@ -130,11 +131,12 @@ def trained(
     data = data_identity(source.lake, train_pairs, validation_pairs, at=at)
     recordings = recordings_of(train_pairs, validation_pairs)
     wanted = network_artifact(source.lake, recipe, data, recordings, branch=branch).id
-    known = source.lake.rows({"artifact": wanted}, at=branch, columns=["artifact"]).num_rows
-    if known:
-        say("this model was trained before")
-        row = source.lake.artifact(wanted, at=branch)
-        return _report(row, read_card(source.lake.object_path(str(row.object))))
+    if source.lake.rows({"artifact": wanted}, at=branch, columns=["artifact"]).num_rows:
+        there = present(source.lake, source.lake.artifact(wanted, at=branch))
+        if there.whole is not None:
+            say("this model was trained before")
+            return _report(there.whole, read_card(source.lake.object_path(str(there.whole.object))))
+        say("this model was trained before, but its object is damaged or missing: it is trained again")
     films = film_rows(train_pairs, sequences=recipe.data.sequences, seed=recipe.seed)
     if names := recipe.loss.targets:
         for side, table, rows in (
@@ -187,9 +189,11 @@ def trained(
             ranks.barrier()  # no rank leaves while another still talks to it
         if not first:
             return None
-        row, card = publish(
+        row, card, healed = publish(
             source.lake, recipe, data, recordings, done, batches=training.batches.state(), branch=branch
         )  # fmt: skip
+        if healed is not None:
+            say(said(row.id, healed))
     finally:
         held.close()
         if several:

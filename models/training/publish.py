@@ -9,6 +9,7 @@ from typing import Any
 from flagdata.checksums import write_sums
 from flagdata.dataset import Pairs
 from flagdata.lake import Artifact, Lake
+from flagdata.lake.healing import Healing
 from flagdata.provenance import canonical, code_version
 from flagdata.schema import Kind
 from models.storage import WEIGHTS, write_card, write_tensors
@@ -69,8 +70,9 @@ def card_of(
 def publish(
     lake: Lake, recipe: TrainingRecipe, data: dict[str, Any], recordings: Sequence[str], trained: Trained, *,
     batches: dict[str, Any], branch: str,
-) -> tuple[Artifact, dict[str, Any]]:  # fmt: skip
-    """Commit a model and return its row and card; one that is there already is kept. A recording that was withdrawn
+) -> tuple[Artifact, dict[str, Any], Healing | None]:  # fmt: skip
+    """Commit a model and return its row and card; one that is there already is kept, unless its object is damaged or
+    missing: what was done about that is returned, too. A recording that was withdrawn
     from the branch since the training began is not among its parents.
 
     Raises:
@@ -88,4 +90,4 @@ def publish(
         best = {"epochs": card["epochs"], "best": card["best"], "parameters": card["parameters"]}
         artifact = replace(artifact, object=transaction.put(staged), parameters=canonical(best))
         transaction.add(artifact)
-    return transaction.result.artifacts[artifact.id], card
+    return transaction.result.artifacts[artifact.id], card, transaction.result.healed.get(artifact.id)

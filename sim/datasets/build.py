@@ -28,7 +28,7 @@ from sim.datasets.cluster import Job, results
 from sim.datasets.films import Film, Sequences
 from sim.datasets.jobs import Filmed, Simulated
 from sim.datasets.recipe import DatasetRecipe
-from sim.run.publish import publish
+from sim.run.publish import publish, whole
 
 COMMIT_FILMS = 32
 """Films of one commit."""
@@ -47,6 +47,7 @@ class BuildReport:
     Attributes:
         sequences, films: how many the data set has.
         new_sequences, new_films: how many of them were made now.
+        healed: how many of all were there, but damaged or missing, and were made again.
         clips: how many the films have.
         failed: sequences that diverged or crumpled and were replaced, with why.
         seconds: wall time.
@@ -56,6 +57,7 @@ class BuildReport:
     films: int
     new_sequences: int
     new_films: int
+    healed: int
     clips: int
     failed: tuple[str, ...]
     seconds: float
@@ -79,6 +81,7 @@ class Build:
     device: str = "cpu"
     _new_sequences: int = field(default=0, init=False)
     _new_films: int = field(default=0, init=False)
+    _healed: int = field(default=0, init=False)
     _clips: int = field(default=0, init=False)
 
     def run(self) -> BuildReport:
@@ -97,18 +100,15 @@ class Build:
         failed = [f"{roll.cast.simulation.name} {index}: {why}" for roll in rolls for index, why in roll.failed.items()]
         return BuildReport(
             sequences=sum(roll.cast.simulation.count for roll in rolls), films=len(films),
-            new_sequences=self._new_sequences, new_films=self._new_films, clips=self._clips,
+            new_sequences=self._new_sequences, new_films=self._new_films, healed=self._healed, clips=self._clips,
             failed=tuple(failed), seconds=time.perf_counter() - begun,
         )  # fmt: skip
-
-    def _known(self) -> set[str]:
-        return set(self.lake.rows(at=self.branch, columns=["artifact"])["artifact"].to_pylist())
 
     # Sequences
 
     def _simulate(self) -> list[Roll]:
         rolls = [Roll(cast=cast) for cast in casts(self.recipe)]
-        known = self._known()
+        known = whole(self.lake, [roll.id(i) for roll in rolls for i in roll.candidates], branch=self.branch)
         total = sum(roll.cast.simulation.count for roll in rolls)
         with self.bars(total, f"{self.recipe.name}: simulate", "flag") as advance:
             todo = [(roll, roll.pending(known)) for roll in rolls]
@@ -129,9 +129,10 @@ class Build:
                 if outcome.failure is not None:
                     roll.failed[outcome.member.index] = outcome.failure[1]
             if good:
-                publish(self.lake, roll.cast.simulation, good, step=done.step, branch=self.branch)
+                committed = publish(self.lake, roll.cast.simulation, good, step=done.step, branch=self.branch)
                 roll.done |= {outcome.member.index for outcome in good}
-                self._new_sequences += len(good)
+                self._new_sequences += len(committed.added)
+                self._healed += len(committed.healed)
                 advance(len(good))
 
     def _batches(self, todo: Sequence[tuple[Roll, list[int]]]) -> Iterator[Job]:
@@ -161,7 +162,7 @@ class Build:
         self._refuse_other_names(films)
         own = {film.artifact().id for film in films}
         self._refuse_mixture(own)
-        known = self._known()
+        known = whole(self.lake, own, branch=self.branch)
         missing = [film for film in films if film.artifact().id not in known]
         clips = self.lake.rows({"kind": Kind.CLIP}, at=self.branch, columns=["recording"])["recording"].to_pylist()
         self._clips = sum(recording in own for recording in clips)
@@ -224,7 +225,9 @@ class Build:
                 transaction.add(replace(recording, branch=self.branch))
                 for clip in clip_rows(record, recording):
                     self._clips += transaction.add(clip)
-        self._new_films += len(filmed)
+        films = {done.film.artifact().id for done in filmed}
+        self._new_films += len(films.intersection(transaction.result.added))
+        self._healed += len(films.intersection(transaction.result.healed))
         return len(filmed)
 
 

@@ -122,8 +122,7 @@ class Roll:
         Raises:
             RefusedError: more than a quarter of the members failed.
         """
-        count = self.cast.simulation.count
-        limit = count + max(4, math.ceil(count / 4))
+        count, limit = self.cast.simulation.count, len(self.candidates)
         chosen: list[int] = []
         index = 0
         while len(chosen) < count:
@@ -138,11 +137,17 @@ class Roll:
             index += 1
         return chosen
 
+    @property
+    def candidates(self) -> range:
+        """Indices among which sequences are chosen: some may fail."""
+        count = self.cast.simulation.count
+        return range(count + max(4, math.ceil(count / 4)))
+
     def pending(self, known: Collection[str]) -> list[int]:
         """Chosen members that are not in the lake.
 
         Args:
-            known: artifact ids that are there.
+            known: artifact ids that are there, and whole.
         """
         self.done |= {index for index in self.chosen if self.id(index) in known}
         return [index for index in self.chosen if index not in self.done]

@@ -100,6 +100,7 @@ def build(
     say(
         f"{report.new_sequences} of {report.sequences} sequences and {report.new_films} of {report.films} films made "
         f"in {report.seconds:.0f} s; {report.clips} clips"
+        f"{f'; {report.healed} damaged or missing objects replaced' if report.healed else ''}"
     )
     if written is not None:
         click.echo(written)

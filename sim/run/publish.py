@@ -5,17 +5,18 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import islice
 from typing import Any, TypeAlias
 
 import torch
 
 from flagdata.errors import UsageError
-from flagdata.lake import Artifact, Lake
+from flagdata.lake import Artifact, CommitResult, Lake
+from flagdata.lake.healing import Healing, unsound
 from flagdata.lake.meshes import write_meshes
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
@@ -34,7 +35,8 @@ class RunReport:
 
     Attributes:
         added: artifact ids published now.
-        existing: artifact ids that were there already.
+        existing: artifact ids that were there already, and whole.
+        healed: artifact ids that were there, whose objects were damaged or missing and were made again → how.
         failed: what was not stored: index, seed, kind and what of each.
         steps: material → step of the integrator [s].
         seconds: wall time of the simulation.
@@ -43,6 +45,7 @@ class RunReport:
 
     added: tuple[str, ...]
     existing: tuple[str, ...]
+    healed: Mapping[str, Healing]
     failed: tuple[Mapping[str, Any], ...]
     steps: Mapping[str, float]
     seconds: float
@@ -50,7 +53,9 @@ class RunReport:
 
     def as_dict(self) -> dict[str, Any]:
         return {
-            "added": list(self.added), "existing": list(self.existing), "failed": [dict(f) for f in self.failed],
+            "added": list(self.added), "existing": list(self.existing),
+            "healed": {artifact: asdict(how) for artifact, how in self.healed.items()},
+            "failed": [dict(f) for f in self.failed],
             "steps": dict(self.steps), "seconds": self.seconds, "rate": self.rate,
         }  # fmt: skip
 
@@ -64,7 +69,8 @@ def simulate(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> RunReport:
-    """Simulate the members of a recipe that are not on the branch yet, and publish them batch by batch.
+    """Simulate the members of a recipe that are not on the branch yet, or whose object there is damaged or missing, and
+    publish them batch by batch.
 
     A run that was stopped goes on where its last commit was. Members that fail are reported and not stored; a later run
     tries them again. What a member becomes depends neither on the workers nor on what it is simulated with.
@@ -82,14 +88,15 @@ def simulate(
         raise UsageError(f"{workers} workers", where="--workers", fix="give at least one")
     crew = Crew(recipe)
     identity = recipe.identity()
-    known = set(lake.rows(at=branch, columns=["artifact"])["artifact"].to_pylist())
     ids = {index: member_artifact(recipe, identity, index, crew.seed(index)).id for index in range(recipe.count)}
+    known = whole(lake, ids.values(), branch=branch)
     existing = [ids[index] for index in ids if ids[index] in known]
     pending = [index for index in ids if ids[index] not in known]
     steppers = [Stepper.of(crew, base) for base in range(len(recipe.material.bases))]
     if progress is not None:
         progress(len(existing))
     added: list[str] = []
+    healed: dict[str, Healing] = {}
     failed: list[Mapping[str, Any]] = []
     begun = time.perf_counter()
     waiting = batches(crew, steppers, pending)
@@ -97,13 +104,21 @@ def simulate(
         good = [o for o in done if o.sequence is not None]
         failed += [failure_of(o) for o in done if o.failure is not None]
         if good:
-            added += publish(lake, recipe, good, step=stepper.step, branch=branch)
+            done_now = publish(lake, recipe, good, step=stepper.step, branch=branch)
+            added += done_now.added
+            healed |= done_now.healed
     seconds = time.perf_counter() - begun
     return RunReport(
-        added=tuple(added), existing=tuple(existing), failed=tuple(failed), seconds=seconds,
+        added=tuple(added), existing=tuple(existing), healed=healed, failed=tuple(failed), seconds=seconds,
         steps={base.name: stepper.step for base, stepper in zip(recipe.material.bases, steppers, strict=True)},
         rate=len(pending) / seconds if pending else 0.0,
     )  # fmt: skip
+
+
+def whole(lake: Lake, artifacts: Collection[str], *, branch: str) -> frozenset[str]:
+    """Those of some artifacts that a branch has, and whose objects are neither damaged nor missing."""
+    there = lake.rows({"artifact": list(artifacts)}, at=branch, columns=["artifact"])["artifact"].to_pylist()
+    return frozenset(there) - unsound(lake, there, at=branch)
 
 
 def batches(crew: Crew, steppers: Sequence[Stepper], pending: Sequence[int]) -> list[tuple[Stepper, list[int]]]:
@@ -163,8 +178,8 @@ def one_thread() -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def publish(lake: Lake, recipe: Recipe, outcomes: Sequence[Outcome], *, step: float, branch: str) -> list[str]:
-    """Publish the outcomes that have meshes in one commit, and return the artifacts that are new.
+def publish(lake: Lake, recipe: Recipe, outcomes: Sequence[Outcome], *, step: float, branch: str) -> CommitResult:
+    """Publish the outcomes that have meshes in one commit.
 
     Args:
         step: of the integrator [s].
@@ -178,7 +193,7 @@ def publish(lake: Lake, recipe: Recipe, outcomes: Sequence[Outcome], *, step: fl
             staged = transaction.staging(".zarr")
             write_meshes(staged, outcome.sequence)
             transaction.add(_published(recipe, identity, outcome, step, stored=transaction.put(staged)))
-    return list(transaction.result.added)
+    return transaction.result
 
 
 def member_artifact(recipe: Recipe, identity: Mapping[str, Any], index: int, seed: int) -> Artifact:

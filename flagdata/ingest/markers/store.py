@@ -11,7 +11,7 @@ from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.markers.table import MarkerOptions, read_table
 from flagdata.ingest.report import REPORT_SCHEMA
 from flagdata.ingest.source import Source
-from flagdata.ingest.store import IngestResult, Labels, find, result_of
+from flagdata.ingest.store import IngestResult, Labels, find, kept, result_of
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.markers import MarkerSequence, write_markers
@@ -51,9 +51,9 @@ def ingest_markers(
             named[name] = Labels(name=f"{stem} {name}".strip(), session=labels.session)
             recipe = {"ingest": "markers", "recording": name, **options.recipe()}
             asked = named[name] if labels.name is not None else Labels(session=labels.session)
-            there = find(lake, Kind.MARKERS, source, recipe, asked, branch=branch)
+            there = find(lake, Kind.MARKERS, source, recipe, asked, branch=branch).whole
             if there is not None:
-                present[name] = there
+                present[name] = kept(there)
                 continue
             found = _findings(sequence)
             report = _report(sequence, found, reasons)

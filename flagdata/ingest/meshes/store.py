@@ -18,7 +18,7 @@ from flagdata.ingest.meshes.folder import read_folder
 from flagdata.ingest.meshes.pieces import welded
 from flagdata.ingest.report import REPORT_SCHEMA
 from flagdata.ingest.source import Source
-from flagdata.ingest.store import IngestResult, Labels, find, result_of
+from flagdata.ingest.store import IngestResult, Labels, find, kept, result_of
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, write_meshes
@@ -78,9 +78,9 @@ def ingest_meshes(
     options, labels = options or MeshIngest(), labels or Labels()
     source = Source.of(path)
     recipe = options.recipe()
-    present = find(lake, Kind.MESHES, source, recipe, labels, branch=branch)
-    if present is not None:
-        return present
+    there = find(lake, Kind.MESHES, source, recipe, labels, branch=branch).whole
+    if there is not None:
+        return kept(there)
     metre = float(unit(options.unit).to_si(1.0))
     sequence = read_folder(path, rate=options.rate, metre=metre, progress=progress)
     check_units(sequence, where=str(path))

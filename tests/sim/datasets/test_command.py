@@ -100,7 +100,9 @@ def test_a_folder_that_is_no_lake_is_left_alone(
 def test_a_data_set_that_is_built_is_reported_although_its_card_cannot_be_written(
     recipe_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    report = BuildReport(sequences=6, films=15, new_sequences=6, new_films=15, clips=15, failed=(), seconds=1.0)
+    report = BuildReport(
+        sequences=6, films=15, new_sequences=6, new_films=15, healed=0, clips=15, failed=(), seconds=1.0
+    )
 
     def refused(*_: object, **__: object) -> NoReturn:
         raise OSError(errno.EIO, "Input/output error")
