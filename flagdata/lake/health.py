@@ -13,7 +13,7 @@ import pyarrow as pa
 from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
 from flagdata.lake.again import made_again
-from flagdata.lake.artifact import Artifact
+from flagdata.lake.artifact import OBJECT_NAME, Artifact
 from flagdata.lake.collect import left_uploads
 from flagdata.lake.erasure import unfinished
 from flagdata.lake.lake import Lake
@@ -346,8 +346,12 @@ def _later(grace: timedelta) -> str:
 
 def _strays(lake: Lake, foreign: Collection[Path]) -> list[Finding]:
     known: set[Place] = {stored.path for stored in lake.objects} | set(foreign)
-    noted = {path.parent / f"{path.name}{DAMAGED}" for path in known}
-    strays = [p for store in STORES for p in (lake.path / store).glob("*") if p not in known and p not in noted]
+    strays = [
+        path
+        for store, suffix in STORES.items()
+        for path in (lake.path / store).glob("*")
+        if path not in known and not OBJECT_NAME.fullmatch(f"{store}/{path.name.removesuffix(suffix + DAMAGED)}")
+    ]
     return [
         Finding(
             kind="stray-file",
