@@ -21,8 +21,8 @@ from flagdata.record import Record
 from flagdata.schema import Kind
 from flagdata.signals import WindSeries
 
-_CHOOSES = ("wind", "talker")
-"""Options that choose one of several anemometers of a file: another choice is another log, no other reading of it."""
+_CHOOSES = ("wind", "talker", "session")
+"""What makes another log of the same file and no other reading of it: one of several anemometers, a second session."""
 
 
 def other_readings(others: Sequence[Artifact], source_hash: str, recipe: Mapping[str, Any]) -> tuple[Finding, ...]:

@@ -1,8 +1,8 @@
 """From a vendor's file to an artifact of the lake: read, written as a record on the device's own clock, published.
 
 The identity of an artifact is its source's bytes, the options that shaped it, and of a log what was understood of it,
-so that ingesting a file again finds it. One source is one transaction: an error, Ctrl-C or a crash leaves the lake as
-it was.
+so that ingesting a file again finds it. Of a log that comes in for a second session, its session is a part, too. One
+source is one transaction: an error, Ctrl-C or a crash leaves the lake as it was.
 """
 
 from __future__ import annotations
@@ -283,6 +283,8 @@ def _read(
     except NothingMeasuredError as error:
         return error
     recipe = {**options.recipe(), "plan": dict(log.plan)}
+    if _is_of_another_session(lake, source, recipe, labels, branch=branch):
+        recipe["session"] = labels.session
     there = find(lake, Kind.WIND, source, recipe, labels, branch=branch)
     if there.whole is not None:
         return kept(there.whole)
@@ -296,6 +298,16 @@ def _read(
     findings = (*findings, *_beside(lake, log.series, labels.session, others))
     findings = (*findings, *other_readings(others, source.hash, recipe))
     return _Read(log=log, options=options, labels=labels, recipe=recipe, findings=findings, paired=paired, there=there)
+
+
+def _is_of_another_session(
+    lake: Lake, source: Source, recipe: Mapping[str, Any], labels: Labels, *, branch: str
+) -> bool:
+    """Whether the branch has this log for a session, and it is ingested for another one: the same constant wind, or
+    counts of seconds from 0, may have been logged beside another film. It is another artifact, whose recipe names its
+    session."""
+    rows = lake.rows(at=branch).filter(_same(Kind.WIND, source, recipe)).to_pylist()
+    return bool(rows) and None not in (labels.session, rows[0]["session"]) and rows[0]["session"] != labels.session
 
 
 def _present(lake: Lake, kind: Kind, branch: str) -> list[Artifact]:
@@ -376,12 +388,16 @@ def find(lake: Lake, kind: Kind, source: Source, recipe: Mapping[str, Any], labe
     Raises:
         ConflictError: it is there, under another name or session than the one asked for.
     """
-    same = (
+    return _found(lake, lake.rows(at=branch).filter(_same(kind, source, recipe)).to_pylist(), labels)
+
+
+def _same(kind: Kind, source: Source, recipe: Mapping[str, Any]) -> pc.Expression:
+    """What the row of an artifact meets that this source and recipe make."""
+    return (
         (pc.field("kind") == kind.value)
         & (pc.field("source_hash") == source.hash)
         & (pc.field("recipe_hash") == recipe_hash(recipe))
     )
-    return _found(lake, lake.rows(at=branch).filter(same).to_pylist(), labels)
 
 
 def find_same(lake: Lake, artifact: str, labels: Labels, *, branch: str) -> Present:

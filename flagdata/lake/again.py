@@ -1,4 +1,4 @@
-"""How an artifact is made again whose object is damaged or missing: what a user is told to do about it."""
+"""How an artifact is made again whose object is damaged or missing: the remedy that a finding names."""
 
 from __future__ import annotations
 

@@ -19,6 +19,7 @@ from flagdata.lake import Lake
 from flagdata.provenance import file_hash
 from flagdata.record import Coding, Record
 from flagdata.schema import Kind
+from tests.confirming import CONFIRMED
 
 START = 1_777_629_600_000_000_000  # 2026-05-01T10:00:00Z
 
@@ -127,13 +128,35 @@ def test_other_labels_than_the_artifact_has_are_refused_and_the_same_ones_find_i
 
     first = ingest(session="a").artifact
     before = _everything(lake)
-    with pytest.raises(ConflictError, match=r"the session 'a', not 'b'.*flagdata withdraw"):
-        ingest(session="b")
+    if kind is Kind.CAMERA:
+        with pytest.raises(ConflictError, match=r"the session 'a', not 'b'.*flagdata withdraw"):
+            ingest(session="b")
     with pytest.raises(ConflictError, match=f"the name '{first.name}', not 'b'"):
         ingest(name="b")
     for labels in ({}, {"session": "a"}, {"name": str(first.name), "session": "a"}):
         assert ingest(**labels).artifact.id == first.id
     assert _everything(lake) == before
+
+
+def test_the_same_constant_log_enters_once_for_each_session(lake: Lake, tmp_path: Path) -> None:
+    rows = "".join(f"2026-05-01 12:00:{k:02d},5.0\n" for k in range(60))
+    paths = [tmp_path / name for name in ("first-film.csv", "second-film.csv")]
+    for path in paths:
+        path.write_text(f"time,wind_speed (m/s)\n{rows}")
+
+    def ingest(path: Path, session: str | None) -> store.IngestResult:
+        options = WindIngest(wind=WindOptions(zone="UTC", expect=("constant",)))
+        return ingest_wind(lake, path, options, labels=Labels(session=session), confirm=CONFIRMED)
+
+    first, second = ingest(paths[0], "a"), ingest(paths[1], "b")
+    assert (first.created, second.created) == (True, True)
+    assert (second.artifact.session, second.artifact.name) == ("b", "second-film")
+    assert not [found for found in second.report["findings"] if found["kind"] == "ingested-before"]
+    assert [ingest(paths[0], "b").artifact.id, ingest(paths[1], "a").artifact.id] == [
+        second.artifact.id, first.artifact.id,
+    ]  # fmt: skip
+    assert ingest(paths[1], None).artifact.id == first.artifact.id
+    assert len(lake.rows()) == 2
 
 
 def test_a_session_for_an_artifact_without_one_is_refused(lake: Lake, wind_log: Path) -> None:

@@ -289,7 +289,7 @@ def test_a_clone_that_was_killed_is_gone_on_with_by_the_command_that_its_refusal
     assert Lake.open(target).rows()["artifact"].to_pylist() == [film.id]
 
 
-def test_a_lake_whose_making_was_killed_is_told_from_another_folder(
+def test_a_lake_whose_making_was_killed_is_distinguished_from_another_folder(
     lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def kill(*arguments: object, **named: object) -> bool:
