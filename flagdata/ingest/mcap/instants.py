@@ -110,6 +110,13 @@ class Order:
     findings: tuple[Finding, ...]
 
 
+def few_without_date(stamps: NDArray[np.int64], logged: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(n,) which messages have a stamp before 1980 or after 2100, as of a clock that was not set yet, where most have a
+    date and the log has one for these."""
+    odd = (stamps < _FROM) | (stamps >= _TO)
+    return odd & (logged >= _FROM) & (logged < _TO) & (2 * int(odd.sum()) < len(stamps))
+
+
 def order_of(stamps: NDArray[np.int64], logged: NDArray[np.int64], *, sort: bool, where: str) -> Order:
     """The order of messages by their instants.
 
@@ -157,7 +164,7 @@ def clock_findings(
     """What to report of the clocks of messages.
 
     Args:
-        unset: messages whose field for an instant is zero, or holds no time.
+        unset: messages whose field for an instant is zero, or holds no date.
         unstated: those that have no such field.
         where: the topic.
     """

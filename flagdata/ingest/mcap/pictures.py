@@ -95,13 +95,19 @@ class TopicSource:
         if end is not None:
             after = int(found.stamps[end - 1] - found.stamps[0]) / NANOSECONDS
             findings.append(restarted(frame=end, after=after, count=len(found.stamps) - end))
-        self._places, stamps = found.places[:end], found.stamps[:end]
-        timing = survey(np.sort(stamps), tick=_NANOSECOND, missing=0, fallback_rate=Fraction(1), where=where)
-        decoded = self._decoded(messages(self._path, self._topic.name, places=self._places))
+        self._index = found = found.part(0, end)
+        timing = survey(
+            np.sort(found.stamps) if found.in_time else found.stamps,
+            tick=_NANOSECOND,
+            missing=0,
+            fallback_rate=Fraction(1),
+            where=where,
+        )
+        decoded = self._decoded(messages(self._path, self._topic.name, found=found))
         first = next(decoded, None)
         if first is None:
             raise InputError(
-                f"none of {len(self._places)} pictures of {self._topic.name} can be decoded", where=where,
+                f"none of {len(self._index.stamps)} pictures of {self._topic.name} can be decoded", where=where,
                 fix="choose another topic: --topic NAME",
             )  # fmt: skip
         _, width, height, codec, pixel_format, _ = first
@@ -158,21 +164,21 @@ class TopicSource:
             yield self._picture(one)
 
     def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
-        length = len(self._places)
+        length = len(self._index.stamps)
         first = 0
         for run in range(runs):
             start = max(first, length * run // runs)
             first = min(start + count * stride, length)
             if start >= length:
                 return
-            part = messages(self._path, self._topic.name, places=self._places[start:])
+            part = messages(self._path, self._topic.name, found=self._index.part(start))
             sound = (one for one in self._decoded(part, tally=False) if one[1:3] == self._size)
             pictures = [self._picture(one) for one in islice(sound, 0, count * stride, stride)]
             if pictures:
                 yield pictures
 
     def damage(self) -> list[Finding]:
-        return undecoded(self._broken, total=len(self._places)) + resized(self._resized)
+        return undecoded(self._broken, total=len(self._index.stamps)) + resized(self._resized)
 
     def close(self) -> None:
         """The file is open only while pictures are read."""

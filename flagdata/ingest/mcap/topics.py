@@ -9,9 +9,10 @@ Source: the MCAP specification and its registry of encodings, https://mcap.dev/s
 from __future__ import annotations
 
 import struct
+from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError,
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.mcap import cdr
 from flagdata.ingest.mcap.bags import is_described, parts_of
-from flagdata.ingest.mcap.instants import Stamp, checked, clock_findings, order_of, stamp_of
+from flagdata.ingest.mcap.instants import Stamp, checked, clock_findings, few_without_date, order_of, stamp_of
 from flagdata.ingest.mcap.layout import Layout, Message, Messages, layout_of
 from flagdata.timebase import NANOSECONDS
 
@@ -87,10 +88,12 @@ class Decoded:
         place: number of its file, of its block there, and its offset in that.
         log_time: when it was recorded [UTC ns].
         values: of its fields.
+        dated: its instant by its topic's `Index` [UTC ns]; `None` where that was not asked.
     """
 
     place: tuple[int, int, int] = (0, 0, 0)
     log_time: int
+    dated: int | None = None
     values: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -109,6 +112,8 @@ class Decoded:
         Raises:
             CorruptError: an instant beyond those that 64 bits hold.
         """
+        if self.dated is not None:
+            return self.dated
         said = self.said.instant
         return checked(self.log_time) if said is None else said
 
@@ -118,17 +123,26 @@ class Index:
     """The messages of a topic in the order in which they are to be read.
 
     Attributes:
+        rows: (n,) number of each in the order of the file.
         places: (n, 3) as `Decoded.place`.
         stamps, logged: (n,) when each was measured and when it was logged [UTC ns].
         in_time: whether they are in the order of their instants, to within a slip where that of the file stands.
         findings: what to report of their order, their clocks and of those that are missing.
     """
 
+    rows: NDArray[np.intp]
     places: NDArray[np.int64]
     stamps: NDArray[np.int64]
     logged: NDArray[np.int64]
     in_time: bool
     findings: tuple[Finding, ...]
+
+    def part(self, first: int, end: int | None = None) -> Index:
+        """The messages from one place on, or up to another."""
+        rows = slice(first, end)
+        return replace(
+            self, rows=self.rows[rows], places=self.places[rows], stamps=self.stamps[rows], logged=self.logged[rows]
+        )
 
 
 def profile(path: Path) -> str:
@@ -199,12 +213,12 @@ def choose(found: Sequence[Topic], wanted: str | None, *, where: str, noun: str)
     raise InputError(what, where=where, fix="choose one: --topic NAME" if found else "see flagdata doctor FILE")
 
 
-def messages(path: Path, topic: str, *, places: NDArray[np.int64] | None = None) -> Iterator[Decoded]:
-    """The messages of a topic in the order of the file, or those at some places in theirs.
+def messages(path: Path, topic: str, *, found: Index | None = None) -> Iterator[Decoded]:
+    """The messages of a topic in the order of the file, or those of an index in its.
 
     Args:
         topic: its name, as `topics` gives it.
-        places: (n, 3) as `Decoded.place`; `None` for all.
+        found: the index; `None` for all.
 
     Raises:
         InputError: an encoding that is not read.
@@ -224,11 +238,11 @@ def messages(path: Path, topic: str, *, places: NDArray[np.int64] | None = None)
             place = (part, message.block, message.offset)
             return Decoded(place=place, log_time=message.log_time, values=decoders[key](message.data))
 
-        if places is not None:
-            for part, block, offset in places.tolist():
+        if found is not None:
+            for (part, block, offset), dated in zip(found.places.tolist(), found.stamps.tolist(), strict=True):
                 with _readable(layouts[part].path):
                     one = decoded(part, opened[part].at(block, offset))
-                yield one
+                yield replace(one, dated=dated)
             return
         for part, file in enumerate(opened):
             walk = file.of({number for of_part, number in channels if of_part == part})
@@ -241,38 +255,53 @@ def messages(path: Path, topic: str, *, places: NDArray[np.int64] | None = None)
                 yield one
 
 
-def index(path: Path, topic: str, *, limit: int | None = None, sort: bool = True) -> Index:
+def index(
+    path: Path,
+    topic: str,
+    *,
+    limit: int | None = None,
+    sort: bool = True,
+    each: Callable[[Decoded], object] | None = None,
+) -> Index:
     """The messages of a topic in the order of their instants.
 
     Args:
         sort: whether to put messages in order that are a slip late; else they stay in that of the file or the log.
+        each: called with every message, in the order of the file.
 
     Raises:
         LimitError: more messages than `limit`, whatever the file's summary states.
         InputError, CorruptError: as `messages`; or an instant beyond those that 64 bits hold.
     """
-    rows: list[tuple[int, int, int, int, int]] = []
-    unset = unstated = 0
+    numbers = array("q")
+    stated, named = bytearray(), bytearray()
     for one in messages(path, topic):
-        if len(rows) == limit:
+        if len(stated) == limit:
             raise LimitError(
                 f"more than {limit} messages in {topic}", where=str(path), fix="cut the file, or raise the limit"
             )
-        said = one.said
-        unset += said.instant is None and said.field
-        unstated += said.instant is None and not said.field
-        logged = checked(one.log_time)
-        rows.append((*one.place, logged if said.instant is None else said.instant, logged))
-    table = np.array(rows, dtype=np.int64).reshape(-1, 5)
+        said, logged = one.said, checked(one.log_time)
+        stated.append(said.instant is not None)
+        named.append(said.field)
+        numbers.extend((*one.place, logged if said.instant is None else said.instant, logged))
+        if each is not None:
+            each(one)
+    table = np.array(numbers, dtype=np.int64).reshape(-1, 5)
+    places, stamps, logged = table[:, :3], table[:, 3], table[:, 4]
     if not is_described(path):
-        _check_successive(path, topic, table[:, :3], table[:, 4])
-    order = order_of(table[:, 3], table[:, 4], sort=sort, where=topic)
-    found = clock_findings(table[:, 3], table[:, 4], unset=unset, unstated=unstated, where=topic)
-    table = table[order.rows]
+        _check_successive(path, topic, places, logged)
+    with_field = np.frombuffer(named, dtype=bool)
+    by_log = ~np.frombuffer(stated, dtype=bool) | few_without_date(stamps, logged)
+    stamps[by_log] = logged[by_log]
+    order = order_of(stamps, logged, sort=sort, where=topic)
+    found = clock_findings(
+        stamps, logged, unset=int((by_log & with_field).sum()), unstated=int((~with_field).sum()), where=topic
+    )
     return Index(
-        places=table[:, :3],
-        stamps=table[:, 3],
-        logged=table[:, 4],
+        rows=order.rows,
+        places=places[order.rows],
+        stamps=stamps[order.rows],
+        logged=logged[order.rows],
         in_time=order.in_time,
         findings=(*_missing(path, topic), *order.findings, *found),
     )

@@ -14,7 +14,7 @@ from typing import Any
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.options import Limits
 from flagdata.ingest.anemometer.text.source import TableText
-from flagdata.ingest.mcap.topics import Topic, choose, index, messages, topics
+from flagdata.ingest.mcap.topics import Decoded, Topic, choose, index, messages, topics
 from flagdata.record.messages import WIND_FIELDS
 from flagdata.schema import CHANNELS
 from flagdata.timebase import iso
@@ -66,16 +66,19 @@ def open_topic(path: Path, name: str | None, *, limits: Limits) -> TableText:
     topic = choose(of_numbers(path, topics(path)), name, where=where, noun="numbers")
     headings = _HEADINGS.get(topic.type, {})
     names: dict[str, int] = {}
-    rows: list[tuple[int, dict[str, str]]] = []
-    found = index(path, topic.name, limit=limits.rows)
-    for message in messages(path, topic.name, places=found.places):
+    rows: list[dict[str, str]] = []
+
+    def add(message: Decoded) -> None:
         row = dict(_numbers(message.values))
         for one in row:
             if one not in names and len(names) < _WIDEST:
                 names[one] = len(names)
-        rows.append((message.stamp, row))
+        rows.append(row)
+
+    found = index(path, topic.name, limit=limits.rows, each=add)
+    timed = zip(found.stamps.tolist(), (rows[number] for number in found.rows.tolist()), strict=True)
     lines = [",".join(["time", *(headings.get(one, one) for one in names)])]
-    lines += [",".join([iso(stamp), *(row.get(one, "") for one in names)]) for stamp, row in rows]
+    lines += [",".join([iso(stamp), *(row.get(one, "") for one in names)]) for stamp, row in timed]
     what = f"the topic {topic.name}: {len(rows)} messages of {topic.schema or topic.encoding}, a row each"
     read = Finding(kind="topic-read", severity=Severity.NOTE, what=what, count=len(rows))
     return TableText(path=path, encoding="utf-8", lines=len(lines), findings=(read, *found.findings), text=tuple(lines))

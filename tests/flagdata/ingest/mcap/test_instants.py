@@ -93,6 +93,25 @@ def test_pictures_with_a_stamp_of_zero_are_dated_by_the_log_and_reported(tmp_pat
     assert "dated-by-log" not in read(filmed(tmp_path / "c.mcap", steady, steady))[2]
 
 
+def test_pictures_from_before_the_clock_was_set_are_dated_by_the_log(tmp_path: Path) -> None:
+    path = filmed(tmp_path / "a.mcap", lambda k: steady(k) if k >= 3 else 12 * 10**9 + k * STEP, steady)
+    numbers, times, kinds = read(path)
+    assert numbers == times == list(range(40))
+    assert kinds["dated-by-log"] == "warning"
+
+
+def test_copies_of_a_picture_are_left_out_and_counted(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with bag(path) as writer:
+        one, other = (channel(writer, "/cam", "sensor_msgs/msg/CompressedImage", COMPRESSED) for _ in range(2))
+        for k in range(40):
+            for camera in (one, other):
+                writer.add_message(camera, steady(k), compressed(steady(k), k), steady(k))
+    with open_camera(path, CameraOptions(rate="native", size=64)) as stream:
+        assert len(list(stream)) == 40
+    assert [one.count for one in stream.findings if one.kind == "stamps-duplicate"] == [40]
+
+
 def test_simulated_time_is_refused_and_read_from_a_start_that_is_given(tmp_path: Path) -> None:
     path = filmed(tmp_path / "a.mcap", lambda k: 12 * 10**9 + k * STEP, steady)
     with pytest.raises(TimeError, match="1970") as raised:
