@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import operator
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -17,12 +18,21 @@ def stream(seed: int, *names: str | int) -> np.random.Generator:
     """A generator that depends on `seed` and the path of `names` alone.
 
     `stream(7, "sequence", 12, "wind")` is the same whatever other streams were drawn, and in what order. The names are
-    hashed (SHA-256) into a `SeedSequence`'s entropy; the bit generator is PCG64DXSM.
+    hashed (SHA-256) into a `SeedSequence`'s entropy; the bit generator is PCG64DXSM. A number of NumPy or torch is the
+    whole number that it equals.
     """
-    path = "\x1f".join(f"{type(name).__name__}:{name}" for name in names)
+    path = "\x1f".join(map(_named, names))
     digest = hashlib.sha256(path.encode()).digest()
     words = np.frombuffer(digest, dtype="<u4").tolist()
-    return np.random.Generator(np.random.PCG64DXSM(np.random.SeedSequence([seed & (2**64 - 1), *words])))
+    entropy = [operator.index(seed) & (2**64 - 1), *words]
+    return np.random.Generator(np.random.PCG64DXSM(np.random.SeedSequence(entropy)))
+
+
+def _named(name: str | int) -> str:
+    """A name with its kind, so that the number 3 is another than the text "3"."""
+    if isinstance(name, str | int | float):
+        return f"{'str' if isinstance(name, np.str_) else type(name).__name__}:{name}"
+    return f"int:{operator.index(name)}"
 
 
 def child_seed(seed: int, *names: str | int) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from flagdata.arguments import checked
 from flagdata.dataset.source import Source
 from flagdata.lake import Lake
 from flagdata.rows import Rows
@@ -20,6 +21,7 @@ AnyLake: TypeAlias = Source | Lake | Place | str
 """A lake that is open, its folder, or its address `s3://bucket/prefix`."""
 
 
+@checked
 def open(path: Place | str) -> Source:  # noqa: A001  read as flagdata.open
     """The lake in the folder `path`, or at `s3://bucket/prefix`.
 
@@ -41,6 +43,7 @@ def open(path: Place | str) -> Source:  # noqa: A001  read as flagdata.open
     return Source.open(path)
 
 
+@checked
 def query(
     lake: AnyLake,
     where: str | Mapping[str, Any] | None = None,
@@ -76,6 +79,7 @@ def query(
     return opened(lake).query(where, sql=sql, columns=columns, order=order, limit=limit, at=at)
 
 
+@checked
 def pairs(
     lake: AnyLake,
     where: str | None = None,

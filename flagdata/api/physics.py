@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flagdata.api.lakes import AnyLake, opened
+from flagdata.arguments import checked
 from flagdata.errors import UsageError
 from flagdata.parts import call
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 _TABLES = ("scene", "material", "wind", "contact", "limits", "integrator", "time", "effects")
 
 
+@checked
 def simulate(
     recipe: str | Path | Mapping[str, Any] | None = None,
     *,
@@ -79,6 +81,7 @@ def simulate(
     return call("sim.run.arrays:simulated", source, given, device=device, workers=workers)
 
 
+@checked
 def render(
     sequence: MeshSequence | RaggedMeshSequence,
     *,
@@ -123,6 +126,7 @@ def render(
     )  # fmt: skip
 
 
+@checked
 def measure(
     source: Path | str | Frames,
     *,
@@ -191,6 +195,7 @@ def measure(
     )  # fmt: skip
 
 
+@checked
 def calibrate(
     recordings: Mapping[str, ArrayLike] | Path | str | Sequence[Mapping[str, ArrayLike] | Path | str],
     *,
@@ -261,6 +266,7 @@ def calibrate(
     )  # fmt: skip
 
 
+@checked
 def close_loop(
     recordings: ArrayLike | MeshSequence | Sequence[ArrayLike | MeshSequence],
     *,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flagdata.addresses import local_path
 from flagdata.api.lakes import AnyLake, opened
+from flagdata.arguments import checked
 from flagdata.errors import InputError, NotFoundError
 from flagdata.examples import example_of
 from flagdata.film import Film
@@ -27,6 +28,7 @@ _BLOWN = (Kind.RECORDING, Kind.WIND)
 """Kinds of artifacts that have a wind."""
 
 
+@checked
 def wind(
     source: Path | str,
     *,
@@ -78,6 +80,7 @@ def wind(
     return _wind(series, name=artifact.name)
 
 
+@checked
 def frames(
     source: Path | str,
     *,
@@ -112,6 +115,7 @@ def frames(
     return collected(film, first=start, last=end)
 
 
+@checked
 def motion(
     source: Path | str | Frames,
     *,
@@ -151,6 +155,7 @@ def motion(
     )
 
 
+@checked
 def meshes(
     source: Path | str, *, lake: AnyLake | None = None, at: str | None = None, rate: float | None = None
 ) -> MeshSequence | RaggedMeshSequence:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.addresses import local_path
+from flagdata.arguments import checked
 from flagdata.documents import from_json
 from flagdata.errors import FlagdataError, UsageError
 
@@ -57,6 +58,7 @@ class DecodedCache:
         UsageError: no room for anything, a folder inside a lake, or one that holds other files.
     """
 
+    @checked
     def __init__(self, path: Path | str, *, limit: int) -> None:
         self.path = local_path(path).absolute()
         self.limit = limit
@@ -79,6 +81,7 @@ class DecodedCache:
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_verified": set()}
 
+    @checked
     def frames(
         self, object_name: str, first: int, count: int, *, decode: Callable[[], NDArray[np.uint8]]
     ) -> NDArray[np.uint8]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from flagdata import provenance
 from flagdata.align.clock import ClockModel
+from flagdata.arguments import checked
 from flagdata.dataset.truth import TruthSeries, WindTruth, over_ground
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact
@@ -48,6 +49,7 @@ def runs(times: Instants, frames: int) -> Iterator[int]:
         yield from range(first, last - frames + 1, frames)
 
 
+@checked
 def clip_rows(
     record: Record, recording: Artifact, *, frames: int = CLIP_FRAMES, window: float = TRUTH_WINDOW
 ) -> list[Artifact]:

@@ -16,6 +16,7 @@ import torch
 from numpy.typing import NDArray
 from torch.utils.data import DataLoader, Dataset
 
+from flagdata.arguments import checked, whole
 from flagdata.dataset.sample import Batch, Sample, collate
 from flagdata.errors import RefusedError, UsageError
 from flagdata.rng import stream
@@ -78,6 +79,7 @@ class PairLoader:
         UsageError: sizes that cannot be, an unknown option, or pinned memory where there is no accelerator.
     """
 
+    @checked
     def __init__(
         self,
         pairs: Batchable,
@@ -143,6 +145,7 @@ class PairLoader:
         whole, rest = divmod(len(self.pairs), self._batch_size)
         return whole + (rest > 0 and self._last == "keep")
 
+    @checked
     def batches(self, epoch: int) -> list[list[int]]:
         """Indices of the pairs in each batch of this share in a whole epoch, in order."""
         return self._from(epoch, 0)
@@ -160,6 +163,7 @@ class PairLoader:
             return np.arange(n)
         return stream(self.pairs.seed, "pairs", "order", epoch).permutation(n)
 
+    @checked
     def order_hash(self, epoch: int) -> str:
         """SHA-256 of the samples and their order in an epoch, in hexadecimal: equal for any workers and shares."""
         order = self._ordered(epoch).astype("<i8").tobytes()
@@ -214,12 +218,12 @@ class PairLoader:
         return {
             "at": self.pairs.at,
             "fingerprint": self.pairs.fingerprint,
-            "seed": self.pairs.seed,
+            "seed": whole(self.pairs.seed, "seed"),
             "batch_size": self._batch_size,
             "order": self._order,
             "last": self._last,
             "share": f"{self._share[0]} of {self._share[1]}",
-            "epoch": self.epoch,
+            "epoch": whole(self.epoch, "epoch"),
             "before": self._before,
             "cursor": self.cursor,
         }
@@ -245,9 +249,9 @@ class PairLoader:
                 where=f"data at {state['at'] or 'the head of main'}",
                 fix="resolve the query at the same tag, with the same options",
             )
-        numbers = [value for value in (state["epoch"], state["before"], state["cursor"]) if isinstance(value, int)]
+        numbers = [whole(state[name], f"{name} of the state") for name in ("epoch", "before", "cursor")]
         count, total = int(share[2]), self._total()
-        if len(numbers) < 3 or min(numbers) < 0 or numbers[1] + numbers[2] * count >= total:
+        if min(numbers) < 0 or numbers[1] + numbers[2] * count >= total:
             raise UsageError(
                 f"no batch {state['cursor']!r} in epoch {state['epoch']!r}", fix="give what state_dict returned"
             )

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arguments import checked
 from flagdata.dataset.cache import DecodedCache
 from flagdata.dataset.loader import Batchable, Last, Memory, Order, PairLoader, RunIn
 from flagdata.dataset.sample import Sample
@@ -70,6 +71,7 @@ class Pairs(Batchable):
     def __len__(self) -> int:
         return len(self.table)
 
+    @checked
     def __getitem__(self, index: int) -> Sample:
         """The pair at `index`, 0 ≤ index < len.
 
@@ -97,6 +99,7 @@ class Pairs(Batchable):
             end=int(table.end[index]),
         )
 
+    @checked
     def film(self, index: int) -> NDArray[np.uint8]:
         """All frames of the recording that the pair at `index` is of: (frames, height, width) gray.
 
@@ -109,6 +112,7 @@ class Pairs(Batchable):
         record = self._record(int(self.table.object[index]))
         return record.frames(0, record.frame_count)
 
+    @checked
     def film_times(self, index: int) -> NDArray[np.float64]:
         """(frames,) instants of the frames of `film`, from the first [s].
 
@@ -137,6 +141,7 @@ class Pairs(Batchable):
         rows = {"version": self.at or "the head of main", "wind": f"{wind.min():.2f} to {wind.max():.2f} m/s"}
         return table(f"{len(self)} pairs, {len(self.refused)} refused", rows | refused)
 
+    @checked
     def loader(
         self,
         batch_size: int,

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from flagdata.errors import UsageError
+from flagdata.arguments import checked
 from flagdata.extras import explained
 from flagdata.html import table
 from flagdata.lake import Lake
@@ -32,6 +32,7 @@ class Source:
         self.lake = lake
 
     @classmethod
+    @checked
     def open(cls, path: Place | str) -> Source:
         """The lake in the folder `path`, or at `s3://bucket/prefix`.
 
@@ -40,6 +41,7 @@ class Source:
         """
         return cls(Lake.open(path))
 
+    @checked
     def query(
         self,
         where: str | Mapping[str, Any] | None = None,
@@ -55,6 +57,7 @@ class Source:
 
         return Rows(select(self.lake, where, at=at, columns=columns, order=order, sql=sql, limit=limit))
 
+    @checked
     def pairs(
         self,
         where: str | None = None,
@@ -95,8 +98,6 @@ class Source:
         from flagdata.dataset.splits import HashedSplit
         from flagdata.dataset.tolerance import Tolerance
 
-        if not isinstance(seed, int):
-            raise UsageError(f"the seed {seed!r}", where="seed", fix="give a whole number")
         resolved = resolve(
             self.lake,
             where=where,
@@ -109,6 +110,7 @@ class Source:
         openers = self.lake.openers([str(name) for name in resolved.table.objects])
         return Pairs(resolved.table, openers=openers, refused=resolved.refused, at=at, seed=seed, cache=cache)
 
+    @checked
     def sides(
         self,
         where: str | None = None,

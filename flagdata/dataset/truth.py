@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.arguments import checked
 from flagdata.errors import InputError, UsageError
 from flagdata.schema import TRUTH_WINDOW, UNUSABLE, SampleFlag
 from flagdata.signals import Instants, Sensor, Series, WindSeries
@@ -143,6 +144,7 @@ class TruthSeries:
             sensor=series.sensor,
         )
 
+    @checked
     def before(self, end: int, *, window: float = TRUTH_WINDOW, clock_sigma: float = 0.0) -> WindTruth:
         """The mean over (end - window, end].
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from flagdata.arguments import checked
 from flagdata.errors import UnknownNameError
 from flagdata.html import table
 
@@ -68,6 +69,7 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(path.parent.name for path in _HERE.glob(f"*/{_ABOUT}")))
 
 
+@checked
 def example(name: str = "flag") -> Example:
     """An example that comes with the package: a film of a simulated flag, the log beside it, and the truth.
 

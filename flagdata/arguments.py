@@ -1,0 +1,182 @@
+"""Arguments of public calls: numbers and paths of other libraries become Python's own, or are refused in a sentence.
+
+NumPy's `int64(3)`, torch's `tensor(3)` and pandas' values compare equal to 3, and yet hash, print and serialise as
+something else: a seed of that kind gave another order. `checked` reads the annotations of a call, so that every
+parameter that says `int` takes every whole number, and means the same by it.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import operator
+import os
+import re
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from flagdata.errors import UsageError
+from flagdata.storage import RemotePath
+
+P = ParamSpec("P")
+R = TypeVar("R")
+Convert = Callable[[Any, str], Any]
+_SHORT = {"float32": np.float32, "float16": np.float16}
+_NO_NUMBER = re.compile("bool|datetime|timedelta")
+"""In the name of an array's type."""
+_TUPLE = re.compile(r"tuple\[(?P<kind>int|float)(?P<more>(?:, (?P=kind))*)\]")
+
+
+def whole(value: object, name: str) -> int:
+    """A whole number of Python, Numpy, torch or pandas as Python's own.
+
+    Args:
+        name: of the argument, for the error message.
+
+    Raises:
+        UsageError: a truth value, a text, a number with a point, a length of time, or several numbers.
+    """
+    with _refused(value, name, "whole number", "give one such as 3, without a point or quotes"):
+        return operator.index(value)  # type: ignore[arg-type]
+
+
+def real(value: object, name: str) -> float:
+    """A number of Python, Numpy, torch or pandas as Python's own; whole numbers stay whole.
+
+    Raises:
+        UsageError: a truth value, a text, a time, or several numbers.
+    """
+    with _refused(value, name, "number", "give one such as 2.5, without quotes"):
+        number = plain(value)
+        if isinstance(number, str | bytes):
+            raise TypeError
+        return number if isinstance(number, int | float) else float(number)
+
+
+@contextmanager
+def _refused(value: object, name: str, noun: str, fix: str) -> Iterator[None]:
+    """Refuse a truth value, a time, and what raises in it."""
+    try:
+        if isinstance(value, bool) or _NO_NUMBER.search(str(getattr(value, "dtype", ""))):
+            raise TypeError
+        yield
+    except (TypeError, RuntimeError, ValueError):
+        what = f"{name} is {_shown(value)}, which is no {noun}"
+        raise UsageError(what, fix=fix) from None
+
+
+def plain(value: Any) -> Any:
+    """A value whose numbers, alone or within tables and lists, are Python's own; arrays stay what they are.
+
+    A number of 32 bits or fewer is the one that it prints: `float32(0.2)` is 0.2, not 0.20000000298.
+    """
+    if isinstance(value, Mapping):
+        return {key: plain(one) for key, one in value.items()}
+    if type(value) in (list, tuple):
+        return type(value)(map(plain, value))
+    if getattr(value, "ndim", None) != 0 or not hasattr(value, "item"):
+        return value
+    short = _SHORT.get(str(value.dtype).rpartition(".")[2])
+    return value.item() if short is None else float(str(short(value.item())))
+
+
+def checked(call: Callable[P, R]) -> Callable[P, R]:
+    """A public call whose arguments are made plain, each by its annotation.
+
+    `int` and `float` take the numbers of other libraries, `tuple[int, int]` as many of them, `Path` whatever names a
+    path, `str` texts alone, and tables keep no number of another library.
+
+    Raises:
+        UsageError: when the call is made with a value that is none of its kind.
+    """
+    signature = inspect.signature(call)
+    kinds = {name: str(one.annotation) for name, one in signature.parameters.items()}
+    converts = {name: convert for name, kind in kinds.items() if (convert := _convert(kind)) is not None}
+
+    @functools.wraps(call)
+    def door(*args: P.args, **kwargs: P.kwargs) -> R:
+        bound = signature.bind(*args, **kwargs)
+        for name in converts.keys() & bound.arguments.keys():
+            bound.arguments[name] = converts[name](bound.arguments[name], name)
+        return call(*bound.args, **bound.kwargs)
+
+    vars(door)["converts"] = frozenset(converts)
+    return door
+
+
+def _convert(annotation: str) -> Convert | None:
+    """What makes values of an annotation plain; `None` where they stay as they are."""
+    kinds = [kind for kind in annotation.split(" | ") if kind != "None"]
+    found: Convert | None = None
+    if kinds == ["int"]:
+        found = whole
+    elif kinds and set(kinds) <= {"int", "float"}:
+        found = real
+    elif len(kinds) == 1 and (numbers := _TUPLE.fullmatch(kinds[0])):
+        each = whole if numbers["kind"] == "int" else real
+        found = functools.partial(_several, each=each, count=1 + numbers["more"].count(","))
+    elif kinds == ["str"]:
+        found = _text
+    elif kinds == ["Sequence[str]"]:
+        found = _texts
+    elif {"Path", "Place", "AnyLake"} & set(kinds):
+        found = _path
+    elif kinds and ("Mapping" in annotation or "float" in kinds):
+        found = _plain
+    if found is None or "None" not in annotation.split(" | "):
+        return found
+    return functools.partial(_or_none, convert=found)
+
+
+def _or_none(value: object, name: str, *, convert: Convert) -> Any:
+    return None if value is None else convert(value, name)
+
+
+def _plain(value: object, name: str) -> Any:
+    return plain(value)
+
+
+def _several(values: object, name: str, *, each: Callable[[object, str], Any], count: int) -> tuple[Any, ...]:
+    try:
+        if isinstance(values, str | bytes):
+            raise TypeError
+        found = tuple(values)  # type: ignore[call-overload]
+    except TypeError:
+        found = ()
+    if len(found) != count:
+        what = f"{name} is {_shown(values)}, not {count} numbers"
+        raise UsageError(what, fix=f"give {count} in parentheses, separated by commas")
+    return tuple(each(value, name) for value in found)
+
+
+def _text(value: object, name: str) -> str:
+    if isinstance(value, str):
+        return str(value)
+    if isinstance(value, os.PathLike):
+        return os.fsdecode(value)
+    raise UsageError(f"{name} is {_shown(value)}, which is no text", fix="give it in quotes")
+
+
+def _texts(values: Any, name: str) -> list[str]:
+    if isinstance(values, str | bytes) or not hasattr(values, "__iter__"):
+        what = f"{name} is {_shown(values)}, not a list of texts"
+        raise UsageError(what, fix=f"give a list, such as [{str(values)!r}]")
+    return [_text(value, name) for value in values]
+
+
+def _path(value: Any, name: str) -> Any:
+    """A path as a text or as it is; what else a call takes stays."""
+    if isinstance(value, bytes) or (isinstance(value, os.PathLike) and not isinstance(value, Path | RemotePath)):
+        return os.fsdecode(value)
+    if isinstance(value, int | float):
+        raise UsageError(f"{name} is {value!r}, which names no file", fix="give a path")
+    return value
+
+
+def _shown(value: object) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
