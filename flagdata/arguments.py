@@ -20,7 +20,6 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 
 from flagdata.errors import UsageError
-from flagdata.storage import RemotePath
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -170,7 +169,7 @@ def _texts(values: Any, name: str) -> list[str]:
 
 def _path(value: Any, name: str) -> Any:
     """A path as a text or as it is; what else a call takes stays."""
-    if isinstance(value, bytes) or (isinstance(value, os.PathLike) and not isinstance(value, Path | RemotePath)):
+    if isinstance(value, bytes) or (isinstance(value, os.PathLike) and not isinstance(value, Path)):
         return os.fsdecode(value)
     if isinstance(value, int | float):
         raise UsageError(f"{name} is {value!r}, which names no file", fix="give a path")
