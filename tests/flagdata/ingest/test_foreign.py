@@ -14,6 +14,7 @@ from flagdata.cli import root
 from flagdata.errors import CorruptError, InputError
 from flagdata.export import Export, export
 from flagdata.findings import Severity
+from flagdata.ingest.camera import CameraOptions, open_camera
 from flagdata.ingest.foreign import examine
 from flagdata.ingest.mcap import topics
 from tests.flagdata.export.conftest import known as known
@@ -95,6 +96,17 @@ def test_a_lerobot_data_set_is_examined_by_its_episodes(known: Any, tmp_path: Pa
     (folder / "meta" / "stats.json").unlink()
     kinds = {finding.kind for finding in examine(folder).findings}
     assert {"lost-instants", "timing-uneven", "episodes-missing", "files-missing"} <= kinds
+
+
+def test_what_an_operating_system_puts_beside_tables_is_no_table_of_a_data_set(known: Any, tmp_path: Path) -> None:
+    folder = tmp_path / "set"
+    export(known.lake, Export(format="lerobot", where="kind = 'clip'", options={"frames": "png"}), folder)
+    whole = examine(folder)
+    for path in list(folder.rglob("*.parquet")):
+        path.with_name(f"._{path.name}").write_bytes(b"\0\5\x16\7 beside")
+    assert examine(folder) == whole
+    with open_camera(folder, CameraOptions(episode=0, rate="native", size=64)) as stream:
+        assert len(list(stream)) > 0
 
 
 def test_the_command_exits_with_3_where_there_is_something_to_act_on(write_json: Callable[..., Path]) -> None:
