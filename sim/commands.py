@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from flagdata.console import document, in_steps, json_option, lake_option, progress, say
+from flagdata.printable import counted
 
 if TYPE_CHECKING:
     from sim.run import RunReport
@@ -87,8 +88,8 @@ def _print(report: RunReport) -> None:
         say(f"member {failure['index']} is not stored: {failure['kind']}: {failure['what']}")
     steps = [f"{step * 1e3:.3g}" for step in sorted(report.steps.values())]
     speed = f"{report.rate:.2f} flags/s, steps of {'–'.join(dict.fromkeys((steps[0], steps[-1])))} ms"
+    replaced = f", {counted(len(report.healed), 'damaged or missing object')} replaced" if report.healed else ""
     say(
         f"{len(report.added) + len(report.healed)} simulated in {report.seconds:.1f} s ({speed}), "
-        f"{len(report.existing)} in the lake already, {len(report.failed)} failed"
-        f"{f', {len(report.healed)} damaged or missing objects replaced' if report.healed else ''}"
+        f"{len(report.existing)} in the lake already, {len(report.failed)} failed{replaced}"
     )

@@ -198,7 +198,10 @@ class Refs:
         except OSError as error:
             raise unreadable("the ref", path, error) from None
         except (ValueError, KeyError, TypeError):
-            raise CorruptError("the ref cannot be read", where=str(path), fix="restore it from a copy") from None
+            raise CorruptError(
+                "the ref cannot be read", where=str(path),
+                fix="delete the file and flagdata pull a clone of this lake, or restore it from a copy",
+            ) from None  # fmt: skip
 
 
 def resolve(

@@ -15,6 +15,8 @@ from flagdata.lake.marking import mark
 from flagdata.lake.refs import MAIN
 from flagdata.lake.store import Store
 
+_RESTORE = "the version of flagdata that ingested the source restores it by ingesting it again"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Removal:
@@ -108,14 +110,14 @@ def explained(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
                 return NotFoundError(
                     f"{name} went when versions up to {one.up_to} expired, by version {one.version} ({one.message})",
                     where=missing.where,
-                    fix=f"use a tag, or a version from {one.version} on; ingesting the source again restores it",
+                    fix=f"use a tag, or a version from {one.version} on; {_RESTORE}",
                 )
         for removal in removals(lake):
             if name in removal.objects.values():
                 return NotFoundError(
                     f"{name} was withdrawn by version {removal.version} ({removal.message}), and gc has deleted it",
                     where=missing.where,
-                    fix=f"use a tag, or a version from {removal.version} on; ingesting the source again restores it",
+                    fix=f"use a tag, or a version from {removal.version} on; {_RESTORE}",
                 )
     except FlagdataError:
         return missing

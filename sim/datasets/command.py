@@ -11,6 +11,7 @@ import click
 
 from flagdata.addresses import lake_place
 from flagdata.console import LocalPath, document, following, in_steps, json_option, lake_option, progress, say, table
+from flagdata.printable import counted
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -97,10 +98,10 @@ def build(
         return
     for failure in report.failed:
         say(f"replaced: {failure}")
+    replaced = f"; {counted(report.healed, 'damaged or missing object')} replaced" if report.healed else ""
     say(
         f"{report.new_sequences} of {report.sequences} sequences and {report.new_films} of {report.films} films made "
-        f"in {report.seconds:.0f} s; {report.clips} clips"
-        f"{f'; {report.healed} damaged or missing objects replaced' if report.healed else ''}"
+        f"in {report.seconds:.0f} s; {report.clips} clips{replaced}"
     )
     if written is not None:
         click.echo(written)

@@ -19,6 +19,7 @@ from flagdata.lake.health import doctor, is_healthy, object_names, verify, verif
 from flagdata.lake.objects import Objects
 from flagdata.lake.refs import Refs
 from flagdata.lake.transfer import clone, transfer
+from tests.flagdata.lake.conftest import overwrite
 from tests.flagdata.lake.test_transfer import no_bar
 from tests.program import invoke
 
@@ -307,3 +308,22 @@ def test_a_lake_whose_making_was_killed_is_distinguished_from_another_folder(
         assert "delete what is there and give the command again" in str(refused.value.fix)
         shutil.rmtree(target)
         assert make(target).path == target
+
+
+@pytest.mark.parametrize("kind", ["tags", "branches"])
+def test_a_damaged_ref_that_is_deleted_comes_back_by_a_pull(
+    lake: Lake, put_text: Put, tmp_path: Path, kind: str
+) -> None:
+    put_text(lake, "first")
+    lake.tag("name") if kind == "tags" else lake.branch("name")
+    put_text(lake, "second", branch="main" if kind == "tags" else "name")
+    copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
+    path = lake.refs.root / kind / "name.json"
+    overwrite(path, b"{")
+    found = [finding for finding in doctor(lake) if finding.kind == "ref-unreadable"]
+    assert found
+    assert all("delete the file and flagdata pull a clone" in str(finding.fix) for finding in found)
+    path.unlink()
+    transfer(copy, lake, bars=no_bar)
+    assert lake.refs.stored() == copy.refs.stored()
+    assert is_whole(lake)
