@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import av
 import numpy as np
 
+from flagdata.cli import main
 from flagdata.ingest.store import ingest_camera, ingest_wind
 from flagdata.lake import Lake
+from flagdata.lake.labels import columns
 from tests.failing.trial import Command
 from tests.small import SCENE
 
@@ -37,6 +40,11 @@ def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callab
     (folder / "second.csv").write_text(wind_log.read_text().replace("+02:00,5.", "+02:00,6."))
     third = ingest_camera(lake, write_video(folder / "third.mp4", frames=28), branch="side").artifact
     write_video(folder / "fourth.mp4", frames=26)
+    aligned = ["align", camera.id, wind.id, "--by", "given", "--offset", "0", "--offset-sigma", "0.1"]
+    with suppress(SystemExit):
+        main([*aligned, "--lake", str(lake.path)])
+    (recording,) = lake.rows("kind = 'recording'")["artifact"].to_pylist()
+    single = ingest_camera(lake, write_video(folder / "single.mp4", frames=12)).artifact
     spare = ingest_camera(lake, write_video(folder / "spare.mp4", frames=5)).artifact
     lake.withdraw([spare.id], "spare")
     (lake.staging / "left").mkdir()
@@ -57,7 +65,8 @@ def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callab
         ]
         text = "\n".join([*corners, "f 1/1 2/2 3/3", "f 2/2 4/4 3/3", ""]).format(z=0.1 * frame)
         (folder / "meshes" / f"{frame:04d}_00.obj").write_text(text)
-    return Scene(folder=folder, ids={"camera": camera.id, "wind": wind.id})
+    ids = {"camera": camera.id, "wind": wind.id, "recording": recording, "single": single.id}
+    return Scene(folder=folder, ids=ids)
 
 
 def made_scene(folder: Path) -> Scene:
@@ -89,6 +98,12 @@ def rows(folder: Path) -> frozenset[object]:
     return frozenset(tuple(row.values()) for row in lake.rows(columns=columns).to_pylist())
 
 
+def labels(folder: Path) -> frozenset[object]:
+    """Every artifact of the lake with its labels."""
+    table = columns(Lake.open(folder / "lake").rows())
+    return frozenset((name, *values.to_pylist()) for name, values in table.items())
+
+
 def artifacts(folder: Path) -> frozenset[object]:
     """Every artifact of the lake, of commands whose objects note how long something took."""
     return frozenset(Lake.open(folder / "lake").rows(columns=["artifact"])["artifact"].to_pylist())
@@ -118,8 +133,27 @@ COMMANDS = {
     ),
     "declare": Command(arguments=("declare", "{camera}", "--speed", "3", "--sigma", "0.2", *_LAKE), state=rows),
     "declare-cloths": Command(arguments=("declare-cloths", "{folder}/cloths.csv", *_LAKE), state=rows, one_step=False),
+    "realign": Command(
+        arguments=(
+            *("realign", "{recording}", "--by", "given", "--offset", "0", "--offset-sigma", "0.3"),
+            *_LAKE,
+        ),
+        state=rows,
+    ),
+    "label": Command(arguments=("label", "{camera}", "operator=me", *_LAKE), state=labels),
     "merge": Command(arguments=("merge", "side", *_LAKE), state=rows),
     "withdraw": Command(arguments=("withdraw", "{camera}", "-m", "wrong", *_LAKE), state=rows),
+    "withdraw --everywhere": Command(
+        arguments=("withdraw", "{single}", "--everywhere", "-m", "a person asked", *_LAKE),
+        state=lambda folder: rows(folder) | files("lake/mcap")(folder),
+        one_step=False,
+        unfinished="erasure-unfinished",
+    ),
+    "expire": Command(
+        arguments=("expire", "--keep", "1", *_LAKE),
+        state=files("lake/mcap", "lake/zarr"),
+        one_step=False,
+    ),
     "tag": Command(arguments=("tag", "v1", *_LAKE), state=lambda folder: {*Lake.open(folder / "lake").refs.tags()}),
     "tag --delete": Command(
         arguments=("tag", "v0", "--delete", *_LAKE), state=lambda folder: {*Lake.open(folder / "lake").refs.tags()}

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.examples import example
 from flagdata.lake import Artifact, Lake
 from flagdata.schema import Kind
 from measure.closing.close import close_loop
@@ -139,6 +140,23 @@ def measure_scene(folder: Path) -> Scene:
     return Scene(folder=folder)
 
 
+def weigh_scene(folder: Path) -> Scene:
+    """A flag's film, and a table of observables of a known cloth; beside the folder, what is read off the film."""
+    started(folder)
+    (folder / "flag.mp4").write_bytes(example("flag").film.read_bytes())
+    seconds = np.arange(24) * 2.5
+    speed = 5.0 + 1.5 * np.sin(np.arange(24) / 1.7)
+    values = {"area_weight": np.array([0.2]), "gain": np.array([1.0]), "damping": np.array([0.01])}
+    from tests.measure.calibrate.conftest import readings
+
+    shown = readings({**values, "azimuth": np.array([1.2])}, speed, seed=3)[0, :, :3]
+    lines = [",".join(map(str, row)) for row in np.column_stack([seconds, speed, shown]).tolist()]
+    (folder / "table.csv").write_text("\n".join(["time,wind,droop,extension,middle-speed", *lines, ""]))
+    kept = folder.with_name(f"{folder.name}.kept")
+    kept.mkdir()
+    return Scene(folder=folder, ids={"kept": str(kept)})
+
+
 # What stands in for the computing. Each is called in the process from which commands are forked, with the folder of
 # what was kept.
 
@@ -183,6 +201,33 @@ def kept_jobs(kept: str) -> None:
 
     sim.datasets.build.results = done  # pyright: ignore[reportPrivateImportUsage]
     sim.datasets.cluster.connected = lambda *_, **__: nullcontext()  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def kept_windows(kept: str) -> None:
+    """What is read off a film is read once."""
+    import measure.observables.watching
+
+    plain = measure.observables.watching.watched
+
+    def watched(film: Any, size: Any, **others: Any) -> object:
+        path = Path(kept) / "windows"
+        if not path.exists():
+            path.write_bytes(pickle.dumps(plain(film, size, **others)))
+        return pickle.loads(path.read_bytes())
+
+    measure.observables.watching.watched = watched
+
+
+def known_flags(kept: str) -> None:
+    """Simulated flags are a known function of their cloth, and few walkers weigh it."""
+    import measure.calibrate.calibrate
+    import measure.calibrate.posterior
+    from tests.measure.calibrate.conftest import known
+
+    del kept
+    measure.calibrate.calibrate.simulated = known
+    measure.calibrate.posterior.WALKERS, measure.calibrate.posterior.STEPS = 96, 300
+    measure.calibrate.posterior.CHECK = (32, 120)
 
 
 def _name(arguments: Sequence[object]) -> str:
@@ -249,8 +294,20 @@ MEASURE = {
         state=rows,
     ),
 }
+WEIGH = {
+    "observe": Command(
+        arguments=("observe", "{folder}/flag.mp4", "--flag-size", "1.5x1.0", *_LAKE),
+        state=artifacts,
+        stand_in="tests.failing.slow:kept_windows",
+    ),
+    "calibrate": Command(
+        arguments=("calibrate", "{folder}/table.csv", "--flag-size", "1.5x1.0", "--azimuth", "70±7", *_LAKE),
+        state=artifacts,
+        stand_in="tests.failing.slow:known_flags",
+    ),
+}
 SCENES = {
     "train": (train_scene, TRAIN), "measure": (measure_scene, MEASURE), "build": (build_scene, BUILD),
-    "loop": (loop_scene, LOOP),
+    "loop": (loop_scene, LOOP), "weigh": (weigh_scene, WEIGH),
 }  # fmt: skip
 """Scenes, each with its commands."""

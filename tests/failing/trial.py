@@ -29,6 +29,7 @@ class Command:
         stand_in: "module:function" that puts something in the place of its computing, called with the scene's id "kept"
             in the process that it is forked from.
         one_step: whether it changes all or nothing; else what it has done before an error stays, and a repeat goes on.
+        unfinished: kind of the finding by which doctor reports that it was cut off; empty where it leaves none.
     """
 
     arguments: tuple[str, ...]
@@ -36,6 +37,7 @@ class Command:
     lake: str = "lake"
     stand_in: str | None = None
     one_step: bool = True
+    unfinished: str = ""
 
     def given(self, folder: Path, ids: Mapping[str, str]) -> list[str]:
         return [argument.format(folder=folder, **ids) for argument in self.arguments]
@@ -96,7 +98,7 @@ class Trials:
         self.failed[met] += 1
         state = command.state(folder)
         problems = self._lost(done, state) if fault.kills else self._report_against(done, state)
-        problems += _health(folder / command.lake)
+        problems += _health(folder / command.lake, unfinished=command.unfinished)
         if done.code and (repeated or fault.kills):
             again = self._injector.run(folder, command.given(folder, self._ids))
             if again.code or command.state(folder) != self.whole.after:
@@ -126,12 +128,13 @@ class Trials:
         return problems + [word for word in ("Traceback", "unforeseen", "interrupted") if word in done.stderr]
 
     def _lost(self, done: Done, state: object) -> list[str]:
-        """What is wrong with a command that was killed: what was there before must be there."""
+        """What is wrong with a command that was killed: what was there before must be there, if it does not go."""
         problems = [] if done.code == -signal.SIGKILL else [f"exit code {done.code}, not killed"]
         if self._command.one_step and state not in (self.whole.before, self.whole.after):
             problems.append("a part is published")
-        if isinstance(state, frozenset) and isinstance(self.whole.before, frozenset) and not self.whole.before <= state:
-            problems.append("something is lost")
+        before, after = self.whole.before, self.whole.after
+        if isinstance(state, frozenset) and isinstance(before, frozenset) and isinstance(after, frozenset):
+            problems += ["something is lost"] * (not before & after <= state)
         return problems
 
     def _copy(self) -> Path:
@@ -141,8 +144,12 @@ class Trials:
         return folder
 
 
-def _health(path: Path) -> list[str]:
-    """What is wrong with a lake, if there is one."""
+def _health(path: Path, *, unfinished: str = "") -> list[str]:
+    """What is wrong with a lake, if there is one.
+
+    Args:
+        unfinished: kind of a finding that is right before the command is given once more.
+    """
     if not (path / "lake.json").exists():
         return []
     lake = Lake.open(path)
@@ -150,4 +157,8 @@ def _health(path: Path) -> list[str]:
     found = (
         *doctor(lake, grace=timedelta(0)), *verify_catalog(lake, refs), *verify(lake, object_names(lake, refs)),
     )  # fmt: skip
-    return [f"unhealthy: {finding.kind}: {finding.what}" for finding in found if finding.severity is Severity.ERROR]
+    return [
+        f"unhealthy: {finding.kind}: {finding.what}"
+        for finding in found
+        if finding.severity is Severity.ERROR and finding.kind != unfinished
+    ]

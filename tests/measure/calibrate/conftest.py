@@ -31,19 +31,25 @@ def readings(values: dict[str, Floats], speed: Floats, *, seed: int) -> Floats:
     return out
 
 
+def known(design: Design, *, folder: Path, workers: int, advance: object) -> Floats:
+    """What a design's simulations show: `readings`."""
+    del folder, workers, advance
+    starts = np.arange(round(design.duration / WINDOW)) * WINDOW
+    return readings(
+        dict(design.values()),
+        design.log.mean_speed(starts, starts + WINDOW),
+        seed=child_seed(design.seed, design.recording),
+    )
+
+
 @pytest.fixture(scope="module")
 def cheap() -> Iterator[list[Design]]:
-    """`simulated` replaced by `readings`, and few walkers; the designs that were asked for."""
+    """`simulated` replaced by `known`, and few walkers; the designs that were asked for."""
     asked: list[Design] = []
 
     def simulated(design: Design, *, folder: Path, workers: int, advance: object) -> Floats:
         asked.append(design)
-        starts = np.arange(round(design.duration / WINDOW)) * WINDOW
-        return readings(
-            dict(design.values()),
-            design.log.mean_speed(starts, starts + WINDOW),
-            seed=child_seed(design.seed, design.recording),
-        )
+        return known(design, folder=folder, workers=workers, advance=advance)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(calibrate, "simulated", simulated)
