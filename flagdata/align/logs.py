@@ -347,5 +347,6 @@ def _model(
 def _refused(names: tuple[str, str], reasons: list[str]) -> RefusedError:
     return RefusedError(
         f"no offset can be estimated: {'; '.join(reasons)}", where=f"{names[0]} and {names[1]}",
-        fix="check that both logs are of one wind, and their zones; search around another offset: --centre, --search",
+        fix="check that both logs are of one wind, and their zones; search around another offset: --centre, --search;"
+        " or compare logs that last longer",
     )  # fmt: skip

@@ -26,6 +26,7 @@ from flagdata.signals import WindAverage
 from flagdata.timebase import NANOSECONDS
 
 Progress = Callable[[int], object]
+_GIVEN = "use --by given --offset SECONDS --offset-sigma SECONDS"
 _PASSED = 3.0  # m of air, about twice the length of the flags that people film
 _QUICKEST, _SLOWEST = 0.3, 1.0  # s
 _UNCERTAIN = 0.3  # s; beyond it few estimates would be certain enough
@@ -70,7 +71,7 @@ class ClockOptions:
             )
         if (self.offset is not None) != (self.by is Method.GIVEN):
             what = "without an offset" if self.by is Method.GIVEN else "together with an offset"
-            raise UsageError(f"alignment by {self.by} {what}", where="--offset", fix="use --by given --offset SECONDS")
+            raise UsageError(f"alignment by {self.by} {what}", where="--offset", fix=_GIVEN)
         if (self.offset_sigma is not None) == (self.by is Method.ESTIMATE):
             if self.by is Method.ESTIMATE:
                 raise UsageError(
@@ -214,7 +215,7 @@ def estimated(pair: Pair, found: Evidence, *, recipe: Mapping[str, Any]) -> Outc
         raise RefusedError(
             f"no offset can be estimated: {'; '.join(found.reasons)}",
             where=f"{pair.camera.name} and {pair.wind.name}",
-            fix="look at it with --plot FILE.png; then state the offset: --by given --offset S --offset-sigma S",
+            fix=f"look at it with --plot FILE.png; or state the offset: {_GIVEN}",
         )
     start, end = pair.span
     segment = Segment(

@@ -37,7 +37,7 @@ FOREIGN = {
 """What each kind of source is called, and the options that mean nothing for it."""
 SNIFF = (
     "sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture", "unit", "wind",
-    "date_order", "columns", "topic", "episode", "join", "stream",
+    "date_order", "columns", "topic", "episode", "join", "stream", "encoding",
 )  # fmt: skip
 ONE_SOURCE = ("start", "date", "name", "crop_picture", "accept")
 

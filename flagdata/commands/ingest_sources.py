@@ -48,7 +48,14 @@ def ingest_sources(
     wind = options.wind.wind
 
     def kind_of(source: Path) -> Guess:
-        return classify(source, format_name=format_name, recipe=wind.recipe, columns=wind.columns, topic=wind.topic)
+        return classify(
+            source,
+            format_name=format_name,
+            recipe=wind.recipe,
+            columns=wind.columns,
+            topic=wind.topic,
+            encoding=wind.encoding,
+        )
 
     kinds = _recognised(sources, kind_of)
     if options.camera.camera.chapters:
@@ -98,8 +105,9 @@ def sniff_sources(sources: Sequence[Path], options: Given, *, given: frozenset[s
     """
     from flagdata.ingest.classify import guesses
 
+    topic, encoding = options.wind.wind.topic, options.wind.wind.encoding
     ranked = _recognised(
-        sources, lambda source: _completed(source, guesses(source, topic=options.wind.wind.topic), options)
+        sources, lambda source: _completed(source, guesses(source, topic=topic, encoding=encoding), options)
     )
     check_applies([None if isinstance(r, FlagdataError) else r[0].kind for r in ranked], options, given=given)
     entries, failures = _each(

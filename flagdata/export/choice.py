@@ -51,4 +51,6 @@ def check_kinds(rows: pa.Table, name: str, kinds: frozenset[Kind]) -> None:
     others = Counter(kind for kind in rows["kind"].to_pylist() if kind not in kinds)
     if others:
         found = ", ".join(f"{count} of kind {kind}" for kind, count in sorted(others.items()))
-        raise UsageError(f"{name} cannot hold {found}", where="--where", fix="restrict the filter, e.g. kind = 'clip'")
+        held = ", ".join(f"'{kind}'" for kind in sorted(kinds))
+        fix = f'choose what it holds: --where "kind in ({held})", with your filter'
+        raise UsageError(f"{name} cannot hold {found}", where="--where", fix=fix)

@@ -166,12 +166,19 @@ def prepare(lake: Lake, request: Export) -> Prepared:
     version = view[0].version
     catalog = lake.table(view)
     rows = Selection(catalog, Request(where=request.where)).table()
-    if request.split is not None:
+    if request.split is not None and rows.num_rows:
+        matching = rows.num_rows
         rows = on_side(catalog, rows, request.split, salt=request.salt)
+        if not rows.num_rows:
+            raise NotFoundError(
+                f"none of the {matching} rows that match is on the side {request.split}, by its clips",
+                where=f"filter {request.where}, version {version}",
+                fix="choose another side by --split, or leave it out",
+            )
     rows, replaced = current(catalog, rows)
     check_kinds(rows, request.format, exporter.kinds)
     if not rows.num_rows:
-        given = {"filter": request.where, "split": request.split, "version": str(version)}
+        given = {"filter": request.where, "version": str(version)}
         where = ", ".join(f"{name} {value}" for name, value in given.items() if value is not None)
         raise NotFoundError("no rows match", where=where, fix="try the filter with flagdata query")
     labels = labels_of(catalog)

@@ -20,11 +20,12 @@ MESHES = "meshes"
 MARKERS = "markers"
 
 
-def guesses(path: Path, *, topic: str | None = None) -> tuple[Guess, ...]:
+def guesses(path: Path, *, topic: str | None = None, encoding: str | None = None) -> tuple[Guess, ...]:
     """What a source may be, the likeliest first; never empty. A file of no known signature is tried as a video.
 
     Args:
         topic: of an MCAP file, for which it is judged.
+        encoding: of a text, by the user's word.
 
     Raises:
         NotFoundError: there is no such source.
@@ -43,7 +44,7 @@ def guesses(path: Path, *, topic: str | None = None) -> tuple[Guess, ...]:
     if is_lerobot(path):
         reason = f"it has LeRobot's {LEROBOT_INFO}"
         return (Guess(format="LeRobot", score=0.99, reasons=(reason,), kind="camera"),)
-    found = sniff(path)
+    found = sniff(path, encoding=encoding)
     if found[0].kind != "other":
         return found
     seen = _probe(path)
@@ -60,6 +61,7 @@ def classify(
     recipe: str | None = None,
     columns: str | None = None,
     topic: str | None = None,
+    encoding: str | None = None,
 ) -> Guess:
     """What a source is to be ingested as: a guess of kind "camera", "anemometer", "meshes", "markers" or "record".
 
@@ -69,6 +71,7 @@ def classify(
         recipe: a sensor recipe the user named, for any source that is no camera's, meshes or markers by its content.
         columns: what the columns of a table are, by the user's word; likewise.
         topic: of an MCAP file.
+        encoding: of a text, by the user's word.
 
     Raises:
         InputError: something else (one mesh, an archive), with what to do.
@@ -87,7 +90,7 @@ def classify(
         if format_name not in FORMATS:
             raise UnknownNameError.of("format", format_name, [CAMERA, MESHES, MARKERS, *FORMATS], where="--as")
         return Guess(format=format_name, score=1.0, reasons=(f"the format {format_name} was named",))
-    best = guesses(path, topic=topic)[0]
+    best = guesses(path, topic=topic, encoding=encoding)[0]
     by_content = best.kind in (CAMERA, MARKERS, "record") or (best.kind == MESHES and path.is_dir())
     if recipe is not None and not by_content:
         return Guess(format="delimited", score=1.0, reasons=(f"the recipe {recipe} was named",), recipe=recipe)
@@ -105,13 +108,18 @@ def classify(
 def _of_mcap(path: Path, topic: str | None) -> tuple[Guess, ...]:
     """A record of flagdata's, or of another program's file the topic that was named: pictures before numbers."""
     from flagdata.ingest.anemometer.containers.mcap import of_numbers
+    from flagdata.ingest.mcap.bags import parts_of
     from flagdata.ingest.mcap.pictures import of_pictures
     from flagdata.ingest.mcap.topics import profile, topics
     from flagdata.ingest.records import is_ours
     from flagdata.record.writer import PROFILE
 
-    if topic is None and path.is_file() and profile(path) == PROFILE and is_ours(path):
+    ours = topic is None and any(profile(one) == PROFILE and is_ours(one) for one in parts_of(path))
+    if ours and path.is_file():
         return (Guess(format="record", score=1.0, reasons=("its header says that flagdata wrote it",), kind="record"),)
+    if ours:  # each is a recording of its own
+        reason, fix = "a folder of records that flagdata wrote", f"give the files in it: {path / '*.mcap'}"
+        return (Guess(format="records", score=0.0, reasons=(reason,), kind="other", fix=fix),)
     present = [one for one in topics(path) if topic in (None, one.name, one.plain)]
     found = [
         Guess(format="MCAP", score=0.9, reasons=(f"the topic {one} holds pictures",), kind="camera")

@@ -66,7 +66,7 @@ def ingest_record(lake: Lake, path: Path, *, labels: Labels | None = None, branc
     record = Record.open(path)
     _check(record)
     row = _row_beside(path, source.hash)
-    artifact, findings = _artifact(record, row, source)
+    artifact, findings = _artifact(record, row, source, labels)
     absent = sorted(set(artifact.parents) - set(lake.rows(at=branch, columns=["artifact"])["artifact"].to_pylist()))
     if absent:
         artifact = _alone(artifact, source)
@@ -122,13 +122,15 @@ def _row_beside(path: Path, sha256: str) -> dict[str, Any] | None:
     return {name: found[0][name] for name in CATALOG}
 
 
-def _artifact(record: Record, row: Mapping[str, Any] | None, source: Source) -> tuple[Artifact, tuple[Finding, ...]]:
+def _artifact(
+    record: Record, row: Mapping[str, Any] | None, source: Source, labels: Labels
+) -> tuple[Artifact, tuple[Finding, ...]]:
     """What a record was, with its former parents; of a clip's part the recording that it is now."""
     if SAMPLE in record.metadata:
         return _of_sample(record, row, source), ()
     if row is not None:
         return replace(Artifact.from_row(row), branch="main", created=None, object=None), ()
-    return _of_metadata(record, source), (_unreported(),)
+    return _of_metadata(record, source), (_unreported(labels),)
 
 
 def _of_sample(record: Record, row: Mapping[str, Any] | None, source: Source) -> Artifact:
@@ -209,11 +211,14 @@ def _without(absent: list[str]) -> Finding:
     )  # fmt: skip
 
 
-def _unreported() -> Finding:
+def _unreported(labels: Labels) -> Finding:
+    unknown = [label for label, given in (("name", labels.name), ("session", labels.session)) if given is None]
+    fix = "take it off (flagdata withdraw), then ingest the file in the folder that flagdata export wrote"
     return Finding(
         kind="report-absent", severity=Severity.WARNING,
-        what=f"there is no {ROWS} with its row beside the record: its name, session and quality flags are unknown",
-        fix="ingest it from the folder that flagdata export wrote, or give --name and --session",
+        what=f"there is no {ROWS} with its row beside the record: unknown are its {', '.join(unknown)}"
+        f"{' and ' if unknown else ''}quality flags",
+        fix=fix + (f", or give {' and '.join(f'--{label}' for label in unknown)}" if unknown else ""),
     )  # fmt: skip
 
 

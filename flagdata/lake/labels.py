@@ -25,6 +25,8 @@ from flagdata.schema import catalog_schema
 
 Value: TypeAlias = bool | int | float | str
 PREFIX = "label_"
+_NAMED = 4
+"""Artifacts at most whose ids a remedy names."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
 _LONGEST = 1000  # characters of a text
 
@@ -85,7 +87,7 @@ def put(
         others = {artifact: present[artifact] for artifact in sorted(present.keys() & known)}
         _check_types(others, values, except_of=labelled)
         if fresh := {name for name, value in values.items() if value is not None}:
-            _check_case(fresh.union(*others.values()))
+            _check_case(fresh, others)
         noted = {artifact: dict(values) for artifact in sorted(labelled)}
         info = {"message": message, "branch": branch, LABELS: json.dumps(noted, ensure_ascii=False, allow_nan=False)}
         return lake.catalog.append(catalog_schema().empty_table(), base=head, info=info), labelled
@@ -116,20 +118,27 @@ def _check_types(
                 )  # fmt: skip
 
 
-def _check_case(names: Collection[str]) -> None:
-    """Whether all names are different columns in SQL, which takes capitals for small letters.
+def _check_case(fresh: Collection[str], present: Mapping[str, Mapping[str, Value]]) -> None:
+    """Whether all names, new ones and those that artifacts have, are other columns in SQL: it ignores capitals.
 
     Raises:
         ConflictError: they are not.
     """
-    known: dict[str, str] = {}
-    for name in sorted(names):
+    known = {name.lower(): name for name in sorted(fresh)}
+    for name in {name: None for labels in present.values() for name in labels} | dict.fromkeys(sorted(fresh)):
         other = known.setdefault(name.lower(), name)
         if other != name:
             raise ConflictError(
-                f"the labels {other} and {name} are one column in SQL, which takes capitals for small letters",
-                where=name, fix=f"keep one of the two names; flagdata label ID {name}= takes the other off",
+                f"the labels {name} and {other} are one column in SQL, which takes capitals for small letters",
+                where=other, fix="keep one of the two names" + _taking_off(name, present),
             )  # fmt: skip
+
+
+def _taking_off(name: str, present: Mapping[str, Mapping[str, Value]]) -> str:
+    """How a label is taken off the artifacts that have it, if any do."""
+    holders = [artifact for artifact, labels in present.items() if name in labels]
+    rest = f"; then repeat this, for the rest of the {len(holders)}" if len(holders) > _NAMED else ""
+    return f"; flagdata label {' '.join(holders[:_NAMED])} {name}= takes the other off{rest}" if holders else ""
 
 
 def kind(value: Value) -> str:
@@ -141,8 +150,9 @@ def columns(catalog: pa.Table) -> dict[str, pa.Array]:
     """Name of a column → the values of the rows of a table, null where a row has no such label."""
     labels = labels_of(catalog)
     ids = catalog["artifact"].to_pylist()
-    names = sorted({name for artifact in ids if artifact in labels for name in labels[artifact]})
-    _check_case(names)
+    shown = {artifact: labels[artifact] for artifact in ids if artifact in labels}
+    _check_case((), shown)
+    names = sorted({name for own in shown.values() for name in own})
     return {PREFIX + name: _column([labels.get(artifact, {}).get(name) for artifact in ids]) for name in names}
 
 

@@ -129,7 +129,8 @@ class Store:
             return self._row(name, ref, kinds)
         if len(found) == 1:
             return self.matching(view, {"artifact": found[0]["artifact"]})
-        where, listed = str(self.path), "flagdata ls lists them"
+        where = str(self.path)
+        listed = "flagdata ls lists them" if at is None else f"flagdata ls --at {at} lists them"
         if not found:
             names = self.columns(view, ["name"])["name"].unique().to_pylist()
             close = difflib.get_close_matches(artifact, filter(None, names[:_NAMES]), n=1)

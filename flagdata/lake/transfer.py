@@ -165,12 +165,13 @@ def _check_history(source: Lake, target: Lake, *, head: int, there: int) -> None
         raise ConflictError(
             "each of the two lakes has versions that the other lacks" if same else "the lakes share no history",
             where=f"{source.path} and {target.path}",
-            fix="clone the lake to a new place, and commit there what it lacks; or write to it directly with --lake",
+            fix=f"flagdata clone {target.path} NEW, and commit there what it lacks; or write to it directly:"
+            f" --lake {target.path}",
         )
     if there > head:
         raise ConflictError(
             f"{target.path} is ahead: it has versions up to {there}, {source.path} up to {head}",
-            where=str(target.path), fix="move them the other way: flagdata pull for push, or push for pull",
+            where=str(target.path), fix="move them the other way: flagdata pull for push, or flagdata push for pull",
         )  # fmt: skip
 
 

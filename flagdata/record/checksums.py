@@ -33,7 +33,10 @@ from flagdata.schema import TOPIC_IMAGE
 CHECKSUMS = "flagdata.checksums"
 """Name of the metadata record."""
 SCHEMA = "flagdata.checksums/1"
-FIX = "run flagdata verify: it lists all that is damaged, and what replaces it; or restore the record from a copy"
+FIX = (
+    "run flagdata verify: it lists all of a lake that is damaged, and what replaces it; or restore the record from a "
+    "copy, or save the rest of it: flagdata recover"
+)
 _HEAD = struct.Struct("<HIQQ")
 HEAD_BYTES = _HEAD.size
 """Bytes of a message's head that `heads` covers: all but the record's opcode and length."""

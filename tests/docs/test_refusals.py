@@ -34,6 +34,7 @@ CONDITIONAL = {
         "--azimuth",  # components without a heading; refused where the log has a direction already
         "--date",  # stamps without a day; refused where stamps have one
         "--episode", "--topic", "--stream",  # where a file has several; refused of files that have none
+        "--sequence-fps",  # pictures without times; refused of a film that has stamps
         "--join",  # never asked for: the fix names ingesting without it
         "--unit",  # a heading without a unit; refused where the format states it
     },

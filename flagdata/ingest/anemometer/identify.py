@@ -74,8 +74,11 @@ def guess_of(draft: Draft) -> Guess:
     )  # fmt: skip
 
 
-def sniff(path: Path | str) -> tuple[Guess, ...]:
+def sniff(path: Path | str, *, encoding: str | None = None) -> tuple[Guess, ...]:
     """Guesses at what a file or folder is, the likeliest first; never empty.
+
+    Args:
+        encoding: of a text, where the file does not show it.
 
     Raises:
         NotFoundError: there is no such file.
@@ -99,9 +102,9 @@ def sniff(path: Path | str) -> tuple[Guess, ...]:
         reason = f"the name ends in {path.suffix}"
         return (Guess(format="mesh", score=0.9, reasons=(reason,), kind="meshes", fix="ingest the folder it is in"),)
     try:
-        source = opened(path, WindOptions(limits=Limits()))
+        source = opened(path, WindOptions(limits=Limits(), encoding=encoding))
         rewritten = tuple(finding.what for finding in source.findings)
-        found = recognised(source) or tuple(filter(None, [completed(path, WindOptions())]))
+        found = recognised(source) or tuple(filter(None, [completed(path, WindOptions(encoding=encoding))]))
     except FlagdataError as error:
         return (Guess(format="unknown", score=0.0, reasons=(error.what,), kind="other", fix=error.fix),)
     return tuple(replace(guess, notes=(*rewritten, *guess.notes)) for guess in found) or (unknown(source),)
@@ -141,9 +144,10 @@ def unknown(source: TextFile) -> Guess:
     if said is not None:
         return said
     text = "its text is neither a table with a time and a wind, nor lines of an instrument that is known"
-    columns = '--columns "time[FORMAT],wind_speed[UNIT]"'
     fix = (
-        f"if it is a log, say what its columns are, in order: {columns}; or describe it by a recipe: --sensor FILE.toml"
+        'if it is a log, say what its columns are, in order: --columns "time[FORMAT],wind_speed[UNIT]"; where none is '
+        'a time, and readings came at a steady rate: --columns "wind_speed[UNIT]" --start TIME --rate HZ; or describe '
+        "it by a recipe: --sensor FILE.toml"
     )
     return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix)
 

@@ -324,15 +324,15 @@ def _timing(
         if options.sequence_fps is None:
             raise TimeError(
                 "a raw stream has no time stamps", where=str(path),
-                fix="give the camera's frame rate (sequence_fps), or wrap the stream in a container with stamps",
+                fix="give the camera's frame rate, --sequence-fps HZ, or wrap the stream in a container with stamps",
             )  # fmt: skip
         rate = exact(options.sequence_fps)
         places = np.arange(tally.frames, dtype=np.int64)
         return survey(places, tick=1 / rate, missing=0, fallback_rate=rate)
     if options.sequence_fps is not None:
         raise UsageError(
-            "sequence_fps is for image sequences and raw streams; this file has time stamps of its own",
-            where=str(path), fix="drop it, or give true_fps if a high-speed camera stored a wrong rate",
+            "--sequence-fps is for image sequences and raw streams; this file has time stamps of its own",
+            where=str(path), fix="leave it out, or give --true-fps HZ if a high-speed camera stored a wrong rate",
         )  # fmt: skip
     rate = stream.average_rate or stream.guessed_rate
     stamps = np.frombuffer(tally.stamps, dtype=np.int64)

@@ -46,7 +46,7 @@ class SequenceSource:
         paths, others = self._files(folder)
         if options.sequence_fps is None:
             raise TimeError(
-                "images have no time stamps", where=self._where, fix="give the camera's frame rate (sequence_fps)"
+                "images have no time stamps", where=self._where, fix="give the camera's frame rate: --sequence-fps HZ"
             )
         rate = exact(options.sequence_fps)
         found = ordered([path.name for path in paths], rate=rate, where=self._where)

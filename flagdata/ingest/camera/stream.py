@@ -58,7 +58,7 @@ class CameraStream:
             raise LimitError(
                 f"the time stamps span {duration:.0f} s, beyond the limit of {options.limits.duration:.0f} s",
                 where=str(path),
-                fix="give the rate at which they were taken (sequence_fps), or number them by frames"
+                fix="give the rate at which they were taken, --sequence-fps HZ, or number them by frames"
                 if facts.sequence else "the stamps are damaged; repair the container, or raise the limit",
             )  # fmt: skip
         chapter = chapter_of(path) if options.start is None else None
@@ -134,8 +134,9 @@ class CameraStream:
         if self._options.exposure > interval * (1 + _EXPOSURE_SLACK):
             raise UsageError(
                 f"an exposure of {self._options.exposure:g} s is longer than the {interval:.4g} s from frame to frame",
-                where=where, fix="give it in seconds (1/500 s is 0.002), or true_fps if the file states a wrong rate",
-            )  # fmt: skip
+                where=where,
+                fix="give it in seconds (1/500 s is 0.002), or --true-fps HZ if the file states a wrong rate",
+            )
 
     @property
     def findings(self) -> tuple[Finding, ...]:

@@ -116,11 +116,14 @@ class _Parts:
     used: set[int] = field(default_factory=set)
 
 
-def draft(lines: Sequence[str], options: WindOptions, *, serial_days: str = "excel-days") -> Draft | None:
+def draft(
+    lines: Sequence[str], options: WindOptions, *, serial_days: str = "excel-days", counted: bool = False
+) -> Draft | None:
     """The draft of the table that a file begins with; `None` where it holds none.
 
     Args:
         serial_days: the form that "excel-days" are in this file.
+        counted: whether its last column are instants that `untimed` counted.
 
     Raises:
         UsageError, UnknownNameError, InputError: `options.columns` do not fit the table.
@@ -136,7 +139,7 @@ def draft(lines: Sequence[str], options: WindOptions, *, serial_days: str = "exc
     winds, of_earth = (
         _of_wind(parts, shape, meanings, options) if given is None else (_given(parts, shape, given), False)
     )
-    time = _time(parts, shape, meanings, given, options)
+    time = _time(parts, shape, meanings, given, options, counted=counted)
     if given is None and not winds and time is None:
         return None
     if given is None:
@@ -181,15 +184,18 @@ def _cutting(shape: Shape, lines: Sequence[str]) -> Fact:
 
 
 def _time(
-    parts: _Parts, shape: Shape, meanings: Sequence[Meaning], given: GivenColumns | None, options: WindOptions
-) -> TimeFields | None:
+    parts: _Parts, shape: Shape, meanings: Sequence[Meaning], given: GivenColumns | None, options: WindOptions, *,
+    counted: bool,
+) -> TimeFields | None:  # fmt: skip
     if given is not None:
-        time = of_columns(shape, given.time, options.date_order, given.form or None) if given.time else None
+        columns = given.time or ((len(shape.names) - 1,) if counted else ())
+        time = of_columns(shape, columns, options.date_order, given.form or None) if columns else None
     else:
         time = find_time(shape, meanings, options.date_order)
     if time is None:
         question = f"no column reads as a time: which one is it, and in what format?{unread_count(shape, meanings)}"
-        parts.open.append(Open(key="columns", question=question, example="'1=time[FORMAT],2=wind_speed[UNIT]'"))
+        example = "'1=time[FORMAT],2=wind_speed[UNIT]' (or, if readings came at a steady rate, --start TIME --rate HZ)"
+        parts.open.append(Open(key="columns", question=question, example=example))
         return None
     parts.used.update(time.columns)
     shown = " + ".join(shape.shown(i) for i in time.columns)

@@ -93,7 +93,7 @@ def drafted(source: TextFile, options: WindOptions) -> Draft | None:
     for key in options.expect:
         if key not in KEYS:
             raise UnknownNameError.of("check", key, KEYS, where="--expect")
-    return draft(source.head(HEAD_LINES), options, serial_days=source.serial_days)
+    return draft(source.head(HEAD_LINES), options, serial_days=source.serial_days, counted=source.counted)
 
 
 def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:

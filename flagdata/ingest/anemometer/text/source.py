@@ -157,6 +157,7 @@ _SIGNATURES: tuple[tuple[int, bytes, str, str], ...] = (
     (0, b"\x89PNG", "a PNG picture", "give the anemometer's log"),
     (0, b"\xff\xd8\xff", "a JPEG picture", "give the anemometer's log"),
     (4, b"ftyp", "a video (MP4 or MOV)", "ingest it as a camera file"),
+    (0, b"GIF8", "a video (GIF)", "ingest it as a camera file"),
     (0, b"RIFF", "a video or sound (AVI or WAV)", "ingest it as a camera file"),
     (0, b"\x1a\x45\xdf\xa3", "a video (Matroska or WebM)", "ingest it as a camera file"),
     (0, b"\x00\x00\x01\xba", "a video (MPEG)", "ingest it as a camera file"),

@@ -322,7 +322,7 @@ def test_a_raw_stream_needs_a_rate_and_then_keeps_its_frames(
     path = write_video(tmp_path / "raw.h264", range(12), tick=Fraction(1, 50), container="h264")
     with pytest.raises(TimeError, match="no time stamps") as raised:
         open_camera(path, plain)
-    assert "sequence_fps" in raised.value.fix
+    assert "--sequence-fps" in raised.value.fix
     _, frames, _ = read(path, replace(plain, sequence_fps=50.0))
     assert [number_of(f.image) for f in frames] == [0, 2, 4, 6, 8, 10]
 

@@ -1,0 +1,74 @@
+"""Remedies of commands that measure, simulate and learn, as far as a second's work brings them about."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.remedies.cases import OR, Case, heal
+from tests.remedies.user import User
+
+SHORT = "measure second.mp4"
+"""A film of less than a second: refused for its length, once the options fit."""
+TOO_SHORT = "s of film, a measurement takes"
+STAMPS = "align first mast --by stamps --offset-sigma 0.1"
+CASES = [
+    Case(
+        "estimate/command.py",
+        "choose one of --json and --csv",
+        f"{SHORT} --json --csv",
+        (f"{SHORT} --json", OR, f"{SHORT} --csv"),
+        shows=TOO_SHORT,
+        code=1,
+    ),
+    Case(
+        "estimate/command.py",
+        "give --refine N",
+        f"{SHORT} --cache c",
+        (SHORT, OR, f"{SHORT} --cache c --refine 20 --flag-size 1.5x1"),
+        shows=TOO_SHORT,
+        code=1,
+    ),
+    Case(
+        "estimate/run.py",
+        "choose one of --area-weight and --material",
+        f"{SHORT} --area-weight 0.1 --material x",
+        (f"{SHORT} --area-weight 0.1", OR, f"{SHORT} --material camel-ponte-roma"),
+        shows=TOO_SHORT,
+        code=1,
+    ),
+    Case("estimate/source.py", "see flagdata measure --help", "measure", ("measure --help",), shows="--query"),
+    Case(
+        "estimate/source.py",
+        "look with flagdata query --where",
+        "measure --query \"name = 'mist'\"",
+        ("query --where \"name = 'first'\"",),
+        shows="first",
+    ),
+    Case(
+        "sim/blender/command.py",
+        "leave out --folder and --python",
+        "blender-setup --check --folder x --python y",
+        ("blender-setup --check",),
+        code=1,
+    ),
+]
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_what_a_remedy_says_heals(case: Case, user: User) -> None:
+    heal(user, case)
+
+
+def test_a_film_without_a_log_is_aligned_before_it_is_calibrated(user: User) -> None:
+    user.meets(
+        "calibrate/filmed.py", "and name the recording that comes out", "calibrate", "first", "--flag-size", "1x1"
+    )
+    recording = user.follows(*STAMPS.split(), "--json").document["recording"]
+    assert "no log of the wind is beside" not in user.types("calibrate", recording, "--flag-size", "1x1").err
+
+
+def test_a_query_of_clips_needs_a_lake(user: User, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("FLAGDATA_LAKE")
+    command = ("measure", "--query", "kind = 'clip'")
+    user.meets("estimate/source.py", "name the lake by --lake", *command)
+    user.follows(*command, "--lake", "lake", code=1, shows="no clip matches")
