@@ -44,7 +44,7 @@ SECRETS = {
 def moto() -> Iterator[str]:
     """The address of moto's server, with an empty bucket; in a process of its own, since the Delta library keeps
     Python's lock while it waits for an answer."""
-    with _process(_SERVER) as address:
+    with process(_SERVER) as address:
         urlopen(Request(f"{address}/{BUCKET}", method="PUT")).close()
         yield address
 
@@ -52,12 +52,12 @@ def moto() -> Iterator[str]:
 @contextmanager
 def read_only(store: str) -> Iterator[str]:
     """The address of a server that passes reads on to another one; in a process of its own, as moto's."""
-    with _process(_READ_ONLY, store.removeprefix("http://")) as address:
+    with process(_READ_ONLY, store.removeprefix("http://")) as address:
         yield address
 
 
 @contextmanager
-def _process(program: str, *arguments: str) -> Iterator[str]:
+def process(program: str, *arguments: str) -> Iterator[str]:
     """The address that a server in a process of its own prints."""
     command = [sys.executable, "-c", program, *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, cwd=Path(__file__).parents[1]) as process:
@@ -242,10 +242,18 @@ def refusing(status: int, code: str, message: str = "no", *, rest: str = "") -> 
     return status, {"Content-Type": "application/xml"}, text.encode()
 
 
+class _Quiet(ThreadingHTTPServer):
+    """Says nothing of clients that are gone."""
+
+    def handle_error(self, request: object, client_address: object) -> None:
+        if not isinstance(sys.exc_info()[1], ConnectionError):
+            super().handle_error(request, client_address)  # type: ignore[arg-type]
+
+
 @contextmanager
 def serving(handler: type[BaseHTTPRequestHandler]) -> Iterator[str]:
     """The address of a server."""
-    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    server = _Quiet(("127.0.0.1", 0), handler)
     Thread(target=server.serve_forever, daemon=True).start()
     try:
         yield f"http://127.0.0.1:{server.server_address[1]}"

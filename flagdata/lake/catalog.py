@@ -20,6 +20,7 @@ import hashlib
 import json
 import random
 import re
+import tempfile
 import threading
 import time
 import uuid
@@ -133,19 +134,19 @@ class Catalog:
         """Make the empty table.
 
         Raises:
+            ConflictError: there is one.
             OSError: what the disk refused.
         """
-        try:
+        # In a scratch folder: the Delta library takes a put whose answer was lost for one that another made before it.
+        with tempfile.TemporaryDirectory() as folder:
             DeltaTable.create(
-                self.path.as_uri(),
-                catalog_schema(),
-                mode="error",
-                configuration=_CONFIGURATION,
-                storage_options=self._options(),
+                folder, catalog_schema(), mode="error", configuration=_CONFIGURATION,
                 commit_properties=_properties(info),
-            )
-        except DeltaError as error:
-            raise self._refused(error) from None
+            )  # fmt: skip
+            entry = (Path(folder) / "_delta_log" / self._entries.path(0).name).read_bytes()
+        self._log.mkdir(parents=True, exist_ok=True)
+        if not self._entries.adopt(0, entry):
+            raise ConflictError("another process is making a lake there", where=str(self.path), fix="open that one")
         self._flush_log(0)
 
     @_one_at_a_time
@@ -333,7 +334,7 @@ class Catalog:
     def _whole_history(self, head: int) -> list[dict[str, Any]]:
         table = self._open(head)
         with self._log_errors():
-            found = table.history()
+            found = self._repeated(table.history)
         if not found:  # the library lists nothing in a folder whose name has a # or a ?
             found = [{**self._entries.info(version), "version": version} for version in range(head, -1, -1)]
         # The Delta library lists the log as it is by now, and counts its versions down from the table's.
@@ -391,10 +392,7 @@ class Catalog:
 
     def _open(self, version: int) -> DeltaTable:
         with self._log_errors():
-            if self._table is not None and self._table.version() < version:
-                self._table.update_incremental()
-            if self._table is None or self._table.version() != version:
-                self._table = DeltaTable(self.path.as_uri(), version=version, storage_options=self._options())
+            self._table = self._repeated(lambda: self._at(version))
         unknown = [f.name for f in self._table.schema().fields if f.name not in CATALOG]
         if unknown:
             raise newer(f"the catalog has the columns {', '.join(unknown)}", self.path)
@@ -424,6 +422,27 @@ class Catalog:
                 if self._entries.checkpoints()
                 else restore,
             ) from None
+
+    def _at(self, version: int) -> DeltaTable:
+        table = self._table
+        if table is not None and table.version() < version:
+            table.update_incremental()
+        if table is None or table.version() != version:
+            table = DeltaTable(self.path.as_uri(), version=version, storage_options=self._options())
+        return table
+
+    def _repeated(self, reading: Callable[[], T]) -> T:
+        """What the Delta library reads, which does not ask again where an answer of a store breaks off."""
+        for _ in range(_BROKEN):
+            try:
+                return reading()
+            except (DeltaError, OSError) as error:
+                place = self.path
+                if not isinstance(place, RemotePath) or not _NO_ANSWER.search(str(error)):
+                    raise
+                if not refusal(error, bucket=place.bucket, where=str(place)).passing:
+                    raise
+        return reading()
 
     def _refused(self, error: DeltaError) -> OSError:
         """What the Delta library could not write, as an error of the system."""
@@ -481,6 +500,8 @@ _HINT = "_last_checkpoint"
 _SYSTEM_ERROR = "(os error "  # as the Delta library writes it
 _NO_ANSWER = re.compile(r"Generic S3 error|Error performing [A-Z]+ ")
 """What it writes where a store refused a request or did not answer; all else concerns what the store gave."""
+_BROKEN = 4
+"""How often it is asked again after an answer that broke off."""
 _WRITER = 2
 """Version of Delta's protocol that tables of this package ask of writers; a later one has duties unknown here."""
 

@@ -27,7 +27,7 @@ from flagdata.lake.leases import collecting
 from flagdata.lake.merging import MergeResult, merge
 from flagdata.lake.objects import Objects
 from flagdata.lake.refs import MAIN, Ref
-from flagdata.lake.remote_leases import MADE
+from flagdata.lake.remote_leases import MADE, claimed, unfinished
 from flagdata.lake.removals import explained
 from flagdata.lake.store import Store
 from flagdata.lake.transaction import Transaction
@@ -61,12 +61,12 @@ class Lake(Store):
     def _make(cls, path: Place | str, fill: Callable[[Lake], None]) -> Lake:
         lake = cls(_usable(path))
         with disk_errors("creating a lake", lake.path):
-            there = lake.path.exists() and not lake.path.is_dir()
-            if there or (lake.path.is_dir() and any(True for _ in lake.path.iterdir())):
+            if lake._is_occupied():
                 raise lake._taken()
             if not lake._claim():
                 raise ConflictError("another process is making a lake there", where=str(lake.path), fix="open that one")
             try:
+                lake._clear()
                 fill(lake)
             except BaseException:
                 for entry in lake.path.iterdir():
@@ -87,11 +87,26 @@ class Lake(Store):
             )  # fmt: skip
         return ConflictError("there is something else already", where=where, fix="choose an empty or new folder")
 
+    def _is_occupied(self) -> bool:
+        """Whether anything is there but, in a bucket, what a process left that was killed while it made a lake."""
+        if isinstance(self.staging, RemotePath):
+            others = any(entry != self.staging for entry in self.path.iterdir())
+            return others and not unfinished(self.staging, done=self.path / _MARKER)
+        there = self.path.exists() and not self.path.is_dir()
+        return there or (self.path.is_dir() and any(True for _ in self.path.iterdir()))
+
+    def _clear(self) -> None:
+        """Delete what such a process left; nothing but the claim of this one is there then."""
+        if isinstance(self.path, RemotePath):
+            for entry in self.path.rglob("*"):
+                if entry != self.staging / MADE:
+                    entry.unlink()
+
     def _claim(self) -> bool:
         """Whether this process makes the lake: the one that succeeds in making its staging."""
         if isinstance(self.staging, RemotePath):
             self.check_writable()
-            return (self.staging / MADE).create(uuid.uuid4().hex.encode())
+            return claimed(self.staging, done=self.path / _MARKER)
         self.path.mkdir(parents=True, exist_ok=True)
         try:
             self.staging.mkdir()

@@ -34,7 +34,7 @@ from typing import Any
 
 from flagdata.documents import from_json
 from flagdata.errors import ConflictError
-from flagdata.storage import RemotePath
+from flagdata.storage import Place, RemotePath
 
 LIFE = 240.0
 """How long what is not written anew counts [s]: longer than all retries of one request."""
@@ -150,6 +150,19 @@ def alone(staging: RemotePath) -> Iterator[Held]:
         yield held
     finally:
         held.close()
+
+
+def claimed(staging: RemotePath, *, done: Place) -> bool:
+    """Whether this process makes the lake: nobody did yet, or whoever did was killed before `done` was there."""
+    text = _line({**owner(), "id": uuid.uuid4().hex})
+    if (staging / MADE).create(text.encode()):
+        return True
+    return unfinished(staging, done=done) and _taken(staging / MADE, text, staging) is not None
+
+
+def unfinished(staging: RemotePath, *, done: Place) -> bool:
+    """Whether a process began to make the lake and was killed before `done` was there."""
+    return (staging / MADE).exists() and _living(staging / MADE, staging) is None and not done.exists()
 
 
 def _taken(place: RemotePath, text: str, staging: RemotePath) -> str | None:

@@ -30,6 +30,8 @@ BLOCK = 8 << 20
 """Bytes that one request reads or writes of a larger object."""
 _UPLOADS = 3
 """How often a file is put whose parts the store does not find."""
+_BROKEN = 5
+"""How often a request is sent whose answer breaks off; each may be sent twice, see `RemotePath.create`."""
 _CONFLICTS = 8
 """How often a conditional put is made that the store calls in conflict with another, and neither shows."""
 _ADDRESS = re.compile(r"s3://([a-z0-9][a-z0-9.-]{1,61}[a-z0-9])(?:/(.*))?", re.DOTALL)
@@ -298,13 +300,33 @@ class RemotePath:
         """
         prefix = f"{self.key}/" if self.key else ""
         offset = None if after is None else prefix + after
-        stream = self._ask(lambda obstore, store: obstore.list(store, self.key or None, offset=offset, chunk_size=1000))
+        broken = 0
         while True:
-            chunk = self._ask(lambda obstore, store: next(stream, None))
+            try:
+                for meta in self._listed(offset):
+                    offset = meta["path"]
+                    yield meta["path"].removeprefix(prefix), _status(meta)
+                return
+            except StoreError as error:
+                broken += 1
+                if not error.passing or broken == _BROKEN:
+                    raise
+
+    def _listed(self, offset: str | None) -> Iterator[Any]:
+        """What is beneath, after a key; a listing that breaks off cannot be gone on with."""
+        store = connection.client(self.bucket)
+        import obstore
+        from obstore import exceptions
+
+        stream = iter(obstore.list(store, self.key or None, offset=offset, chunk_size=1000))
+        while True:
+            try:
+                chunk = next(stream, None)
+            except (exceptions.BaseError, OSError) as error:
+                raise self._refusal(error) from None
             if chunk is None:
                 return
-            for meta in chunk:
-                yield meta["path"].removeprefix(prefix), _status(meta)
+            yield from chunk
 
     def rglob(self, pattern: str) -> Iterator[RemotePath]:
         """All objects beneath whose last name fits; folders are none."""
@@ -347,20 +369,24 @@ class RemotePath:
         import obstore
         from obstore import exceptions
 
-        try:
-            return request(obstore, store)
-        except (FileNotFoundError, exceptions.NotFoundError) as error:
-            if "NoSuchBucket" in str(error):
-                raise self._refusal(error) from None
-            raise FileNotFoundError(errno.ENOENT, "there is no such object", str(self)) from None
-        except (exceptions.AlreadyExistsError, exceptions.PreconditionError) as error:
-            if "performing PUT" not in str(error):  # 409 of a bucket that is being changed
-                raise self._refusal(error) from None
-            raise FileExistsError(
-                errno.EEXIST, "there is such an object, or another version of it", str(self)
-            ) from None
-        except (exceptions.BaseError, OSError) as error:
-            raise self._refusal(error) from None
+        for left in reversed(range(_BROKEN)):
+            try:
+                return request(obstore, store)
+            except (FileNotFoundError, exceptions.NotFoundError) as error:
+                if "NoSuchBucket" in str(error):
+                    raise self._refusal(error) from None
+                raise FileNotFoundError(errno.ENOENT, "there is no such object", str(self)) from None
+            except (exceptions.AlreadyExistsError, exceptions.PreconditionError) as error:
+                if "performing PUT" not in str(error):  # 409 of a bucket that is being changed
+                    raise self._refusal(error) from None
+                raise FileExistsError(
+                    errno.EEXIST, "there is such an object, or another version of it", str(self)
+                ) from None
+            except (exceptions.BaseError, OSError) as error:
+                refused = self._refusal(error)
+                if not refused.passing or not left:
+                    raise refused from None
+        raise AssertionError("unreachable")
 
     def _refusal(self, error: Exception) -> StoreError:
         return refusal(error, bucket=self.bucket, where=str(self))

@@ -36,9 +36,12 @@ class StoreError(OSError):
 
     Attributes:
         fix: what can be done about it.
+        passing: whether the answer was cut off, or lost, by a store that answers again; the client repeats no request
+            whose answer breaks off.
     """
 
     fix = "check the network and the store"
+    passing = False
 
 
 class DeniedError(StoreError, PermissionError):
@@ -148,17 +151,21 @@ def refusal(error: BaseException, *, bucket: str, where: str) -> StoreError:
     code = _first(_CODE, text)
     needs = _needs(text)
     cause = _cause(code, status, text, bucket=bucket, needs=needs)
+    passing = False
     if cause is None and status in _UNNAMED:
         answer = asked(bucket, {"list-type": "2", "max-keys": "1"}, again=False)
         if isinstance(answer, Unreachable) and status is None and code is None:
             cause = Cause(what=answer.what, fix=answer.fix)
         elif isinstance(answer, Answer):
             cause = _answered(answer, bucket=bucket, needs=needs, refused=status)
+            passing = cause is None and status is None
     if cause is None:
         cause = _of_status(status, needs)
     said = plain(error) if cause.what == "" or "<Message>" in text else "" if state is None else state[0]
     what = f"{cause.what} ({said})" if cause.what and said else cause.what or said
-    return _error(cause, what, where)
+    found = _error(cause, what, where)
+    found.passing = passing
+    return found
 
 
 def refused(answer: Answer | Unreachable, *, bucket: str, where: str, needs: str) -> StoreError:
@@ -239,7 +246,7 @@ def _answered(answer: Answer, *, bucket: str, needs: str, refused: int | None) -
         return _abroad(None)
     if answer.status in _BY_STATUS:
         return _BY_STATUS[answer.status]
-    if "aws_access_key_id" not in settings() and refused != 200:
+    if answer.status != 200 and "aws_access_key_id" not in settings():
         return _MISSING
     text = answer.body.decode(errors="replace")
     if answer.code is None or (answer.code == "AccessDenied" and not _ACTION.search(text)):

@@ -23,9 +23,9 @@ from flagdata.cli import main
 
 _STATE = struct.Struct("@qqiiii1024s")  # as calls.c has it
 _LONGEST = 900.0  # s, of a command
-_SHARED = {
+SHARED = {
     "flagdata", "sim", "models", "measure", "torch", "zarr", "scipy", "av", "jinja2", "duckdb", "safetensors", "PIL",
-    "matplotlib", "pandas", "pyarrow", "deltalake", "numcodecs",
+    "matplotlib", "pandas", "pyarrow", "deltalake", "numcodecs", "obstore",
 }  # fmt: skip
 """Packages whose modules, once a child has imported them, are imported before later forks."""
 
@@ -65,7 +65,7 @@ def run(arguments: list[str], folder: Path) -> int:
         traceback.print_exc()
     sys.stdout.flush()
     sys.stderr.flush()
-    imported = [name for name in sys.modules if name.partition(".")[0] in _SHARED]
+    imported = [name for name in sys.modules if name.partition(".")[0] in SHARED]
     (folder / "modules").write_text("\n".join(imported))
     return code
 

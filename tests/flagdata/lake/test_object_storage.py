@@ -10,7 +10,7 @@ import pickle
 import shutil
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from pathlib import Path
@@ -32,6 +32,7 @@ from flagdata.selection import select
 from flagdata.storage import RemotePath, StoreError
 from flagdata.storage import cache as object_cache
 from flagdata.storage.connection import plain
+from tests.failing.store import failing, planned
 from tests.program import invoke
 from tests.s3 import SECRETS, Careless, Denying, Forbidding, read_only, serving
 
@@ -568,3 +569,70 @@ def test_without_permission_to_list_or_to_delete_a_command_says_which_is_missing
             ended = invoke(capsys, *command, "--lake", remote_lake.path)
             assert ended.code == 1
             assert f"have {action} permitted" in ended.err.partition("fix:")[2]
+
+
+def test_a_lake_whose_making_was_killed_is_made_by_the_same_command(bucket_folder: str) -> None:
+    root = RemotePath.parse(bucket_folder)
+    (root / "staging" / "probe-0").write_bytes(b"1")
+    assert Lake.create(f"{bucket_folder}").rows().num_rows == 0
+    other = RemotePath.parse(f"{bucket_folder}-other")
+    (other / "staging" / "made").write_bytes(json.dumps(dead_owner()).encode() + b"\n")
+    (other / "catalog" / "_delta_log" / f"{0:020d}.json").write_bytes(b"half done")
+    lake = Lake.create(str(other))
+    assert lake.rows().num_rows == 0
+    assert doctor(lake, grace=NOW) == ()
+    with pytest.raises(ConflictError, match="a lake already"):
+        Lake.create(str(other))
+
+
+def test_a_lake_that_a_living_process_is_making_is_left_to_it(bucket_folder: str) -> None:
+    place = RemotePath.parse(bucket_folder)
+    (place / "staging" / "made").write_bytes(json.dumps(remote_leases.owner()).encode() + b"\n")
+    with pytest.raises(ConflictError, match="another process is making"):
+        Lake.create(bucket_folder)
+    (place / "lake-of-others").write_bytes(b"1")
+    with pytest.raises(ConflictError, match="something else"):
+        Lake.create(bucket_folder)
+
+
+def test_an_answer_that_breaks_off_is_asked_for_again_and_a_listing_goes_on_behind_its_last_name(
+    bucket_folder: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, listed, broken = RemotePath.parse(bucket_folder), RemotePath._listed, [2, 3]
+    for number in range(5):
+        (folder / str(number)).write_bytes(b"1")
+
+    def breaking(place: RemotePath, offset: str | None) -> Iterator[object]:
+        after = broken.pop() if broken else 99
+        for count, meta in enumerate(listed(place, offset)):
+            if count == after:
+                error = StoreError("broken off")
+                error.passing = True
+                raise error
+            yield meta
+
+    monkeypatch.setattr(RemotePath, "_listed", breaking)
+    assert [name for name, _ in folder.names()] == ["0", "1", "2", "3", "4"]
+    broken[:] = [0] * 9
+    with pytest.raises(StoreError, match="broken off"):
+        list(folder.names())
+
+
+def test_a_conditional_put_whose_answer_is_lost_counts_for_its_writer(
+    s3_server: str, use_store: Use, capsys: pytest.CaptureFixture[str], put_text: Put
+) -> None:
+    address = f"s3://bucket/lost-answers-{time.time_ns()}"
+    with failing(s3_server) as proxy:
+        use_store(proxy)
+        planned(proxy, lost=0.6, seed=1)
+        commands = (("init", address), ("tag", "v1"), ("branch", "side"), ("tag", "v1", "--delete"), ("gc",))
+        for name, *arguments in commands:
+            place = () if name == "init" else ("--lake", address)
+            ended = invoke(capsys, name, *arguments, *place)
+            assert ended.code == 0, ended.err
+        lake = Lake.open(address)
+        artifacts = [put_text(lake, f"gusts {number}").id for number in range(4)]
+        lake.withdraw(artifacts[:1], "wrong")
+        assert lake.rows()["artifact"].to_pylist() == artifacts[1:]
+        assert planned(proxy)["faults"]["lost answer of a conditional put"] > 10
+        assert [finding.severity for finding in doctor(lake, grace=NOW)] == [Severity.WARNING]  # what was withdrawn
