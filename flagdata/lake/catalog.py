@@ -392,11 +392,11 @@ class Catalog:
 
     def _open(self, version: int) -> DeltaTable:
         with self._log_errors():
-            self._table = self._repeated(lambda: self._at(version))
-        unknown = [f.name for f in self._table.schema().fields if f.name not in CATALOG]
+            table = self._table = self._repeated(lambda: self._at(version))
+        unknown = [f.name for f in table.schema().fields if f.name not in CATALOG]
         if unknown:
             raise newer(f"the catalog has the columns {', '.join(unknown)}", self.path)
-        return self._table
+        return table
 
     @contextmanager
     def _log_errors(self) -> Iterator[None]:
