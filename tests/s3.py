@@ -18,6 +18,8 @@ BUCKET = "bucket"
 _SERVER = """
 import logging, threading
 from moto.server import ThreadedMotoServer
+from werkzeug.serving import WSGIRequestHandler
+WSGIRequestHandler.disable_nagle_algorithm = True  # else each answer waits 40 ms for the client's acknowledgement
 logging.getLogger("werkzeug").setLevel(logging.ERROR)
 server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
 server.start()
@@ -71,6 +73,8 @@ def process(program: str, *arguments: str) -> Iterator[str]:
 class Careless(BaseHTTPRequestHandler):
     """A store that takes the conditions of puts and ignores them, as `rclone serve s3` does."""
 
+    disable_nagle_algorithm = True
+
     objects: ClassVar[dict[str, bytes]] = {}
 
     def do_PUT(self) -> None:
@@ -121,6 +125,8 @@ class Denying(Careless):
 
 class Passing(BaseHTTPRequestHandler):
     """Passes requests on to another store."""
+
+    disable_nagle_algorithm = True
 
     store: ClassVar[str] = ""
 
@@ -210,6 +216,7 @@ class Scripted(BaseHTTPRequestHandler):
     """A store that gives one answer to all requests; None closes the connection."""
 
     protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True
     answer: ClassVar[tuple[int, dict[str, str], bytes] | None] = None
     asked: ClassVar[list[tuple[str, str]]] = []
 

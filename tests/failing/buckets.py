@@ -3,7 +3,8 @@
 Each verb that writes to a lake is killed at so many of its requests to the store, spread evenly, in turn before the
 store has the request and after it has done it. 5 % of the requests meet a fault: they are answered by an error, cut off
 before or after the store has acted or within the answer, or answered late. Then the command is given again, beside
-faults, and the lake is examined, collected and examined again.
+faults, and the lake is examined, collected and examined again: a copy on disk, and at every fifth point the lake in the
+bucket, too.
 
 Results stay in FILE, a JSON file, verb after verb, so that a campaign may be stopped and given again; beside it a page
 of the same name shows them.
@@ -38,6 +39,7 @@ from flagdata.findings import Severity
 from flagdata.lake import Lake
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, object_names, verify
+from flagdata.lake.remote_objects import SUMS
 from flagdata.storage import RemotePath, connection
 from tests.evidence import circumstances
 from tests.failing import slow
@@ -166,12 +168,27 @@ SCENES: Mapping[str, tuple[Callable[[Path], Scene], Mapping[str, Verb]]] = {
 }
 
 
-def state(address: str, *, deletes: bool) -> State:
-    """What a lake shows: rows by branch, with their labels, tags and branches; and its objects."""
-    try:
-        lake = Lake.open(address)
-    except Exception:  # noqa: BLE001 — there is none yet, or it is not whole
+def copied(address: str, folder: Path) -> set[str]:
+    """Copy a lake's files out of the bucket, where they are looked at in a tenth of the time; the names of all that is
+    there. Of folders without their sums, which count as absent, nothing is copied, nor what lies in staging."""
+    shutil.rmtree(folder, ignore_errors=True)
+    place = RemotePath.parse(address)
+    names = {name for name, _ in place.names()}
+    whole = {name.removesuffix(f"/{SUMS}") for name in names if name.endswith(f"/{SUMS}")}
+    for name in names:
+        parts = name.split("/")
+        inside = parts[0] not in ("zarr", "model") or "/".join(parts[:2]) in whole
+        if inside and parts[0] != "staging" and parts[-1] != SUMS:
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes((place / name).read_bytes())
+    return names
+
+
+def state(folder: Path, *, deletes: bool) -> State:
+    """What a copied lake shows: rows by branch, with their labels, tags and branches; and its objects."""
+    if not (folder / "lake.json").exists():
         return frozenset({("no lake",)})
+    lake = Lake.open(folder)
     found: set[tuple[str, ...]] = {("lake",)}
     for branch in ("main", *lake.refs.branches()):
         found.add(("branch", branch))
@@ -180,18 +197,34 @@ def state(address: str, *, deletes: bool) -> State:
     found |= {("tag", name) for name in lake.refs.tags()}
     if deletes:
         found |= {("object", stored.name) for stored in lake.objects}
-        found |= {("upload", str(upload)) for upload in RemotePath.parse(address).uploads()}
     return frozenset(found)
 
 
-def examine(address: str) -> dict[str, Any]:
-    """What is wrong with a lake, and what a collection leaves in it that is not to be there."""
-    lake = Lake.open(address)
-    found = [*doctor(lake, grace=NOW), *verify(lake, object_names(lake))]
+def examine(address: str, folder: Path, *, remotely: bool) -> dict[str, Any]:
+    """What is wrong with a lake, and what a collection leaves in it that is not to be there.
+
+    Args:
+        folder: where it was copied to.
+        remotely: whether the lake in the bucket is examined, too.
+    """
+    lake, local = Lake.open(address), Lake.open(folder)
+    found = [*doctor(local, grace=NOW), *verify(local, object_names(local))]
+    if remotely:
+        found += [*doctor(lake, grace=NOW), *verify(lake, object_names(lake))]
     errors = [f"{one.kind}: {one.what}" for one in found if one.severity is Severity.ERROR]
     collected = collect(lake, grace=NOW)
-    left = [f"{one.kind}: {one.what}" for one in doctor(lake, grace=NOW) if one.severity is not Severity.NOTE]
+    names = copied(address, folder)
+    left = [f"staging: {name}" for name in names if name.startswith("staging/") and name != "staging/made"]
+    left += [f"a folder without its sums: {name}" for name in names - _files(folder) if not name.startswith("staging/")]
+    after = doctor(lake if remotely else Lake.open(folder), grace=NOW)
+    left += [f"{one.kind}: {one.what}" for one in after if one.severity is not Severity.NOTE]
     return {"errors": errors, "left": left, "collected": len(collected.objects) + len(collected.leftovers)}
+
+
+def _files(folder: Path) -> set[str]:
+    """Names of the files of a copied lake, with those of the sums that were not copied."""
+    files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    return files | {f"{'/'.join(name.split('/')[:2])}/{SUMS}" for name in files if name[:4] in ("zarr", "mode")}
 
 
 def _invoked(arguments: Sequence[str]) -> int:
@@ -302,16 +335,20 @@ class Trials:
     def _target(self, prefix: str) -> str:
         return self.verb.target.format(**self._places(prefix))
 
+    def _state(self, target: str) -> State:
+        copied(target, self.scratch / "copy")
+        return state(self.scratch / "copy", deletes=self.verb.deletes)
+
     def whole(self) -> tuple[State, State, int]:
         """The state before and after the verb without a fault, and how many requests it made."""
 
         def work() -> tuple[State, State, int, int]:
             target = self._target("whole")
-            before = state(target, deletes=self.verb.deletes)
+            before = self._state(target)
             planned(self.proxy)
             code = _invoked(self.given("whole"))
             count = planned(self.proxy)["count"]
-            return before, state(target, deletes=self.verb.deletes), count, code
+            return before, self._state(target), count, code
 
         self.bucket.put("whole/lake")
         code, result, said = Child(work, self.scratch / "whole").ended()
@@ -342,13 +379,14 @@ class Trials:
         def second() -> dict[str, Any]:
             faults = planned(self.proxy)["faults"]
             target = self._target(prefix)
-            middle = state(target, deletes=self.verb.deletes)
+            middle = self._state(target)
             planned(self.proxy, share=FAULTY, lost=LOST, seed=1000 * number + call + 1)
             again = self.verb.again if self.verb.again and middle != frozenset({("no lake",)}) else None
             code = _invoked(self.given(prefix, again))
             faults = Counter(faults) + Counter(planned(self.proxy)["faults"])
-            end = state(target, deletes=self.verb.deletes)
-            return {"faults": faults, "middle": middle, "again": code, "end": end, **examine(target)}
+            end = self._state(target)
+            seen = examine(target, self.scratch / "copy", remotely=number % 5 == 0)
+            return {"faults": faults, "middle": middle, "again": code, "end": end, **seen}
 
         code, ended, said = Child(first, self.scratch / prefix / "first").ended()
         failed, found, told = Child(second, self.scratch / prefix / "second").ended()
@@ -458,6 +496,7 @@ def campaign(names: Sequence[str], results: Path, *, points: int, scratch: Path)
                 place.mkdir()
                 trials = Trials(verb=verb, scene=scene, bucket=bucket, proxy=proxy, scratch=place)
                 known[name] = {**tried(trials, points=points), "circumstances": circumstances(0)}
+                shutil.rmtree(place)
                 print(name, {key: value for key, value in known[name].items() if key != "circumstances"}, flush=True)  # noqa: T201
                 results.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n")
                 results.with_suffix(".md").write_text(page(known))
