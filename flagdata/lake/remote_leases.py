@@ -153,7 +153,7 @@ def alone(staging: RemotePath) -> Iterator[Held]:
 
 
 def claimed(staging: RemotePath, *, done: Place) -> bool:
-    """Whether this process makes the lake: nobody did yet, or the process that did was killed before `done` was there."""
+    """Whether this process makes the lake: nobody did, or who did was killed before `done` was there."""
     text = _line({**owner(), "id": uuid.uuid4().hex})
     if (staging / MADE).create(text.encode()):
         return True
