@@ -124,6 +124,8 @@ def _convert(annotation: str) -> Convert | None:
         found = _texts
     elif {"Path", "Place", "AnyLake"} & set(kinds):
         found = _path
+    elif kinds and all(kind == "str" or kind.startswith("Mapping[") for kind in kinds):
+        found = _table
     elif kinds and ("Mapping" in annotation or "float" in kinds):
         found = _plain
     if found is None or "None" not in annotation.split(" | "):
@@ -158,6 +160,14 @@ def _text(value: object, name: str) -> str:
     if isinstance(value, os.PathLike):
         return os.fsdecode(value)
     raise UsageError(f"{name} is {_shown(value)}, which is no text", fix="give it in quotes")
+
+
+def _table(value: object, name: str) -> Any:
+    """A table, or a text that stands for one."""
+    if isinstance(value, str | Mapping):
+        return plain(value)
+    what = f"{name} is {_shown(value)}, which is no table of names and values"
+    raise UsageError(what, fix='give one such as {"name": value}')
 
 
 def _texts(values: Any, name: str) -> list[str]:

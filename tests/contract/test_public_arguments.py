@@ -109,6 +109,13 @@ def test_numbers_within_tables_become_pythons_own_and_arrays_stay() -> None:
     assert found["time"] is array
 
 
+def test_a_table_of_another_library_is_refused_by_the_name_of_the_argument() -> None:
+    with pytest.raises(UsageError, match=r"where is .*no table"):
+        flagdata.query("lake", pd.Series({"kind": "clip"}))  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match=r"wind is 5\.0"):
+        flagdata.simulate(wind=5.0)  # type: ignore[arg-type]
+
+
 class Path3:
     """A path of another library."""
 
