@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import av
 import numpy as np
 import pytest
 from PIL import Image
 
 from tests.remedies.cases import OR, Case, heal
+from tests.remedies.scene import write_film
 from tests.remedies.user import User
 
 FILM = "ingest second.mp4"
@@ -101,23 +99,10 @@ def test_the_rate_of_a_gif_is_given(user: User, pictures: list[Image.Image]) -> 
     user.again("--true-fps", 25)
 
 
-def write_film(path: Path, begin: str, *, size: tuple[int, int] = (48, 64)) -> None:
-    """Write half a second of a film that states when it began."""
-    with av.open(str(path), "w") as container:
-        container.metadata["creation_time"] = begin
-        stream = container.add_stream("libx264", rate=50, options={"threads": "1"})
-        stream.height, stream.width = size
-        stream.pix_fmt = "yuv420p"
-        for k in range(25):
-            pixels = np.full(size, 40 + 5 * k, np.uint8)
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="gray")))
-        container.mux(stream.encode(None))
-
-
 def test_files_that_are_no_chapters_are_ingested_by_themselves(user: User) -> None:
-    write_film(user.folder / "a.mp4", "2026-05-01T10:00:00Z")
-    write_film(user.folder / "b.mp4", "2026-05-01T10:00:00Z", size=(32, 32))
-    write_film(user.folder / "c.mp4", "2026-05-01T11:00:00Z")
+    write_film(user.folder / "a.mp4", frames=25, begin="2026-05-01T10:00:00Z")
+    write_film(user.folder / "b.mp4", frames=25, begin="2026-05-01T10:00:00Z", size=(32, 32))
+    write_film(user.folder / "c.mp4", frames=25, begin="2026-05-01T11:00:00Z")
     user.meets("camera/joined.py", "ingest it by itself, without --join", "ingest", "a.mp4", "b.mp4", "--join")
     user.follows("ingest", "b.mp4")
     user.meets("camera/joined.py", "or leave out --join", "ingest", "a.mp4", "c.mp4", "--join")

@@ -20,8 +20,8 @@ def aligned(user: User, *more: str) -> str:
 
 def test_a_name_that_nothing_has_is_found_where_the_fix_says(user: User) -> None:
     user.meets("lake/store.py", "flagdata ls lists them", "show", "nothing")
-    user.follows("ls", shows=user.ids["camera"][:12])
-    user.succeeds("show", user.ids["camera"][:12])
+    listed = user.follows("ls", shows="camera +first").out
+    user.succeeds("show", listed.splitlines()[1].split()[0])
 
 
 def test_a_name_of_a_branch_is_listed_with_the_branch_that_was_asked(user: User) -> None:

@@ -42,12 +42,10 @@ class User:
     Attributes:
         origin: what `folder` is a copy of.
         folder: where files and the lake are.
-        ids: artifacts of the lake by what a test calls them.
     """
 
     origin: Path
     folder: Path
-    ids: dict[str, str]
     capsys: pytest.CaptureFixture[str]
     met: dict[Remedy, set[str]] = field(default_factory=dict)
     """Remedies that were printed, each with the commands and options it names that are still to be typed."""
@@ -131,16 +129,9 @@ class User:
         return [f"{remedy}: {' '.join(sorted(left))}" for remedy, left in self.met.items() if left]
 
     @classmethod
-    def at(
-        cls,
-        origin: Path,
-        folder: Path,
-        ids: dict[str, str],
-        capsys: pytest.CaptureFixture[str],
-        patch: pytest.MonkeyPatch,
-    ) -> User:
+    def at(cls, origin: Path, folder: Path, capsys: pytest.CaptureFixture[str], patch: pytest.MonkeyPatch) -> User:
         """A user in `folder`, whose errors and findings are noted as they are made."""
-        user = cls(origin, folder, ids, capsys)
+        user = cls(origin, folder, capsys)
         user.begins()
         for made in (FlagdataError, Finding):
             patch.setattr(made, "__init__", _noting(made, user._made))
