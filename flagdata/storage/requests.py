@@ -21,7 +21,7 @@ from email.utils import parsedate_to_datetime
 from http.client import HTTPException, HTTPMessage
 from typing import IO, Any
 from urllib.error import HTTPError, URLError
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote, urlencode, urlsplit
 
 from flagdata.storage.connection import CONNECT_TIMEOUT, redacted, settings
 
@@ -101,9 +101,9 @@ def asked(
 
 def _once(bucket: str, query: Mapping[str, str], method: str, key: str) -> Answer | Unreachable:
     url = _address(bucket, key)
-    text = "&".join(f"{_quoted(name)}={_quoted(value)}" for name, value in sorted(query.items()))
+    text = urlencode(sorted(query.items()), quote_via=quote, safe="-_.~")
     headers = signed(method, url, text, settings(), when=datetime.now(UTC))
-    request = urllib.request.Request(f"{url}?{text}", method=method, headers=headers)
+    request = urllib.request.Request(urlsplit(url)._replace(query=text).geturl(), method=method, headers=headers)
     try:
         with urllib.request.build_opener(_Staying).open(request, timeout=2 * CONNECT_TIMEOUT) as answer:
             return _answer(answer.status, answer.headers, answer.read())

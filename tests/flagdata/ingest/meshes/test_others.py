@@ -66,7 +66,7 @@ def test_obj_files_beside_other_meshes_are_read(tmp_path: Path) -> None:
     assert classify(folder).kind == "meshes"
 
 
-def test_a_folder_given_as_meshes_without_obj_files_is_told_what_is_read(tmp_path: Path) -> None:
+def test_a_folder_given_as_meshes_without_obj_files_leads_to_what_is_read(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     folder.mkdir()
     (folder / "a.stl").write_bytes(STL)
