@@ -49,7 +49,7 @@ def other_readings(others: Sequence[Artifact], source_hash: str, recipe: Mapping
             what = f"the same file was understood otherwise before, as {artifact.id[:SHORT]}{said}; both stay"
         else:
             continue
-        fix = f"if that one is wrong, take it off: flagdata withdraw {artifact.id[:SHORT]}"
+        fix = f"if that one is wrong, take it off: flagdata withdraw {artifact.id[:SHORT]} -m 'read otherwise'"
         found.append(Finding(kind="ingested-before", severity=Severity.NOTE, what=what, fix=fix))
     return tuple(found)
 

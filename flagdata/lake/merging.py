@@ -9,6 +9,7 @@ the other withdrew it comes back, and is named.
 from __future__ import annotations
 
 import secrets
+import shlex
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -159,8 +160,7 @@ def _check_parents(
                 raise ConflictError(
                     f"{what}, which was withdrawn from {into!r}",
                     where=f"branch {branch}",
-                    fix=f"flagdata withdraw {parent} --with-descendants --branch {branch}, or ingest its source again"
-                    f" with --branch {into}",
+                    fix=_apart(parent, gone=into, there=branch),
                 )
     for row in made_from(mine, withdrawn).to_pylist():
         for parent in row["parents"]:
@@ -169,6 +169,13 @@ def _check_parents(
                     f"{row['kind']} {row['name']!r} ({row['artifact']}) was made from {parent}, which was withdrawn"
                     f" from {branch!r}",
                     where=f"branch {into}",
-                    fix=f"flagdata withdraw {parent} --with-descendants --branch {into}, or ingest its source again"
-                    f" with --branch {branch}",
+                    fix=_apart(parent, gone=branch, there=into),
                 )
+
+
+def _apart(parent: str, *, gone: str, there: str) -> str:
+    """How two branches agree again on an artifact that one withdrew and the other made something from."""
+    return (
+        f"flagdata withdraw {parent} --with-descendants --branch {there} -m {shlex.quote(f'as on {gone}')}, or ingest "
+        f"its source again with --branch {gone}"
+    )

@@ -23,7 +23,7 @@ _READ_ONLY = 0o444
 DAMAGED = ".damaged"
 """Ends the name of the note that an object was found damaged, which lies beside it."""
 REMEDY = (
-    "do again what made it: flagdata doctor says what that is, and the damaged object is replaced; or flagdata pull a"
+    "do again what made it: flagdata verify says what that is, and the damaged object is replaced; or flagdata pull a"
     " clone of this lake, or restore the object from a copy"
 )
 _AT_ONCE = 8

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import time
 from pathlib import Path
 
@@ -79,9 +80,9 @@ def test_a_merge_that_lacks_a_parent_goes_on_after_either_way(user: User) -> Non
         aligned(user, "--branch", branch)
         user.succeeds("withdraw", "mast", "-m", "zero")
         fix = user.meets("lake/merging.py", "flagdata withdraw", "merge", branch)
-        withdrawing = fix.partition("flagdata ")[2].partition(",")[0].split()
+        withdrawing = shlex.split(fix.partition("flagdata ")[2].partition(",")[0])
         if number:
-            user.follows(*withdrawing, "-m", "zero")
+            user.follows(*withdrawing)
         else:
             user.follows("ingest", "mast.csv", "--branch", "main")
         user.succeeds("merge", branch)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import textwrap
 
 import pytest
@@ -388,7 +389,7 @@ def test_a_log_that_was_read_by_a_wrong_option_is_taken_off_by_the_id_that_is_na
     (user.folder / "a.csv").write_text(NAKED)
     user.succeeds("ingest", "a.csv", "--zone", "+01:00")
     fix = user.meets("ingest/before.py", "take it off: flagdata withdraw", "ingest", "a.csv", "--zone", "+02:00")
-    user.follows(*fix.partition("flagdata ")[2].split(), "-m", "the zone")
+    user.follows(*shlex.split(fix.partition("flagdata ")[2]))
     user.succeeds("show", "a")
 
 

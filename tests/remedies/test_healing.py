@@ -1,0 +1,153 @@
+"""Remedies of lakes whose objects, refs or catalog are damaged, and of work that was killed halfway."""
+
+from __future__ import annotations
+
+import shlex
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from flagdata.lake import Lake
+from flagdata.lake.artifact import Artifact
+from flagdata.lake.objects import Objects
+from flagdata.lake.refs import Refs
+from flagdata.lake.transfer import clone, transfer
+from flagdata.schema import Kind
+from tests.flagdata.lake.conftest import overwrite
+from tests.flagdata.lake.test_healing import cut, flip, lose
+from tests.flagdata.lake.test_transfer import no_bar
+from tests.flagdata.lake.test_unfinished import stopped
+from tests.remedies.user import User
+
+
+def the_lake(user: User, name: str = "lake") -> Lake:
+    return Lake.open(user.folder / name)
+
+
+def object_of(lake: Lake, name: str) -> str:
+    return str(lake.artifact(name).object)
+
+
+def keep_measurement(lake: Lake) -> Artifact:
+    """A measurement, of which no file is the source."""
+    with lake.transaction("measure") as transaction:
+        staged = transaction.staging(".zarr")
+        staged.mkdir()
+        (staged / "zarr.json").write_text("{}")
+        row = Artifact(
+            kind=Kind.MEASUREMENT, name="wave", object=transaction.put(staged), recipe={"measure": 1},
+            code_version="1.0",
+        )  # fmt: skip
+        transaction.add(row)
+    return row
+
+
+def test_a_film_whose_object_is_lost_is_put_back_by_its_file_or_by_a_clone(user: User) -> None:
+    user.succeeds("clone", "lake", "copy.lake")
+    lose(the_lake(user), object_of(the_lake(user), "first"))
+    user.meets("lake/again.py", ": it replaces the object", "doctor")
+    user.follows("pull", "copy.lake")
+    user.succeeds("doctor", shows="(?m)^healthy")
+    cut(the_lake(user), object_of(the_lake(user), "first"))
+    fix = user.meets("lake/again.py", "again, with the options", "doctor")
+    user.follows(*shlex.split(fix.partition("flagdata ")[2].partition(" again")[0]))
+    user.succeeds("doctor", shows="(?m)^healthy")
+    user.succeeds("verify")
+
+
+def test_a_measurement_whose_object_is_lost_comes_back_by_a_clone_or_is_withdrawn(user: User) -> None:
+    keep_measurement(the_lake(user))
+    user.succeeds("clone", "lake", "copy.lake")
+    lose(the_lake(user), object_of(the_lake(user), "wave"))
+    user.meets("lake/again.py", "), which replaces the object", "doctor")
+    user.follows("pull", "copy.lake")
+    user.succeeds("doctor", shows="(?m)^healthy")
+    lose(the_lake(user), object_of(the_lake(user), "wave"))
+    fix = user.meets("lake/again.py", "-m 'its data are lost'", "doctor")
+    user.follows(*shlex.split(fix.rpartition("or flagdata ")[2]))
+    user.succeeds("doctor", shows="(?m)^healthy")
+
+
+def test_a_damaged_object_is_explained_by_verify_and_put_back(user: User) -> None:
+    user.succeeds("clone", "lake", "copy.lake")
+    export = ("export", "mcap", "--to", "out", "--where", "name = 'first'")
+    for words in (("pull", "copy.lake"), None):
+        flip(the_lake(user), object_of(the_lake(user), "first"))
+        user.meets("lake/objects.py", "do again what made it: f", *export)
+        said = user.follows("verify", code=3, shows="object-changed").out
+        again = said.partition("fix: ")[2].partition(" again")[0].split()[1:]
+        user.follows(*words) if words else user.succeeds(*again)
+        user.succeeds(*export[:3], f"out {words}", *export[4:])
+
+
+def test_a_damaged_ref_is_deleted_and_pulled(user: User) -> None:
+    user.succeeds("clone", "lake", "copy.lake")
+    path = user.folder / "lake" / "refs" / "tags" / "v0.json"
+    overwrite(path, b"{")
+    user.meets("lake/refs.py", "delete the file and flag", "doctor")
+    path.unlink()
+    user.follows("pull", "copy.lake")
+    user.succeeds("ls", "--at", "v0", shows="camera +first")
+    user.succeeds("doctor", shows="(?m)^healthy")
+
+
+def test_an_erasure_deletes_nothing_until_what_doctor_names_is_mended(user: User) -> None:
+    path = user.folder / "lake" / "refs" / "branches" / "side.json"
+    kept = path.read_bytes()
+    path.unlink()
+    erase = ("withdraw", "first", "--everywhere", "-m", "asked")
+    user.meets("lake/erasure.py", "mend what flagdata docto", *erase)
+    user.follows("doctor", code=3, shows="error: branch-lost")
+    path.write_bytes(kept)
+    user.succeeds(*erase)
+    user.succeeds("doctor", shows="(?m)^healthy")
+
+
+def test_an_erasure_that_was_killed_is_ended_by_gc_or_by_the_same_command(user: User) -> None:
+    for words in (("gc",), ("withdraw", "first", "--everywhere", "-m", "asked")):
+        user.begins()
+        lake = the_lake(user)
+        with pytest.MonkeyPatch.context() as patch:
+            stopped(patch, Objects, "delete", partial(lake.erase, [lake.artifact("first").id], "asked"), at=0)
+        user.meets("lake/health.py", "run flagdata gc, which d", "doctor")
+        user.follows(*words)
+        user.succeeds("doctor", shows="(?m)^healthy")
+
+
+def test_a_disk_that_lets_nothing_be_deleted_keeps_what_gc_or_the_same_command_deletes_later(user: User) -> None:
+    erase = ("withdraw", "first", "--everywhere", "-m", "asked")
+    for words in (("gc",), erase):
+        user.begins()
+
+        def refuse(self: Objects, name: str) -> None:
+            raise PermissionError(13, "Permission denied", name)
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(Objects, "delete", refuse)
+            user.meets("lake/erasure.py", "let its folder and what", *erase)
+        user.follows("gc") if words == ("gc",) else user.succeeds(*words)
+        user.succeeds("doctor", shows="(?m)^healthy")
+
+
+def test_a_clone_that_was_killed_is_ended_by_the_push_that_is_named(user: User) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        stopped(patch, Objects, "publish", partial(clone, the_lake(user), Path("copy.lake"), bars=no_bar), at=0)
+    fix = user.meets("lake/transfer.py", "brings it up to date, a", "clone", "lake", "copy.lake")
+    user.follows(*shlex.split(fix.partition("flagdata ")[2].partition(" brings")[0]))
+    user.succeeds("doctor", "--lake", "copy.lake", shows="(?m)^healthy")
+    user.succeeds("ls", "--lake", "copy.lake", shows="camera +first")
+
+
+def test_a_push_or_pull_that_was_killed_is_ended_by_the_same_one(user: User) -> None:
+    for words in (("push", "copy.lake"), ("pull", "lake", "--lake", "copy.lake")):
+        user.begins()
+        user.succeeds("clone", "lake", "copy.lake")
+        user.succeeds("branch", "later")
+        user.succeeds("ingest", "second.csv", "--branch", "later")
+        with pytest.MonkeyPatch.context() as patch:
+            push = partial(transfer, the_lake(user), the_lake(user, "copy.lake"), bars=no_bar)
+            stopped(patch, Refs, "adopt", push, at=0)
+        user.meets("lake/marking.py", "give the flagdata push o", "doctor", "--lake", "copy.lake")
+        user.follows(*words)
+        user.succeeds("doctor", "--lake", "copy.lake", shows="(?m)^healthy")
