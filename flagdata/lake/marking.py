@@ -155,8 +155,10 @@ def _is_recent(lake: Store, entry: Mapping[str, Any], since: float) -> bool:
     """Whether a version was committed since then: as its writer's clock says, or that of the disk or store, since the
     writer's may be behind."""
     stated = entry["timestamp"] / 1000
-    taken = any(word in entry for word in ("withdrawn", "deleted")) or noted_hidden(entry)
-    return stated >= since or (taken and stated >= since - _BEHIND and lake.catalog.written(entry["version"]) >= since)
+    taken = any(word in entry for word in ("withdrawn", "deleted")) or bool(noted_hidden(entry))
+    if not taken or stated >= since:
+        return bool(stated >= since)
+    return bool(stated >= since - _BEHIND) and lake.catalog.written(entry["version"]) >= since
 
 
 def _unerased(lake: Store, rows: pa.Table, view: View) -> pa.Table:
