@@ -12,7 +12,7 @@ import time
 from dataclasses import dataclass
 
 from flagdata.storage.connection import COLOUR, plain, settings
-from flagdata.storage.requests import Answer, Unreachable, asked
+from flagdata.storage.requests import SHORTLY, Answer, Unreachable, asked
 
 _NEEDS = {
     "GET": "s3:GetObject", "HEAD": "s3:GetObject (and s3:ListBucket)", "PUT": "s3:PutObject",
@@ -153,7 +153,7 @@ def refusal(error: BaseException, *, bucket: str, where: str) -> StoreError:
     cause = _cause(code, status, text, bucket=bucket, needs=needs)
     passing = False
     if cause is None and status in _UNNAMED:
-        answer = asked(bucket, {"list-type": "2", "max-keys": "1"}, again=False)
+        answer = asked(bucket, {"list-type": "2", "max-keys": "1"}, waits=SHORTLY)
         if isinstance(answer, Unreachable) and status is None and code is None:
             cause = Cause(what=answer.what, fix=answer.fix)
         elif isinstance(answer, Answer):
@@ -225,7 +225,7 @@ def _cause(code: str | None, status: int | None, text: str, *, bucket: str, need
     if code == "NoSuchBucket":
         return Cause(what=f"there is no bucket {bucket!r}", fix=NoBucketError.fix, kind=NoBucketError)
     if code in _CLOCK:
-        answer = asked(bucket, {"location": ""}, method="HEAD", again=False)
+        answer = asked(bucket, {"location": ""}, method="HEAD", waits=SHORTLY)
         return _skewed(_ahead(answer) if isinstance(answer, Answer) else None)
     if code is not None and (action := _ACTION.search(text)):
         return _denied(action[1])
@@ -293,7 +293,7 @@ def _denied(needs: str) -> Cause:
 
 
 def _region_of(bucket: str) -> str | None:
-    answer = asked(bucket, {"location": ""}, method="HEAD", again=False)
+    answer = asked(bucket, {"location": ""}, method="HEAD", waits=SHORTLY)
     return answer.headers.get("x-amz-bucket-region") if isinstance(answer, Answer) else None
 
 

@@ -14,7 +14,7 @@ import socket
 import ssl
 import time
 import urllib.request
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
@@ -27,6 +27,8 @@ from flagdata.storage.connection import CONNECT_TIMEOUT, redacted, settings
 
 _WAITS = (0.1, 0.3, 1.0, 2.0, 4.0)
 """Seconds before a request is sent again that the store, or the way to it, let fail."""
+SHORTLY = _WAITS[:3]
+"""The same where a user waits to hear why something failed."""
 _PASSING = (408, 429, 500, 502, 503, 504)
 _NOTHING = hashlib.sha256(b"").hexdigest()
 _CODE = re.compile(rb"<Code>([\w.]+)</Code>")
@@ -67,10 +69,12 @@ class Unreachable:
 
     Attributes:
         fix: what can be done about it.
+        broken: whether the store was reached, and broke off.
     """
 
     what: str
     fix: str
+    broken: bool = False
 
 
 class _Staying(urllib.request.HTTPRedirectHandler):
@@ -83,16 +87,16 @@ class _Staying(urllib.request.HTTPRedirectHandler):
 
 
 def asked(
-    bucket: str, query: Mapping[str, str], *, method: str = "GET", key: str = "", again: bool = True
+    bucket: str, query: Mapping[str, str], *, method: str = "GET", key: str = "", waits: Sequence[float] = _WAITS
 ) -> Answer | Unreachable:
     """The store's answer to a request for a bucket, or for a key of it.
 
     Args:
-        again: whether a request that failed in the store or on the way is sent again.
+        waits: before a request that failed in the store, or whose answer broke off, is sent again [s].
     """
     answer = _once(bucket, query, method, key)
-    for wait in _WAITS if again else ():
-        if isinstance(answer, Answer) and answer.status not in _PASSING:
+    for wait in waits:
+        if not (answer.broken if isinstance(answer, Unreachable) else answer.status in _PASSING):
             break
         time.sleep(wait)
         answer = _once(bucket, query, method, key)
@@ -194,7 +198,9 @@ def _unreachable(reason: Any, url: str) -> Unreachable:
         return Unreachable(what=what, fix=f"{end_point}, and that the store runs")
     if isinstance(reason, TimeoutError):
         return Unreachable(what=f"{host} did not answer in time", fix=f"{end_point}, the network and its firewall")
-    return Unreachable(what=f"there was no answer of {host}: {_said(reason)}", fix=f"{end_point} and the network")
+    what = f"there was no answer of {host}: {_said(reason)}"
+    broken = isinstance(reason, HTTPException | ConnectionError)
+    return Unreachable(what=what, fix=f"{end_point} and the network", broken=broken)
 
 
 def _said(reason: object) -> str:

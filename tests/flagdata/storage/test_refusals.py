@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from email.utils import formatdate
 from pathlib import Path
+from typing import Any
 
 import pytest
 from deltalake import DeltaTable
@@ -134,6 +135,22 @@ def test_a_command_ends_at_once_with_the_cause(answering: Answering, capsys: pyt
     ended = invoke(capsys, "ls", "--lake", "s3://case/lake")
     assert ended.code == 1
     assert "clock" in ended.err.partition("fix:")[2]
+
+
+def test_an_answer_that_broke_off_is_one_of_a_store_that_answers_again(
+    answering: Answering, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place, once, broken = answering((200, {}, b"")), requests._once, [True, True]
+
+    def breaking(*arguments: Any) -> object:
+        failed = requests.Unreachable(what="broke off", fix="check the network", broken=True)
+        return failed if broken and broken.pop() else once(*arguments)
+
+    monkeypatch.setattr(requests, "_once", breaking)
+    lost = OSError("HTTP error: request or response body error")
+    assert refusal(lost, bucket=place.bucket, where=str(place)).passing
+    broken[:] = [True] * 9
+    assert not refusal(lost, bucket=place.bucket, where=str(place)).passing
 
 
 @pytest.mark.parametrize(
