@@ -17,7 +17,7 @@ from flagdata.align.clock import ClockModel
 from flagdata.align.declared import given
 from flagdata.align.lag import LagSearch
 from flagdata.align.logs import clock_between
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.lake import Lake
 from flagdata.record import Record
 from flagdata.rng import stream
@@ -112,9 +112,17 @@ def estimated(
         # A row's time is the middle of its span: nothing precedes it.
         sensor=Sensor(name=names[1], averaging=0.0, distance_constant=0.0),
     )  # fmt: skip
-    model, _, _ = clock_between(
-        series, motion, names=names, search=search, generator=stream(0, "calibrate", "beside", seed), progress=progress
-    )
+    try:
+        model, _, _ = clock_between(
+            series, motion, names=names, search=search, generator=stream(0, "calibrate", "beside", seed),
+            progress=progress,
+        )  # fmt: skip
+    except RefusedError as error:
+        raise RefusedError(
+            error.what, where=error.where,
+            fix="check that the table and the log are of one wind, or state what is added to the table's clock to reach "
+            "the log's: --offset 0.3±0.1",
+        ) from error  # fmt: skip
     segments = tuple(
         replace(
             one, offset=one.offset + search.response, sigma_offset=math.hypot(one.sigma_offset, search.response_sigma)

@@ -13,7 +13,7 @@ from flagdata.findings import Finding
 from flagdata.lake import Lake
 from flagdata.stated import Stated
 from measure.calibrate.beside import joined
-from measure.calibrate.observed import LONGEST, Excerpt, Observed, cut, first_part
+from measure.calibrate.observed import LONGEST, Excerpt, Observed, check_duration, cut, first_part
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.tables import of_table
 from measure.calibrate.wind import Log
@@ -144,6 +144,7 @@ def with_log(
     findings: tuple[Finding, ...] = ()
     if end - first > LONGEST + WINDOW:
         findings, end = (first_part(end - first),), first + LONGEST
+    check_duration(end - first, where=film.name)
     log.cut(first, end)  # refuses before the film is read
     seen = watched(film, size, first=first, last=end, advance=advance)
     findings += film.findings()

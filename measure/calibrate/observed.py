@@ -79,11 +79,7 @@ class Observed:
             raise InputError(
                 f"readings of shape {self.readings.shape}", where=self.name, fix=f"give (window, {count}) of {OBSERVED}"
             )
-        if len(self.readings) < LEAST_WINDOWS:
-            raise InputError(
-                f"{len(self.readings) * WINDOW:g} s of film with a log beside them", where=self.name,
-                fix=f"give {LEAST_WINDOWS * WINDOW:g} s or more; two minutes are better",
-            )  # fmt: skip
+        check_duration(len(self.readings) * WINDOW, where=self.name)
         if not shown(self.readings).any():
             raise InputError(
                 f"no observable could be read in {SHOWN:.0%} of the windows: what is followed may not be the flag",
@@ -152,6 +148,19 @@ def cut(found: Observed, first: float, last: float | None) -> Observed:
     readings = found.readings[begin : min(end, most)]
     log = found.log.cut(begin * WINDOW, (begin + len(readings)) * WINDOW)
     return replace(found, readings=readings, log=log, first=found.first + begin * WINDOW, findings=findings)
+
+
+def check_duration(seconds: float, *, where: str) -> None:
+    """Refuse a recording that has too few windows.
+
+    Raises:
+        InputError: so it is.
+    """
+    if seconds < LEAST_WINDOWS * WINDOW:
+        raise InputError(
+            f"{max(seconds, 0.0):.3g} s of film with a log beside them", where=where,
+            fix=f"give {LEAST_WINDOWS * WINDOW:g} s or more; two minutes are better",
+        )  # fmt: skip
 
 
 def first_part(duration: float) -> Finding:

@@ -38,6 +38,8 @@ _LEAST = 0.01
 """Least intensity of turbulence that is filled in: that of a tunnel."""
 STEADY = 0.05
 """Standard deviation of the windows' mean speeds over their mean below which a wind counts as constant."""
+_LEAST = 4
+"""Samples of a log that a wind is made of."""
 _LONGEST_GAP = 5.0
 """s without a sample that is bridged: large eddies last a few seconds."""
 
@@ -68,8 +70,13 @@ class Log:
 
     def __post_init__(self) -> None:
         shapes = {self.times.shape, self.speed.shape} | (set() if self.turn is None else {self.turn.shape})
-        if len(shapes) != 1 or self.times.ndim != 1 or len(self.times) < 4:
-            raise InputError(f"shapes {sorted(shapes)}", where="wind log", fix="give (n,) each, four samples or more")
+        if len(shapes) != 1 or self.times.ndim != 1:
+            raise InputError(f"shapes {sorted(shapes)}", where="wind log", fix="give (n,) each")
+        if len(self.times) < _LEAST:
+            raise InputError(
+                f"{len(self.times)} usable samples of the wind, at least {_LEAST} are needed", where="wind log",
+                fix="give a log of more samples, or a longer part of the film",
+            )  # fmt: skip
         if not (np.diff(self.times) > 0).all() or not np.isfinite(self.speed).all() or not self.speed.mean() > 0:
             raise InputError(
                 "times that do not ascend, speeds that are not finite, or no wind", where="wind log",

@@ -109,13 +109,13 @@ class User:
         assert set(words) <= named(self._last[0].text)
         self.met[self._last[0]] -= set(words)
 
-    def again(self, *more: object, without: str = "", value: bool = True) -> Ended:
+    def again(self, *more: object, without: str = "", value: bool = True, code: int = 0, shows: str = "") -> Ended:
         """Follow the last remedy by typing the command again: with more options, or without one (and its value)."""
         command = list(self._command)
         if without:
             at = command.index(without)
             del command[at : at + 1 + value]
-        return self.follows(*command, *more)
+        return self.follows(*command, *more, code=code, shows=shows)
 
     @staticmethod
     def _is(made: Made, remedy: Remedy) -> bool:

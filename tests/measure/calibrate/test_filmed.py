@@ -78,3 +78,8 @@ def test_a_film_without_a_log_is_refused() -> None:
     subject.record = None
     with pytest.raises(InputError, match="no log of the wind"):
         filmed.of_film(subject, _SIZE, first=0.0, last=None)
+
+
+def test_a_film_too_short_to_weigh_is_refused_by_its_length_before_its_log_is_cut() -> None:
+    with pytest.raises(InputError, match=r"0\.5 s of film with a log"):
+        filmed.of_film(_subject(), _SIZE, first=0.0, last=0.5)
