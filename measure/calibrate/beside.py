@@ -120,8 +120,8 @@ def estimated(
     except RefusedError as error:
         raise RefusedError(
             error.what, where=error.where,
-            fix="check that the table and the log are of one wind, or state what is added to the table's clock to reach "
-            "the log's: --offset 0.3±0.1",
+            fix="check that the table and the log are of one wind, or state what is added to the table's clock to "
+            "reach the log's: --offset 0.3±0.1",
         ) from error  # fmt: skip
     segments = tuple(
         replace(

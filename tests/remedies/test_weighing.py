@@ -161,7 +161,7 @@ def test_flags_that_are_simulated_otherwise_do_not_show_what_the_film_shows(
 
     def shows(design: Design, every: NDArray[np.float64]) -> NDArray[np.float64]:
         rare = design.flag.length > 2
-        return np.where((np.arange(len(every)) % 12 < (9 if rare else 2))[:, None, None], np.nan, every)
+        return np.where((np.arange(len(every)) % 12 < (9 if rare else 0))[:, None, None], np.nan, every)
 
     simulated(monkeypatch, shows)
     (user.folder / "t.csv").write_text(GUSTY)
