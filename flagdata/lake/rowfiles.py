@@ -24,13 +24,13 @@ from flagdata.errors import CorruptError
 from flagdata.files import open_regular
 from flagdata.lake.log import COPY_BACK
 from flagdata.lake.older_rows import SINCE, with_data_sets
+from flagdata.parquet import check_stated
 from flagdata.schema import catalog_schema
 from flagdata.storage import Place
 
 ROW_ORDER = ("created", "start", "frame_first", "artifact")
 _NUMBERS = ROW_ORDER[:-1]
 _LAST = np.iinfo(np.int64).max
-_EXPANSION = 1000
 """Most bytes of rows a byte of their file: rows alike but for their ids take a hundredth, and an id takes 16 bytes."""
 
 
@@ -135,12 +135,7 @@ class RowFiles:
     def _metadata(self, name: str, content: pa.Buffer) -> pq.FileMetaData:
         """What a file states of itself, once it is sure that it takes no more memory than rows of that size can."""
         file = pq.read_metadata(pa.BufferReader(content))
-        size = sum(file.row_group(number).total_byte_size for number in range(file.num_row_groups))
-        if file.num_rows > len(content) or not 0 <= size <= _EXPANSION * len(content):
-            raise CorruptError(
-                f"a file of the catalog states {file.num_rows} rows of {size} bytes in {len(content)}",
-                where=str(self._folder / name), fix=COPY_BACK,
-            )  # fmt: skip
+        check_stated(file, content.size, where=str(self._folder / name), fix=COPY_BACK)
         return file
 
     @contextmanager
