@@ -31,7 +31,6 @@ from flagdata.storage import Place
 ROW_ORDER = ("created", "start", "frame_first", "artifact")
 _NUMBERS = ROW_ORDER[:-1]
 _LAST = np.iinfo(np.int64).max
-"""Most bytes of rows a byte of their file: rows alike but for their ids take a hundredth, and an id takes 16 bytes."""
 
 
 class RowFiles:
