@@ -38,7 +38,7 @@ _LEAST = 0.01
 """Least intensity of turbulence that is filled in: that of a tunnel."""
 STEADY = 0.05
 """Standard deviation of the windows' mean speeds over their mean below which a wind counts as constant."""
-_LEAST = 4
+_FEWEST_SAMPLES = 4
 """Samples of a log that a wind is made of."""
 _LONGEST_GAP = 5.0
 """s without a sample that is bridged: large eddies last a few seconds."""
@@ -72,10 +72,10 @@ class Log:
         shapes = {self.times.shape, self.speed.shape} | (set() if self.turn is None else {self.turn.shape})
         if len(shapes) != 1 or self.times.ndim != 1:
             raise InputError(f"shapes {sorted(shapes)}", where="wind log", fix="give (n,) each")
-        if len(self.times) < _LEAST:
+        if len(self.times) < _FEWEST_SAMPLES:
             raise InputError(
-                f"{len(self.times)} usable samples of the wind, at least {_LEAST} are needed", where="wind log",
-                fix="give a log of more samples, or a longer part of the film",
+                f"{len(self.times)} usable samples of the wind, at least {_FEWEST_SAMPLES} are needed",
+                where="wind log", fix="give a log of more samples, or a longer part of the film",
             )  # fmt: skip
         if not (np.diff(self.times) > 0).all() or not np.isfinite(self.speed).all() or not self.speed.mean() > 0:
             raise InputError(
