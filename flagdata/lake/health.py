@@ -196,6 +196,9 @@ def _rows(lake: Lake, marked: Marked, foreign: Collection[Path]) -> list[Finding
     return findings
 
 
+_ROW_FIX = "withdraw the artifact and ingest its source again"
+
+
 def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign: Collection[Path]) -> list[Finding]:
     where = f"{row['kind']} {row['name']!r}, artifact {row['artifact']}, ref {ref}"
 
@@ -207,7 +210,7 @@ def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign:
     try:
         artifact = Artifact.from_row(row)
     except FlagdataError as problem:
-        return [error("row-malformed", problem.what, "withdraw the artifact and ingest its source again")]
+        return [error("row-malformed", problem.what, _ROW_FIX)]
     findings = [
         error("parent-missing", f"its parent {parent} is not there", "ingest the parent again")
         for parent in artifact.parents
@@ -215,7 +218,9 @@ def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign:
     ]
     if artifact.recording is not None and artifact.recording not in known:
         findings.append(error("parent-missing", f"its recording {artifact.recording} is not there", "align it again"))
-    if artifact.object is not None:
+    if artifact.object is None:
+        findings.append(error("row-malformed", "it names no object", _ROW_FIX))
+    else:
         again = made_again(artifact)
         if not lake.objects.has(artifact.object):
             findings.append(error("dangling-row", f"its object {artifact.object} is missing", again))

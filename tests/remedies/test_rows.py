@@ -1,0 +1,94 @@
+"""Remedies of rows of a catalog that were changed behind the lake's back."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from flagdata.lake import Lake
+from flagdata.lake.artifact import Artifact
+from flagdata.schema import Kind
+from tests.flagdata.lake.conftest import overwrite
+from tests.remedies.cases import Case
+from tests.remedies.user import User
+
+EXPORT = "export mcap --to out --where \"name = 'one'\""
+
+
+def changed(user: User, kind: Kind, column: str, value: object) -> tuple[Path, bytes]:
+    """Change a value of the row of a kind that is called `one`; the catalog's file of it, and what it held."""
+    for path in (user.folder / "lake" / "catalog").rglob("*.parquet"):
+        before, table = path.read_bytes(), pq.ParquetFile(path).read()
+        rows = table.to_pylist()
+        hit = [row for row in rows if (row.get("name"), row.get("kind")) == ("one", kind)]
+        if hit:
+            for row in hit:
+                row[column] = value
+            path.chmod(0o644)
+            pq.write_table(pa.Table.from_pylist(rows, schema=table.schema), path)
+            return path, before
+    raise AssertionError(kind)
+
+
+def add_clip(user: User) -> None:
+    """The first frames of the film `first` as a clip `one` of it."""
+    lake = Lake.open(user.folder / "lake")
+    film = lake.artifact("first")
+    with lake.transaction("align") as transaction:
+        transaction.hold(str(film.object))
+        transaction.add(
+            Artifact(
+                kind=Kind.CLIP, name="one", object=film.object, parents=[film.id], recording=film.id, frame_first=0,
+                frame_count=3, start=film.start, end=film.end, recipe={"clip": 1}, parameters="{}",
+            )
+        )  # fmt: skip
+
+
+MADE = {
+    Kind.CAMERA: ("ingest", "second.mp4", "--name", "one"),
+    Kind.MESHES: ("ingest", "meshes", "--rate", "25", "--name", "one"),
+    Kind.CLIP: (),
+}
+"""What makes each kind that is changed; a clip is `add_clip`'s."""
+CHANGES = [
+    (Case("export/source.py", "run flagdata doctor", EXPORT), Kind.CAMERA, "object", None),
+    (Case("export/obj.py", "run flagdata doctor", EXPORT.replace("mcap", "obj")), Kind.MESHES, "object", None),
+    (Case("export/source.py", "run flagdata verify", EXPORT), Kind.CLIP, "frame_count", 9000),
+    (
+        Case("flagdata/documents.py", "run flagdata doctor", EXPORT.replace("mcap", "webdataset")),
+        Kind.CLIP,
+        "parameters",
+        "{",
+    ),
+    (Case("lake/artifact.py", "run flagdata doctor", "show one"), Kind.CAMERA, "recipe", "{"),
+    (Case("lake/artifact.py", "run flagdata doctor", "show one"), Kind.CAMERA, "recipe", "{}"),
+]
+"""What is met, and the column of which kind's row is changed to what."""
+
+
+@pytest.mark.parametrize(("case", "kind", "column", "value"), CHANGES)
+def test_a_row_that_was_changed_is_named_by_the_check_and_made_anew(
+    user: User, case: Case, kind: Kind, column: str, value: object
+) -> None:
+    made, command = MADE[kind], shlex.split(case.command)
+    if made:
+        user.succeeds(*made)
+    else:
+        add_clip(user)
+    path, before = changed(user, kind, column, value)
+    user.meets(case.module, case.words, *command)
+    said = user.follows(case.words.split()[-1], code=3).out
+    if made:
+        assert "withdraw the artifact and ingest its source again" in said
+        user.succeeds("withdraw", "one", "-m", "its row is damaged")
+        user.succeeds(*made)
+    else:
+        assert str(path) in user.types("verify").out
+        overwrite(path, before)
+        user.succeeds("verify")
+    user.succeeds("doctor", shows="(?m)^healthy")
+    user.succeeds(*command)
