@@ -218,9 +218,9 @@ def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign:
     ]
     if artifact.recording is not None and artifact.recording not in known:
         findings.append(error("parent-missing", f"its recording {artifact.recording} is not there", "align it again"))
-    if artifact.object is None:
+    if artifact.object is None and artifact.source_name is not None:
         findings.append(error("row-malformed", "it names no object", _ROW_FIX))
-    else:
+    if artifact.object is not None:
         again = made_again(artifact)
         if not lake.objects.has(artifact.object):
             findings.append(error("dangling-row", f"its object {artifact.object} is missing", again))
