@@ -55,6 +55,11 @@ def heal(user: User, case: Case) -> None:
         _heal(user, case, way)
 
 
+def meet(user: User, case: Case) -> str:
+    """Meet the trouble of a case; what was printed after "fix:"."""
+    return user.meets(case.module, case.words, *shlex.split(case.command))
+
+
 def _heal(user: User, case: Case, way: list[str]) -> None:
     for name, text in case.files.items():
         place = user.folder / name

@@ -13,7 +13,7 @@ from flagdata.lake import Lake
 from flagdata.lake.artifact import Artifact
 from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import overwrite
-from tests.remedies.cases import Case
+from tests.remedies.cases import Case, meet
 from tests.remedies.user import User
 
 EXPORT = "export mcap --to out --where \"name = 'one'\""
@@ -80,7 +80,7 @@ def test_a_row_that_was_changed_is_named_by_the_check_and_made_anew(
     else:
         add_clip(user)
     path, before = changed(user, kind, column, value)
-    user.meets(case.module, case.words, *command)
+    meet(user, case)
     said = user.follows(case.words.split()[-1], code=3).out
     if made:
         assert "withdraw the artifact and ingest its source again" in said
