@@ -140,10 +140,16 @@ class Catalog:
         """
         # In a scratch folder: the Delta library takes a put whose answer was lost for one that another made before it.
         with tempfile.TemporaryDirectory() as folder:
-            DeltaTable.create(
-                folder, catalog_schema(), mode="error", configuration=_CONFIGURATION,
-                commit_properties=_properties(info),
-            )  # fmt: skip
+            try:
+                DeltaTable.create(
+                    folder,
+                    catalog_schema(),
+                    mode="error",
+                    configuration=_CONFIGURATION,
+                    commit_properties=_properties(info),
+                )
+            except DeltaError as error:
+                raise self._refused(error) from None
             entry = (Path(folder) / "_delta_log" / self._entries.path(0).name).read_bytes()
         self._log.mkdir(parents=True, exist_ok=True)
         if not self._entries.adopt(0, entry):

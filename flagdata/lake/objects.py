@@ -193,7 +193,8 @@ class Objects:
             OSError: what the disk refused.
         """
         self.remove(self.path(name))
-        self._mended(name)
+        with suppress(OSError):  # a note without its object says nothing
+            self._mended(name)
 
     def _mended(self, name: str) -> None:
         self._note(name).unlink(missing_ok=True)

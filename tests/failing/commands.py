@@ -40,7 +40,8 @@ def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callab
     (folder / "second.csv").write_text(wind_log.read_text().replace("+02:00,5.", "+02:00,6."))
     third = ingest_camera(lake, write_video(folder / "third.mp4", frames=28), branch="side").artifact
     write_video(folder / "fourth.mp4", frames=26)
-    aligned = ["align", camera.id, wind.id, "--by", "given", "--offset", "0", "--offset-sigma", "0.1"]
+    fifth = ingest_camera(lake, write_video(folder / "fifth.mp4", frames=32)).artifact
+    aligned = ["align", fifth.id, wind.id, "--by", "given", "--offset", "0", "--offset-sigma", "0.1"]
     with suppress(SystemExit):
         main([*aligned, "--lake", str(lake.path)])
     (recording,) = lake.rows("kind = 'recording'")["artifact"].to_pylist()

@@ -17,7 +17,7 @@ class Case:
 
     Attributes:
         module: whose message it is.
-        words: of the remedy, enough to tell it from others of the module.
+        words: of the remedy, enough to distinguish it from others of the module.
         command: what is typed first, after "flagdata".
         then: what is typed next, in this order; all of it succeeds. `OR` is between ways to go on, each from the begin.
         files: written before, by name.

@@ -55,7 +55,8 @@ CASES = [
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)
-def test_what_a_remedy_says_heals(case: Case, user: User) -> None:
+def test_what_a_remedy_says_heals(case: Case, user: User, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("FLAGDATA_BLENDER", raising=False)
     heal(user, case)
 
 

@@ -152,5 +152,5 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("models/training/inputs.py", "free some space or name"),
     ),
 }
-"""Reason → module of the remedy, and enough of its words to tell it from others of the module."""
+"""Reason → module of the remedy, and enough of its words to distinguish it from others of the module."""
 UNEXECUTED = tuple((module, words, reason) for reason, rows in BY_REASON.items() for module, words in rows)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import shutil
 import signal
 import subprocess
@@ -124,7 +125,7 @@ def test_rows_that_a_format_cannot_hold_are_refused_with_the_filter_to_write(
         tx.add(Artifact(kind=Kind.MODEL, name="regressor"))
     with pytest.raises(UsageError, match="1 of kind model") as caught:
         export(lake, Export(format=name, options=options), tmp_path / "out")
-    assert "kind = '" in caught.value.fix
+    assert re.search("kind (= '|in \\(')", caught.value.fix)
 
 
 @pytest.mark.parametrize("name", ["webdataset", "mp4", "mcap"])

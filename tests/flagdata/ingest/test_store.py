@@ -113,7 +113,9 @@ def test_a_file_that_is_read_by_other_options_names_the_one_before(lake: Lake, t
     right = ingest_wind(lake, path, WindIngest(wind=WindOptions(zone="+02:00")))
     (found,) = [found for found in right.report["findings"] if found["kind"] == "ingested-before"]
     assert "zone UTC, now +02:00" in found["what"]
-    assert wrong.artifact.id.startswith(found["fix"].split()[-1])
+    named = found["fix"].partition("flagdata withdraw ")[2].split()[0]
+    assert named
+    assert wrong.artifact.id.startswith(named)
     assert not [found for found in wrong.report["findings"] if found["kind"] == "ingested-before"]
     assert "ingested-before" not in right.artifact.quality
 

@@ -20,7 +20,7 @@ NOBODY = 65534
 COMMANDS = (["ls"], ["doctor"], ["verify"], ["tag", "v1"], ["log"])
 # One process that imports everything, and a child of it for each command, which may not read what is closed.
 _AS_NOBODY = """
-import json, os, sys, zoneinfo
+import json, os, resource, sys, zoneinfo
 import flagdata.commands.lake, flagdata.commands.upkeep, flagdata.ingest.before, flagdata.lake.health, tqdm, xml
 from flagdata.cli import main
 from tests.program import invoke

@@ -60,7 +60,7 @@ REFUSED = [
     case("matroska", content=b"\x1aE\xdf\xa3" + bytes(50), error=InputError, says="video"),
     case("mpeg-ts", content=(b"G" + bytes(187)) * 4, error=InputError, says="video"),
     case("avchd", content=(bytes(4) + b"G" + bytes(187)) * 4, error=InputError, says="video"),
-    case("mcap", content=b"\x89MCAP0\r\n" + bytes(50), error=CorruptError, says="MCAP file is damaged or cut off"),
+    case("mcap", content=b"\x89MCAP0\r\n" + bytes(50), error=CorruptError, says="MCAP file is damaged"),
     case("parquet", content=b"PAR1" + bytes(50), error=InputError, says="Parquet"),
     case("hdf5", content=b"\x89HDF\r\n\x1a\n" + bytes(50), error=InputError, says="HDF5"),
     case("sqlite", content=b"SQLite format 3\x00" + bytes(50), error=InputError, says="SQLite"),
