@@ -15,7 +15,7 @@ from mcap.records import Chunk
 
 from flagdata.errors import CorruptError, LimitError
 
-UNPACKED_LIMIT = 256 << 20
+UNPACKED_LIMIT = 128 << 20
 """No compressed chunk is unpacked to more than this [B]: it is held in memory whole."""
 _FED = 64 << 10
 """Bytes given to LZ4 at a time: it keeps a copy of those that it has not used."""

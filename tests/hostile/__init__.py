@@ -1,3 +1,3 @@
-"""Hostile recipes, models, inputs and lakes, drawn from one seed."""
+"""Hostile recipes, models, inputs, files and lakes, drawn from one seed; and bombs made by hand."""
 
-KINDS = ("recipes", "models", "inputs", "lakes")
+KINDS = ("recipes", "models", "inputs", "files", "lakes", "bombs")

@@ -3,11 +3,28 @@
 from __future__ import annotations
 
 import argparse
+import pkgutil
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 
 from tests.hostile import KINDS
 from tests.hostile.campaign import run
+
+PACKAGES = {"recipes": ("flagdata", "sim", "models", "measure"), "models": ("flagdata", "models", "measure"),
+            "bombs": ("flagdata", "sim", "models")}  # fmt: skip
+"""Packages whose modules a class uses, where it uses others than flagdata's."""
+
+
+def load(names: tuple[str, ...]) -> None:
+    """Load all modules of some packages, which the examples would load one after another."""
+    for name in names:
+        package = import_module(name)
+        for module in pkgutil.walk_packages(package.__path__, f"{name}."):
+            if not module.name.endswith("__main__") and ".blender" not in module.name:
+                with suppress(ImportError):
+                    import_module(module.name)
+
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
@@ -16,5 +33,6 @@ if __name__ == "__main__":
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
+    load(PACKAGES.get(options.kind, ("flagdata",)))
     subjects = import_module(f"tests.hostile.{options.kind}").subjects()
     run(subjects, count=options.count, start=options.seed, out=options.out)

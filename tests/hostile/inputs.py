@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import io
 import json
-import tempfile
 from collections.abc import Callable
 from fractions import Fraction
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +23,7 @@ from tests.compat.make_lake import write_record
 from tests.damage import damaged, damages, edited, edits
 from tests.hostile.campaign import Subject, command
 from tests.hostile.recipes import SQUARE
+from tests.hostile.sound import sound
 
 _CODECS = {"mp4": "libx264", "mkv": "libx264", "mov": "mjpeg", "avi": "mjpeg", "ts": "libx264"}
 _LOG = "\n".join(
@@ -110,25 +109,25 @@ texts = st.tuples(
 )
 
 
-@cache
 def made(name: str) -> bytes:
     """A sound file of that name."""
-    kind = name.rpartition(".")[2]
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / name
-        if kind in _CODECS:
-            _write_film(path, _CODECS[kind])
-        elif kind == "mcap":
-            write_record(path)
-        elif kind == "parquet":
-            rows = [line.split(",") for line in _MARKERS.split("\n")]
-            columns = dict(zip(rows[0], zip(*rows[1:], strict=True), strict=True))
-            arrays = {n: list(v) if n == "marker" else [int(float(x)) for x in v] for n, v in columns.items()}
-            pyarrow.parquet.write_table(pa.table(arrays), path)
-        return path.read_bytes()
+    return sound(name, _write).read_bytes()
 
 
-def _write_film(path: Path, codec: str) -> None:
+def _write(path: Path) -> None:
+    kind = path.suffix[1:]
+    if kind in _CODECS:
+        write_film(path, _CODECS[kind])
+    elif kind == "mcap":
+        write_record(path)
+    elif kind == "parquet":
+        rows = [line.split(",") for line in _MARKERS.split("\n")]
+        columns = dict(zip(rows[0], zip(*rows[1:], strict=True), strict=True))
+        arrays = {n: list(v) if n == "marker" else [int(float(x)) for x in v] for n, v in columns.items()}
+        pyarrow.parquet.write_table(pa.table(arrays), path)
+
+
+def write_film(path: Path, codec: str) -> None:
     with av.open(str(path), "w") as container:
         container.metadata["creation_time"] = "2026-05-01T10:00:00Z"
         stream = container.add_stream(codec, rate=25)

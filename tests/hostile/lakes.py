@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import tempfile
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +14,7 @@ from flagdata.lake import Lake
 from tests.compat.make_lake import fill
 from tests.damage import damaged, damages, edited, edits
 from tests.hostile.campaign import Subject, command
+from tests.hostile.sound import sound
 
 PLACES = st.floats(0, 1, exclude_max=True)
 PARTS = {
@@ -56,12 +55,9 @@ WRITERS: list[list[object]] = [
 ]  # fmt: skip
 
 
-@cache
-def made() -> tempfile.TemporaryDirectory[str]:
-    """A sound lake, made once."""
-    folder = tempfile.TemporaryDirectory()
-    fill(Lake.create(Path(folder.name) / "lake"))
-    return folder
+def made() -> Path:
+    """A sound lake."""
+    return sound("lake", lambda path: fill(Lake.create(path)))
 
 
 def _files(lake: Path, part: str) -> list[Path]:
@@ -128,7 +124,7 @@ def _act(part: str) -> Any:
     def act(example: Any, folder: Path) -> None:
         changes, commands = example
         lake = folder / "lake"
-        shutil.copytree(Path(made().name) / "lake", lake)
+        shutil.copytree(made(), lake)
         (folder / "log.csv").write_text("time,wind_speed (m/s)\n2026-05-01T12:00:00Z,5.0\n2026-05-01T12:00:01Z,5.1\n")
         harm(lake, part, changes)
         errors: list[BaseException] = []

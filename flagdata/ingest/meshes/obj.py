@@ -7,6 +7,7 @@ in any OBJ reader; lines of an unknown keyword are refused.
 
 from __future__ import annotations
 
+from array import array
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +20,9 @@ from flagdata.ingest.meshes.polygons import convex, ears, fans, in_plane
 
 SIZE_LIMIT = 1 << 30
 """Largest file that is read [B]."""
+
+_NOWHERE = 1 << 40
+"""An index beyond those of any file that is read."""
 
 # Keywords of the format (and of ArcSim's dialect) that carry nothing this reader keeps.
 _PASSED_OVER = frozenset({"vn", "vp", "g", "o", "s", "l", "e", "usemtl", "mtllib", "ny", "ms", "tm", "tl", "te", "tf"})
@@ -53,12 +57,9 @@ def read_obj(path: Path) -> Obj:
             seam), or a polygon without area or with edges that cross in the material, each with its line.
     """
     check_input(path, noun="mesh file", limit=SIZE_LIMIT)
-    positions: list[list[float]] = []
-    texture: list[list[float]] = []
+    positions, texture = array("d"), array("d")  # a list of lists takes ten times the memory of the file
     velocities: dict[int, list[float]] = {}
-    corners: list[tuple[int, int]] = []
-    sizes: list[int] = []
-    face_lines: list[int] = []
+    corners, sizes, face_lines = array("q"), array("q"), array("q")
     with path.open(encoding="utf-8-sig", errors="replace") as lines:
         for number, line in enumerate(lines, start=1):
             words = line.split("#", 1)[0].split()
@@ -67,17 +68,18 @@ def read_obj(path: Path) -> Obj:
             keyword, values = words[0], words[1:]
             where = f"{path}, line {number}"
             if keyword == "v":
-                positions.append(_numbers(values, 3, where))
+                positions.extend(_numbers(values, 3, where))
             elif keyword == "vt":
-                texture.append(_numbers(values, 2, where))
+                texture.extend(_numbers(values, 2, where))
             elif keyword == "nv":
                 if not positions:
                     raise InputError("a velocity before any vertex", where=where, fix="write nv after its v")
-                velocities[len(positions) - 1] = _numbers(values, 3, where)
+                velocities[len(positions) // 3 - 1] = _numbers(values, 3, where)
             elif keyword == "f":
                 if len(values) < 3:
                     raise InputError("a face of fewer than three corners", where=where, fix="give at least three")
-                corners += [_corner(word, len(positions), len(texture), where) for word in values]
+                for word in values:
+                    corners.extend(_corner(word, len(positions) // 3, len(texture) // 2, where))
                 sizes.append(len(values))
                 face_lines.append(number)
             elif keyword not in _PASSED_OVER:
@@ -85,8 +87,9 @@ def read_obj(path: Path) -> Obj:
     if not corners:
         raise InputError("a mesh without faces", where=str(path), fix="export triangles")
     faces = _Faces(
-        path=path, corners=np.array(corners, dtype=np.int64), sizes=np.array(sizes), lines=np.array(face_lines)
-    )
+        path=path, corners=np.frombuffer(corners, dtype=np.int64).reshape(-1, 2),
+        sizes=np.frombuffer(sizes, dtype=np.int64), lines=np.frombuffer(face_lines, dtype=np.int64),
+    )  # fmt: skip
     return _assembled(faces, np.array(positions).reshape(-1, 3), np.array(texture).reshape(-1, 2), velocities)
 
 
@@ -115,7 +118,7 @@ def _corner(word: str, vertices: int, textures: int, where: str) -> tuple[int, i
         vertex = max(vertices + 1 + vertex, 0) or -1
     if texture < 0:
         texture = max(textures + 1 + texture, 0) or -1
-    return vertex, texture
+    return min(vertex, _NOWHERE), min(texture, _NOWHERE)
 
 
 @dataclass(frozen=True, kw_only=True)
