@@ -1,5 +1,4 @@
-"""Five hundred hostile recipes, models, inputs, files and lakes from a seed, and bombs; `validate-hostile.md` is written
-beside."""
+"""Five hundred hostile recipes, models, inputs, files and lakes, and bombs; `validate-hostile.md` is written beside."""
 
 from __future__ import annotations
 
@@ -28,12 +27,12 @@ def page(result: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> str:
         for kind, found in kinds.items()
     ]
     words = (
-        "Recipes, models, inputs, files and lakes are damaged by values, types, bits, lengths, numbers, shapes, parts and "
-        "files of other kinds, drawn from a seed; bombs are small files, made by hand, that state or unpack to what no "
-        "machine holds. Each is read by the function or the commands that take it, in a process of its own. An example "
-        "fails where anything but an error of flagdata or of the command's usage comes out, where it takes more than "
-        f"{SECONDS:g} s of processor time or {WALL_SECONDS:g} s in all, or where the process, or one that it starts, takes "
-        f"more than {MEMORY >> 20} MiB, of which some 400 MiB are modules that a single command does not load."
+        "Recipes, models, inputs, files and lakes are damaged by values, types, bits, lengths, numbers, shapes, parts "
+        "and files of other kinds, drawn from a seed; bombs are small files, made by hand, that state or unpack to "
+        "what no machine holds. Each is read by the function or the commands that take it, in a process of its own. An "
+        "example fails where anything but an error of flagdata or of the command's usage comes out, where it takes "
+        f"more than {SECONDS:g} s of processor time or {WALL_SECONDS:g} s in all, or where the process, or one that it "
+        f"starts, takes more than {MEMORY >> 20} MiB, of which some 400 MiB are modules that one command does not load."
     )
     head = "| class | seed | examples | kinds of file | refused | failed | slowest | most memory |"
     return "\n".join(["# Hostile files", "", words, "", head, "|---" * 8 + "|", *rows, ""])
