@@ -17,7 +17,6 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 
 from flagdata.align.clock import ClockModel
 from flagdata.align.recording import truth_window
@@ -30,6 +29,7 @@ from flagdata.ingest.report import REPORT_SCHEMA
 from flagdata.ingest.source import Source
 from flagdata.ingest.store import IngestResult, Labels, find_same, kept, result_of
 from flagdata.lake import Artifact, Lake
+from flagdata.parquet import read_parquet
 from flagdata.printable import SHORT
 from flagdata.record import Record
 from flagdata.record.metadata import CLOCK, PROVENANCE
@@ -106,7 +106,7 @@ def _row_beside(path: Path, sha256: str) -> dict[str, Any] | None:
     if not rows.is_file():
         return None
     try:
-        table = pq.read_table(rows)
+        table = read_parquet(rows)
         missing = [name for name in CATALOG if name not in table.column_names]
         for name in missing:
             table = table.append_column(name, pa.nulls(table.num_rows, CATALOG[name].type))

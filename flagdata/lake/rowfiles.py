@@ -19,6 +19,7 @@ from flagdata.catalog_sql import dataset_of
 from flagdata.errors import CorruptError
 from flagdata.files import open_regular
 from flagdata.lake.older_rows import SINCE, with_data_sets
+from flagdata.parquet import check_stated
 from flagdata.schema import catalog_schema
 from flagdata.storage import Place
 
@@ -110,7 +111,10 @@ class RowFiles:
         if name in self._contents:
             return self._contents[name]
         with self._reading(name), open_regular(self._folder / name) as stream:
-            return pa.py_buffer(stream.read())
+            content = pa.py_buffer(stream.read())
+            stated = pq.read_metadata(pa.BufferReader(content))
+            check_stated(stated, content.size, where=str(self._folder / name), fix="restore it from a copy")
+        return content
 
     @contextmanager
     def _reading(self, name: str) -> Iterator[None]:

@@ -16,6 +16,7 @@ import numpy as np
 from flagdata.errors import InputError, TimeError
 from flagdata.files import check_input
 from flagdata.ingest.headings import small_table, small_table_head
+from flagdata.parquet import read_parquet
 from flagdata.plain_text import plain_text
 from flagdata.timebase import NANOSECONDS, parse
 from flagdata.units import spelled, unit
@@ -169,10 +170,9 @@ def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """
     if path.suffix.lower() == ".parquet":
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
         try:
-            table = pq.read_table(path)
+            table = read_parquet(path)
         except pa.ArrowException as error:
             raise InputError(f"no Parquet table: {error}", where=str(path), fix="name a table") from None
         headings = []

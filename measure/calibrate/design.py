@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from flagdata.arrays import read_arrays
 from flagdata.errors import CorruptError
 from flagdata.lake.durable import put_if_absent
 from flagdata.provenance import canonical, digest
@@ -150,10 +151,9 @@ def _make(batch: Batch, path: Path) -> None:
 
 
 def _read(path: Path) -> Floats:
+    again = "delete the file: it is made anew"
+    content = read_arrays(path, what="a file of kept simulations", fix=again)
     try:
-        with np.load(path, allow_pickle=False) as content:
-            return np.asarray(content["readings"], dtype=np.float64)
-    except (OSError, ValueError, KeyError) as error:
-        raise CorruptError(
-            f"kept simulations cannot be read: {error}", where=str(path), fix="delete the file: it is made anew"
-        ) from None
+        return np.asarray(content["readings"], dtype=np.float64)
+    except (ValueError, KeyError, TypeError) as error:
+        raise CorruptError(f"kept simulations cannot be read: {error}", where=str(path), fix=again) from None

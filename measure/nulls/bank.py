@@ -7,7 +7,6 @@ a design: an amortised null.
 from __future__ import annotations
 
 import math
-import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
@@ -19,7 +18,8 @@ from typing import Any
 import numpy as np
 import torch
 
-from flagdata.errors import CorruptError, LimitError, NotFoundError, UsageError
+from flagdata.arrays import read_arrays
+from flagdata.errors import CorruptError, NotFoundError, UsageError
 from flagdata.lake.durable import put_if_absent
 from flagdata.provenance import code_version
 from flagdata.rng import child_seed, stream
@@ -49,8 +49,6 @@ _SEGMENTS = (
     "turned", "turning", "moment", "course", "course_curvature", "settled",
 )  # fmt: skip
 """Arrays with a row for each segment."""
-FILE_LIMIT = 4 << 30
-"""Largest batch that is read, unpacked [B]."""
 _DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.2, 5.0), (0.25e-3, 40e-3)
 Progress = Callable[[int], object]
 
@@ -172,17 +170,7 @@ def _file(folder: Path, index: int) -> Path:
 def _content(path: Path) -> Mapping[str, np.ndarray]:
     """The contents of a file of a bank, each of the batch's segments in all its arrays."""
     rebuild = "delete it and build the bank again"
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-        if size > FILE_LIMIT:
-            raise LimitError(f"a batch of nulls of {size} bytes", where=str(path), fix=f"at most {FILE_LIMIT} are read")
-        with np.load(path, allow_pickle=False) as stored:
-            content = {name: np.asarray(stored[name]) for name in stored.files}
-    except LimitError:
-        raise
-    except Exception as error:  # noqa: BLE001  zip, zlib and numpy each raise errors of their own kinds
-        raise CorruptError(f"not a batch of nulls: {error}", where=str(path), fix=rebuild) from None
+    content = read_arrays(path, what="a batch of nulls", fix=rebuild)
     if not set(content) >= {*_SEGMENTS, "version", "columns", "duration", "anchors_told"}:
         raise CorruptError("it lacks arrays of this version", where=str(path), fix="build the bank again")
     if content["version"].ravel().tolist() != [_VERSION]:

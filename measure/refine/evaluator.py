@@ -16,6 +16,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from flagdata.arrays import read_arrays
 from flagdata.checksums import is_sealed, sealed
 from flagdata.errors import CorruptError
 from flagdata.outputs import rewrite
@@ -176,8 +177,8 @@ def _read(path: Path) -> Evaluated:
     try:
         if not is_sealed(path):
             raise CorruptError("a cached simulation is damaged, or of an older version", where=str(path), fix=again)
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as content:
-            embedding, frame, seconds = content["embedding"], content["frame"], content["seconds"].tolist()
+        content = read_arrays(path, what="a cached simulation", fix=again)
+        embedding, frame, seconds = content["embedding"], content["frame"], content["seconds"].tolist()
     except (OSError, ValueError, KeyError) as error:
         raise CorruptError(f"a cached simulation cannot be read: {error}", where=str(path), fix=again) from None
     return Evaluated(

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, NotFoundError, UnknownNameError
+from flagdata.arrays import read_arrays
+from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownNameError
 
 SCHEMA = "flagdata.predictions/1"
 WIND = "wind_speed"
@@ -144,12 +143,11 @@ def load(path: Path) -> Predictions:
     """
     fix = "write it with models.evaluation.predictions.save, or copy it again"
     try:
-        with path.open("rb") as source, np.load(source, allow_pickle=False) as archive:
-            content = {name: archive[name] for name in archive.files}
+        content = read_arrays(path, what="a file of predictions", fix=fix)
     except FileNotFoundError:
         raise NotFoundError("no such file", where=str(path), fix="check the path") from None
-    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, OSError, AttributeError, TypeError) as cause:
-        raise InputError(f"cannot be read as predictions: {cause}", where=str(path), fix=fix) from None
+    except CorruptError as cause:
+        raise InputError(f"cannot be read as predictions: {cause.what}", where=str(path), fix=fix) from None
     tag = str(content.pop("schema", "none"))
     if tag != SCHEMA:
         raise InputError(f"schema {tag!r}, not {SCHEMA!r}", where=str(path), fix=fix)

@@ -38,6 +38,7 @@ from flagdata.ingest.camera.luma import BROKEN, STILLS, luma_of_frame, luma_of_i
 from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import survey
+from flagdata.parquet import read_parquet
 
 VERSION = "v3.0"
 TIME = "flagdata.time"
@@ -300,8 +301,9 @@ def read(path: Path, columns: list[str]) -> pa.Table:
     Raises:
         NotFoundError: it is missing.
         CorruptError: it cannot be read, or lacks one of them.
+        LimitError: it states more than is held in memory.
     """
-    return _reading(path, partial(pq.read_table, columns=columns))
+    return _reading(path, partial(read_parquet, columns=columns))
 
 
 def _reading(path: Path, how: Callable[[Path], T]) -> T:

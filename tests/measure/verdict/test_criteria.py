@@ -29,7 +29,7 @@ METHOD = {
     "probes/wind_log": {"NUISANCES", "DIRECTION", "_STEPS", "_REACH", "_LAGS", "_CALM"},
     "inference/evidence": {"_HERE"},
     "inference/random_effect": {"_SHIFTS", "_POWERS", "_UNSEEN"},
-    "nulls/bank": {"WINDS", "FILE_LIMIT", "_VERSION", "_DENSITY", "_BENDING", "_DAMPING"},
+    "nulls/bank": {"WINDS", "_VERSION", "_DENSITY", "_BENDING", "_DAMPING"},
     "nulls/conformal": {"MOST_KINDS"},
     "nulls/free_run": {"_COPIES"},
     "nulls/stiffness": {"_STRETCHING", "_APART"},
