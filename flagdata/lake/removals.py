@@ -68,7 +68,7 @@ def erased(lake: Store) -> dict[str, tuple[int, str]]:
         name: (entry["version"], entry.get("message", ""))
         for entry in reversed(lake.catalog.history())
         for name in noted_erased(entry).values()
-        if name is not None
+        if isinstance(name, str)
     }
 
 

@@ -20,7 +20,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from flagdata.catalog_sql import dataset_of
-from flagdata.errors import CorruptError
+from flagdata.errors import CorruptError, LimitError
 from flagdata.files import open_regular
 from flagdata.lake.log import COPY_BACK
 from flagdata.lake.older_rows import SINCE, with_data_sets
@@ -134,7 +134,10 @@ class RowFiles:
     def _metadata(self, name: str, content: pa.Buffer) -> pq.FileMetaData:
         """What a file states of itself, once it is sure that it takes no more memory than rows of that size can."""
         file = pq.read_metadata(pa.BufferReader(content))
-        check_stated(file, content.size, where=str(self._folder / name), fix=COPY_BACK)
+        try:
+            check_stated(file, content.size, where=str(self._folder / name), fix=COPY_BACK)
+        except LimitError as error:  # the project's own files never state so much
+            raise CorruptError(error.what, where=error.where, fix=COPY_BACK) from None
         return file
 
     @contextmanager

@@ -32,13 +32,13 @@ def fingerprint(model: Estimator) -> NDArray[np.uint8]:
 def write(folder: Path, gate: Gate, model: Estimator) -> Path:
     """Store a gate in the folder of the model that it was calibrated for.
 
-    Its largest array, `whitening`, is stored in single precision: distances keep seven digits, and the file is half as
-    large.
+    Its largest arrays, `whitening` and `directions`, are stored in single precision: distances keep seven digits, and
+    the file is half as large.
     """
     tensors = {name: torch.from_numpy(np.ascontiguousarray(getattr(gate, name))) for name in _DIRECT}
     tensors |= {"tail_start": torch.from_numpy(gate.tails.start), "tail_excess": torch.from_numpy(gate.tails.excess)}
     tensors["network"] = torch.from_numpy(fingerprint(model).copy())
-    tensors["whitening"] = tensors["whitening"].float()
+    tensors |= {name: tensors[name].float() for name in ("whitening", "directions")}
     renew(folder, GATE, tensor_bytes(tensors))
     return folder / GATE
 

@@ -1,4 +1,4 @@
-"""No command of the program gives a terminal what it would obey, whoever named what is printed.
+"""No command of the program gives a terminal what it would obey, no matter whose names are printed.
 
 The commands are those of the click tree: one that is added has to be given arguments here.
 """
@@ -212,7 +212,7 @@ def test_csv_is_escaped_for_a_terminal_and_left_as_it_is_for_a_file(
     assert row == [printable(EVIL) if terminal else EVIL, "1"]
 
 
-def test_what_is_said_in_several_lines_is_indented(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_message_of_several_lines_is_indented(capsys: pytest.CaptureFixture[str]) -> None:
     console.say("one\ntwo\x1b[2J", mark="warning")
     assert capsys.readouterr().err == "warning: one\n  two\\x1b[2J\n"
 

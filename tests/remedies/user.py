@@ -77,7 +77,9 @@ class User:
         remedy = found(module, words)
         ended = self.types(*command)
         printed = f"{ended.out}\n{ended.err}"
-        fix = next((made.fix for made in self._made if self._is(made, remedy) and made.fix in printed), None)
+        words_printed = " ".join(printed.split())  # lines of a fix are indented
+        there = (made.fix for made in self._made if self._is(made, remedy))
+        fix = next((fix for fix in there if fix and " ".join(fix.split()) in words_printed), None)
         if fix is None and (said := remedy.printed(printed)) is not None:
             fix = said
         assert fix is not None, f"no fix of {remedy} in\n{printed}\nmade: {[(m.kind, m.fix) for m in self._made]}"
