@@ -445,7 +445,7 @@ def tried(trials: Trials, *, points: int) -> dict[str, Any]:
     faults: Counter[str] = Counter()
     kinds: Counter[str] = Counter()
     examples: list[str] = []
-    for number, call in enumerate(total * point // points for point in range(points)):
+    for number, call in enumerate((total - 1) * point // max(points - 1, 1) for point in range(points)):
         found = trials.killed(number, call, before, after)
         counts.update({
             "killed": found["killed"], "published when killed": found.get("published", False),
