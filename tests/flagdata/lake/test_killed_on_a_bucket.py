@@ -1,4 +1,4 @@
-"""A command on a bucket that is killed beside faults, as the campaign of `tests.failing.buckets` does with every verb."""
+"""A command on a bucket is killed beside faults, as `tests.failing.buckets` does with every verb."""
 
 from __future__ import annotations
 
