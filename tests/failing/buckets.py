@@ -130,14 +130,14 @@ def core(folder: Path) -> Scene:
         _invoked([*arguments, "--lake", str(lake.path)])
     (recording,) = lake.rows("kind = 'recording'").to_pylist()
     single = ingest_camera(lake, folder / "fourth.mp4").artifact
-    (folder / "record.mcap").write_bytes(lake.object_path(recording["object"]).read_bytes())
     (folder / "markers.csv").write_text(
         "time,marker,u,v,x,y,z\n"
         + "".join(f"{k / 25},m{m},{m},0,{m},{k / 100},0\n" for k in range(30) for m in range(3))
     )
     shutil.copytree(folder / "lake", folder / "ahead")
     ahead = Lake.open(folder / "ahead")
-    ingest_camera(ahead, folder / "film.mp4")
+    film = ingest_camera(ahead, folder / "film.mp4").artifact
+    (folder / "record.mcap").write_bytes(ahead.object_path(str(film.object)).read_bytes())
     ahead.tag("later")
     ids = {**scene.ids, "recording": recording["artifact"], "single": single.id}
     return Scene(folder=folder, ids=ids)
@@ -445,7 +445,7 @@ def tried(trials: Trials, *, points: int) -> dict[str, Any]:
     faults: Counter[str] = Counter()
     kinds: Counter[str] = Counter()
     examples: list[str] = []
-    for number, call in enumerate(total * point // points for point in range(points)):
+    for number, call in enumerate((total - 1) * point // max(points - 1, 1) for point in range(points)):
         found = trials.killed(number, call, before, after)
         counts.update({
             "killed": found["killed"], "published when killed": found.get("published", False),
@@ -495,7 +495,7 @@ def campaign(names: Sequence[str], results: Path, *, points: int, scratch: Path)
                 if verb.stand_in is not None:
                     module, _, function = verb.stand_in.partition(":")
                     getattr(import_module(module), function)(scene.ids["kept"])
-                place = scratch / name.replace(" ", "-")
+                place = scratch / f"of-{name.replace(' ', '-')}"
                 place.mkdir()
                 trials = Trials(verb=verb, scene=scene, bucket=bucket, proxy=proxy, scratch=place)
                 try:
