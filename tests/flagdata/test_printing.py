@@ -181,15 +181,15 @@ def test_a_message_of_several_lines_forges_no_line_of_the_log(
 
 
 def test_texts_that_come_from_another_lake_are_reported_and_stay_as_they_are(
-    scene: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder, _ = scene
-    done = invoke(capsys, "clone", folder / "lake", tmp_path / "copy")
+    of_another(tmp_path / "lake")
+    done = invoke(capsys, "clone", tmp_path / "lake", tmp_path / "copy")
     assert done.code == 0
     assert "control characters" in done.err
     copy = Lake.open(tmp_path / "copy")
     assert set(copy.rows()["name"].to_pylist()) == {EVIL, "good"}
-    plain = invoke(capsys, "push", tmp_path / "copy", "--lake", folder / "lake", "--json")
+    plain = invoke(capsys, "push", tmp_path / "copy", "--lake", tmp_path / "lake", "--json")
     assert plain.document["findings"] == []
 
 
