@@ -12,6 +12,7 @@ import re
 from pathlib import Path
 
 from flagdata.errors import CorruptError, InputError
+from flagdata.files import is_beside
 from flagdata.provenance import file_hash
 
 SUMS = "SHA256SUMS"
@@ -21,7 +22,8 @@ _DIGEST = 32  # B
 
 
 def files_of(path: Path) -> list[Path]:
-    """The regular files of a folder, sorted by relative path; the file itself if it is one.
+    """The regular files of a folder, sorted by relative path, without what `files.is_beside`; the file itself if it is
+    one.
 
     Raises:
         InputError: a symbolic link or special file, whose content the hash would not cover.
@@ -34,7 +36,7 @@ def files_of(path: Path) -> list[Path]:
     for entry in sorted(path.rglob("*"), key=lambda p: p.relative_to(path).as_posix()):
         if entry.is_symlink() or not (entry.is_dir() or entry.is_file()):
             raise InputError("a link or special file inside an object", where=str(entry), fix="store plain files only")
-        if entry.is_file():
+        if entry.is_file() and not any(map(is_beside, entry.relative_to(path).parts)):
             found.append(entry)
     return found
 

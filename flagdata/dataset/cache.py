@@ -25,6 +25,7 @@ from flagdata.addresses import local_path
 from flagdata.arguments import checked
 from flagdata.documents import from_json
 from flagdata.errors import FlagdataError, UsageError
+from flagdata.files import is_beside
 
 _FORMAT = "flagdata.decoded/1"
 _SUFFIX = ".clip"
@@ -72,7 +73,8 @@ class DecodedCache:
         self.path.mkdir(parents=True, exist_ok=True)
         with os.scandir(self.path) as found:
             for entry in found:
-                if not _NAME.fullmatch(entry.name) and entry.name not in (_TALLY, _WRITING):
+                own = _NAME.fullmatch(entry.name) or entry.name in (_TALLY, _WRITING)
+                if not own and not is_beside(entry.name):
                     raise UsageError(
                         "a cache among other files", where=entry.path, fix="give it a new or empty folder of its own"
                     )

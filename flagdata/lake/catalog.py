@@ -10,7 +10,7 @@ old versions are made of them. (Each file costs a fresh reader about 1 ms; tidyi
 commit.) The library's own checkpoints are off: it does not flush them to the disk, so a power cut could leave one that
 is empty and a table that does not open.
 
-Each commit notes the SHA-256 of its file, which `verify` compares and `gc` relies on. (Not the checksums that Parquet
+Each commit notes the SHA-256 of its file, which is compared whenever the file is read. (Not the checksums that Parquet
 can keep of its pages: the hash covers the whole file, footer too, costs readers nothing, and `sha256sum` prints it.)
 """
 
@@ -25,7 +25,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -38,12 +38,13 @@ from deltalake import CommitProperties, DeltaTable
 from deltalake.exceptions import CommitFailedError, DeltaError
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
-from flagdata.files import open_regular
+from flagdata.files import is_beside, open_regular
 from flagdata.forks import OneProcess
 from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder, put_if_absent, write_durably
-from flagdata.lake.log import CHECKPOINT, FILE_HASH, PREVIOUS_HASH, Log
+from flagdata.lake.log import CHECKPOINT, FILE_HASH, PREVIOUS_HASH, Entry, Log, is_stated
 from flagdata.lake.rowfiles import RowFiles, Scan
 from flagdata.lake.summaries import Summaries
+from flagdata.provenance import file_hash
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
 from flagdata.storage import Place, RemotePath
 from flagdata.storage.connection import delta_options, plain
@@ -65,7 +66,6 @@ _PATIENCE = 120.0  # s, how long a commit competes with other writers before it 
 _LEAST_TRIES = 20  # whatever time these take: an attempt may have waited for a collection
 _FIRST_WAIT = 0.01  # s
 _LONGEST_WAIT = 0.5  # s
-_LATEST = 253_402_300_800_000  # ms since 1970: the year 10000
 _PROCESS = OneProcess("the catalog", fix="resolve the query in the parent, or start workers by spawn")
 
 
@@ -121,7 +121,8 @@ class Catalog:
         self._summaries = Summaries(marks.parent / "history", self._entries)
         self._lock = threading.RLock()
         self._table: DeltaTable | None = None
-        self._files = RowFiles(path)
+        self._files = RowFiles(path, self._noted)
+        self._hashes: dict[str, frozenset[str]] = {}
         self._rows: tuple[int, pa.Table] | None = None
         self._listed: dict[int, list[str]] = {}
         self._history: tuple[int, list[dict[str, Any]]] | None = None
@@ -274,7 +275,8 @@ class Catalog:
             if (hint := self._log / _HINT).exists():
                 flush_file(hint)
             flush_folder(self._log)
-        self._summaries.extend(self.history()[::-1])
+        made = file_hash(self._log / f"{version:020d}{CHECKPOINT}")
+        self._summaries.extend(self.history()[::-1], checkpoint=made)
         small = [name for name in self._names(version) if (self.path / name).stat().st_size < _SMALL]
         if len(small) > 1:
             rows = pa.concat_tables(self._files.read(name) for name in small)
@@ -288,7 +290,7 @@ class Catalog:
             CorruptError: a log entry that cannot be read.
         """
         tracked = self._entries.files()
-        rows = [path for path in self.path.glob("*.parquet") if path.name not in tracked]
+        rows = [path for path in self.path.glob("*.parquet") if path.name not in tracked and not is_beside(path.name)]
         entries = self._log.glob("*#*")  # the Delta library's own name for an entry it has not linked yet
         return sorted([*rows, *entries])  # type: ignore[type-var]
 
@@ -323,33 +325,38 @@ class Catalog:
         if known is None or known[0] > head:
             summarised = self._summaries.read(head)
             known = (len(summarised) - 1, [dict(version) for version in reversed(summarised)])
-        if not known[1] or head - known[0] > 2 * _TIDY_EVERY:  # the Delta library reads many entries at once
-            known = (head, self._whole_history(head))
         # Entries never change, so that a process reads each once: in a bucket each is a request.
-        unread = range(head, known[0], -1)
-        later = [self._stated({**self._entries.info(version), "version": version}) for version in unread]
-        self._history = (head, [*later, *known[1]])
+        unread = range(known[0] + 1, head + 1)
+        later = map(self._stated, unread, self._entries.entries(unread, head=head))
+        self._history = (head, [*reversed([*later]), *known[1]])
         return self._history[1][:limit]
 
-    def _whole_history(self, head: int) -> list[dict[str, Any]]:
-        table = self._open(head)
-        with self._log_errors():
-            found = self._repeated(table.history)
-        if not found:  # the library lists nothing in a folder whose name has a # or a ?
-            found = [{**self._entries.info(version), "version": version} for version in range(head, -1, -1)]
-        # The Delta library lists the log as it is by now, and counts its versions down from the table's.
-        later = max(0, len(found) - (head + 1))
-        return [self._stated({**entry, "version": entry["version"] + later}) for entry in found[later:]]
-
-    def _stated(self, entry: Mapping[str, Any]) -> dict[str, Any]:
+    def _stated(self, version: int, entry: Entry) -> dict[str, Any]:
         """What the log says of a version."""
-        own = {k.removeprefix(_INFO_PREFIX): v for k, v in entry.items() if k.startswith(_INFO_PREFIX)}
-        when, operation = entry.get("timestamp"), entry.get("operation")
-        if not isinstance(when, int) or not 0 <= when < _LATEST or not isinstance(operation, str):
-            raise self._entries.damaged(entry["version"])
-        if not all(isinstance(value, str) for value in own.values()) or ("commit" in own and "branch" not in own):
-            raise self._entries.damaged(entry["version"])
-        return {"version": entry["version"], "timestamp": when, "operation": operation, **own}
+        own = {k.removeprefix(_INFO_PREFIX): v for k, v in entry.info.items() if k.startswith(_INFO_PREFIX)}
+        what = {key: entry.info.get(key) for key in ("timestamp", "operation")}
+        stated = {"version": version, **what, **own, "files": list(entry.files)}
+        if not is_stated(stated, version):
+            raise self._entries.damaged(version)
+        return stated
+
+    def _noted(self, name: str) -> frozenset[str]:
+        """The SHA-256 of a file as its commit noted it; nothing where it noted none. Of one whose commit is known from
+        a summary without names of files, those of all such commits."""
+        if name not in self._hashes:
+            noted: dict[str, frozenset[str]] = {}
+            others: set[str] = set()
+            complete = True
+            for version in self.history():
+                found = version.get(_FILE_HASH)
+                if "files" in version:
+                    noted |= dict.fromkeys(version["files"], frozenset({found} if found else ()))
+                elif found:
+                    others.add(found)
+                else:
+                    complete &= version["operation"] != "WRITE"
+            self._hashes = {name: frozenset(others if complete else ()), **noted}
+        return self._hashes[name]
 
     def _commit(
         self, table: DeltaTable, rows: pa.Table, *, removed: Sequence[str], rows_change: bool, info: Mapping[str, str]
@@ -390,7 +397,27 @@ class Catalog:
         """The version of the newest, by the files' names: a process may die before `_last_checkpoint` is written."""
         return max(self._entries.checkpoints(), default=0)
 
+    def _check_checkpoint(self, version: int) -> None:
+        """Compare the checkpoint from which the Delta library reads a version with what was noted of it."""
+        noted = self._summaries.checkpoints
+        newest = max((number for number in noted if number <= version), default=None)
+        if newest is None:
+            return
+        path = self._log / f"{newest:020d}{CHECKPOINT}"
+        with suppress(FileNotFoundError):
+            if file_hash(path) != noted[newest]:
+                raise CorruptError(
+                    "a checkpoint of the catalog's log has changed since it was written", where=str(path),
+                    fix=_DELETE,
+                )  # fmt: skip
+
     def _open(self, version: int) -> DeltaTable:
+        newest = self.history(1)[0]["version"] if self._history is None else self._history[0]
+        if version > newest and version > self.head():
+            raise CorruptError(
+                f"version {version} is named, but the newest is {self.head()}", where=str(self.path),
+                fix="run flagdata doctor: it lists the refs that cannot be read",
+            )  # fmt: skip
         with self._log_errors():
             table = self._table = self._repeated(lambda: self._at(version))
         unknown = [f.name for f in table.schema().fields if f.name not in CATALOG]
@@ -417,10 +444,7 @@ class Catalog:
             raise CorruptError(
                 f"the catalog's log cannot be read: {first}",
                 where=str(self._log),
-                fix=f"delete {_HINT} and *{CHECKPOINT} there: they save time, the .json files hold all;"
-                f" if that does not help, {restore}"
-                if self._entries.checkpoints()
-                else restore,
+                fix=f"{_DELETE}; if that does not help, {restore}" if self._entries.checkpoints() else restore,
             ) from None
 
     def _at(self, version: int) -> DeltaTable:
@@ -428,6 +452,7 @@ class Catalog:
         if table is not None and table.version() < version:
             table.update_incremental()
         if table is None or table.version() != version:
+            self._check_checkpoint(version)
             table = DeltaTable(self.path.as_uri(), version=version, storage_options=self._options())
         return table
 
@@ -496,7 +521,9 @@ class Catalog:
         self._entries.acknowledge(version)
 
 
+_FILE_HASH = FILE_HASH.removeprefix(_INFO_PREFIX)
 _HINT = "_last_checkpoint"
+_DELETE = f"delete {_HINT} and *{CHECKPOINT} there: they save time, the .json files hold all"
 _SYSTEM_ERROR = "(os error "  # as the Delta library writes it
 _NO_ANSWER = re.compile(r"Generic S3 error|Error performing [A-Z]+ ")
 """What it writes where a store refused a request or did not answer; all else concerns what the store gave."""

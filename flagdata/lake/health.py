@@ -11,18 +11,21 @@ from pathlib import Path
 import pyarrow as pa
 
 from flagdata.errors import FlagdataError
+from flagdata.files import is_beside
 from flagdata.findings import Finding, Severity
 from flagdata.lake.again import made_again
 from flagdata.lake.artifact import OBJECT_NAME, Artifact
 from flagdata.lake.collect import left_uploads
+from flagdata.lake.durable import SCRATCH
 from flagdata.lake.erasure import unfinished
 from flagdata.lake.lake import Lake
-from flagdata.lake.layout import STORES, foreign_entries
-from flagdata.lake.leases import LeaseState, last_written, leases, looking, unleased
+from flagdata.lake.layout import FOLDERS, STORES, foreign_entries
+from flagdata.lake.leases import COLLECT, TURN, LeaseState, last_written, leases, looking, unleased
 from flagdata.lake.log import LogGapError
 from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import DAMAGED, StoredObject
 from flagdata.lake.removals import erased, expirations, removals
+from flagdata.printable import counted
 from flagdata.schema import FORMAT_VERSION, Kind
 from flagdata.storage import Place, StoreError
 from flagdata.storage.uploads import Upload
@@ -56,23 +59,22 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
         return tuple(findings)  # what follows would call the files of the missing entries' commits leftovers
     if not marked.findings:
         held = {name for state in states if state.alive for name in state.objects}
-        findings += _erased(lake, marked)
-        findings += _expired(lake, marked, {found.name for found in stored})
-        findings += _collected(lake, marked, {found.name for found in stored})
+        try:
+            findings += _gone(lake, marked, {found.name for found in stored})
+        except FlagdataError as error:
+            findings.append(_log_damaged(error))
         needed = marked.objects | held
         left = unfinished(lake, needed)
         findings += [_unfinished(lake, name, *why) for name, why in left.items()]
         findings += [_orphan(found, limit, grace) for found in stored if found.name not in needed | left.keys()]
         findings += _left_uploads(lake, states, limit, grace)
-    findings += _strays(lake, foreign)
+    findings += [*_strays(lake, foreign), *_beside(lake)]
     findings += [_abandoned(state) for state in states if state.leased and not state.alive]
     findings += [_unleased(path, written, limit, grace) for path, written in unowned]
     try:
         findings += [_unpublished(path, limit, grace) for path in lake.unpublished_files()]
     except FlagdataError as error:
-        findings.append(
-            Finding(kind="log-damaged", severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
-        )
+        findings.append(_log_damaged(error))
     return tuple(dict.fromkeys(findings))  # an entry that cannot be read stops more than one check
 
 
@@ -229,6 +231,19 @@ def _row(lake: Lake, row: dict[str, object], known: set[str], ref: str, foreign:
     return findings
 
 
+def _log_damaged(error: FlagdataError) -> Finding:
+    return Finding(kind="log-damaged", severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
+
+
+def _gone(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
+    """Notes on data that went: erased, expired, collected.
+
+    Raises:
+        CorruptError: what the log notes of it cannot be read.
+    """
+    return [*_erased(lake, marked), *_expired(lake, marked, stored), *_collected(lake, marked, stored)]
+
+
 def _erased(lake: Lake, marked: Marked) -> list[Finding]:
     """A note for each tag or branch that lists rows whose data were erased."""
     gone = {name: why for name, why in erased(lake).items() if name not in marked.objects}
@@ -352,6 +367,7 @@ def _strays(lake: Lake, foreign: Collection[Path]) -> list[Finding]:
         for path in (lake.path / store).glob("*")
         if path not in known and not OBJECT_NAME.fullmatch(f"{store}/{path.name.removesuffix(suffix + DAMAGED)}")
     ]
+    strays = [path for path in strays if not is_beside(path.name)]
     return [
         Finding(
             kind="stray-file",
@@ -363,6 +379,21 @@ def _strays(lake: Lake, foreign: Collection[Path]) -> list[Finding]:
         )
         for path in sorted(strays)  # type: ignore[type-var]
     ]
+
+
+def _beside(lake: Lake) -> list[Finding]:
+    """A note on files of an operating system in the lake's folders; what lies in objects is passed over."""
+    own = {COLLECT, TURN}
+    found = sorted(
+        str(path) for folder in ("", *FOLDERS) for path in (lake.path / folder).glob("*")
+        if is_beside(path.name) and path.name not in own and not SCRATCH.fullmatch(path.name)
+    )  # fmt: skip
+    if not found:
+        return []
+    what = f"{counted(len(found), 'file')} of an operating system, as .DS_Store: passed over"
+    fix = "none needed; they may be deleted"
+    note = Severity.NOTE
+    return [Finding(kind="files-beside", severity=note, what=what, where=found[0], count=len(found), fix=fix)]
 
 
 def _abandoned(state: LeaseState) -> Finding:

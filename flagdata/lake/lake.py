@@ -15,7 +15,7 @@ from flagdata import provenance
 from flagdata.addresses import lake_place
 from flagdata.documents import from_json
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
-from flagdata.files import open_regular
+from flagdata.files import is_beside, open_regular
 from flagdata.lake.catalog import newer
 from flagdata.lake.deletion import check_reuse, delete
 from flagdata.lake.durable import disk_errors, put_if_absent
@@ -69,17 +69,21 @@ class Lake(Store):
                 lake._clear()
                 fill(lake)
             except BaseException:
-                for entry in lake.path.iterdir():
+                for entry in lake._entries():
                     Objects.remove(entry)
                 raise
         return lake
+
+    def _entries(self) -> list[Place]:
+        """What lies in the lake's folder, without what `files.is_beside`."""
+        return [entry for entry in self.path.iterdir() if not is_beside(entry.name)]
 
     def _taken(self) -> ConflictError:
         """The error for a lake that cannot be made since something is there."""
         where = str(self.path)
         if (self.path / _MARKER).exists():
             return ConflictError("there is a lake already", where=where, fix="choose an empty or new folder")
-        inside = {path.name for path in self.path.iterdir()} if self.path.is_dir() else set()
+        inside = {path.name for path in self._entries()} if self.path.is_dir() else set()
         if STAGING in inside and inside <= {*FOLDERS, _MARKER}:
             return ConflictError(
                 "a lake is being made there, or its making was stopped", where=where,

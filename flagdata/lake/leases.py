@@ -29,14 +29,15 @@ from typing import IO
 
 from flagdata.caches import user_cache
 from flagdata.documents import from_json
+from flagdata.files import is_beside
 from flagdata.lake import remote_leases
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.layout import LinkError
 from flagdata.storage import Place, RemotePath
 
 _LEASE = "lease"
-_COLLECT = ".collect"
-_TURN = ".turn"
+COLLECT = ".collect"
+TURN = ".turn"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,7 +191,7 @@ def leases(staging: Place) -> list[LeaseState]:
     """All staging folders, by name."""
     states = []
     for folder in sorted(path for path in _entries(staging) if _is_folder(path)):  # type: ignore[type-var]
-        if folder.name == remote_leases.SHARED:
+        if folder.name == remote_leases.SHARED or is_beside(folder.name):
             continue
         leased = True
         try:
@@ -216,9 +217,10 @@ def _lines_of(folder: Place) -> tuple[list[str], bool]:
 def unleased(staging: Place) -> list[Place]:
     """Entries of staging without a lease: folders without one, and files, by name."""
     # The shared locks' folder in a bucket is gone with the last of them, which may be between two requests.
-    own = (_COLLECT, _TURN, remote_leases.COLLECT, remote_leases.MADE, remote_leases.SHARED)
+    own = (remote_leases.COLLECT, remote_leases.MADE, remote_leases.SHARED)
     folders = [state.folder for state in leases(staging) if not state.leased]
-    files = [path for path in _entries(staging) if not _is_folder(path) and path.name not in own]
+    entries = [path for path in _entries(staging) if path.name not in own and not is_beside(path.name)]
+    files = [path for path in entries if not _is_folder(path)]
     return sorted([*folders, *files])  # type: ignore[type-var]
 
 
@@ -262,9 +264,9 @@ def _locked(staging: Path, mode: int) -> Iterator[None]:
     """Take the lock behind a turnstile: a process that waits for it holds the turnstile, so that a stream of shared
     holders cannot keep an exclusive one out for ever. Not to be nested."""
     with ExitStack() as held:
-        with _opened(staging / _TURN) as turn:
+        with _opened(staging / TURN) as turn:
             fcntl.flock(turn, fcntl.LOCK_EX)
-            lock = held.enter_context(_opened(staging / _COLLECT))
+            lock = held.enter_context(_opened(staging / COLLECT))
             fcntl.flock(lock, mode)
         yield
 

@@ -5,7 +5,10 @@ what comes before it for all there is. The loss of the last entries leaves no ho
 entry is on the disk, also puts its number as a file name in the folder `refs/newest/`, outside the log, and takes lower
 ones away. The number to believe is the highest, so writers need no lock for it, and it never falls.
 
-Each entry notes the SHA-256 of the one before it, and the mark that of the newest, so that a change in any is found.
+Each entry notes the SHA-256 of the one before it, and the mark that of the newest, so that a change in any is found:
+by whoever reads the entries in a row, and by `verify`.
+
+A number that a name states may be anything, in a damaged listing or a lake of other users. Nothing is counted up to it.
 """
 
 from __future__ import annotations
@@ -14,8 +17,10 @@ import json
 import os
 import re
 import stat
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -32,21 +37,44 @@ FILE_HASH = "flagdata.file_sha256"
 PREVIOUS_HASH = "flagdata.previous_sha256"
 """Key of a commit's info: SHA-256 of the log entry before it."""
 
+COPY_BACK = "copy the file of this name from a backup, or from a clone of the lake"
+"""What heals a file of the catalog: a clone has the same under the same name."""
+
 _ACTIONS = {"add", "remove", "metaData", "protocol", "commitInfo", "txn", "cdc", "domainMetadata"}
 _FILE = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
 """Names of files of rows: none leads out of the catalog's folder, also where a lake of somebody else is copied."""
 _NAME = "{:020d}.json"
-_ENTRY = re.compile(r"(\d{20})\.json").fullmatch
+_ENTRY = re.compile(r"([0-9]{20})\.json").fullmatch
 CHECKPOINT = ".checkpoint.parquet"
 """How the names of checkpoints end."""
 
-_MARK = re.compile(r"\d{1,20}")
+_CHECKPOINT = re.compile(r"([0-9]{20})" + re.escape(CHECKPOINT)).fullmatch
+_MARK = re.compile(r"[0-9]{1,20}").fullmatch
+_COUNT = re.compile(r"[0-9]{1,18}").fullmatch
+_LATEST = 253_402_300_800_000  # ms since 1970: the year 10000
+_NAMED = 3  # missing entries that a message names
+_AT_ONCE = 16  # entries of a bucket that are read at the same time
 
 
 class LogGapError(CorruptError):
     """An entry of the catalog's log is missing, so what was committed is not known."""
 
     kind = "log-gap"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """An entry of the log, as it was read.
+
+    Attributes:
+        files: names of the files that it adds.
+        info: what the writer said of its commit.
+        hash: SHA-256 of the entry.
+    """
+
+    files: Sequence[str]
+    info: Mapping[str, Any]
+    hash: str
 
 
 class Log:
@@ -75,10 +103,9 @@ class Log:
         if not present:
             raise LogGapError("the catalog's log is gone", where=str(self.folder), fix="restore it from a copy")
         newest = max(present)
-        # A listing may leave out an entry that came while it was made, hence the second look.
-        missing = [v for v in range(max(newest, acknowledged) + 1) if v not in present and not self.path(v).exists()]
+        missing = list(islice(self._missing(present, upto=max(newest, acknowledged)), _NAMED))
         if missing:
-            raise self._gap(missing, newest=newest)
+            raise self._gap(missing, present, acknowledged=acknowledged)
         for version in sorted(present.keys() - self._filled):
             entry = self.path(version)
             if isinstance(entry, Path):
@@ -88,6 +115,11 @@ class Log:
                 raise self.damaged(version)
         self._filled = set(present)
         return max(newest, acknowledged)
+
+    def _missing(self, present: Mapping[int, object], *, upto: int) -> Iterator[int]:
+        """The versions that have no entry, each looked for as it is asked for."""
+        # A listing may leave out an entry that came while it was made, hence the second look.
+        return (version for version in range(upto + 1) if version not in present and not self.path(version).exists())
 
     def files(self) -> dict[str, str | None]:
         """Name of each file that some version is made of → the SHA-256 that its commit noted, `None` in older lakes.
@@ -109,10 +141,8 @@ class Log:
             CorruptError: an entry that cannot be read, by its name.
         """
         noted: dict[int, str] = {}
-        newest = self.acknowledged()
-        if newest >= 0:
-            with suppress(FileNotFoundError):  # another commit has just replaced it
-                noted[newest] = _content_of(self.marks / str(newest)).strip()
+        if (marked := self._marked(newest := self.acknowledged())) is not None:
+            noted[newest] = marked
         present = self._present()
         for version in sorted(present):
             previous = self._content(version)[1].get(PREVIOUS_HASH)
@@ -146,13 +176,48 @@ class Log:
         """
         return self._text(version).encode(), self._content(version)[0]
 
-    def info(self, version: int) -> dict[str, Any]:
-        """What the writer of an entry said of its commit.
+    def entries(self, versions: Sequence[int], *, head: int) -> list[Entry]:
+        """The entries of consecutive versions, each of which is what the next one, or the mark, says that it is.
+
+        Args:
+            head: the newest version of all.
 
         Raises:
-            CorruptError: it cannot be read.
+            CorruptError: one cannot be read, or has changed since it was written.
         """
-        return self._content(version)[1]
+        if isinstance(self.folder, Path) or len(versions) < _AT_ONCE:
+            found = [self._read(version) for version in versions]
+        else:
+            with ThreadPoolExecutor(_AT_ONCE) as pool:
+                found = list(pool.map(self._read, versions))
+        for version, entry, following in zip(versions, found, found[1:], strict=False):
+            if following.info.get(PREVIOUS_HASH, entry.hash) != entry.hash:
+                raise self._disagreeing(version, self.path(version + 1))
+        if versions and versions[-1] == head and self._marked(head) not in (None, found[-1].hash):
+            raise self._disagreeing(head, self.marks / str(head))
+        return found
+
+    def _read(self, version: int) -> Entry:
+        text = self._text(version)
+        files, info = self._parsed(version, text)
+        return Entry(files=files, info=info, hash=digest(text))
+
+    def _marked(self, version: int) -> str | None:
+        """The SHA-256 of an entry that its mark notes, if there is one."""
+        try:
+            return _content_of(self.marks / str(version)).strip() or None
+        except FileNotFoundError:  # another commit has just replaced it
+            return None
+
+    def _disagreeing(self, version: int, noting: Place) -> CorruptError:
+        """The error for an entry whose SHA-256 is not the one that the next entry, or its mark, notes."""
+        path = self.path(version)
+        fix = f"{COPY_BACK}; if it is the same there, "
+        fix += f"delete {noting}" if noting.parent == self.marks else f"that of {noting.name}"
+        return CorruptError(
+            f"the log entry {path.name} is not what {noting.name} says: one of the two has changed since it was "
+            "written", where=str(path), fix=fix,
+        )  # fmt: skip
 
     def adopt(self, version: int, entry: bytes) -> bool:
         """Put an entry of another lake of the same history; False where there is another one of that version."""
@@ -163,8 +228,11 @@ class Log:
 
     def _content(self, version: int) -> tuple[list[str], dict[str, str]]:
         """Names of the files that an entry adds, and its commit info."""
+        return self._parsed(version, self._text(version))
+
+    def _parsed(self, version: int, text: str) -> tuple[list[str], dict[str, str]]:
         try:
-            actions = [from_json(line) for line in self._text(version).splitlines()]
+            actions = [from_json(line) for line in text.splitlines()]
             if not actions or not all(_ACTIONS.issuperset(action.keys()) for action in actions):
                 raise self.damaged(version)
             info = next((action["commitInfo"] for action in actions if "commitInfo" in action), {})
@@ -207,8 +275,7 @@ class Log:
 
     def checkpoints(self) -> list[int]:
         """Versions at which the Delta library finds all that is in the entries before."""
-        ends = CHECKPOINT
-        return [int(name.removesuffix(ends)) for name in _sizes_in(self.folder) if name.endswith(ends)]
+        return [int(match[1]) for name in _sizes_in(self.folder) if (match := _CHECKPOINT(name))]
 
     def _present(self) -> dict[int, int | None]:
         """Version of each entry → its size, where a listing states it."""
@@ -219,17 +286,37 @@ class Log:
         return {version: size for name, size in sizes.items() if (version := self._numbers[name]) >= 0}
 
     def _marks(self) -> list[int]:
-        return [int(name) for name in _sizes_in(self.marks) if _MARK.fullmatch(name)]
+        return [int(name) for name in _sizes_in(self.marks) if _MARK(name)]
 
-    def _gap(self, missing: list[int], *, newest: int) -> LogGapError:
-        names = ", ".join(self.path(version).name for version in missing[:3])
-        more = f" and {len(missing) - 3} more" if len(missing) > 3 else ""
+    def _gap(self, missing: Sequence[int], present: Mapping[int, object], *, acknowledged: int) -> LogGapError:
+        newest = max(present)
+        names = ", ".join(self.path(version).name for version in missing)
+        more = max(newest, acknowledged) + 1 - len(present) - len(missing)
+        what = f"an entry of the catalog's log is missing: {names}{f' and {more} more' if more > 0 else ''}"
         fix = "restore it from a copy, and run neither gc nor another program on the lake before"
         if missing[0] > newest:  # what is left is a whole, older catalog
-            fix += f"; to give up what was committed after version {newest} instead, empty the folder {self.marks}"
-        return LogGapError(
-            f"an entry of the catalog's log is missing: {names}{more}", where=str(self.path(missing[0])), fix=fix
-        )
+            mark = next(path for path in self.marks.iterdir() if _MARK(path.name) and int(path.name) == acknowledged)
+            what += f"; {mark} says that version {acknowledged} was committed"
+            fix += f"; if it never was, or to give up what was committed after version {newest}, delete {mark}"
+        elif newest - missing[0] >= len(present):  # more of them than there are: rather is the last name wrong
+            what += f", before {self.path(newest).name}"
+            fix += f"; if this lake never had so many versions, move {self.path(newest)} away"
+        return LogGapError(what, where=str(self.path(missing[0])), fix=fix)
+
+
+def is_stated(version: object, number: int) -> bool:
+    """Whether this is what `Catalog.history` says of the version of that number, as a file that states it may not."""
+    if not isinstance(version, dict) or version.get("version") != number:
+        return False
+    when, files = version.get("timestamp"), version.get("files", [])
+    texts = [value for key, value in version.items() if key not in ("version", "timestamp", "files")]
+    return (
+        isinstance(when, int) and 0 <= when < _LATEST
+        and isinstance(files, list) and all(isinstance(text, str) for text in (*texts, *files))
+        and isinstance(version.get("operation"), str)
+        and all(_COUNT(version.get(key, "0")) for key in ("rows", "withdrawn"))
+        and ("commit" not in version or "branch" in version)
+    )  # fmt: skip
 
 
 def names_in(folder: Place) -> list[str]:

@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 from flagdata.errors import FlagdataError
 from flagdata.findings import Finding, Severity
 from flagdata.lake.lineage import noted_erased, noted_hidden, noted_view
-from flagdata.lake.log import LogGapError
+from flagdata.lake.log import COPY_BACK, LogGapError
 from flagdata.lake.refs import MAIN, Slice, View
 from flagdata.lake.store import Store
 from flagdata.provenance import file_hash
@@ -51,7 +51,7 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
     recent: list[pa.Table] = []
     findings: list[Finding] = []
     try:
-        lake.catalog.head()
+        lake.catalog.history()
     except FlagdataError as error:
         kind = error.kind if isinstance(error, LogGapError) else "log-damaged"
         found = Finding(kind=kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)
@@ -116,7 +116,7 @@ def catalog_files(lake: Store) -> tuple[Finding, ...]:
 
 
 def _damaged(kind: str, what: str, path: Place) -> Finding:
-    return Finding(kind=kind, severity=Severity.ERROR, what=what, where=str(path), fix="restore it from a copy")
+    return Finding(kind=kind, severity=Severity.ERROR, what=what, where=str(path), fix=COPY_BACK)
 
 
 def _lost(head: pa.Table, known: list[str], where: str) -> list[Finding]:
@@ -169,4 +169,6 @@ def _unerased(lake: Store, rows: pa.Table, view: View) -> pa.Table:
 
 
 def _unreadable(error: FlagdataError, where: str) -> Finding:
-    return Finding(kind="ref-unreadable", severity=Severity.ERROR, what=error.what, where=where, fix=error.fix)
+    """The finding of what is to blame, where the error names a file, else of what was read."""
+    at = error.where or where
+    return Finding(kind="ref-unreadable", severity=Severity.ERROR, what=error.what, where=at, fix=error.fix)

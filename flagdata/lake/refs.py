@@ -3,7 +3,7 @@
 A view is what a ref shows: for each branch of its line, that branch's rows at one version of the table. A branch's
 view is its own rows at the head, and its parent's view at the version it forked from, without rows that were withdrawn
 from the branch; so `main` may go on without the branch noticing. Every row names the branch that it was committed on. A
-tag stores its whole view and stays what it was.
+tag stores its whole view and stays what it was. Each file ends with the SHA-256 of what it states.
 """
 
 from __future__ import annotations
@@ -21,11 +21,16 @@ from flagdata.errors import ConflictError, CorruptError, NotFoundError, UnknownN
 from flagdata.files import open_regular
 from flagdata.lake.durable import confirming, disk_errors, flush_folder, put_if_absent, unreadable
 from flagdata.lake.moments import moment
+from flagdata.provenance import recipe_hash
 from flagdata.storage import Place
 
 MAIN = "main"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}")
+_VERSION = re.compile(r"[0-9]+")
+_SHOWN = 60  # characters of a name in a message
 _NOUNS = {"tags": "tag", "branches": "branch"}
+_HASH = "sha256"
+_PULL = "delete the file and flagdata pull a clone of this lake, or restore it from a copy"
 _COMMIT = re.compile(r"c[0-9a-f]{16}")
 
 
@@ -134,6 +139,7 @@ class Refs:
             "created": ref.created,
             "view": as_json(view),
         }
+        content[_HASH] = recipe_hash(content)
         path = self.root / kind / f"{name}.json"
         with disk_errors(f"creating the ref {name}", path):
             # In a bucket a put of the same bytes counts as one that was sent twice, so that it would not say so.
@@ -172,7 +178,20 @@ class Refs:
         known = self.branches()
         if branch not in known:
             raise _not_there("branch", branch, [MAIN, *known])
-        return (Slice(branch=branch, version=head), *known[branch].view)
+        return (Slice(branch=branch, version=head), *self.checked("branches", known[branch], head))
+
+    def checked(self, kind: str, ref: Ref, head: int) -> View:
+        """The view of a tag or branch, once it is known to name versions that there are.
+
+        Raises:
+            CorruptError: it names a later one.
+        """
+        newest = max(part.version for part in ref.view)
+        if newest > head:
+            path = self.root / kind / f"{ref.name}.json"
+            what = f"the {_NOUNS[kind]} {ref.name!r} shows version {newest}, but the newest is {head}"
+            raise CorruptError(what, where=str(path), fix=_PULL)
+        return ref.view
 
     def remove(self, kind: str, name: str) -> None:
         """Take a tag or branch away; what is noted of it is the log's.
@@ -194,13 +213,16 @@ class Refs:
         try:
             with open_regular(path) as stream:
                 content: dict[str, Any] = from_json(stream.read())
+            noted = content.pop(_HASH, None)  # which those of older lakes lack
+            if content["name"] != path.stem or (noted is not None and noted != recipe_hash(content)):
+                raise ValueError("it has changed since it was written")
             return Ref(name=content["name"], created=content["created"], view=view_from(content["view"]))
         except OSError as error:
             raise unreadable("the ref", path, error) from None
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, AttributeError):
             raise CorruptError(
-                "the ref cannot be read", where=str(path),
-                fix="delete the file and flagdata pull a clone of this lake, or restore it from a copy",
+                "the ref cannot be read, or has changed since it was written", where=str(path),
+                fix=_PULL,
             ) from None  # fmt: skip
 
 
@@ -224,10 +246,11 @@ def resolve(
     """
     if at is None:
         return refs.view(MAIN, head)
-    if at.isdecimal():
-        if int(at) > head:
-            raise NotFoundError(f"there is no version {at}", fix=f"the newest is {head}")
-        return (Slice(branch=MAIN, version=int(at)),)
+    if _VERSION.fullmatch(at):
+        number = at.lstrip("0") or "0"
+        if len(number) > len(str(head)) or int(number) > head:  # Python reads no number of thousands of digits
+            raise NotFoundError(f"there is no version {_shown(at)}", fix=f"the newest is {head}")
+        return (Slice(branch=MAIN, version=int(number)),)
     if _COMMIT.fullmatch(at):
         known = commits()
         if at not in known:
@@ -235,7 +258,7 @@ def resolve(
         return known[at]
     tags = refs.tags()
     if at in tags:
-        return tags[at].view
+        return refs.checked("tags", tags[at], head)
     branches = refs.branches()
     if at == MAIN or at in branches:
         return refs.view(at, head)
@@ -249,4 +272,9 @@ def resolve(
 
 
 def _not_there(noun: str, at: str, known: Iterable[str]) -> NotFoundError:
+    at = _shown(at)  # also since names that are alike are sought in time with the square of the length
     return NotFoundError(f"there is no {noun} {at!r}", fix=UnknownNameError.of(noun, at, known).fix)
+
+
+def _shown(name: str) -> str:
+    return name if len(name) <= _SHOWN else f"{name[:_SHOWN]}…"

@@ -38,6 +38,8 @@ from flagdata.storage import Place, RemotePath
 
 LIFE = 240.0
 """How long what is not written anew counts [s]: longer than all retries of one request."""
+_LONGEST_LIFE = 3600.0
+"""After how long any lock is void, whatever it states [s]."""
 _FIRST_WAIT = 0.02  # s
 _LONGEST_WAIT = 1.0  # s
 _SILENT = 10.0
@@ -254,6 +256,7 @@ def _living(place: RemotePath, staging: RemotePath) -> dict[str, Any] | None:
     try:
         content = from_json(place.read_bytes().decode().split("\n")[0])
         life, machine, pid, started = float(content["life"]), content["machine"], content["pid"], content["started"]
+        life = min(_LONGEST_LIFE, life)  # also of what is not a number
     except FileNotFoundError:
         return None
     except (ValueError, KeyError, TypeError):

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from flagdata.checksums import content_hash, files_of, read_sums, size_of, sums_of
 from flagdata.errors import CorruptError
+from flagdata.files import is_beside
 from flagdata.lake.artifact import OBJECT_NAME
 from flagdata.lake.layout import STORES
 from flagdata.lake.objects import DAMAGED, REMEDY, Objects, StoredObject, path_in_lake
@@ -108,7 +109,7 @@ class RemoteObjects(Objects):
             raise self.missing(name) from None
         if found.pop(SUMS, None) is None:
             raise self.missing(name)
-        return sum(found.values())
+        return sum(size for key, size in found.items() if not _is_beside(key))
 
     def is_sound(self, name: str, size: int | None) -> bool:
         """As `is_there`: to compare the bytes would fetch all of them. What verify or a reader found damaged counts."""
@@ -169,7 +170,7 @@ class RemoteObjects(Objects):
             for key, status in (self._root / store).names():
                 name = f"{store}/{key.partition('/')[0].removesuffix(suffix)}"
                 if OBJECT_NAME.fullmatch(name) and key.startswith(path_in_lake(name).name):
-                    sizes[name] = sizes.get(name, 0) + (0 if key.endswith(f"/{SUMS}") else status.st_size)
+                    sizes[name] = sizes.get(name, 0) + (0 if _is_beside(key) else status.st_size)
                     modified[name] = max(modified.get(name, 0.0), status.st_mtime)
             for name, size in sorted(sizes.items()):
                 yield StoredObject(name=name, path=self.path(name), size=size, modified=modified[name])
@@ -227,6 +228,11 @@ class RemoteObjects(Objects):
             return _digest(place)
         text = "".join(f"{_digest(place / file)}  {file}\n" for file in sorted(self._sums(place)))
         return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _is_beside(key: str) -> bool:
+    """Whether a key is that of the sums, or of what an operating system put beside an object's files."""
+    return any(map(is_beside, key.split("/")))
 
 
 def _download(source: RemotePath, target: Path) -> None:

@@ -3,7 +3,8 @@
 A summary covers consecutive versions. It names the SHA-256 of the entry before its first and of its last one, so that
 summaries form a chain as entries do, and the end of the chain is compared with the log itself: what was written of
 another course of the log, as one that was restored from a copy and went on, is not believed. Its own SHA-256 is in its
-name. Summaries save time only; the entries hold all.
+name. Summaries save time only; the entries hold all. A summary also notes the SHA-256 of the checkpoints that the Delta
+library wrote of its versions.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from flagdata.documents import from_json
 from flagdata.errors import CorruptError
 from flagdata.files import open_regular
 from flagdata.lake.durable import put_if_absent
-from flagdata.lake.log import Log, names_in
+from flagdata.lake.log import Log, is_stated, names_in
 from flagdata.provenance import digest
 from flagdata.storage import Place
 
@@ -33,21 +34,28 @@ class Summary:
     Attributes:
         name: of its file.
         before, end: SHA-256 of the log entry before the first version, "" where that is 0, and of the last one.
+        checkpoints: version → SHA-256 of the file.
         versions: what the log states of each, oldest first.
     """
 
     name: str
     before: str
     end: str
+    checkpoints: Mapping[int, str]
     versions: Sequence[Mapping[str, Any]]
 
 
 class Summaries:
-    """The summaries of a log in a folder."""
+    """The summaries of a log in a folder.
+
+    Attributes:
+        checkpoints: version → SHA-256 of its checkpoint, as the summaries that were read last note it.
+    """
 
     def __init__(self, folder: Place, log: Log) -> None:
         self._folder = folder
         self._log = log
+        self.checkpoints: dict[int, str] = {}
 
     def read(self, head: int) -> list[Mapping[str, Any]]:
         """What is summarised of the versions from 0 on, oldest first, up to `head` at most.
@@ -57,11 +65,12 @@ class Summaries:
         """
         return [version for summary in self._chain(head) for version in summary.versions]
 
-    def extend(self, history: Sequence[Mapping[str, Any]]) -> None:
+    def extend(self, history: Sequence[Mapping[str, Any]], *, checkpoint: str) -> None:
         """Summarise what is not yet.
 
         Args:
             history: all versions, oldest first.
+            checkpoint: SHA-256 of that of the last version.
 
         Raises:
             CorruptError: as `read`.
@@ -75,15 +84,16 @@ class Summaries:
         merged = chain[len(chain) - small :] if small >= _MANY else []
         first = covered - sum(len(summary.versions) for summary in merged)
         if first < len(history):
-            self._put(history, first)
+            noted = {number: made for summary in merged for number, made in summary.checkpoints.items()}
+            self._put(history, first, {**noted, len(history) - 1: checkpoint})
         for summary in merged:
             (self._folder / summary.name).unlink(missing_ok=True)
 
-    def _put(self, history: Sequence[Mapping[str, Any]], first: int) -> None:
+    def _put(self, history: Sequence[Mapping[str, Any]], first: int, checkpoints: Mapping[int, str]) -> None:
         last = len(history) - 1
         content = {
             "schema": _SCHEMA, "before": self._log.hash(first - 1) if first else "", "end": self._log.hash(last),
-            "versions": list(history[first:]),
+            "checkpoints": checkpoints, "versions": list(history[first:]),
         }  # fmt: skip
         text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
         self._folder.mkdir(exist_ok=True)
@@ -108,6 +118,7 @@ class Summaries:
             following, before = following + len(found.versions), found.end
         while chain and self._log.hash(following - 1) != chain[-1].end:
             following -= len(chain.pop().versions)
+        self.checkpoints = {number: noted for summary in chain for number, noted in summary.checkpoints.items()}
         return chain
 
     def _read(self, name: str) -> Summary | None:
@@ -118,10 +129,17 @@ class Summaries:
             if digest(text) != name.removesuffix(".json").rpartition("-")[2]:
                 raise ValueError("its checksum is wrong")
             content = from_json(text)
-            return Summary(name=name, before=content["before"], end=content["end"], versions=content["versions"])
+            versions = content["versions"]
+            first, last = (int(number) for number in name.split("-")[:2])
+            if len(versions) != last + 1 - first or not all(map(is_stated, versions, range(first, last + 1))):
+                raise ValueError("it states other versions than its name, or none")
+            checkpoints = {int(number): str(noted) for number, noted in content.get("checkpoints", {}).items()}
+            return Summary(
+                name=name, before=content["before"], end=content["end"], checkpoints=checkpoints, versions=versions
+            )
         except FileNotFoundError:  # another process has just made one of several
             return None
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise CorruptError(
                 f"a summary of the catalog's log cannot be read: {error}",
                 where=str(path),

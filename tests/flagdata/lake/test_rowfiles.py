@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -106,9 +107,9 @@ def test_a_damaged_column_is_named_by_its_file(lake: Lake, put_text: Put) -> Non
     content[first : first + name.total_compressed_size] = b"\xff" * name.total_compressed_size
     overwrite(file, bytes(content))
     lake = Lake.open(lake.path)
-    assert select(lake, columns=["kind"]).to_pylist() == [{"kind": "wind"}]
-    for look in (lambda: select(lake, "name = 'gusts'"), lambda: lake.artifact("gusts"), lake.rows):
-        with pytest.raises(CorruptError, match="cannot be read") as caught:
+    other = partial(select, lake, columns=["kind"])
+    for look in (other, lambda: select(lake, "name = 'gusts'"), lambda: lake.artifact("gusts"), lake.rows):
+        with pytest.raises(CorruptError, match="has changed") as caught:
             look()
         assert caught.value.where == str(file)
 
