@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import logging
 import sys
 import traceback
 from importlib import import_module
@@ -11,7 +13,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from flagdata.commands.help import print_help
-from flagdata.console import document, fail, foreseen
+from flagdata.console import Aside, document, echo_lines, fail, foreseen, say
 from flagdata.errors import UnknownNameError, UsageError
 
 # group → what it is about, and its verbs: where the click command is, one line of help shown without importing it
@@ -163,23 +165,28 @@ def _with_json(context: click.Context, verb: str) -> dict[str, Any]:
 def _show_traceback() -> None:
     """Show the traceback of the error that ends the command, if one does."""
     if sys.exc_info()[0] not in (None, SystemExit, click.exceptions.Exit):
-        traceback.print_exc()
+        echo_lines(traceback.format_exc(), aside=True)
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 failed, 2 usage, 3 refused: the data fail a quality check."""
     given = sys.argv[1:] if arguments is None else arguments
+    log = logging.getLogger("flagdata")
+    if not any(isinstance(handler, Aside) for handler in log.handlers):
+        log.addHandler(Aside())
     try:
         outcome = root.main(args=given, prog_name="flagdata", standalone_mode=False)
     except click.ClickException as error:
         if "--json" in given:
             document("error", {"kind": UsageError.kind, "what": error.format_message(), "where": None, "fix": _HELP})
-        error.show()
+        shown = io.StringIO()
+        error.show(shown)
+        echo_lines(shown.getvalue(), aside=True)
         sys.exit(error.exit_code)
     except (click.Abort, KeyboardInterrupt) as error:
         if isinstance(error.__cause__, EOFError):  # of a file, which click takes for the end of the user's input
             sys.exit(fail(foreseen(error.__cause__), as_json="--json" in given))
-        click.echo("flagdata: interrupted", err=True)
+        say("flagdata: interrupted")
         sys.exit(1)
     except Exception as error:  # noqa: BLE001  all errors are reported in one form
         sys.exit(fail(foreseen(error), as_json="--json" in given))

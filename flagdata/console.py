@@ -1,8 +1,15 @@
-"""The command line's manners: results on stdout, all else on stderr, JSON with a schema tag, exit codes."""
+"""The command line's manners: results on stdout, all else on stderr, JSON with a schema tag, exit codes.
+
+All that a terminal is given goes through this module. Files and lakes of strangers name things, and a name may hold
+what a terminal obeys: control characters, marks of direction, line ends that would forge a line. They are escaped here,
+so that no command has to think of it.
+"""
 
 from __future__ import annotations
 
+import csv
 import json
+import logging
 import os
 import sys
 import traceback
@@ -16,6 +23,7 @@ import click
 from flagdata.addresses import lake_place, local_path
 from flagdata.errors import FlagdataError, LimitError, UnforeseenError
 from flagdata.extras import missing
+from flagdata.printable import printable, printable_lines
 from flagdata.storage import Place, StoreError
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -70,43 +78,80 @@ def document(tag: str, content: Mapping[str, Any]) -> None:
     """Print one JSON document, tagged "flagdata.<tag>/1"."""
     tagged = {"schema": f"flagdata.{tag}/1", **content}
     text = json.dumps(tagged, indent=2, allow_nan=False, ensure_ascii=False)
-    if not is_text(text):  # a file's name of bytes that are not UTF-8
+    if printable_lines(text) != text:  # what stands in a text may be written as \u and its number
         text = json.dumps(tagged, indent=2, allow_nan=False)
     click.echo(text)
 
 
-def is_text(text: str) -> bool:
-    """Whether it can be written as UTF-8; file names may not."""
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
+def echo(text: object = "") -> None:
+    """One line of a result, on stdout."""
+    click.echo(printable(str(text)))
+
+
+def echo_lines(text: str, *, aside: bool = False) -> None:
+    """A result of several lines; nothing where there is none.
+
+    Args:
+        aside: on stderr.
+    """
+    click.echo(printable_lines(text), nl=bool(text) and not text.endswith("\n"), err=aside)
+
+
+def csv_rows(rows: Iterable[Sequence[object]]) -> None:
+    """A result as CSV: to a file or another program as it is, to a terminal as other text."""
+    writer = csv.writer(sys.stdout, lineterminator="\n")
+    if sys.stdout.isatty():
+        rows = ([printable(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)
+    writer.writerows(rows)
+
+
+def ask(question: str) -> str:
+    """What somebody at the terminal types, without blanks around it."""
+    return str(click.prompt(printable(question), err=True, prompt_suffix="> ")).strip()
 
 
 _COLOURS = {"warning": "yellow", "error": "red", "flagdata": "red"}
 
 
 def say(text: str, *, mark: str | None = None) -> None:
-    """A line for people, on stderr; bytes of a file's name that are no UTF-8 are escaped.
+    """A text for people, on stderr; further lines of it are indented, so that none is taken for a message of its own.
 
     Args:
         mark: "note", "warning" or "error" before it, or "flagdata" before the error that ends a command: in colour on a
             terminal, unless the environment variable NO_COLOR is set.
     """
-    line = text.encode(errors="backslashreplace").decode()
+    shown = _indented(text)
     if mark is not None:
         coloured = mark in _COLOURS and not os.environ.get("NO_COLOR")
-        line = f"{click.style(f'{mark}:', fg=_COLOURS[mark], bold=True) if coloured else f'{mark}:'} {line}"
-    click.echo(line, err=True)  # which takes the colour out where stderr is no terminal
+        shown = f"{click.style(f'{mark}:', fg=_COLOURS[mark], bold=True) if coloured else f'{mark}:'} {shown}"
+    click.echo(shown, err=True)  # which takes the colour out where stderr is no terminal
+
+
+def say_beside_bars(text: str) -> None:
+    """A text for people while a bar of `progress` is shown."""
+    from tqdm import tqdm  # loads slowly
+
+    tqdm.write(_indented(text), file=sys.stderr)
+
+
+def _indented(text: str) -> str:
+    return printable_lines(text).replace("\n", "\n  ")
+
+
+class Aside(logging.Handler):
+    """Says what the package logs while a command runs."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        echo_lines(record.getMessage(), aside=True)
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """Aligned columns on stdout; numbers to the right."""
-    body = [["" if cell is None else str(cell) for cell in row] for row in rows]
-    widths = [max(len(r[i]) for r in [list(header), *body]) for i in range(len(header))]
+    body = [["" if cell is None else printable(str(cell)) for cell in row] for row in rows]
+    header = list(map(printable, header))
+    widths = [max(len(r[i]) for r in [header, *body]) for i in range(len(header))]
     numeric = [all(_is_number(r[i]) for r in body if r[i]) and bool(body) for i in range(len(header))]
-    for row in [list(header), *body]:
+    for row in [header, *body]:
         cells = [c.rjust(w) if n else c.ljust(w) for c, w, n in zip(row, widths, numeric, strict=True)]
         click.echo("  ".join(cells).rstrip())
 
@@ -125,7 +170,9 @@ def progress(total: int | None, label: str, unit: str) -> Iterator[Callable[[int
     from tqdm import tqdm
 
     interval = 0.2 if sys.stderr.isatty() else 10.0  # a log file gets a line now and then, not an animation
-    with tqdm(total=total, desc=label, unit=unit, delay=2, mininterval=interval, file=sys.stderr, ncols=100) as bar:
+    with tqdm(
+        total=total, desc=printable(label), unit=unit, delay=2, mininterval=interval, file=sys.stderr, ncols=100
+    ) as bar:
 
         def advance(count: int = 1) -> None:
             bar.update(count)

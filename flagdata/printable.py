@@ -8,7 +8,14 @@ SHORT = 12
 
 def printable(text: str) -> str:
     """The text in one line; control characters, marks of direction and bytes that are not UTF-8 are escaped."""
+    if text.isprintable():
+        return text
     return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
+
+
+def printable_lines(text: str) -> str:
+    """The same of a text of several lines, which stay."""
+    return "\n".join(map(printable, text.split("\n")))
 
 
 def counted(count: int, noun: str) -> str:

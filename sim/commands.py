@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.console import document, in_steps, json_option, lake_option, progress, say
+from flagdata.console import document, echo, in_steps, json_option, lake_option, progress, say
 from flagdata.printable import counted
 
 if TYPE_CHECKING:
@@ -81,9 +81,9 @@ def _print(report: RunReport) -> None:
     from flagdata.lake.healing import said
 
     for artifact in report.added:
-        click.echo(artifact)
+        echo(artifact)
     for artifact, how in report.healed.items():
-        click.echo(said(artifact, how))
+        echo(said(artifact, how))
     for failure in report.failed:
         say(f"member {failure['index']} is not stored: {failure['kind']}: {failure['what']}")
     steps = [f"{step * 1e3:.3g}" for step in sorted(report.steps.values())]

@@ -11,7 +11,7 @@ import click
 
 from flagdata.commands.durations import DURATION
 from flagdata.commands.sections import LongCommand
-from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
+from flagdata.console import LocalPath, document, echo, json_option, lake_option, progress, say
 from flagdata.printable import SHORT
 from flagdata.timebase import NANOSECONDS
 
@@ -252,9 +252,9 @@ def _report(made: RecordingResult | None, outcome: Outcome | None, *, as_json: b
         document("align", content)
         return
     if outcome is not None:
-        click.echo(_sentence(outcome))
+        echo(_sentence(outcome))
     if made is not None:
-        click.echo(made.line)
+        echo(made.line)
 
 
 def _sentence(outcome: Outcome) -> str:

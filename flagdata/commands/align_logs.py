@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-import click
-
-from flagdata.console import document, progress, say
+from flagdata.console import document, echo, progress, say
 
 if TYPE_CHECKING:
     from flagdata.align.logs import LogClock
@@ -91,11 +89,11 @@ def _report(
         document("align-logs", content)
         return
     if found is not None:
-        click.echo(sentence(found))
+        echo(sentence(found))
     if made is not None:
-        click.echo(f"wind {made.id}, on the clock of {made.parents[0]}")
+        echo(f"wind {made.id}, on the clock of {made.parents[0]}")
         if healed is not None:
-            click.echo(said(made.id, healed))
+            echo(said(made.id, healed))
 
 
 def sentence(found: LogClock) -> str:

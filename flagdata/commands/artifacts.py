@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flagdata.console import at_option, document, json_option, lake_option, say, table
+from flagdata.console import at_option, document, echo, json_option, lake_option, say, table
 from flagdata.printable import SHORT, counted, size_text
 
 if TYPE_CHECKING:
@@ -110,28 +110,28 @@ def show(artifact: str, whole: bool, at: str | None, as_json: bool, lake_path: s
         )  # fmt: skip
         return
     for name, text in _gist(lake, row):
-        click.echo(f"{name:<15} {text}")
+        echo(f"{name:<15} {text}")
     left_out = ("parents", "report") if whole else ("parents", "report", *_INNER)
     for column, value in row.items():
         if value is not None and value != [] and column not in left_out:
-            click.echo(f"{column:<15} {said(column, value)}")
+            echo(f"{column:<15} {said(column, value)}")
     for name, value in labels.items():
-        click.echo(f"{PREFIX + name:<15} {value}")
+        echo(f"{PREFIX + name:<15} {value}")
     if path is not None:
-        click.echo(f"{'path':<15} {path}")
+        echo(f"{'path':<15} {path}")
     for one in stated if len(stated) > 1 else ():
         this = " (this one)" if one["artifact"] == found.id else ""
         label = f"version {one['version']}"
-        click.echo(f"{label:<15} {one['artifact'][:SHORT]} by code {one['code_version']}{this}")
+        echo(f"{label:<15} {one['artifact'][:SHORT]} by code {one['code_version']}{this}")
     for label, relatives in (("made from", parents), ("made into", children)):
         for one in relatives if whole else relatives[:_MOST]:
-            click.echo(f"{label:<15} {one['artifact'][:SHORT]} {one['kind']} {one['name']}")
+            echo(f"{label:<15} {one['artifact'][:SHORT]} {one['kind']} {one['name']}")
         if len(relatives) > _MOST and not whole:
             kinds = Counter(one["kind"] for one in relatives[_MOST:])
             more = ", ".join(counted(count, kind) for kind, count in sorted(kinds.items()))
-            click.echo(f"{label:<15} … and {more} more (--all lists them)")
+            echo(f"{label:<15} … and {more} more (--all lists them)")
     for finding in (*(row["report"] or {}).get("findings", []), *(finding.as_dict() for finding in doubts)):
-        click.echo(f"{finding.get('severity', 'note'):<15} {finding.get('kind')}: {finding.get('what')}")
+        echo(f"{finding.get('severity', 'note'):<15} {finding.get('kind')}: {finding.get('what')}")
 
 
 def _gist(lake: Lake, row: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import click
 
-from flagdata.console import document, json_option, say, table
+from flagdata.console import document, echo, echo_lines, json_option, say, table
 from flagdata.errors import MissingExtraError, UnknownNameError
 from flagdata.extras import explained
 from flagdata.recipes import Shelf
@@ -47,8 +47,8 @@ def catalog(kind: str | None, as_json: bool) -> None:
         table((kind, "what it is"), found[kind].items())
     else:
         for name, names in found.items():
-            click.echo(f"{name} ({kinds[name][1]})")
-            click.echo(textwrap.fill(", ".join(names), initial_indent="  ", subsequent_indent="  ",
+            echo(f"{name} ({kinds[name][1]})")
+            echo_lines(textwrap.fill(", ".join(names), initial_indent="  ", subsequent_indent="  ",
                                      break_on_hyphens=False, width=80))  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 from click.shell_completion import BashComplete, FishComplete, ZshComplete
 
-from flagdata.console import document, json_option, say
+from flagdata.console import document, echo_lines, json_option, say
 
 _SHELLS = {"bash": BashComplete, "zsh": ZshComplete, "fish": FishComplete}
 _WHERE = {
@@ -31,5 +31,5 @@ def completion(context: click.Context, shell: str, as_json: bool) -> None:
     if as_json:
         document("completion", {"shell": shell, "script": script})
         return
-    click.echo(script)
+    echo_lines(script)
     say(f"to use it: {_WHERE[shell]}")

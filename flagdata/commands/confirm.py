@@ -7,9 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
-import click
-
-from flagdata.console import say
+from flagdata.console import ask, say
 from flagdata.errors import FlagdataError, RefusedError, ZoneMissingError
 
 if TYPE_CHECKING:
@@ -116,7 +114,7 @@ def _answer(question: Open) -> tuple[str, object]:
     }
     asked = f"{question.question} {_DOUBT}" if question.key == "expect" else question.question
     while True:
-        text: str = click.prompt(asked, err=True, prompt_suffix="> ").strip()
+        text: str = ask(asked)
         try:
             if question.key == "expect":
                 return _expected(question, text)
@@ -153,7 +151,7 @@ def _wrong(text: str, wanted: str) -> object:
 
 def _choice(question: str, words: tuple[str, ...]) -> str:
     while True:
-        text: str = click.prompt(question, err=True, prompt_suffix="> ").strip().lower()
+        text: str = ask(question).lower()
         if text in words:
             return text
         say(f"type {' or '.join(words)}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from flagdata.console import document, json_option, lake_option, progress
+from flagdata.console import document, echo, json_option, lake_option, progress
 
 
 @click.command()
@@ -41,5 +41,5 @@ def declare(
             {"wind": stated.id, **made.as_dict()},
         )
         return
-    click.echo(f"wind {speed:g} ± {sigma:g} m/s declared: {stated.id}")
-    click.echo(made.line)
+    echo(f"wind {speed:g} ± {sigma:g} m/s declared: {stated.id}")
+    echo(made.line)

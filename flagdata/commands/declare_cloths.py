@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from flagdata.console import LocalPath, document, in_steps, json_option, lake_option, progress
+from flagdata.console import LocalPath, document, echo, in_steps, json_option, lake_option, progress
 
 
 @click.command("declare-cloths")
@@ -62,4 +62,4 @@ def declare_cloths(table: Path, crop: str, branch: str, as_json: bool, lake_path
         return
     for cloth, one in made:
         healed = "" if one.healed is None else f"; {one.healed.sentence}"
-        click.echo(f"{one.recording.id}  {cloth.fabric}, {cloth.density:g} kg/m², {len(one.clips)} clips{healed}")
+        echo(f"{one.recording.id}  {cloth.fabric}, {cloth.density:g} kg/m², {len(one.clips)} clips{healed}")

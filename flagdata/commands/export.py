@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from flagdata.console import LocalPath, at_option, document, json_option, lake_option, progress, say
+from flagdata.console import LocalPath, at_option, document, echo, json_option, lake_option, progress, say
 from flagdata.errors import UsageError
 
 
@@ -85,7 +85,7 @@ def export(
     size = sum(file["bytes"] for file in files)
     artifacts = _count(manifest["artifacts"], "artifact")
     say(f"{artifacts} of version {manifest['version']} in {_count(len(files), 'file')}, {size:,} B")
-    click.echo(target)
+    echo(target)
 
 
 def _count(number: int, noun: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from flagdata.console import document, json_option
+from flagdata.console import document, echo_lines, json_option
 from flagdata.errors import UnknownNameError
 
 
@@ -36,4 +36,4 @@ def print_help(shown: click.Context, *, as_json: bool) -> None:
     if as_json:
         document("help", {"command": shown.command_path, "help": shown.get_help()})
     else:
-        click.echo(shown.get_help())
+        echo_lines(shown.get_help())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import click
+from flagdata.console import echo, echo_lines
 
 if TYPE_CHECKING:
     from flagdata.ingest.store import IngestResult
@@ -28,18 +28,18 @@ def _print_result(result: IngestResult, printed: set[tuple[str, str]]) -> None:
         click.echo(f"{artifact.id}  {artifact.kind} {artifact.name}: {result.healed.sentence}")
         return
     if not result.created:
-        click.echo(f"already in the lake: {artifact.id}  {artifact.kind} {artifact.name} (from {artifact.source_name})")
+        echo(f"already in the lake: {artifact.id}  {artifact.kind} {artifact.name} (from {artifact.source_name})")
         return
-    click.echo(f"{artifact.id}  {artifact.kind} {artifact.name} (from {artifact.source_name})")
+    echo(f"{artifact.id}  {artifact.kind} {artifact.name} (from {artifact.source_name})")
     again = 0
     for label, text in _lines(report):
         if label in _ONCE and (label, text) in printed:
             again += 1
             continue
         printed.add((label, text))
-        click.echo(f"  {label:<8} {text}")
+        echo(f"  {label:<8} {text}")
     if again:
-        click.echo(f"  {'':<8} and {again} reasons and notes as above")
+        echo(f"  {'':<8} and {again} reasons and notes as above")
 
 
 def _lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -120,36 +120,36 @@ def _how_sure(guess: Mapping[str, Any]) -> str:
 
 def print_sniffed(entry: Mapping[str, Any]) -> None:
     """One source and its guesses for people, on stdout."""
-    click.echo(entry["source"])
+    echo(entry["source"])
     for guess in entry["guesses"]:
         recipe = f", recipe {guess['recipe']}" if guess["recipe"] else ""
-        click.echo(f"  {guess['kind']}: {guess['format']}{recipe} ({_how_sure(guess)})")
+        echo(f"  {guess['kind']}: {guess['format']}{recipe} ({_how_sure(guess)})")
         for reason in guess["reasons"]:
-            click.echo(f"    because {reason}")
+            echo(f"    because {reason}")
         if guess["fix"] and guess["kind"] != "camera" and not guess["doubts"]:
-            click.echo(f"    to do: {guess['fix']}")
+            echo(f"    to do: {guess['fix']}")
         for note in guess["notes"]:
-            click.echo(f"    not taken or odd: {note}")
+            echo(f"    not taken or odd: {note}")
         if len(guess["winds"]) > 1:
             how = "" if guess is entry["guesses"][0] else f" with --as {guess['format']}"
             winds = ", ".join(guess["winds"])
-            click.echo(f"    {len(guess['winds'])} anemometers, each becomes an artifact{how}: {winds}")
+            echo(f"    {len(guess['winds'])} anemometers, each becomes an artifact{how}: {winds}")
         for doubt in guess["doubts"]:
-            click.echo(f"    to answer: {doubt}")
+            echo(f"    to answer: {doubt}")
         if guess["draft"]:
             unfinished = guess["doubts"] or guess["kind"] == "other"
             state = "complete it where it says ?" if unfinished else "nothing is missing"
-            click.echo(f"    the recipe ({state}; name it by --recipe FILE.toml to change anything):")
-            click.echo("\n".join(f"      {line}" for line in guess["draft"].splitlines()))
+            echo(f"    the recipe ({state}; name it by --recipe FILE.toml to change anything):")
+            echo_lines("\n".join(f"      {line}" for line in guess["draft"].splitlines()))
     if "problem" in entry:
-        click.echo(f"  {entry['problem']['what']}: {entry['problem']['fix']}")
+        echo(f"  {entry['problem']['what']}: {entry['problem']['fix']}")
     if "camera" in entry:
         seen = entry["camera"]
-        click.echo(
+        echo(
             f"  {seen['container']} / {seen['codec']}, {seen['width']}×{seen['height']}, {seen['frames']} frames "
             f"at {seen['rate']:.6g} Hz{' (variable)' if seen['variable_rate'] else ''}, {seen['duration']:.3f} s"
         )
-        click.echo(f"  start: {seen['start'] or 'unknown, give --start'}")
+        echo(f"  start: {seen['start'] or 'unknown, give --start'}")
     if "crop" in entry:
         box = ",".join(map(str, entry["crop"]["box"]))
-        click.echo(f"  crop: {box} holds {entry['crop']['share']:.0%} of the motion")
+        echo(f"  crop: {box} holds {entry['crop']['share']:.0%} of the motion")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from flagdata.console import document, json_option, lake_option
+from flagdata.console import document, echo, json_option, lake_option
 from flagdata.errors import UsageError
 from flagdata.printable import counted
 
@@ -37,4 +37,4 @@ def label(words: tuple[str, ...], message: str | None, branch_name: str, as_json
     if as_json:
         document("label", {"version": version, "artifacts": sorted(labelled), "labels": values})
     else:
-        click.echo(f"version {version}: {counted(len(labelled), 'artifact')} labelled")
+        echo(f"version {version}: {counted(len(labelled), 'artifact')} labelled")

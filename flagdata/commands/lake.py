@@ -10,7 +10,7 @@ import click
 from click.core import ParameterSource
 
 from flagdata.commands.artifacts import relative
-from flagdata.console import at_option, document, json_option, lake_option, say, table
+from flagdata.console import at_option, document, echo, json_option, lake_option, say, table
 from flagdata.errors import UsageError
 from flagdata.printable import SHORT, counted
 
@@ -37,7 +37,7 @@ def init(context: click.Context, folder: str | None, as_json: bool, lake_path: s
     if as_json:
         document("init", {"lake": str(lake.path), "format_version": FORMAT_VERSION})
     else:
-        click.echo(lake.path)
+        echo(lake.path)
 
 
 @click.command()
@@ -165,10 +165,10 @@ def merge(branch_name: str, into: str, message: str | None, as_json: bool, lake_
     for artifact, version in result.brought_back.items():
         say(f"comes back to {into}: {artifact[:SHORT]}, which version {version} had withdrawn")
     if result.commit is None:
-        click.echo(f"nothing new on {branch_name}")
+        echo(f"nothing new on {branch_name}")
         return
     withdrawn = f", {len(result.withdrawn)} withdrawn" if result.withdrawn else ""
-    click.echo(f"version {result.version}: {len(result.added)} added, {len(result.existing)} were there{withdrawn}")
+    echo(f"version {result.version}: {len(result.added)} added, {len(result.existing)} were there{withdrawn}")
 
 
 @click.command()
@@ -194,9 +194,9 @@ def diff(before: str, after: str | None, as_json: bool, lake_path: str) -> None:
         return
     for sign, rows, objects in (("+", added, found.objects_added), ("-", removed, found.objects_removed)):
         for row in rows:
-            click.echo(f"{sign} {row['kind']:<11} {row['artifact'][:SHORT]} {row['name']}")
+            echo(f"{sign} {row['kind']:<11} {row['artifact'][:SHORT]} {row['name']}")
         for name in objects:
-            click.echo(f"{sign} object      {name}")
+            echo(f"{sign} object      {name}")
     say(f"{counted(len(added), 'row')} added, {len(removed)} removed")
 
 
@@ -247,7 +247,7 @@ def withdraw(
         parts.append(f"{counted(len(done.clips), 'clip')} went along")
     if made:
         parts.append(f"{len(made)} made from them")
-    click.echo(f"version {done.version}: {', '.join(parts)}")
+    echo(f"version {done.version}: {', '.join(parts)}")
 
 
 def _erase(lake: Lake, artifacts: tuple[str, ...], message: str, *, with_descendants: bool, as_json: bool) -> None:
@@ -264,7 +264,7 @@ def _erase(lake: Lake, artifacts: tuple[str, ...], message: str, *, with_descend
     say(f"not reached from here: {'; '.join(BEYOND)}")
     tags = f"; listed without data by {', '.join(done.tags)}" if done.tags else ""
     what = f"{counted(len(done.artifacts), 'artifact')} erased, {counted(len(done.objects), 'object')} deleted"
-    click.echo(f"version {done.version}: {what}{tags}")
+    echo(f"version {done.version}: {what}{tags}")
 
 
 def _anywhere(lake: Lake, artifact: str) -> str:
@@ -293,7 +293,7 @@ def _report_deletion(noun: str, name: str, version: int, *, as_json: bool) -> No
     if as_json:
         document(f"{noun}-deleted", {"version": version, "name": name})
     else:
-        click.echo(f"version {version}: {noun} {name} deleted")
+        echo(f"version {version}: {noun} {name} deleted")
 
 
 def _print_refs(noun: str, refs: Collection[Ref], *, as_json: bool) -> None:

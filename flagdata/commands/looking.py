@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import click
 
 from flagdata.commands.upkeep import grace_option
-from flagdata.console import LocalPath, at_option, document, json_option, lake_option, say, table
+from flagdata.console import LocalPath, at_option, document, echo, json_option, lake_option, say, table
 from flagdata.errors import UsageError
 from flagdata.printable import SHORT, printable, size_text
 
@@ -60,7 +60,7 @@ def lineage(
         document("lineage", {"at": at, "artifact": found.artifact, "relatives": relatives, "edges": found.edges})
         return
     for text in _lines(found, details=details, most=most):
-        click.echo(text)
+        echo(text)
 
 
 def _lines(found: Ancestry, *, details: bool, most: int | None) -> Iterator[str]:
@@ -116,7 +116,7 @@ def du(grace: timedelta, at: str | None, as_json: bool, lake_path: str) -> None:
     kinds = [(name, one.artifacts or "", one.objects or "", size_text(one.size)) for name, one in found.kinds.items()]
     whole = sum(one.size for one in found.kinds.values())
     table(("kind", "artifacts", "objects", "size"), [*kinds, ("total", "", "", size_text(whole))])
-    click.echo()
+    echo()
     table(
         ("shown by", "", "artifacts", "size", "own", "shared", "lost"),
         [
@@ -150,7 +150,7 @@ def view(port: int, opens: bool, as_json: bool, lake_path: str) -> None:
         if as_json:
             document("view", {"address": server.address})
         else:
-            click.echo(server.address)
+            echo(server.address)
             say("only this machine can open it; Ctrl-C ends it")
         sys.stdout.flush()
         if opens:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import math
-import sys
 from collections.abc import Iterable, Sequence
 from datetime import date, datetime, time
 from decimal import Decimal
@@ -13,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flagdata.console import LocalPath, at_option, document, json_option, lake_option, say, table
+from flagdata.console import LocalPath, at_option, csv_rows, document, json_option, lake_option, say, table
 from flagdata.errors import UsageError
 from flagdata.printable import SHORT
 from flagdata.sql_process import sql_process
@@ -193,11 +191,10 @@ def plain(value: Any) -> Any:
 
 def _print_csv(selection: Selection) -> None:
     batches = selection.batches()
-    writer = csv.writer(sys.stdout, lineterminator="\n")
-    writer.writerow(batches.schema.names)
+    csv_rows([batches.schema.names])
     for batch in batches:
         cells = [[_csv_cell(value) for value in column.to_pylist()] for column in batch.columns]
-        writer.writerows(zip(*cells, strict=True))
+        csv_rows(zip(*cells, strict=True))
 
 
 def _csv_cell(value: Any) -> Any:

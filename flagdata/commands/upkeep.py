@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 from flagdata.addresses import local_path
-from flagdata.console import LocalPath, document, json_option, lake_option, progress, say, table
+from flagdata.console import LocalPath, document, echo, json_option, lake_option, progress, say, table
 from flagdata.errors import UsageError
 from flagdata.files import check_input
 from flagdata.findings import Finding, Severity
@@ -155,7 +155,7 @@ def gc(grace: timedelta, dry_run: bool, as_json: bool, lake_path: str) -> None:
         )
         return
     for name in (*found.objects, *map(str, found.leftovers), *map(str, found.uploads)):
-        click.echo(name)
+        echo(name)
     verb = "would be deleted" if dry_run else "deleted"
     what = f"{counted(len(found.objects), 'object')} and {counted(len(found.leftovers), 'leftover')}"
     say(f"{what}, {size_text(found.size)}, {verb}")
@@ -194,7 +194,7 @@ def expire(
         document("expire", {**asdict(found), "deleted": not dry_run})
         return
     for name in found.objects:
-        click.echo(name)
+        echo(name)
     if found.up_to < 0:
         say("no version is that old")
         return
@@ -226,7 +226,7 @@ def recover(source: str, target: Path, as_json: bool, lake_path: str) -> None:
         document("recover", {"source": str(path), "target": str(target), "findings": [f.as_dict() for f in findings]})
         return
     _print(findings)
-    click.echo(target)
+    echo(target)
 
 
 def _conclude(tag: str, findings: Sequence[Finding], checked: str, *, as_json: bool) -> None:
@@ -237,7 +237,7 @@ def _conclude(tag: str, findings: Sequence[Finding], checked: str, *, as_json: b
         document(tag, {"healthy": healthy, "checked": checked, "findings": [f.as_dict() for f in findings]})
     else:
         _print(findings)
-        click.echo("healthy" if healthy else "not healthy")
+        echo("healthy" if healthy else "not healthy")
         say(checked)
     if not healthy:
         sys.exit(_GATE_NOT_MET)
@@ -245,8 +245,8 @@ def _conclude(tag: str, findings: Sequence[Finding], checked: str, *, as_json: b
 
 def _print(findings: Sequence[Finding]) -> None:
     for finding in findings:
-        click.echo(f"{finding.severity}: {finding.kind}: {finding.what}")
+        echo(f"{finding.severity}: {finding.kind}: {finding.what}")
         if finding.where:
-            click.echo(f"  where: {finding.where}")
+            echo(f"  where: {finding.where}")
         if finding.fix:
-            click.echo(f"  fix:   {finding.fix}")
+            echo(f"  fix:   {finding.fix}")

@@ -232,7 +232,8 @@ class Log:
 
     def _parsed(self, version: int, text: str) -> tuple[list[str], dict[str, str]]:
         try:
-            actions = [from_json(line) for line in text.splitlines()]
+            # Not splitlines: a message may hold one of the other line ends of Unicode.
+            actions = [from_json(line) for line in text.split("\n") if line]
             if not actions or not all(_ACTIONS.issuperset(action.keys()) for action in actions):
                 raise self.damaged(version)
             info = next((action["commitInfo"] for action in actions if "commitInfo" in action), {})

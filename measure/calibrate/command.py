@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from flagdata.commands.durations import DURATION
 from flagdata.commands.sections import LongCommand
 from flagdata.commands.statements import STATED
-from flagdata.console import LakePlace, LocalPath, document, following, json_option, progress, say
+from flagdata.console import LakePlace, LocalPath, document, echo, following, json_option, progress, say
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.findings import Severity
 from flagdata.printable import SHORT
@@ -269,7 +269,7 @@ def _report(anemometer: Made, report: Path | None, *, as_json: bool) -> None:
     if as_json:
         document("calibrate", {"anemometer": anemometer.as_dict()})
     else:
-        click.echo(anemometer.found.sentence)
+        echo(anemometer.found.sentence)
 
 
 def _provenance(found: Calibration, artifact: str | None) -> dict[str, str]:
@@ -285,11 +285,11 @@ def _provenance(found: Calibration, artifact: str | None) -> dict[str, str]:
 def _print(found: Calibration) -> None:
     from measure.calibrate.page import shown
 
-    click.echo(found.sentence)
+    echo(found.sentence)
     for one in found.cloth[1:]:
         row = shown(one)
         value = f"{row['value']} {row['interval']} {row['unit']}" if row["value"] else "not determined"
-        click.echo(f"{row['name']}: {value} (assumed: {row['assumed']})")
+        echo(f"{row['name']}: {value} (assumed: {row['assumed']})")
     for recording, place in zip(found.recordings, found.places, strict=True):
         fitted = ", ".join(f"{row['name']} {row['interval']} {row['unit']}".strip() for row in map(shown, place))
         say(f"  {recording.observed.name}: {fitted}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.console import LakePlace, LocalPath, document, json_option, progress, say
+from flagdata.console import LakePlace, LocalPath, document, echo, echo_lines, json_option, progress, say
 from flagdata.errors import UsageError
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
     if as_json:
         document("challenge-made", {"folder": str(made.path), "sets": made.manifest()["sets"]})
     else:
-        click.echo(str(made.path))
+        echo(str(made.path))
 
 
 @challenge.command()
@@ -106,7 +106,7 @@ def bank(
     if as_json:
         document("challenge-bank", {"folder": str(folder), "kinds": kinds, "recordings": kinds * banks.WINDS})
     else:
-        click.echo(str(folder))
+        echo(str(folder))
 
 
 @challenge.command()
@@ -169,7 +169,7 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
         document("challenge-run", {"folder": str(folder), "filed": rows})
     else:
         for filing in sorted(filings, key=lambda f: f.name):
-            click.echo(str(target.verdict(filing.name)))
+            echo(str(target.verdict(filing.name)))
 
 
 @challenge.command()
@@ -218,6 +218,6 @@ def score(
     if as_json:
         document("score", sheets.as_dict(sheet))
     else:
-        click.echo(sheets.markdown(sheet), nl=False)
+        echo_lines(sheets.markdown(sheet))
     if not all(gate.met for gate in sheet.gates):
         context.exit(3)

@@ -11,6 +11,7 @@ import click
 from flagdata.console import LocalPath, say
 from flagdata.errors import UsageError
 from flagdata.findings import Finding
+from flagdata.printable import printable
 from measure.closing.findings import checked, finding_text
 
 if TYPE_CHECKING:
@@ -87,7 +88,9 @@ def stage_bars() -> Stage:
 
     def advance(what: str, done: int, total: int) -> None:
         if what not in bars:
-            bars[what] = tqdm(total=total, desc=what, unit="part", ncols=100, mininterval=interval, file=sys.stderr)
+            bars[what] = tqdm(
+                total=total, desc=printable(what), unit="part", ncols=100, mininterval=interval, file=sys.stderr
+            )
         bars[what].update(done - bars[what].n)
         if done >= total:
             bars[what].close()

@@ -9,9 +9,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-import click
-
-from flagdata.console import document, in_steps, say
+from flagdata.console import document, echo_lines, in_steps, say
 from flagdata.lake import Lake
 from flagdata.outputs import write_files
 from measure.closing import toml
@@ -40,7 +38,7 @@ def deliver(answer: Answer, *, out: Path, lake: Lake | None, branch: str, as_jso
         written.pop("schema")
         document("verdict", written)
     else:
-        click.echo(answer.words)
+        echo_lines(answer.words)
 
 
 def deliver_joint(
@@ -65,9 +63,9 @@ def deliver_joint(
     if as_json:
         document("joint-verdict", content)
     else:
-        click.echo(textwrap.fill(joint.words, 100))
+        echo_lines(textwrap.fill(joint.words, 100))
         for kind, answer in zip(KINDS, answers, strict=True):
-            click.echo(f"\nBy {kind}:\n{answer.words}")
+            echo_lines(f"\nBy {kind}:\n{answer.words}")
 
 
 def _written(answer: Answer, *, out: Path, lake: Lake | None, branch: str) -> dict[str, Any]:

@@ -91,4 +91,5 @@ def demo(out: Path, seed: int, story: str, as_json: bool) -> None:
     if as_json:
         document("demo", {"page": str(out / "index.html")})
     else:
-        say(f"\nOpen {out / 'index.html'}")
+        say("")
+        say(f"Open {out / 'index.html'}")

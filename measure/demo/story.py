@@ -179,7 +179,8 @@ class _Step:
         self._page = "" if printed is None else self._page
 
     def __enter__(self) -> _Step:
-        say(f"\n{self._title}")
+        say("")
+        say(self._title)
         return self
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:

@@ -11,9 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import click
-
-from flagdata.console import say
+from flagdata.console import echo_lines, say
 from flagdata.errors import FlagdataError, RefusedError
 from measure.demo.cards import Card
 
@@ -48,7 +46,7 @@ class Transcript:
             FlagdataError: when it ends with anything but 0 and 3.
         """
         printed, code = self._typed(arguments)
-        click.echo(printed, nl=False, err=self.aside)
+        echo_lines(printed, aside=self.aside)
         if code not in (0, RefusedError.exit_code):
             raise FlagdataError(
                 f"`{self.entries[-1][0]}` ended with {code}", where="the demonstration", fix="see its message above"
@@ -58,7 +56,8 @@ class Transcript:
     def _typed(self, arguments: tuple[str, ...]) -> tuple[str, int]:
         """What `flagdata ARGUMENTS` prints on stdout, and its exit code."""
         typed = " ".join(map(_word, ("flagdata", *arguments)))
-        say(f"\n$ {typed}")
+        say("")
+        say(f"$ {typed}")
         done = subprocess.run(
             [sys.executable, "-m", "flagdata.cli", *arguments],
             cwd=self.folder,
@@ -73,7 +72,7 @@ class Transcript:
     def show(self, *arguments: str) -> str:
         """`run`, and its stdout printed for the person who watches."""
         printed = self.run(*arguments)
-        click.echo(printed, nl=False, err=self.aside)
+        echo_lines(printed, aside=self.aside)
         return printed
 
     def read(self, *arguments: str) -> dict[str, Any]:

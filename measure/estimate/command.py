@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
@@ -15,7 +13,7 @@ import click
 from flagdata.commands.durations import DURATION
 from flagdata.commands.sections import LongCommand
 from flagdata.commands.statements import STATED
-from flagdata.console import LakePlace, LocalPath, document, following, json_option, progress, say
+from flagdata.console import LakePlace, LocalPath, csv_rows, document, echo, following, json_option, progress, say
 from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.printable import SHORT
@@ -157,7 +155,7 @@ def measure(
     if as_json:
         document("measure", done.as_dict(anyway=anyway))
     elif as_csv:
-        csv.writer(sys.stdout, lineterminator="\n").writerows(done.series.rows())
+        csv_rows(done.series.rows())
     else:
         _report(done, series=step is not None)
 
@@ -325,7 +323,7 @@ def _several(job: _Job, found: Sequence[Subject], *, as_json: bool) -> None:
         for one in done:
             source = one.subject.artifact.id[:SHORT] if one.subject.artifact is not None else one.measured.film
             answer = one.measured.sentence if one in shown else f"refused: {one.measured.verdict.sentence}"
-            click.echo(f"{source}  {answer}")
+            echo(f"{source}  {answer}")
     if not shown:
         raise RefusedError(
             f"all {len(done)} clips are unlike what the network was trained on", where="--query",
@@ -344,7 +342,7 @@ def _report(done: _Done, *, series: bool) -> None:
 
     measured = done.measured
     mark = "refused by the gate, not to be relied on: " if measured.verdict.refused else ""
-    click.echo(mark + measured.sentence)
+    echo(mark + measured.sentence)
     say(f"  {measured.verdict.sentence}; {measured.combined} of {len(measured.verdict.window_p)} windows in the answer")
     known = done.subject.known or {}
     if shown := [f"{SHORT[q.name]} {known[q.name]:.3g} {q.unit}" for q in measured.quantities if q.name in known]:
@@ -353,13 +351,13 @@ def _report(done: _Done, *, series: bool) -> None:
         if finding.severity is Severity.NOTE:
             say(f"  {finding.what}; {finding.fix}")
     if done.refinement is not None:
-        click.echo(f"{mark}refined: {done.refinement.sentence}")
+        echo(f"{mark}refined: {done.refinement.sentence}")
     if not series:
         return
     for window in measured.windows:
         wind = window.quantity("wind_speed")
         value = f"{wind.value:6.2f} m/s " if wind.span.bound is None else ""
-        click.echo(f"{window.start:9.2f} s  {value}{wind.span.phrase(2, ' m/s')}")
+        echo(f"{window.start:9.2f} s  {value}{wind.span.phrase(2, ' m/s')}")
     for title, agreement in (("window", done.series.window), ("minute", done.series.of_minute)):
         if agreement is not None:
             say(f"  against the anemometer's {title} means: {agreement.sentence}")

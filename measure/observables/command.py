@@ -8,7 +8,7 @@ import click
 
 from flagdata.commands.durations import DURATION
 from flagdata.commands.sections import LongCommand
-from flagdata.console import LakePlace, LocalPath, document, json_option, progress, say
+from flagdata.console import LakePlace, LocalPath, document, echo, json_option, progress, say
 from flagdata.errors import RefusedError, UsageError
 from flagdata.printable import SHORT
 from flagdata.storage import Place
@@ -104,4 +104,4 @@ def observe(
         document("observe", {**table.as_dict(), "artifact": identity})
     else:
         for line in table.lines():
-            click.echo(line)
+            echo(line)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.console import LakePlace, LocalPath, document, json_option, say
+from flagdata.console import LakePlace, LocalPath, document, echo_lines, json_option, say
 from flagdata.storage import Place
 from measure.closing.command_line import null_options, nulls_given, refuse, stage_bars
 
@@ -90,7 +90,7 @@ def _report(outcome: Outcome, spec: str, folder: Path, *, as_json: bool, text: s
     if as_json:
         document("proposal", {"effect": spec, **outcome.as_dict()})
     else:
-        click.echo(text)
+        echo_lines(text)
     if spec:
         say(f"effect {spec}")
     say(f"wrote {folder / 'proposals.json'}")

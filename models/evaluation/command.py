@@ -14,7 +14,7 @@ from flagdata.addresses import lake_place
 from flagdata.caches import beside
 from flagdata.commands.sections import LongCommand
 from flagdata.commands.statements import STATED
-from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
+from flagdata.console import LocalPath, document, echo_lines, json_option, lake_option, progress, say
 from flagdata.errors import InputError
 
 if TYPE_CHECKING:
@@ -109,8 +109,9 @@ def evaluate(
     if as_json:
         document("evaluation", as_document(found))
     else:
-        click.echo(report.markdown(found))
-        say(f"{page}\n{text}\n{data}")
+        echo_lines(report.markdown(found))
+        for written in (page, text, data):
+            say(str(written))
 
 
 def refuse_learned(catalog: pa.Table, learned: Iterable[DataSpec], *, dataset: str, side: str) -> None:

@@ -12,7 +12,7 @@ import click
 
 from flagdata.addresses import lake_place
 from flagdata.caches import beside
-from flagdata.console import LocalPath, document, json_option, lake_option, progress, say
+from flagdata.console import LocalPath, document, echo, json_option, lake_option, progress, say
 from flagdata.errors import ConflictError
 from flagdata.storage import Place
 from flagdata.workload import announced
@@ -88,7 +88,7 @@ def train(
     best = report["best"]
     say(f"{report['epochs']} epochs of {report['seconds'] / max(1, report['epochs']):.0f} s; the best was "
         f"{best['number'] + 1}, validation loss {best['validation']:.4f}")  # fmt: skip
-    click.echo(f"{report['artifact']}  network {report['name']}, seed {report['seed']}")
+    echo(f"{report['artifact']}  network {report['name']}, seed {report['seed']}")
 
 
 def trained(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from flagdata.console import LocalPath, document, json_option, say
+from flagdata.console import LocalPath, document, echo, json_option, say
 
 
 @click.command("blender-setup")
@@ -48,6 +48,6 @@ def blender_setup(folder: Path | None, python: str | None, only_check: bool, as_
     if as_json:
         document("blender", {**content, "python_version": made.python_version})
         return
-    click.echo(f"Blender {made.blender}, Python {made.python_version}, NumPy {made.numpy}: {made.python}")
+    echo(f"Blender {made.blender}, Python {made.python_version}, NumPy {made.numpy}: {made.python}")
     if folder:
         say(f"set {environment.SETTING}={made.python.absolute()} to have it used")

@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from flagdata.addresses import lake_place
-from flagdata.console import LocalPath, document, following, in_steps, json_option, lake_option, progress, say, table
+from flagdata.console import (
+    LocalPath,
+    document,
+    echo,
+    following,
+    in_steps,
+    json_option,
+    lake_option,
+    progress,
+    say,
+    say_beside_bars,
+    table,
+)
 from flagdata.printable import counted
 
 if TYPE_CHECKING:
@@ -88,7 +99,7 @@ def build(
         say(lasting)
     with in_steps(added_since(lake, branch)), connected(scheduler, workers=workers or _cores()) as client:
         report = Build(
-            lake=lake, recipe=loaded, client=client, bars=progress, say=_beside_bar, branch=branch, device=device
+            lake=lake, recipe=loaded, client=client, bars=progress, say=say_beside_bars, branch=branch, device=device
         ).run()
     written = None
     with following(f"the data set {loaded.name}", "writing its card"):
@@ -104,14 +115,7 @@ def build(
         f"in {report.seconds:.0f} s; {report.clips} clips{replaced}"
     )
     if written is not None:
-        click.echo(written)
-
-
-def _beside_bar(text: str) -> None:
-    """A line for people while a bar is shown."""
-    from tqdm import tqdm
-
-    tqdm.write(text, file=sys.stderr)
+        echo(written)
 
 
 def _lake(path: str) -> Lake | None:

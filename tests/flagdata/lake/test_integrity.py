@@ -395,3 +395,14 @@ def test_the_log_counts_up_to_no_number_that_a_name_states(lake: Lake, monkeypat
     (lake.path / "refs" / "newest" / ("8" * 19)).write_bytes(b"0\n")
     refused(lake.catalog.head)
     assert len(looked) < 20
+
+
+@pytest.mark.parametrize("end", ["\u2028", "\u2029", "\x85", "\x0b", "\x1c", "\n", "\r"])
+def test_a_message_with_any_line_end_of_unicode_is_read_as_it_was_written(lake: Lake, put_text: Put, end: str) -> None:
+    put_text(lake, "a")
+    message = f"first{end}second"
+    with lake.transaction(message) as tx:
+        tx.add(Artifact(kind=Kind.MEASUREMENT, name="m", recipe={"of": "m"}))
+    assert Lake.open(lake.path).catalog.history()[0]["message"] == message
+    assert Lake.open(lake.path).rows().num_rows == 2
+    assert doctor(Lake.open(lake.path), grace=NOW) == ()
