@@ -1,6 +1,6 @@
 """The command line's manners: results on stdout, all else on stderr, JSON with a schema tag, exit codes.
 
-All that a terminal is given goes through this module. Files and lakes of strangers name things, and a name may hold
+All that a terminal is given goes through this module. Files and lakes of other users name things, and a name may hold
 what a terminal obeys: control characters, marks of direction, line ends that would forge a line. They are escaped here,
 so that no command has to think of it.
 """

@@ -25,7 +25,7 @@ def _print_result(result: IngestResult, printed: set[tuple[str, str]]) -> None:
     """One artifact; reasons and notes that were printed of another of the same source are left out."""
     artifact, report = result.artifact, result.report
     if result.healed is not None:
-        click.echo(f"{artifact.id}  {artifact.kind} {artifact.name}: {result.healed.sentence}")
+        echo(f"{artifact.id}  {artifact.kind} {artifact.name}: {result.healed.sentence}")
         return
     if not result.created:
         echo(f"already in the lake: {artifact.id}  {artifact.kind} {artifact.name} (from {artifact.source_name})")

@@ -5,8 +5,8 @@ what comes before it for all there is. The loss of the last entries leaves no ho
 entry is on the disk, also puts its number as a file name in the folder `refs/newest/`, outside the log, and takes lower
 ones away. The number to believe is the highest, so writers need no lock for it, and it never falls.
 
-Each entry notes the SHA-256 of the one before it, and the mark that of the newest, so that a change in any is found:
-by whoever reads the entries in a row, and by `verify`.
+Each entry notes the SHA-256 of the one before it, and the mark that of the newest, so that a change in any is found
+when entries are read in a row, and by `verify`.
 
 A number that a name states may be anything, in a damaged listing or a lake of other users. Nothing is counted up to it.
 """

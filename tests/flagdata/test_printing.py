@@ -44,7 +44,7 @@ def leaves(command: click.Command, path: tuple[str, ...] = ()) -> Iterator[tuple
         yield path
 
 
-def stranger(folder: Path) -> tuple[Lake, str]:
+def of_another(folder: Path) -> tuple[Lake, str]:
     """A lake whose rows, messages and labels hold `EVIL`, and the id of a row that does."""
     lake = Lake.create(folder)
     identity = secrets.token_hex(16)
@@ -71,9 +71,9 @@ def stranger(folder: Path) -> tuple[Lake, str]:
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A folder with the lake, and files of strangers: their names, headers, recipes and values hold `EVIL`."""
+    """A folder with the lake, and files of other users: their names, headers, recipes and values hold `EVIL`."""
     folder = tmp_path_factory.mktemp("scene")
-    _, identity = stranger(folder / "lake")
+    _, identity = of_another(folder / "lake")
     name = EVIL.replace("/", "").replace("\n", " ")
     (folder / "log.csv").write_text(f"time,wind_speed {EVIL!r} (m/s),{name}\n2026-05-01T12:00:00Z,5,{name}\n")
     (folder / f"{name}.csv").write_text("time,wind_speed (m/s)\n2026-05-01T12:00:00Z,5\n")

@@ -141,10 +141,10 @@ def test_a_lock_of_a_bucket_that_states_a_long_life_is_void_after_an_hour(
     owner = {**remote_leases.owner(), "machine": "another"}
     for life in (1e300, "nan", "inf"):
         (staging / "collect").write_bytes(json.dumps({**owner, "life": life}).encode())
-        monkeypatch.setattr(remote_leases, "_ahead", lambda _: 0.0)
-        assert remote_leases._living(staging / "collect", staging) is not None
-        monkeypatch.setattr(remote_leases, "_ahead", lambda _: -3700.0)
-        assert remote_leases._living(staging / "collect", staging) is None
+        written = (staging / "collect").stat().st_mtime
+        for later, counts in ((0.0, True), (3700.0, False)):
+            monkeypatch.setattr(RemotePath, "now", lambda self, at=written + later: at)
+            assert (remote_leases._living(staging / "collect", staging) is not None) == counts
 
 
 def summary(lake: Lake, content: dict[str, Any], first: int, last: int) -> Place:
