@@ -2,55 +2,109 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import logging
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from flagdata.errors import UnknownNameError
+from flagdata.errors import FlagdataError, UnknownNameError
+
+_LOG = logging.getLogger("flagdata")
+
+
+class PlugInError(FlagdataError):
+    """What an installed package adds by an entry point cannot be used."""
+
+    kind = "plug-in"
 
 
 class Registry(Mapping[str, Any]):
     """A read-only mapping from name to a lazily imported attribute.
 
+    Looking up what an installed package adds raises a PlugInError that names the package, where it cannot be imported
+    or is none of these. One that has a name of the table, or of another package, is not added: the name is refused, so
+    that an installed package cannot replace another silently.
+
     Args:
         noun: what the entries are, for error messages ("sensor format").
         table: name → "module:Attr".
-        group: an entry-point group whose entries are added after the table's own; a name in both is an error at
-            look-up, so that an installed package cannot replace a built-in silently.
+        group: an entry-point group whose entries are added after the table's own.
+        accepts: whether what an entry point leads to is one of these.
     """
 
-    def __init__(self, noun: str, table: Mapping[str, str], *, group: str | None = None) -> None:
+    def __init__(
+        self, noun: str, table: Mapping[str, str], *, group: str | None = None,
+        accepts: Callable[[Any], bool] = lambda entry: True,
+    ) -> None:  # fmt: skip
         self._noun = noun
         self._own = dict(table)
         self._group = group
-        self._resolved: dict[str, str] | None = None
+        self._accepts = accepts
+        self._found: dict[str, list[EntryPoint]] | None = None
 
-    def _targets(self) -> dict[str, str]:
-        if self._resolved is None:
-            targets = dict(self._own)
+    def _added(self) -> dict[str, list[EntryPoint]]:
+        """The entry points of each name."""
+        if self._found is None:
+            self._found = {}
             for entry in entry_points(group=self._group) if self._group else ():
-                if entry.name in targets:
-                    raise UnknownNameError(
-                        f"{self._noun} {entry.name!r} is defined twice: built in and by {entry.value}",
-                        fix="rename the entry point of the installed package",
-                    )
-                targets[entry.name] = entry.value
-            self._resolved = targets
-        return self._resolved
+                self._found.setdefault(entry.name, []).append(entry)
+        return self._found
 
     def __getitem__(self, name: str) -> Any:
-        targets = self._targets()
-        if name not in targets:
-            raise UnknownNameError.of(self._noun, name, targets)
-        module, _, attribute = targets[name].partition(":")
-        return getattr(import_module(module), attribute)
+        added = self._added().get(name, [])
+        if len(added) + (name in self._own) > 1:
+            by = [*(["flagdata"] if name in self._own else []), *map(_package, added)]
+            raise PlugInError(
+                f"the {self._noun} {name!r} is defined twice: by {' and by '.join(by)}", where=added[-1].value,
+                fix="rename the entry point of the installed package, or uninstall it",
+            )  # fmt: skip
+        if added:
+            return self._loaded(added[0])
+        if name not in self._own:
+            raise UnknownNameError.of(self._noun, name, self)
+        return _imported(self._own[name])
+
+    def _loaded(self, entry: EntryPoint) -> Any:
+        try:
+            found = _imported(entry.value)
+            why = None if self._accepts(found) else f"it is no {self._noun}, but {type(found).__name__} {found!r:.60}"
+        except (Exception, SystemExit) as error:  # noqa: BLE001  whatever code of others raises
+            found, why = None, f"{type(error).__name__}: {error}"
+        if why is not None:
+            raise PlugInError(
+                f"the {self._noun} {entry.name!r} of {_package(entry)} cannot be used: {why}", where=entry.value,
+                fix="repair the package, or uninstall it",
+            )  # fmt: skip
+        return found
+
+    def package(self, name: str) -> str | None:
+        """The installed package that adds a name; `None` for those of the table."""
+        added = self._added().get(name)
+        return _package(added[-1]) if added else None
+
+    def usable(self, names: Iterable[str] | None = None) -> Iterator[tuple[str, Any]]:
+        """The entries that can be used, of some names or of all; a warning is logged of each that cannot."""
+        for name in self if names is None else names:
+            try:
+                yield name, self[name]
+            except PlugInError as error:
+                _LOG.warning("warning: left out: %s\n  where: %s\n  fix:   %s", error.what, error.where, error.fix)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._targets()
+        return name in self._own or name in self._added()
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._targets())
+        return iter(dict.fromkeys([*self._own, *self._added()]))
 
     def __len__(self) -> int:
-        return len(self._targets())
+        return len(self._own.keys() | self._added().keys())
+
+
+def _package(entry: EntryPoint) -> str:
+    return f"package {entry.dist.name}" if entry.dist is not None else "a package"
+
+
+def _imported(target: str) -> Any:
+    module, _, attribute = target.partition(":")
+    return getattr(import_module(module), attribute)

@@ -16,6 +16,7 @@ from flagdata.console import document, echo, echo_lines, json_option, say, table
 from flagdata.errors import MissingExtraError, UnknownNameError
 from flagdata.extras import explained
 from flagdata.recipes import Shelf
+from flagdata.registry import PlugInError, Registry
 
 
 @click.command()
@@ -65,13 +66,26 @@ def titles(target: str) -> Mapping[str, str]:
     if isinstance(held, Path):
         cards = {path.parent.name: json.loads(path.read_text(encoding="utf-8")) for path in held.glob("*/card.json")}
         return {name: str(cards[name]["title"]) for name in sorted(cards)}
-    return {name: _line(held[name]) for name in held}
+    found: dict[str, str] = {}
+    for name in held:
+        try:
+            found[name] = _line(held[name])
+        except Exception as error:
+            package = held.package(name) if isinstance(held, Registry) else None
+            if package is None:
+                raise
+            what = (
+                error.what if isinstance(error, PlugInError) else f"{name!r} of {package} cannot be described: {error}"
+            )
+            say(f"left out: {what}", mark="warning")
+    return found
 
 
 def _line(entry: object) -> str:
-    """What an entry of a registry says of itself, or the first line of its module."""
+    """What an entry of a registry says of itself, or the first line of its module or of itself."""
     if isinstance(entry, partial):
         entry = entry()
-    module = entry.__module__ if isinstance(entry, type) else type(entry).__module__
-    about = getattr(entry, "about", None) or (sys.modules[module].__doc__ or "").strip().splitlines()[0]
-    return str(about).rstrip(".")
+    module = sys.modules.get(entry.__module__ if isinstance(entry, type) else type(entry).__module__)
+    texts = (getattr(entry, "about", None), getattr(module, "__doc__", None), entry.__doc__)
+    lines = [line for text in texts if text for line in str(text).strip().splitlines()[:1]]
+    return lines[0].rstrip(".") if lines else "says nothing of itself"

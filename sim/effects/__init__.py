@@ -42,6 +42,7 @@ EFFECTS = Registry(
         "tilted-pole": "sim.effects.tilted_pole:TiltedPole",
     },
     group="flagdata.effects",
+    accepts=lambda entry: isinstance(entry, type) and issubclass(entry, Effect),
 )
 """On the cloth: kinds of `sim.effects.effect`; also those of installed packages, from the entry points
 `flagdata.effects`. Of files, see `sim.effects.files`."""

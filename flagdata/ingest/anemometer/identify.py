@@ -54,8 +54,8 @@ def recognised(source: TextFile) -> tuple[Guess, ...]:
 def _guesses(source: TextFile) -> tuple[Guess, ...]:
     head = Head(lines=tuple(source.head(HEAD_LINES)), counted=source.counted)
     found: list[Guess] = []
-    for name in signed(source) or FORMATS:
-        reader: Format = FORMATS[name]()
+    for _, form in FORMATS.usable(signed(source) or None):
+        reader: Format = form()
         guess = reader.recognise(head)
         if guess is not None and guess.score >= NAMED:
             return (guess,)

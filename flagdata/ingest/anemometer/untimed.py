@@ -81,8 +81,8 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
 def of_an_instrument(lines: Sequence[str]) -> bool:
     """Whether stamped lines are those of an instrument whose format is known."""
     head = Head(lines=tuple(lines))
-    for name in FORMATS:
-        reader: Format = FORMATS[name]()
+    for name, form in FORMATS.usable():
+        reader: Format = form()
         found = None if name in _TABLES else reader.recognise(head)
         if found is not None and found.score >= SURE:
             return True

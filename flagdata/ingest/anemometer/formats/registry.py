@@ -6,6 +6,7 @@ A user's own format is a package with an entry point in the group `flagdata.form
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Protocol
 
 from flagdata.ingest.anemometer.options import WindOptions
@@ -36,6 +37,14 @@ class Format(Protocol):
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """All rows in the order of the file, in SI, instants in UTC nanoseconds. Raises FlagdataError only."""
         ...
+
+
+_CONTRACT = ("name", "about", "uses", "recognise", "read")
+
+
+def _class(entry: object) -> object:
+    """What makes the reader: an entry is a class, or a class with arguments."""
+    return entry.func if isinstance(entry, partial) else entry
 
 
 FORMATS = Registry(
@@ -69,6 +78,7 @@ FORMATS = Registry(
         "host-stamped": "flagdata.ingest.anemometer.formats.host:HostStamped",
     },
     group="flagdata.formats",
+    accepts=lambda entry: callable(entry) and all(hasattr(_class(entry), name) for name in _CONTRACT),
 )
 SIGNATURES: Mapping[str, tuple[str, ...]] = {"toa5": ('"TOA5"', "TOA5,")}
 """Formats whose makers write these at the beginning of every file: no other format is asked about one."""
