@@ -66,9 +66,12 @@ def _report(tag: str, place: str, done: Transfer, *, as_json: bool) -> None:
             {
                 "lake": place, "head": done.head, "versions": done.versions, "objects": list(done.objects),
                 "bytes": done.size, "refs": list(done.refs),
+                "findings": [finding.as_dict() for finding in done.findings],
             },
         )  # fmt: skip
         return
+    for finding in done.findings:
+        say(f"{finding.what}; {finding.fix}", mark=finding.severity.value)
     refs = f", {counted(len(done.refs), 'ref')} ({', '.join(done.refs)})" if done.refs else ""
     say(f"{counted(done.versions, 'version')}, {counted(len(done.objects), 'object')}, {size_text(done.size)}{refs}")
     echo(f"{place} is at version {done.head}")

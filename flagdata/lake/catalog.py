@@ -220,6 +220,15 @@ class Catalog:
         self._commit(table, pa.concat_tables([*staying, fresh]), removed=files, rows_change=True, info=info)
         return base + 1
 
+    @_one_at_a_time
+    def added(self, files: Sequence[str]) -> list[pa.Table]:
+        """The rows of some files of the catalog.
+
+        Raises:
+            CorruptError: a file cannot be read.
+        """
+        return [self._files.read(name) for name in files]
+
     def entry(self, version: int) -> tuple[bytes, dict[str, Place]]:
         """A version's entry of the log, and where the files are that it adds, by name.
 

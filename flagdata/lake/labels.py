@@ -18,8 +18,9 @@ from flagdata.errors import ConflictError, NotFoundError, UsageError
 from flagdata.lake.catalog import persist
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.leases import keeping_collectors_out
+from flagdata.lake.lineage import LABELS
 from flagdata.lake.store import Store
-from flagdata.lake.tabled import LABELS, labels_of
+from flagdata.lake.tabled import labels_of
 from flagdata.lake.withdrawal import clips_of
 from flagdata.schema import catalog_schema
 

@@ -41,6 +41,21 @@ def noted_erased(entry: Entry) -> Mapping[str, str | None]:
         return dict(from_json(entry.get("erased", "{}")).items())
 
 
+def noted_labels(entry: Entry) -> Mapping[str, Mapping[str, Any]]:
+    """The artifacts that a commit put labels on → name → value, `None` where it takes one off.
+
+    Raises:
+        CorruptError: the note cannot be read.
+    """
+    with _reading(entry):
+        noted = {artifact: dict(values.items()) for artifact, values in from_json(entry[LABELS]).items()}
+        if any(isinstance(value, list | dict) for values in noted.values() for value in values.values()):
+            raise ValueError("no value of a label")
+        return noted
+
+
+LABELS = "labels"
+"""Note of a commit that puts labels on artifacts: artifact → name → value, `null` where it takes one off."""
 EXPIRED = "expired"
 """Note of a commit that let versions expire."""
 

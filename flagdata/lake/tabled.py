@@ -8,18 +8,20 @@ from typing import Any
 
 import pyarrow as pa
 
-from flagdata.documents import from_json
+from flagdata.lake.lineage import noted_labels
 
-LABELS = "labels"
-"""Note of a commit that puts labels on artifacts: artifact → name → value, `null` where it takes one off."""
 _KEY = b"flagdata.labels"
 
 
 def folded(entries: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Artifact → its labels, after the commits given, oldest first."""
+    """Artifact → its labels, after the commits given, oldest first.
+
+    Raises:
+        CorruptError: what a commit notes cannot be read.
+    """
     found: dict[str, dict[str, Any]] = {}
     for entry in entries:
-        for artifact, values in from_json(entry[LABELS]).items():
+        for artifact, values in noted_labels(entry).items():
             labels = found.setdefault(artifact, {})
             labels.update(values)
             for name in [name for name, value in labels.items() if value is None]:

@@ -9,19 +9,23 @@ it was, and of two at once one finds the work done, or is refused.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
-from flagdata.findings import Severity
+from flagdata.findings import Finding, Severity
 from flagdata.lake.durable import disk_errors
 from flagdata.lake.lake import Lake
 from flagdata.lake.marking import Marked, mark
 from flagdata.lake.transaction import Transaction
+from flagdata.printable import counted
 from flagdata.storage import Place
 
+_SHOWN = ("name", "session", "source_name", "code_version", "branch", "kind")
+"""Columns of text that commands show."""
 _NOUNS = {"tags": "tag", "branches": "branch"}
 Bars = Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]]
 
@@ -36,6 +40,7 @@ class Transfer:
         objects: names of those that the target did not have, sorted.
         size: of these [B].
         refs: names of the tags and branches that it did not have, sorted.
+        findings: what texts of the versions that came hold which a terminal would obey.
     """
 
     versions: int
@@ -43,6 +48,7 @@ class Transfer:
     objects: tuple[str, ...]
     size: int
     refs: tuple[str, ...]
+    findings: tuple[Finding, ...] = ()
 
 
 def clone(source: Lake, target: Place | str, *, bars: Bars) -> tuple[Lake, Transfer]:
@@ -115,7 +121,31 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
         for (kind, name), stored in refs.items():
             target.refs.adopt(kind, name, stored)
     names = tuple(sorted(name for _, name in refs))
-    return Transfer(versions=head - there, head=head, objects=tuple(missing), size=size, refs=names)
+    findings = tuple(_unprintable(source, versions=head - there))
+    return Transfer(
+        versions=head - there, head=head, objects=tuple(missing), size=size, refs=names, findings=findings
+    )  # fmt: skip
+
+
+def _unprintable(source: Lake, *, versions: int) -> Iterator[Finding]:
+    """A warning where rows or messages of the newest versions hold what a terminal would obey. They come as they are:
+    each version states the hash of the one before, so that a text that was cleaned would be another history."""
+    found: Counter[str] = Counter()
+    for entry in source.catalog.history(versions) if versions else ():
+        found["message"] += not str(entry.get("message", "")).isprintable()
+        if "files" in entry:
+            for table in source.catalog.added(entry["files"]):
+                for name in _SHOWN:
+                    texts = table[name].drop_null().to_pylist()
+                    found[name] += sum(not text.isprintable() for text in texts)
+    columns = [name for name, count in found.items() if count]
+    if columns:
+        yield Finding(
+            kind="control-characters", severity=Severity.WARNING, count=found.total(),
+            what=f"{counted(found.total(), 'text')} of {', '.join(columns)} hold control characters or marks of "
+            "direction: they came as they are, and are shown escaped", where=str(source.path),
+            fix="none needed for flagdata; give other programs what flagdata prints, not the files of the catalog",
+        )  # fmt: skip
 
 
 def _sizes(marked: Marked) -> dict[str, int]:

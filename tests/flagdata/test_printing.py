@@ -63,7 +63,7 @@ def of_another(folder: Path) -> tuple[Lake, str]:
     table = pa.Table.from_pylist([row, good], schema=catalog_schema())
     info = {
         "commit": "c" + secrets.token_hex(8), "message": EVIL, "branch": "main", "rows": "2", "code_version": EVIL,
-        "labels": json.dumps({"artifacts": [identity, good["artifact"]], "values": {"who": EVIL}}),
+        "labels": json.dumps({identity: {"who": EVIL}, good["artifact"]: {"who": EVIL}}),
     }  # fmt: skip
     lake.catalog.append(table, base=lake.catalog.head(), info=info)
     return lake, good["artifact"]
@@ -178,6 +178,19 @@ def test_a_message_of_several_lines_forges_no_line_of_the_log(
     shown = invoke(capsys, "log", "--lake", folder / "lake")
     assert len(shown.out.splitlines()) == 1 + len(Lake.open(folder / "lake").catalog.history())
     assert printable(EVIL) in shown.out
+
+
+def test_texts_that_come_from_another_lake_are_reported_and_stay_as_they_are(
+    scene: tuple[Path, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, _ = scene
+    done = invoke(capsys, "clone", folder / "lake", tmp_path / "copy")
+    assert done.code == 0
+    assert "control characters" in done.err
+    copy = Lake.open(tmp_path / "copy")
+    assert set(copy.rows()["name"].to_pylist()) == {EVIL, "good"}
+    plain = invoke(capsys, "push", tmp_path / "copy", "--lake", folder / "lake", "--json")
+    assert plain.document["findings"] == []
 
 
 def test_json_holds_the_same_texts_escaped(scene: tuple[Path, str], capsys: pytest.CaptureFixture[str]) -> None:

@@ -366,8 +366,10 @@ NOTES = ("rows", "withdrawn", "merged_version", "expired", "labels", "hidden", "
 
 
 @pytest.mark.parametrize("key", NOTES)
-@pytest.mark.parametrize("value", ["9" * 5000, '{"up_to": 1e999, "objects": []}', "[[]]"])
-def test_notes_of_the_log_that_cannot_be_are_reported_and_never_unforeseen(filled: Lake, key: str, value: str) -> None:
+@pytest.mark.parametrize(
+    "value", ["9" * 5000, '{"up_to": 1e999, "objects": []}', "[[]]", '{"a": ["b"]}', '{"a": {"b": [1]}}']
+)
+def test_notes_of_the_log_that_cannot_be_read_are_never_unforeseen(filled: Lake, key: str, value: str) -> None:
     info = {"commit": "c" + "0" * 16, "message": "m", "branch": "main", "merged": "side", key: value}
     filled.catalog.append(catalog_schema().empty_table(), base=3, info=info)
     acts: list[Callable[[], object]] = [
