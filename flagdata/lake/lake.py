@@ -94,10 +94,10 @@ class Lake(Store):
     def _is_occupied(self) -> bool:
         """Whether anything is there but, in a bucket, what a process left that was killed while it made a lake."""
         if isinstance(self.staging, RemotePath):
-            others = any(entry != self.staging for entry in self.path.iterdir())
+            others = any(entry != self.staging for entry in self._entries())
             return others and not unfinished(self.staging, done=self.path / _MARKER)
         there = self.path.exists() and not self.path.is_dir()
-        return there or (self.path.is_dir() and any(True for _ in self.path.iterdir()))
+        return there or (self.path.is_dir() and any(self._entries()))
 
     def _clear(self) -> None:
         """Delete what such a process left; nothing but the claim of this one is there then."""
