@@ -125,7 +125,7 @@ class RowFiles:
             where = str(self._folder / name)
             noted = self._noted(name)
             if noted and hashlib.sha256(content).hexdigest() not in noted:
-                raise CorruptError("a file of the catalog has changed since it was written", where=where, fix=COPY_BACK)
+                raise changed_file(self._folder / name)
             stated = pq.read_metadata(pa.BufferReader(content))
             check_stated(stated, content.size, where=where, fix=COPY_BACK)
         return content
@@ -140,6 +140,11 @@ class RowFiles:
                 where=str(self._folder / name),
                 fix="restore it from a copy",
             ) from None
+
+
+def changed_file(path: Place) -> CorruptError:
+    """The error for a file that is not what its commit noted."""
+    return CorruptError("a file of the catalog has changed since it was written", where=str(path), fix=COPY_BACK)
 
 
 @dataclass(frozen=True, kw_only=True)
