@@ -42,7 +42,7 @@ from flagdata.files import is_beside, open_regular
 from flagdata.forks import OneProcess
 from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder, put_if_absent, write_durably
 from flagdata.lake.log import CHECKPOINT, FILE_HASH, PREVIOUS_HASH, Entry, Log, is_stated
-from flagdata.lake.rowfiles import RowFiles, Scan
+from flagdata.lake.rowfiles import RowFiles, Scan, changed_file
 from flagdata.lake.summaries import Summaries
 from flagdata.provenance import file_hash
 from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
@@ -226,15 +226,6 @@ class Catalog:
         self._commit(table, pa.concat_tables([*staying, fresh]), removed=files, rows_change=True, info=info)
         return base + 1
 
-    @_one_at_a_time
-    def added(self, files: Sequence[str]) -> list[pa.Table]:
-        """The rows of some files of the catalog.
-
-        Raises:
-            CorruptError: a file cannot be read.
-        """
-        return [self._files.read(name) for name in files]
-
     def entry(self, version: int) -> tuple[bytes, dict[str, Place]]:
         """A version's entry of the log, and where the files are that it adds, by name.
 
@@ -250,9 +241,13 @@ class Catalog:
         Raises:
             ConflictError: another version of that number is there.
         """
+        noted = self._entries.noted_of(version, entry)
         for name, file in files.items():
             with open_regular(file) as stream:
-                put_if_absent(self.path / name, stream.read())
+                content = stream.read()
+            if noted is not None and hashlib.sha256(content).hexdigest() != noted:
+                raise changed_file(file)
+            put_if_absent(self.path / name, content)
         if not self._entries.adopt(version, entry):
             raise ConflictError(
                 f"version {version} was committed here by another", where=str(self.path), fix="try again"
@@ -261,6 +256,15 @@ class Catalog:
     def written(self, version: int) -> float:
         """When a version's entry was put here, by the clock of the disk or store [s since 1970]."""
         return self._entries.path(version).stat().st_mtime
+
+    def check_entries(self, first: int) -> None:
+        """Whether the entries from a version on are those that were written.
+
+        Raises:
+            CorruptError: one has changed, or cannot be read.
+        """
+        head = self.head()
+        self._entries.entries(range(first, head + 1), head=head)
 
     def acknowledge(self, version: int) -> None:
         """Note that a version that was adopted, and those before it, are there for good."""

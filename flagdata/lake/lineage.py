@@ -38,7 +38,10 @@ def noted_erased(entry: Entry) -> Mapping[str, str | None]:
         CorruptError: the note cannot be read.
     """
     with _reading(entry):
-        return dict(from_json(entry.get("erased", "{}")).items())
+        noted = dict(from_json(entry.get("erased", "{}")).items())
+        if not all(name is None or isinstance(name, str) for name in noted.values()):
+            raise ValueError("no name of an object")
+        return noted
 
 
 def noted_labels(entry: Entry) -> Mapping[str, Mapping[str, Any]]:

@@ -219,6 +219,14 @@ class Log:
             "written", where=str(path), fix=fix,
         )  # fmt: skip
 
+    def noted_of(self, version: int, entry: bytes) -> str | None:
+        """The SHA-256 that an entry, which may be of another lake, notes of its file.
+
+        Raises:
+            CorruptError: it cannot be read.
+        """
+        return self._parsed(version, entry.decode(errors="replace"))[1].get(FILE_HASH)
+
     def adopt(self, version: int, entry: bytes) -> bool:
         """Put an entry of another lake of the same history; False where there is another one of that version."""
         path = self.path(version)

@@ -20,7 +20,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from flagdata.catalog_sql import dataset_of
-from flagdata.errors import CorruptError, LimitError
+from flagdata.errors import CorruptError
 from flagdata.files import open_regular
 from flagdata.lake.log import COPY_BACK
 from flagdata.lake.older_rows import SINCE, with_data_sets
@@ -70,7 +70,7 @@ class RowFiles:
         count = size = 0
         for name, content in self._contents.items():
             with self._reading(name):
-                file = self._metadata(name, content)
+                file = pq.read_metadata(pa.BufferReader(content))
                 if not file.num_rows:
                     continue
                 oldest, created = _statistics(file)
@@ -108,9 +108,7 @@ class RowFiles:
         if name in self._tables:
             return self._tables[name]
         with self._reading(name):
-            content = self._content(name)
-            self._metadata(name, content)
-            table = _conform(pq.read_table(pa.BufferReader(content)))
+            table = _conform(pq.read_table(pa.BufferReader(self._content(name))))
             table.validate(full=True)  # text that is not UTF-8, for one
         return table
 
@@ -123,22 +121,14 @@ class RowFiles:
         if name in self._contents:
             return self._contents[name]
         with self._reading(name), open_regular(self._folder / name) as stream:
-            content = stream.read()
-        noted = self._noted(name)
-        if noted and hashlib.sha256(content).hexdigest() not in noted:
-            raise CorruptError(
-                "a file of the catalog has changed since it was written", where=str(self._folder / name), fix=COPY_BACK
-            )
-        return pa.py_buffer(content)
-
-    def _metadata(self, name: str, content: pa.Buffer) -> pq.FileMetaData:
-        """What a file states of itself, once it is sure that it takes no more memory than rows of that size can."""
-        file = pq.read_metadata(pa.BufferReader(content))
-        try:
-            check_stated(file, content.size, where=str(self._folder / name), fix=COPY_BACK)
-        except LimitError as error:  # the project's own files never state so much
-            raise CorruptError(error.what, where=error.where, fix=COPY_BACK) from None
-        return file
+            content = pa.py_buffer(stream.read())
+            where = str(self._folder / name)
+            noted = self._noted(name)
+            if noted and hashlib.sha256(content).hexdigest() not in noted:
+                raise changed_file(self._folder / name)
+            stated = pq.read_metadata(pa.BufferReader(content))
+            check_stated(stated, content.size, where=where, fix=COPY_BACK)
+        return content
 
     @contextmanager
     def _reading(self, name: str) -> Iterator[None]:
@@ -150,6 +140,11 @@ class RowFiles:
                 where=str(self._folder / name),
                 fix="restore it from a copy",
             ) from None
+
+
+def changed_file(path: Place) -> CorruptError:
+    """The error for a file that is not what its commit noted."""
+    return CorruptError("a file of the catalog has changed since it was written", where=str(path), fix=COPY_BACK)
 
 
 @dataclass(frozen=True, kw_only=True)

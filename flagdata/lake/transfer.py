@@ -98,6 +98,7 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
         raise CorruptError(damage[0].what, where=damage[0].where, fix=damage[0].fix or "run flagdata doctor")
     head, there = source.catalog.head(), target.catalog.head()
     _check_history(source, target, head=head, there=there)
+    source.catalog.check_entries(min(head, there))
     refs = _missing_refs(source, target)
     sizes = _sizes(marked)
     missing = [name for name in sorted(marked.objects) if not target.objects.is_there(name, sizes.get(name))]
@@ -121,23 +122,22 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
         for (kind, name), stored in refs.items():
             target.refs.adopt(kind, name, stored)
     names = tuple(sorted(name for _, name in refs))
-    findings = tuple(_unprintable(source, versions=head - there))
+    findings = tuple(_unprintable(source, marked, versions=head - there))
     return Transfer(
         versions=head - there, head=head, objects=tuple(missing), size=size, refs=names, findings=findings
     )  # fmt: skip
 
 
-def _unprintable(source: Lake, *, versions: int) -> Iterator[Finding]:
-    """A warning where rows or messages of the newest versions hold what a terminal would obey. They come as they are:
+def _unprintable(source: Lake, marked: Marked, *, versions: int) -> Iterator[Finding]:
+    """A warning where rows, or messages of the newest versions, hold what a terminal would obey. They come as they are:
     each version states the hash of the one before, so that a text that was cleaned would be another history."""
     found: Counter[str] = Counter()
-    for entry in source.catalog.history(versions) if versions else ():
+    for entry in source.catalog.history(versions):
         found["message"] += not str(entry.get("message", "")).isprintable()
-        if "files" in entry:
-            for table in source.catalog.added(entry["files"]):
-                for name in _SHOWN:
-                    texts = table[name].drop_null().to_pylist()
-                    found[name] += sum(not text.isprintable() for text in texts)
+    for table in marked.refs.values() if versions else ():
+        for name in _SHOWN:
+            texts = table[name].unique().drop_null().to_pylist()
+            found[name] += sum(not text.isprintable() for text in texts)
     columns = [name for name, count in found.items() if count]
     if columns:
         yield Finding(

@@ -1,4 +1,4 @@
-"""No command of the program gives a terminal what it would obey, no matter whose names are printed.
+"""No command of the program gives a terminal what it would obey, also where other users named what is printed.
 
 The commands are those of the click tree: one that is added has to be given arguments here.
 """

@@ -18,6 +18,7 @@ VALIDATIONS = {
     "gate": "tests.validation.gate",
     "gate-films": "tests.validation.gate_films",
     "hanging-cloth": "tests.validation.hanging_cloth",
+    "flips": "tests.validation.flips",
     "hostile": "tests.validation.hostile",
     "lake-in-a-bucket": "tests.validation.lake_in_a_bucket",
     "loop-on-films": "tests.validation.loop_on_films",

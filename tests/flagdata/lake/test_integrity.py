@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from flagdata.checksums import content_hash
-from flagdata.errors import CorruptError, FlagdataError, NotFoundError
+from flagdata.errors import CorruptError, FlagdataError, LimitError, NotFoundError
 from flagdata.lake import Artifact, Lake, catalog, remote_leases
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, is_healthy, object_names, verify, verify_catalog
@@ -186,7 +186,7 @@ def test_a_file_of_rows_that_states_more_than_its_bytes_can_hold_is_refused_befo
     files = Lake.open(filled.path).catalog._files
     files._noted = lambda name: ()
     for read in (files.read, lambda name: files.scan([name])):
-        with pytest.raises(CorruptError, match="3000000 rows"):
+        with pytest.raises(LimitError, match="3000000 rows"):
             read(path.name)
 
 
@@ -408,3 +408,24 @@ def test_a_message_with_any_line_end_of_unicode_is_read_as_it_was_written(lake: 
     assert Lake.open(lake.path).catalog.history()[0]["message"] == message
     assert Lake.open(lake.path).rows().num_rows == 2
     assert doctor(Lake.open(lake.path), grace=NOW) == ()
+
+
+@pytest.mark.disk("it changes files behind the lake's back")
+def test_a_clone_takes_no_damaged_entry_and_no_damaged_file(
+    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(catalog, "_TIDY_EVERY", 3)  # so that no reader of the head needs what is old
+    for number in range(7):
+        put_text(lake, str(number))
+    entry = lake.path / "catalog" / "_delta_log" / f"{1:020d}.json"
+    name = lake.catalog.history()[-2]["files"][0]
+    for place, old, new in ((entry, b"ingest 0", b"ingest 1"), (lake.path / "catalog" / name, b"PAR1", b"PAR2")):
+        content = place.read_bytes()
+        overwrite(place, content.replace(old, new))
+        assert Lake.open(lake.path).rows().num_rows == 7
+        with pytest.raises(CorruptError) as caught:
+            clone(Lake.open(lake.path), tmp_path / old.decode(), bars=no_bar)
+        assert caught.value.where == str(place)
+        overwrite(place, content)
+    copy, _ = clone(Lake.open(lake.path), tmp_path / "whole", bars=no_bar)
+    assert copy.rows().num_rows == 7
