@@ -47,6 +47,8 @@ _FIRST_PRIVATE = 0x80
 _DATA_END_BYTES = 4
 _CHUNK_START = re.compile(rb"\x06.{3}[\x00-\x40]\x00{4}", re.DOTALL)  # the opcode, and a length within CHUNK_LIMIT
 _CHUNK_FIELDS = struct.Struct("<QQQII")
+_LOOKS = 64
+"""How often the bytes of a file are looked at, at most, for what may be a chunk behind damage."""
 _LONGEST_NAME = 8  # bytes of the name of a compression
 _KNOWN: dict[str, Any] = {
     kind.DESCRIPTOR.full_name: kind
@@ -215,6 +217,7 @@ class _Pass:
         self._copy = copy
         self._sound = sound
         self._damaged: list[int] = []  # which findings are of damage whose lost messages are not counted
+        self._looked = 0  # bytes of chunks that were looked for
         self._lost = 0  # messages, in the findings that count them
 
     def run(self) -> None:
@@ -252,6 +255,9 @@ class _Pass:
                 end = at + RECORD_HEAD + length
                 if end > self._size or length > CHUNK_LIMIT or not _is_chunk(view, at, length):
                     continue
+                self._looked += length
+                if self._looked > _LOOKS * self._size:
+                    return None
                 try:
                     chunk = parse(Chunk.read, view[at + RECORD_HEAD : end], where=self._where)
                     records = unpacked(chunk)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import time
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,7 @@ from mcap.records import Chunk
 from mcap.writer import CompressionType, Writer
 
 from flagdata.errors import CorruptError, LimitError
+from flagdata.ingest.mcap.topics import messages, topics
 from flagdata.record import unpacking
 from flagdata.record.container import MESSAGE_HEAD
 from flagdata.record.salvage import salvage
@@ -49,7 +51,7 @@ def _lying(path: Path, packing: str, *, stated: int) -> Path:
         writer = Writer(stream, compression=PACKINGS[packing], chunk_size=1 << 20)
         writer.start()
         channel = writer.register_channel(topic="/a", message_encoding="json", schema_id=0)
-        writer.add_message(channel, log_time=1, publish_time=1, data=b'{"x": ' + b"0" * (1 << 20) + b"}")
+        writer.add_message(channel, log_time=1, publish_time=1, data=b'{"x": "' + b"0" * (1 << 20) + b'"}')
         writer.add_message(channel, log_time=2, publish_time=2, data=bytes(BOMB))
         writer.finish()
     true = struct.pack("<Q", BOMB + MESSAGE_HEAD)
@@ -91,9 +93,37 @@ def test_a_chunk_that_states_more_than_the_limit_is_not_unpacked() -> None:
 
 
 @pytest.mark.parametrize("packing", PACKERS)
+def test_reading_a_topic_of_a_chunk_that_lies_takes_no_memory_for_it(tmp_path: Path, packing: str) -> None:
+    path = _lying(tmp_path / "bomb.mcap", packing, stated=1000)
+
+    def read() -> None:
+        assert [topic.name for topic in topics(path)] == ["/a"]
+        with pytest.raises(CorruptError, match="more than the 1000 bytes"):
+            list(messages(path, "/a"))
+
+    assert _peak(read) < BOUND
+
+
+@pytest.mark.parametrize("packing", PACKERS)
 def test_recovery_leaves_a_chunk_out_that_lies_and_takes_no_memory_for_it(tmp_path: Path, packing: str) -> None:
     path = _lying(tmp_path / "bomb.mcap", packing, stated=1000)
     found: list[str] = []
     assert _peak(lambda: found.extend(f.what for f in salvage(path, tmp_path / "out.mcap"))) < BOUND
     assert any("the chunk unpacks to more than the 1000 bytes" in what for what in found)
     assert any(what.startswith("1 messages") for what in found)
+
+
+def test_a_file_of_nothing_but_heads_of_chunks_is_looked_through_in_bounded_time(tmp_path: Path) -> None:
+    """Each head states a chunk to the end of the file, whose checksum is wrong: a comparison of all takes a day."""
+    head, count = 49, 100_000
+    total = 17 + head * count
+    heads = (
+        struct.pack("<BQQQQIIQ", 6, total - at - 9, 1, 1, total - at - head, 7, 0, total - at - head)
+        for at in range(17, total, head)
+    )
+    path = tmp_path / "heads.mcap"
+    path.write_bytes(b"\x89MCAP0\r\n" + bytes(9) + b"".join(heads))
+    begun = time.process_time()
+    with pytest.raises(CorruptError, match="no whole message"):
+        salvage(path, tmp_path / "out.mcap")
+    assert time.process_time() - begun < 30  # s; it takes one
