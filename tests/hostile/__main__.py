@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import gc
 import pkgutil
-import sys
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
@@ -26,8 +25,6 @@ def load(names: tuple[str, ...]) -> None:
             if not module.name.endswith("__main__") and ".blender" not in module.name:
                 with suppress(ImportError):
                     import_module(module.name)
-    if "torch" in sys.modules:
-        import_module("torch._dynamo")  # which the first step of an optimiser loads
     gc.freeze()  # or each example would look at all of it, and so copy it
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import torch
+import torch._dynamo  # which the first step of an optimiser loads
 from hypothesis import strategies as st
 
 from flagdata.checksums import write_sums

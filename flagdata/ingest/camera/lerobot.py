@@ -177,7 +177,7 @@ class EpisodeSource:
                 if image.width * image.height > self._limits.frame_pixels:
                     raise LimitError("a picture beyond the limit of pixels", where=self._where, fix="raise the limit")
                 image.load()
-            except (*BROKEN, TypeError):
+            except BROKEN:
                 continue
             yield Picture(stamp=stamp, luma=partial(luma_of_image, image))
 

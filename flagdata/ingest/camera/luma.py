@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from dataclasses import dataclass
 from typing import cast
 
@@ -14,7 +15,10 @@ from flagdata.errors import InputError
 _FULL = 2  # AVCOL_RANGE_JPEG
 _LIMITED = 1  # AVCOL_RANGE_MPEG
 _STILL_CODECS = frozenset({"mjpeg", "png", "apng", "gif", "bmp", "tiff", "webp", "jpeg2000", "ljpeg", "jpegls", "ffv1"})
-BROKEN = (OSError, ValueError, SyntaxError, EOFError, Image.DecompressionBombError)
+BROKEN = (
+    OSError, ValueError, SyntaxError, EOFError, TypeError, LookupError, ArithmeticError, struct.error,
+    Image.DecompressionBombError,
+)  # fmt: skip
 """What Pillow raises on a picture that is damaged."""
 STILLS = ("JPEG", "PNG", "WEBP")
 """Formats in which other programs' data sets hold single pictures."""

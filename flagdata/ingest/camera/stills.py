@@ -58,10 +58,11 @@ def open_picture(path: Path, limits: Limits) -> Image.Image:
 
     Raises:
         LimitError: its head states a size beyond the limit.
-        OSError, ValueError, SyntaxError, EOFError: it is damaged, see `luma.BROKEN`.
+        OSError, ValueError, ...: it is damaged, see `luma.BROKEN`.
     """
     try:
         with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of EXIF data that are damaged
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             image = Image.open(path, formats=_FORMATS)
     except (Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
@@ -88,7 +89,8 @@ def heads(paths: Sequence[Path], limits: Limits) -> list[Head | None]:
     found: list[Head | None] = []
     for path in paths:
         try:
-            with open_picture(path, limits) as image:
+            with warnings.catch_warnings(), open_picture(path, limits) as image:
+                warnings.simplefilter("ignore", UserWarning)  # of EXIF data that are damaged
                 head = Head(
                     width=image.width,
                     height=image.height,

@@ -157,7 +157,7 @@ def _rows(path: Path, names: list[str]) -> pa.Table:
                 decimal_point="," if head.decimal_commas else ".",
             ),
         )  # fmt: skip
-    except pa.ArrowException as error:
+    except (pa.ArrowException, UnicodeError) as error:  # the second of a file in UTF-16
         raise InputError(
             f"not a table of numbers: {str(error).splitlines()[0]}", where=str(path),
             fix="write numbers with a decimal point, and leave cells empty that have none",

@@ -22,6 +22,7 @@ from flagdata.errors import FlagdataError, InputError, LimitError, NotFoundError
 from flagdata.findings import Finding, Severity
 from flagdata.ingest.camera import CameraOptions, Limits, open_camera, probe
 from flagdata.ingest.camera.boxes import top
+from flagdata.ingest.camera.stills import heads
 from flagdata.signals import Frame
 
 FRAMES = 50
@@ -360,3 +361,28 @@ def test_an_mp4_with_a_wrong_frame_count_or_duration_costs_nothing(
 def test_paths_that_lead_nowhere_are_not_found(name: str, tmp_path: Path, plain: CameraOptions) -> None:
     with pytest.raises((NotFoundError, InputError)):
         open_camera(Path(f"{tmp_path}/{name}"), plain)
+
+
+@pytest.mark.parametrize("form", ["TIFF", "PNG", "WEBP", "BMP", "GIF"])
+def test_a_picture_with_any_byte_changed_is_read_left_out_or_beyond_the_limit(tmp_path: Path, form: str) -> None:
+    path = tmp_path / f"0001.{form.lower()}"
+    Image.fromarray(np.arange(64, dtype=np.uint8).reshape(8, 8)).save(path, form)
+    whole = path.read_bytes()
+    assert heads([path], Limits()) != [None] or form == "GIF"  # of which a folder has none
+    for place, value in product(range(len(whole)), (0, 1, 255)):
+        path.write_bytes(whole[:place] + bytes([value]) + whole[place + 1 :])
+        try:
+            heads([path], Limits())
+        except LimitError:
+            continue
+
+
+def test_a_tiff_that_names_a_second_picture_without_a_size_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "0001.tiff"
+    Image.fromarray(np.arange(64, dtype=np.uint8).reshape(8, 8)).save(path, "TIFF")
+    data = bytearray(path.read_bytes())
+    (first,) = struct.unpack_from("<I", data, 4)
+    (count,) = struct.unpack_from("<H", data, first)
+    struct.pack_into("<I", data, first + 2 + 12 * count, len(data))
+    path.write_bytes(data + struct.pack("<HHHIII", 1, 259, 3, 1, 1, 0))
+    assert heads([path], Limits()) == [None]

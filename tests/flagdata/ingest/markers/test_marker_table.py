@@ -127,3 +127,11 @@ def test_the_command_identifies_marker_tables_by_their_columns(
     (entry,) = ended.document["results"]
     assert entry["report"]["kind"] == "markers"
     assert entry["report"]["tracked"] == 4
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-8"])
+def test_text_that_ends_within_a_letter_is_refused(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "markers.csv"
+    path.write_bytes("marker,u,v,x,y,z,frame\n1,0,0,0,0,0,0\n2,0,1,0,0,0,0\nü".encode(encoding)[:-1])
+    with pytest.raises(InputError):
+        read_table(path, MarkerOptions(rate=25.0))
