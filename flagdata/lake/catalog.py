@@ -41,7 +41,7 @@ from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.files import is_beside, open_regular
 from flagdata.forks import OneProcess
 from flagdata.lake.durable import confirming, disk_errors, flush_file, flush_folder, put_if_absent, write_durably
-from flagdata.lake.log import CHECKPOINT, FILE_HASH, PREVIOUS_HASH, Entry, Log, is_stated
+from flagdata.lake.log import CHECKPOINT, COPY_BACK, FILE_HASH, PREVIOUS_HASH, Entry, Log, is_stated
 from flagdata.lake.rowfiles import RowFiles, Scan, changed_file
 from flagdata.lake.summaries import Summaries
 from flagdata.provenance import file_hash
@@ -437,7 +437,7 @@ class Catalog:
                 f"version {version} is named, but the newest is {self.head()}", where=str(self.path),
                 fix="run flagdata doctor: it lists the refs that cannot be read",
             )  # fmt: skip
-        with self._log_errors():
+        with self._log_errors(version):
             table = self._table = self._repeated(lambda: self._at(version))
         unknown = [f.name for f in table.schema().fields if f.name not in CATALOG]
         if unknown:
@@ -445,7 +445,7 @@ class Catalog:
         return table
 
     @contextmanager
-    def _log_errors(self) -> Iterator[None]:
+    def _log_errors(self, version: int) -> Iterator[None]:
         """What the Delta library cannot read of the log, as an error that names the entry to blame, if one is."""
         try:
             yield
@@ -457,14 +457,29 @@ class Catalog:
                 with disk_errors("reading the catalog", self._log):
                     raise OSError(str(error).splitlines()[0]) from error
             self._entries.files()  # raises, where an entry is to blame
-            first = str(error).splitlines()[0]  # without the Delta library's stack
+            first = str(error).splitlines()[0].removeprefix(_KERNEL)  # without the Delta library's stack
             first = plain(first) if isinstance(self._log, RemotePath) else first
-            restore = "restore the folder from a copy"
+            blamed = self._blamed(version)
+            saving = blamed.name.endswith(CHECKPOINT)
             raise CorruptError(
-                f"the catalog's log cannot be read: {first}",
-                where=str(self._log),
-                fix=f"{_DELETE}; if that does not help, {restore}" if self._entries.checkpoints() else restore,
+                f"{'a checkpoint' if saving else 'an entry'} of the catalog's log cannot be read: {first}",
+                where=str(blamed),
+                fix=f"{_DELETE}; if that does not help, {COPY_BACK}" if saving else COPY_BACK,
             ) from None
+
+    def _blamed(self, version: int) -> Place:
+        """The entry, or the checkpoint, with which the first version begins that the Delta library cannot open."""
+        low, high = 0, version
+        while low < high:
+            middle = (low + high) // 2
+            try:
+                DeltaTable(self.path.as_uri(), version=middle, storage_options=self._options())
+                low = middle + 1
+            except (DeltaError, OSError):
+                high = middle
+        if low in self._entries.checkpoints():
+            return self._log / f"{low:020d}{CHECKPOINT}"
+        return self._entries.path(low)
 
     def _at(self, version: int) -> DeltaTable:
         table = self._table
@@ -504,7 +519,7 @@ class Catalog:
         """The files of a version, which never change; those of the versions that were asked for last are kept."""
         if version not in self._listed:
             table = self._open(version)
-            with self._log_errors():
+            with self._log_errors(version):
                 names = [Path(uri).name for uri in table.file_uris()]
             self._listed = {**dict(list(self._listed.items())[1 - _LISTED :]), version: names}
         return self._listed[version]
@@ -543,6 +558,7 @@ class Catalog:
 _FILE_HASH = FILE_HASH.removeprefix(_INFO_PREFIX)
 _HINT = "_last_checkpoint"
 _DELETE = f"delete {_HINT} and *{CHECKPOINT} there: they save time, the .json files hold all"
+_KERNEL = "Kernel error: "
 _SYSTEM_ERROR = "(os error "  # as the Delta library writes it
 _NO_ANSWER = re.compile(r"Generic S3 error|Error performing [A-Z]+ ")
 """What it writes where a store refused a request or did not answer; all else concerns what the store gave."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -429,3 +430,28 @@ def test_a_clone_takes_no_damaged_entry_and_no_damaged_file(
         overwrite(place, content)
     copy, _ = clone(Lake.open(lake.path), tmp_path / "whole", bars=no_bar)
     assert copy.rows().num_rows == 7
+
+
+ADDED: dict[str, Any] = {"size": "x", "partitionValues": 5, "modificationTime": -(10**30)}
+MADE: dict[str, Any] = {"schemaString": "{", "partitionColumns": 7}
+
+
+@pytest.mark.disk("it changes files behind the lake's back")
+@pytest.mark.parametrize(("key", "value"), [*ADDED.items(), *MADE.items()])
+def test_an_entry_that_the_delta_library_cannot_read_is_named(filled: Lake, key: str, value: Any) -> None:
+    number, action = (2, "add") if key in ADDED else (0, "metaData")
+    path = filled.path / "catalog" / "_delta_log" / f"{number:020d}.json"
+    lines = [json.loads(line) for line in path.read_bytes().decode().split("\n") if line]
+    next(line[action] for line in lines if action in line)[key] = value
+    overwrite(path, "\n".join(map(json.dumps, lines)).encode())
+    fresh = Lake.open(filled.path)
+    fresh.catalog._entries.entries = partial(unchained, fresh.catalog._entries)  # as of users who know the hashes
+    error = refused(fresh.rows)
+    assert error.where == str(path)
+    assert "Kernel" not in error.what
+    assert "clone of the lake" in error.fix
+
+
+def unchained(log: Log, versions: Sequence[int], *, head: int) -> list[Any]:
+    """Entries as they are read, not compared with one another."""
+    return [log._read(version) for version in versions]
