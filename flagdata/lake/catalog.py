@@ -25,7 +25,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -416,19 +416,23 @@ class Catalog:
         """The version of the newest, by the files' names: a process may die before `_last_checkpoint` is written."""
         return max(self._entries.checkpoints(), default=0)
 
-    def _check_checkpoint(self, version: int) -> None:
-        """Compare the checkpoint from which the Delta library reads a version with what was noted of it."""
-        noted = self._summaries.checkpoints
-        newest = max((number for number in noted if number <= version), default=None)
-        if newest is None:
-            return
-        path = self._log / f"{newest:020d}{CHECKPOINT}"
-        with suppress(FileNotFoundError):
-            if file_hash(path) != noted[newest]:
+    def _check_read(self, version: int) -> None:
+        """Compare what the Delta library reads for a version with what was noted of it: the newest checkpoint up to it,
+        and the entries after that. Those that no summary covers were compared when the history was read."""
+        newest = max((number for number in self._entries.checkpoints() if number <= version), default=-1)
+        noted = self._summaries.checkpoints.get(newest)
+        if noted is not None:
+            path = self._log / f"{newest:020d}{CHECKPOINT}"
+            if file_hash(path) != noted:
                 raise CorruptError(
-                    "a checkpoint of the catalog's log has changed since it was written", where=str(path),
-                    fix=_DELETE,
-                )  # fmt: skip
+                    "a checkpoint of the catalog's log has changed since it was written", where=str(path), fix=_DELETE
+                )
+        if newest + 1 < self._summaries.covered:
+            history = self.history()
+            *_, last = self._entries.entries(range(newest + 1, version + 1), head=history[0]["version"]) or [None]
+            following = history[-2 - version] if last is not None and version + 1 < len(history) else {}
+            if last is not None and following.get(_PREVIOUS_HASH, last.hash) != last.hash:
+                raise self._entries.disagreeing(version, self._entries.path(version + 1))
 
     def _open(self, version: int) -> DeltaTable:
         newest = self.history(1)[0]["version"] if self._history is None else self._history[0]
@@ -483,10 +487,11 @@ class Catalog:
 
     def _at(self, version: int) -> DeltaTable:
         table = self._table
+        if table is None or table.version() != version:
+            self._check_read(version)
         if table is not None and table.version() < version:
             table.update_incremental()
         if table is None or table.version() != version:
-            self._check_checkpoint(version)
             table = DeltaTable(self.path.as_uri(), version=version, storage_options=self._options())
         return table
 
@@ -555,7 +560,7 @@ class Catalog:
         self._entries.acknowledge(version)
 
 
-_FILE_HASH = FILE_HASH.removeprefix(_INFO_PREFIX)
+_FILE_HASH, _PREVIOUS_HASH = (key.removeprefix(_INFO_PREFIX) for key in (FILE_HASH, PREVIOUS_HASH))
 _HINT = "_last_checkpoint"
 _DELETE = f"delete {_HINT} and *{CHECKPOINT} there: they save time, the .json files hold all"
 _KERNEL = "Kernel error: "

@@ -192,9 +192,9 @@ class Log:
                 found = list(pool.map(self._read, versions))
         for version, entry, following in zip(versions, found, found[1:], strict=False):
             if following.info.get(PREVIOUS_HASH, entry.hash) != entry.hash:
-                raise self._disagreeing(version, self.path(version + 1))
+                raise self.disagreeing(version, self.path(version + 1))
         if versions and versions[-1] == head and self._marked(head) not in (None, found[-1].hash):
-            raise self._disagreeing(head, self.marks / str(head))
+            raise self.disagreeing(head, self.marks / str(head))
         return found
 
     def _read(self, version: int) -> Entry:
@@ -209,7 +209,7 @@ class Log:
         except FileNotFoundError:  # another commit has just replaced it
             return None
 
-    def _disagreeing(self, version: int, noting: Place) -> CorruptError:
+    def disagreeing(self, version: int, noting: Place) -> CorruptError:
         """The error for an entry whose SHA-256 is not the one that the next entry, or its mark, notes."""
         path = self.path(version)
         fix = f"{COPY_BACK}; if it is the same there, "

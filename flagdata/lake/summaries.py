@@ -50,12 +50,14 @@ class Summaries:
 
     Attributes:
         checkpoints: version → SHA-256 of its checkpoint, as the summaries that were read last note it.
+        covered: how many versions these cover.
     """
 
     def __init__(self, folder: Place, log: Log) -> None:
         self._folder = folder
         self._log = log
         self.checkpoints: dict[int, str] = {}
+        self.covered = 0
 
     def read(self, head: int) -> list[Mapping[str, Any]]:
         """What is summarised of the versions from 0 on, oldest first, up to `head` at most.
@@ -118,6 +120,7 @@ class Summaries:
             following, before = following + len(found.versions), found.end
         while chain and self._log.hash(following - 1) != chain[-1].end:
             following -= len(chain.pop().versions)
+        self.covered = following
         self.checkpoints = {number: noted for summary in chain for number, noted in summary.checkpoints.items()}
         return chain
 

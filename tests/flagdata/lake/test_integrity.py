@@ -455,3 +455,21 @@ def test_an_entry_that_the_delta_library_cannot_read_is_named(filled: Lake, key:
 def unchained(log: Log, versions: Sequence[int], *, head: int) -> list[Any]:
     """Entries as they are read, not compared with one another."""
     return [log._read(version) for version in versions]
+
+
+@pytest.mark.disk("it changes files behind the lake's back")
+def test_an_entry_that_a_summary_covers_is_compared_where_an_old_version_is_read_from_it(
+    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(catalog, "_TIDY_EVERY", 5)
+    for number in range(7):
+        put_text(lake, str(number))
+    path = lake.path / "catalog" / "_delta_log" / f"{3:020d}.json"
+    content = path.read_bytes()
+    right = [Lake.open(lake.path).rows(at=at).num_rows for at in ("3", "4", None)]
+    overwrite(path, content.replace(b'"add":{', b'"cdc":{'))
+    for at in ("3", "4"):
+        assert refused(lambda at=at: Lake.open(lake.path).rows(at=at)).where == str(path)
+    assert Lake.open(lake.path).rows().num_rows == right[-1]
+    overwrite(path, content)
+    assert [Lake.open(lake.path).rows(at=at).num_rows for at in ("3", "4", None)] == right
