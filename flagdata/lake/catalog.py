@@ -11,7 +11,7 @@ commit.) The library's own checkpoints are off: it does not flush them to the di
 is empty and a table that does not open.
 
 Each commit notes the SHA-256 of its file, which is compared whenever the file is read. (Not the checksums that Parquet
-can keep of its pages: the hash covers the whole file, footer too, costs readers nothing, and `sha256sum` prints it.)
+can keep of its pages: the hash covers the whole file, footer too, and `sha256sum` prints it.)
 """
 
 from __future__ import annotations
