@@ -23,14 +23,23 @@ def pause() -> None:
     sys.stdin.readline()
 
 
+def finding_tests() -> dict[str, str]:
+    """Give the environment in which a process finds the package `tests`, wherever it is started."""
+    paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+
+
 def start(*arguments: object, stderr: IO[bytes] | None = None) -> subprocess.Popen[str]:
     """Start a Python script that pauses."""
     command = [sys.executable, *map(str, arguments)]
-    paths = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])  # a script finds no tests
     return subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=stderr, text=True,
-        env={**os.environ, "PYTHONPATH": paths},
-    )  # fmt: skip
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=stderr,
+        text=True,
+        env=finding_tests(),
+    )
 
 
 def await_pause(process: subprocess.Popen[str]) -> None:

@@ -119,17 +119,10 @@ CORE = {
 
 
 def core(folder: Path) -> Scene:
-    """The scene of the commands of the core, with a recording, a film of nothing else, a record and a lake ahead."""
+    """Make the scene of the commands of the core, with markers, a record and a lake ahead beside it."""
     from flagdata.ingest.store import ingest_camera
 
     scene = made_scene(folder)
-    lake = Lake.open(folder / "lake")
-    for arguments in (
-        ("align", scene.ids["camera"], scene.ids["wind"], "--by", "given", "--offset", "0", "--offset-sigma", "0.1"),
-    ):
-        _invoked([*arguments, "--lake", str(lake.path)])
-    (recording,) = lake.rows("kind = 'recording'").to_pylist()
-    single = ingest_camera(lake, folder / "fourth.mp4").artifact
     (folder / "markers.csv").write_text(
         "time,marker,u,v,x,y,z\n"
         + "".join(f"{k / 25},m{m},{m},0,{m},{k / 100},0\n" for k in range(30) for m in range(3))
@@ -139,8 +132,7 @@ def core(folder: Path) -> Scene:
     film = ingest_camera(ahead, folder / "film.mp4").artifact
     (folder / "record.mcap").write_bytes(ahead.object_path(str(film.object)).read_bytes())
     ahead.tag("later")
-    ids = {**scene.ids, "recording": recording["artifact"], "single": single.id}
-    return Scene(folder=folder, ids=ids)
+    return scene
 
 
 _OF_A_TRIAL = {

@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from textwrap import indent
 
 import numpy as np
 import pytest
@@ -179,7 +180,7 @@ def test_a_table_of_several_sites_is_refused_with_the_lines_of_the_recipe_that_r
     code, _, err = run("ingest", path)
     assert code == 3
     lines = '[rows]\ncolumn = "site"\nvalue = "A"\n'
-    assert lines in err
+    assert indent(lines, "  ") in err
     recipe = tmp_path / "mast-a.toml"
     drafted = json.loads(run("ingest", "--sniff", path, "--json")[1])["sources"][0]["guesses"][0]["draft"]
     recipe.write_text(f"{drafted}\n{lines}")
