@@ -189,6 +189,6 @@ def entry_of(row: Mapping[str, Any], record: Record, *, labels: Mapping[str, Any
         raise CorruptError(
             f"frames {first} to {first + count - 1} of a record that has {present}",
             where=row["artifact"],
-            fix="run flagdata verify",
+            fix="run flagdata doctor: it names the rows that are damaged",
         )
     return Entry(row=row, record=record, first=first, count=count, labels=labels or {})
