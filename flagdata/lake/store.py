@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import os
 import time
 from collections.abc import Collection, Sequence
+from tempfile import TemporaryFile
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -58,8 +60,10 @@ class Store:
         check_writable(self.path)
 
     def now(self) -> float:
-        """The clock by which files of the lake have their times: this machine's or, of a bucket, the store's [s since
-        1970].
+        """Read the clock by which files of the lake have their times [s since 1970].
+
+        It is the store's, of a folder that of the machine whose disk it is, which a file without a name tells. In a
+        folder that can only be read it is this machine's.
 
         Raises:
             FlagdataError: the store did not say.
@@ -67,7 +71,11 @@ class Store:
         if isinstance(self.path, RemotePath):
             with disk_errors("asking for the store's time", self.path):
                 return self.path.now()
-        return time.time()
+        try:
+            with TemporaryFile(dir=self.staging) as file:
+                return os.fstat(file.fileno()).st_mtime
+        except OSError:
+            return time.time()
 
     def rows(
         self, where: Where | None = None, *, at: str | None = None, columns: Sequence[str] | None = None

@@ -482,6 +482,8 @@ def campaign(names: Sequence[str], results: Path, *, points: int, scratch: Path)
             assert (code, cloned) == (0, 0), said
             bucket.take(f"template-{group}")
             bucket.template[f"/mcap/{hashlib.sha256(_ORPHAN).hexdigest()}.mcap"] = _ORPHAN
+            for path in (folder / "lake" / "mcap").iterdir():  # what was withdrawn, which a clone does not take
+                bucket.template.setdefault(f"/mcap/{path.name}", path.read_bytes())
             for name in wanted:
                 verb = verbs[name]
                 if verb.stand_in is not None:

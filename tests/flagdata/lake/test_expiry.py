@@ -123,3 +123,24 @@ def test_a_lake_in_a_bucket_expires_alike(remote_lake: Lake, put_text: Put) -> N
     remote_lake.withdraw([film.id], "blurred")
     assert expire(remote_lake, 1).objects == (film.object,)
     assert stored(remote_lake) == set()
+
+
+def test_what_expired_keeps_its_lineage_here_and_in_clones(
+    lake: Lake, put_text: Put, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = put_text(lake, "log")
+    recording = put_text(lake, "recording", parents=(log.id,))
+    clip = put_text(lake, "clip", parents=(recording.id,))  # version 3
+    before, after = tmp_path / "before", tmp_path / "after"
+    assert invoke(capsys, "clone", lake.path, before).code == 0
+    lake.withdraw([log.id, recording.id, clip.id], "another flag")
+    assert expire(lake, 4, "the first season").objects
+    assert invoke(capsys, "pull", lake.path, "--lake", before).code == 0
+    assert invoke(capsys, "clone", lake.path, after).code == 0
+    for place in (lake.path, before, after):
+        of_it = invoke(capsys, "lineage", "clip", "--at", "3", "--lake", place, "--json").document
+        assert {one["name"] for one in of_it["relatives"]} == {"log", "recording", "clip"}
+        assert is_healthy(doctor(Lake.open(place)))
+    put_text(Lake.open(after), "spare")
+    assert invoke(capsys, "push", lake.path, "--lake", after).code == 0
+    assert lake.rows()["name"].to_pylist() == ["spare"]

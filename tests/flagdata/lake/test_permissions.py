@@ -101,3 +101,42 @@ def test_a_path_that_is_none_is_refused(tmp_path: Path) -> None:
         with pytest.raises((UsageError, Exception)) as refused:
             Lake.create(path)
         assert refused.type.__module__ == "flagdata.errors"
+
+
+_MOUNTED = ["unshare", "--mount", "--map-root-user", "sh", "-c"]
+_READ_ONLY = 'mount --bind "$0" "$0" && mount -o remount,ro,bind "$0" && exec "$@"'
+READING = (["ls"], ["log"], ["doctor"], ["verify"], ["query", "--where", "kind = 'wind'"], ["gc", "--dry-run"])
+WRITING = (["tag", "v1"], ["gc"], ["withdraw", "a", "-m", "wrong"], ["expire", "--keep", "1"])
+_IN_TURN = """
+import contextlib, io, json, sys
+from flagdata.cli import main
+for arguments in json.loads(sys.argv[1]):
+    said, code = io.StringIO(), 0
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        try:
+            main(arguments)
+        except SystemExit as ended:
+            code = ended.code
+    print(json.dumps([arguments[0], code, said.getvalue()]))
+"""
+
+
+@pytest.mark.disk(LINKS)
+def test_a_lake_on_a_disk_that_is_mounted_read_only_is_read_and_what_would_write_says_so(
+    lake: Lake, put_text: Callable[..., Artifact]
+) -> None:
+    put_text(lake, "a")
+    try:
+        subprocess.run([*_MOUNTED, _READ_ONLY, str(lake.path), "true"], capture_output=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("this system lets nobody mount a folder read-only (unshare --mount --map-root-user)")
+    commands = [[*arguments, "--lake", str(lake.path)] for arguments in (*READING, *WRITING)]
+    typed = [sys.executable, "-c", _IN_TURN, json.dumps(commands)]
+    ended = subprocess.run(
+        [*_MOUNTED, _READ_ONLY, str(lake.path), *typed], capture_output=True, text=True, timeout=500, check=True
+    )
+    outcomes = [json.loads(line) for line in ended.stdout.splitlines()]
+    assert [(name, code) for name, code, _ in outcomes[: len(READING)]] == [(name, 0) for name, *_ in READING]
+    for name, code, said in outcomes[len(READING) :]:
+        assert (name, code, "mount its disk writable" in said) == (name, 1, True), said
+    assert lake.rows()["name"].to_pylist() == ["a"]

@@ -225,6 +225,20 @@ def test_an_orphan_is_left_alone_for_the_grace_period(lake: Lake) -> None:
     assert doctor(lake, grace=NOW) == ()
 
 
+@pytest.mark.parametrize("ahead", [-7200.0, 7200.0])
+def test_what_is_young_by_the_clock_of_its_disk_is_kept_whatever_this_machines_says(
+    lake: Lake, put_text: Put, monkeypatch: pytest.MonkeyPatch, ahead: float
+) -> None:
+    orphan, withdrawn = abandon(lake, "orphan"), put_text(lake, "withdrawn")
+    lake.withdraw([withdrawn.id], "out of focus")
+    hour = timedelta(hours=1)
+    with monkeypatch.context() as patch:
+        patch.setattr(time, "time", lambda now=time.time: now() + ahead)
+        assert [found.severity for found in doctor(lake, grace=hour)] == [Severity.NOTE]
+        assert collect(lake, grace=hour).objects == ()
+    assert set(collect(lake, grace=NOW).objects) == {orphan, str(withdrawn.object)}
+
+
 def test_collection_spares_what_a_running_transaction_has_put(lake: Lake) -> None:
     with lake.transaction("long running") as tx:
         path = tx.staging(".mcap")
