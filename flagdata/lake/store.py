@@ -62,8 +62,8 @@ class Store:
     def now(self) -> float:
         """Read the clock by which files of the lake have their times [s since 1970].
 
-        It is the store's, of a folder that of the machine whose disk it is, which a file without a name tells. In a
-        folder that can only be read it is this machine's.
+        It is the store's. Of a folder it is the disk's, perhaps another machine's, and is read from a file without a
+        name; where nothing can be written, this machine's.
 
         Raises:
             FlagdataError: the store did not say.
