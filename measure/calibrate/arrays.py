@@ -92,7 +92,9 @@ def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
 def _answer(found: Calibration) -> Calibrated:
     quantities = {
         one.name: Weighed(
-            unit=one.unit, value=one.value, sigma=one.sigma, interval=one.interval, assumed=one.assumed
+            unit=one.unit, value=one.value, sigma=one.sigma, interval=one.interval, assumed=one.assumed,
+            bound=one.span.worded(lambda value: f"{value:.4g}", f" {one.unit}") if one.bounded else None,
+            level=one.span.level,
         )
         for one in found.cloth
     }  # fmt: skip

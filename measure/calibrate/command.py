@@ -108,8 +108,8 @@ def calibrate(
     `wind`, the logged mean over the row [m/s], or with a --log of the lake; or rows against `wind` alone, each with
     its `duration` [s]. Its other columns are observables by their names (droop, extension, middle-speed, frequency,
     bandwidth, amplitude-up, amplitude-across, area), each perhaps with a unit, as in `droop [deg]`, and with
-    NAME-sigma, what it is off by. Several recordings are of one flag. Where no simulated flag looks like it, no weight
-    is given, and the exit code is 3.
+    NAME-sigma, what it is off by. Several recordings are of one flag; one that
+    cannot be used is left out, with a warning. Where no weight is given, neither a value nor a bound, the exit code is 3.
 
     \b
       flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --azimuth 70±7 --report page.html
@@ -189,7 +189,7 @@ def calibrate(
         document("calibrate", {**found.as_dict(), "artifact": wanted, "anemometer": own})
     else:
         _print(found)
-    if found.withheld is not None:
+    if not found.weighs:
         raise click.exceptions.Exit(RefusedError.exit_code)
 
 
@@ -288,7 +288,11 @@ def _print(found: Calibration) -> None:
     echo(found.sentence)
     for one in found.cloth[1:]:
         row = shown(one)
-        value = f"{row['value']} {row['interval']} {row['unit']}" if row["value"] else "not determined"
+        value = "not determined"
+        if row["value"]:
+            value = f"{row['value']} {row['interval']} {row['unit']}"
+        elif row["bounded"]:
+            value = f"{row['interval']} {row['unit']}, {row['level']}"
         echo(f"{row['name']}: {value} (assumed: {row['assumed']})")
     for recording, place in zip(found.recordings, found.places, strict=True):
         fitted = ", ".join(f"{row['name']} {row['interval']} {row['unit']}".strip() for row in map(shown, place))

@@ -11,13 +11,16 @@ import pytest
 
 from flagdata.errors import InputError
 from flagdata.stated import parse
+from flagdata.tables import Range
 from measure.calibrate import calibrate as module
 from measure.calibrate.calibrate import Calibration, Options, calibrate
 from measure.calibrate.design import Design
 from measure.calibrate.observed import Observed
+from measure.calibrate.page import page as written
 from measure.calibrate.prior import CLOTH, Floats, Normal, Uncertain, draws
 from measure.calibrate.simulation import OBSERVED, Flag
 from measure.calibrate.wind import Log
+from measure.ends import Bound
 from tests.measure.calibrate.conftest import readings
 
 _AZIMUTH = Uncertain(
@@ -102,11 +105,59 @@ def test_the_weight_of_a_flag_that_no_simulation_looks_like_is_withheld(plain: C
 
 
 @pytest.mark.usefixtures("cheap")
-def test_a_posterior_at_an_end_of_the_prior_is_warned_of(plain: Calibration) -> None:
-    leaning = [one.what for one in _found(_observed(0.052)).findings if one.kind == "leans-on-prior"]
-    assert leaning
-    assert leaning[0].startswith("area weight: the posterior leans on the end of what is assumed, 0.05 kg/m²")
+@pytest.mark.parametrize(
+    ("true", "words", "side", "end"),
+    [(0.045, "at most 0.0", Bound.MOST, "0.05"), (0.5, "at least 0.4", Bound.LEAST, "0.45")],
+)
+def test_of_a_cloth_beyond_the_prior_a_bound_is_reported_and_no_number(
+    plain: Calibration, true: float, words: str, side: Bound, end: str
+) -> None:
+    found = _found(_observed(true))
+    assert found.weight.span.bound is side
+    assert found.weight.span.low <= true <= found.weight.span.high  # beyond the prior, and not left out
+    assert found.sentence.startswith(f"area weight {words}")
+    assert " kg/m², 95 %, n = 48 windows" in found.sentence
+    said = found.as_dict()
+    weight = said["cloth"]["area_weight"]
+    assert (weight["value"], weight["sigma"], weight["determined"], weight["level"]) == (None, None, False, 0.95)
+    assert weight["bound"] == side.value
+    assert weight["interval"][0 if side is Bound.LEAST else 1] == pytest.approx(float(end), rel=0.15)
+    assert (said["area_weight_stated"], said["close_loop"], found.stated) == (None, None, None)
+    assert found.weighs
+    (leaning,) = [one for one in found.findings if one.kind == "leans-on-prior"]
+    assert leaning.what.startswith("area weight: 10% of the posterior or more lie within 3% of the end of what")
+    assert f"{end} kg/m²" in leaning.what
     assert "leans-on-prior" not in {finding.kind for finding in plain.findings}
+    assert "not-determined" not in {f.kind for f in found.findings if "area weight" in f.what}
+
+
+@pytest.mark.usefixtures("cheap")
+def test_a_bound_has_no_settled_box_and_no_line_to_copy_on_its_page(plain: Calibration) -> None:
+    page = written(_found(_observed(0.045)), {})
+    assert '<p class="verdict open"><b>area weight at most 0.0' in page
+    assert "--area-weight" not in page
+    assert '<p class="verdict settled"><b>area weight 0.1' in written(plain, {})
+
+
+def _uniform(low: float, high: float, *, stated: bool) -> Uncertain:
+    limits = (low, high) if stated else (-math.inf, math.inf)
+    return Uncertain(name="azimuth", unit="rad", prior=Range(low=low, high=high), source="", limits=limits)
+
+
+def test_a_range_that_the_user_states_ends_an_interval_and_one_that_is_assumed_does_not() -> None:
+    draws = np.linspace(0.95, 1.0, 1000)
+    assumed = module.quantity(_uniform(0.0, 1.0, stated=False), draws, 0.9)
+    assert (assumed.value, assumed.interval) == (None, (pytest.approx(0.9525, abs=1e-3), math.inf))
+    stated = module.quantity(_uniform(0.0, 1.0, stated=True), draws, 0.9)
+    assert stated.value == pytest.approx(0.975)
+    assert stated.interval == (pytest.approx(0.9525, abs=1e-3), 1.0)
+
+
+def test_a_normal_prior_has_no_end_that_a_posterior_could_lean_on() -> None:
+    """A view that was misjudged by three standard deviations is a value, far from what was assumed."""
+    found = module.quantity(_AZIMUTH, math.radians(91) + 0.01 * np.sin(np.arange(1000)), 0.9)
+    assert found.value == pytest.approx(math.radians(91), abs=1e-3)
+    assert found.span.bound is None
 
 
 @pytest.mark.usefixtures("cheap")
