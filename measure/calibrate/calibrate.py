@@ -17,14 +17,14 @@ from flagdata.rng import child_seed, stream
 from measure.calibrate import numerics
 from measure.calibrate.design import FAR, Design, simulated
 from measure.calibrate.emulator import Emulator, informative
-from measure.calibrate.observed import Observed, constant_wind
+from measure.calibrate.leaving_out import usable
+from measure.calibrate.observed import Observed, check_in_all, constant_wind
 from measure.calibrate.posterior import Posterior, Sight, posterior, weighed
 from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Floats, Uncertain
 from measure.calibrate.scatter import TAKEN_APART
 from measure.calibrate.simulation import OBSERVED, Flag
-from measure.calibrate.summary import LEAST_IN_ALL, shown
+from measure.calibrate.summary import shown
 from measure.ends import PILED, WITHIN, Bound, Span, span
-from measure.observables.observable import WINDOW
 
 ANSWER = 4
 """Raised when the same recordings and options get another answer."""
@@ -219,10 +219,8 @@ class Calibration:
             return f"area weight: withheld, since no simulated flag looks like {self.withheld}"
         if weight.bounded:
             low, high = weight.range or weight.assumed
-            return (
-                f"area weight {weight.span.phrase(3, ' kg/m²')}, {weight.span.level * 100:.3g} %, n = {windows} windows "
-                f"(assumed: {low:.3f} to {high:.3f} kg/m²)"
-            )
+            bound = f"{weight.span.phrase(3, ' kg/m²')}, {weight.span.level * 100:.3g} %"
+            return f"area weight {bound}, n = {windows} windows (assumed: {low:.3f} to {high:.3f} kg/m²)"
         if weight.value is None:
             low, high = weight.assumed
             return f"area weight: not determined by {windows} windows (assumed: {low:.3f} to {high:.3f} kg/m²)"
@@ -258,38 +256,36 @@ def calibrate(
     *,
     folder: Path,
     workers: int = 1,
+    left_out: Sequence[Finding] = (),
     advance: Callable[[int], object] | None = None,
 ) -> Calibration:
     """Weigh the cloth of one flag.
 
     Args:
         recordings: of it, each cut to what is to be used.
+        left_out: a warning for each recording of it that cannot be used.
         folder: where simulations are kept.
         workers: processes that simulate.
         advance: called with the number of flags that were simulated or found.
 
     Raises:
-        InputError: see `Observed`, `designs_of` and `Emulator.fit`.
+        InputError: see `Observed` and `designs_of`.
+        RefusedError: see `answered`.
     """
     made: list[tuple[Observed, Mapping[str, Floats], Floats]] = []
     for one, design in zip(recordings, designs_of(recordings, options), strict=True):
         readings = simulated(design, folder=folder, workers=workers, advance=advance)
         made.append((one, design.values(), readings))
-    return answered(made, options)
+    return answered(made, options, left_out=left_out)
 
 
 def designs_of(recordings: Sequence[Observed], options: Options) -> list[Design]:
     """What is simulated for each of several recordings of one cloth.
 
     Raises:
-        InputError: a recording that is given twice, or too few windows in all.
+        InputError: a recording that is given twice, or too short recordings in all.
     """
-    windows = sum(len(one.readings) for one in recordings)
-    if windows < LEAST_IN_ALL:
-        raise InputError(
-            f"{windows * WINDOW:g} s of film with a log beside them", where=", ".join(one.name for one in recordings),
-            fix=f"give {LEAST_IN_ALL * WINDOW:g} s or more in all; two minutes are better",
-        )  # fmt: skip
+    check_in_all(sum(one.duration for one in recordings), where=", ".join(one.name for one in recordings))
     names = [f"{one.source} {one.name} {one.first:g}" for one in recordings]
     twice = [one.name for place, one in enumerate(recordings) if names[place] in names[:place]]
     if twice:
@@ -328,7 +324,7 @@ class _Simulated:
         """With an emulator fitted to the simulations.
 
         Raises:
-            InputError: see `Emulator.fit`.
+            RefusedError: see `Emulator.fit`.
         """
         one = self.observed
         return Sight(
@@ -337,32 +333,48 @@ class _Simulated:
         )  # fmt: skip
 
 
-def answered(simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats]], options: Options) -> Calibration:
+def answered(
+    simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats]], options: Options, *,
+    left_out: Sequence[Finding] = (),
+) -> Calibration:  # fmt: skip
     """The answer from recordings, each with its simulations' values, name → (simulation,), and their readings
-    (simulation, window, observable).
+    (simulation, window, observable). Those whose simulations do not show what they show are left out.
+
+    Args:
+        left_out: a warning for each recording that is not among them.
 
     Raises:
-        InputError: see `Emulator.fit`.
+        RefusedError: simulations show nothing of any recording, see `informative` and `Emulator.fit`.
+        InputError: too little is left.
     """
-    made = []
-    for one, values, readings in simulations:
-        summaries = with_errors(one, readings, seed=options.seed)
-        looked = np.tile(shown(one.readings), 2 if one.projection.changes else 1)
-        used = informative(values, summaries, looked, name=one.name)
-        made.append(_Simulated(observed=one, values=values, summaries=summaries, used=used))
-    sights = [one.sight(options) for one in made]
+
+    def seen(one: tuple[Observed, Mapping[str, Floats], Floats]) -> tuple[_Simulated, Sight]:
+        observed, values, readings = one
+        summaries = with_errors(observed, readings, seed=options.seed)
+        looked = np.tile(shown(observed.readings), 2 if observed.projection.changes else 1)
+        used = informative(values, summaries, looked, name=observed.name)
+        own = _Simulated(observed=observed, values=values, summaries=summaries, used=used)
+        return own, own.sight(options)
+
+    both, unlike = usable(simulations, seen, name=lambda one: one[0].name)
+    left_out = (*left_out, *unlike)
+    made, sights = [own for own, _ in both], [own for _, own in both]
+    check_in_all(
+        sum(one.observed.duration for one in made), where=", ".join(one.observed.name for one in made),
+        left_out=left_out,
+    )  # fmt: skip
     found = posterior(sights, [one.observed.summary for one in made], seed=options.seed)
     fitted = tuple(
         _fitted(one, sight, found, place, options) for place, (one, sight) in enumerate(zip(made, sights, strict=True))
     )
     calibration = Calibration(
-        options=options, draws=found, recordings=fitted, check=left_out(made, options),
+        options=options, draws=found, recordings=fitted, check=checked(made, options),
         cloth=tuple(quantity(q, found.cloth[q.name], options.level) for q in CLOTH),
         places=tuple(
             tuple(quantity(q, place[q.name], options.level) for q in _placed(options)) for place in found.places
         ),
     )  # fmt: skip
-    findings = _findings(calibration)
+    findings = (*left_out, *_findings(calibration))
     if calibration.withheld is not None:
         calibration = replace(calibration, cloth=tuple(_assumed(q, options.level) for q in CLOTH))
     return replace(calibration, findings=findings)
@@ -398,7 +410,7 @@ def _assumed(about: Uncertain, level: float) -> Quantity:
     return quantity(about, about.at(np.linspace(0.0, 1.0, 1001)), level)
 
 
-def left_out(made: Sequence[_Simulated], options: Options) -> Check:
+def checked(made: Sequence[_Simulated], options: Options) -> Check:
     """Weigh simulations of all recordings together, an eighth at a time, by emulators fitted to the others; of the
     first recording alone where the others are of other cloths."""
     weights = [one.values[CLOTH[0].name] for one in made]
@@ -499,8 +511,8 @@ def _leaning(calibration: Calibration) -> list[Finding]:
         most = own.span.bound is Bound.MOST
         what = (
             f"{own.name.replace('_', ' ')}: {PILED:.0%} of the posterior or more lie within {WITHIN:.0%} of the end of "
-            f"what is assumed, {own.range[0 if most else 1]:.3g} {own.unit}; {'less' if most else 'more'} would look the "
-            "same, so that only a bound is given"
+            f"what is assumed, {own.range[0 if most else 1]:.3g} {own.unit}; {'less' if most else 'more'} would look "
+            "the same, so that only a bound is given"
         )
         fix = "check the flag's size and where the camera stood" + (
             ", or weigh a piece of the cloth on a scale" if own is calibration.weight else ""

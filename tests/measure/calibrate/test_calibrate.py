@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from flagdata.errors import InputError
+from flagdata.errors import InputError, RefusedError
 from flagdata.stated import parse
 from flagdata.tables import Range
 from measure.calibrate import calibrate as module
@@ -196,8 +197,41 @@ def test_too_few_simulations_are_refused(monkeypatch: pytest.MonkeyPatch) -> Non
         return np.full((design.count, 48, len(OBSERVED)), np.nan)
 
     monkeypatch.setattr(module, "simulated", failed)
-    with pytest.raises(InputError, match="0 of 128 simulations show what the film shows"):
+    with pytest.raises(RefusedError, match="0 of 128 simulations show what the film shows"):
         _found(_observed(0.17))
+
+
+@pytest.mark.usefixtures("cheap")
+def test_a_recording_that_simulations_do_not_show_is_left_out_of_two_and_named(
+    monkeypatch: pytest.MonkeyPatch, plain: Calibration
+) -> None:
+    """The weight is that of the other alone."""
+    cheaply = module.simulated
+
+    def half(design: Design, **given: Any) -> Floats:
+        every = cheaply(design, **given)
+        return np.full_like(every, np.nan) if "0.3" in design.recording else every
+
+    monkeypatch.setattr(module, "simulated", half)
+    found = _found(_observed(0.3), _observed(0.17))
+    assert [one.observed.name for one in found.recordings] == ["flag 0.17"]
+    (left,) = [one for one in found.findings if one.kind == "left-out"]
+    assert left.what.startswith("flag 0.3 is left out: 0 of 128 simulations show what the film shows")
+    assert found.weight.value == pytest.approx(plain.weight.value, rel=0.03)
+
+
+@pytest.mark.usefixtures("cheap")
+def test_what_is_left_has_to_be_long_enough_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    cheaply = module.simulated
+
+    def half(design: Design, **given: Any) -> Floats:
+        every = cheaply(design, **given)
+        return np.full_like(every, np.nan) if "0.3" in design.recording else every
+
+    monkeypatch.setattr(module, "simulated", half)
+    short = replace(_observed(0.17), readings=_observed(0.17).readings[:6])
+    with pytest.raises(InputError, match=r"15 s of film with a log beside them; flag 0\.3 is left out: 0 of 128"):
+        _found(_observed(0.3), short)
 
 
 def test_draws_fill_the_priors_range_evenly() -> None:
