@@ -20,6 +20,7 @@ the limit, nothing lies beyond it, and the mean remains an estimate.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -67,11 +68,15 @@ class Span:
             digits: behind the point.
             unit: of a single end, with the space before it.
         """
+        return self.worded(lambda value: f"{value:.{digits}f}", unit)
+
+    def worded(self, number: Callable[[float], str], unit: str = "") -> str:
+        """The same with ends as `number` writes them."""
         if self.bound is Bound.LEAST:
-            return f"at least {self.low:.{digits}f}{unit}"
+            return f"at least {number(self.low)}{unit}"
         if self.bound is Bound.MOST:
-            return f"at most {self.high:.{digits}f}{unit}"
-        return "not constrained" if self.bound else f"[{self.low:.{digits}f}, {self.high:.{digits}f}]"
+            return f"at most {number(self.high)}{unit}"
+        return "not constrained" if self.bound else f"[{number(self.low)}, {number(self.high)}]"
 
     def ends(self) -> list[float | None]:
         """Both ends as JSON values; None for one at infinity."""
@@ -96,20 +101,21 @@ def bound_of(places: NDArray[np.floating]) -> Bound | None:
 
 
 def span(
-    draws: NDArray[np.floating], places: NDArray[np.floating], *, level: float, limits: tuple[float, float],
+    draws: NDArray[np.floating], places: NDArray[np.floating] | None, *, level: float, limits: tuple[float, float],
     assumed: tuple[float, float],
 ) -> Span:  # fmt: skip
     """The interval of a posterior.
 
     Args:
         draws: (n,) of it.
-        places: (m,) in their range of these draws, or of those that they are means of.
+        places: (m,) in their range of these draws, or of those that they are means of; None of a quantity whose
+            range has no ends, as that of a normal prior.
         level: of a central interval.
         limits: values that the quantity can have at all.
         assumed: the range that was simulated.
     """
     low, high = (float(end) for end in np.quantile(draws, [(1 - level) / 2, (1 + level) / 2]))
-    bound = bound_of(places)
+    bound = None if places is None else bound_of(places)
     if bound is None:
         return Span(low=max(low, limits[0]), high=min(high, limits[1]), level=level, bound=None, estimated=True)
     below, above = limits[0] >= assumed[0], limits[1] <= assumed[1]  # the range ends where the quantity does
