@@ -196,7 +196,9 @@ class _Axes:
         covariance, _ = shrunk_covariance(residuals / spread)
         white = np.linalg.inv(np.linalg.cholesky(covariance)) / spread
         along = white @ changes.T
-        return cls(weights=white.T @ (along / np.linalg.norm(along, axis=0)), white=white)
+        length = np.linalg.norm(along, axis=0)
+        # An effect that changes nothing has no direction, and a z of 0.
+        return cls(weights=white.T @ (along / np.where(length > 0, length, 1.0)), white=white)
 
     def z(self, residuals: Floats) -> Floats:
         """(n, effect + 1) z_e, and z_0."""
@@ -257,7 +259,10 @@ class _Scene:
             if kind not in left:
                 z.append(self.axes(*left, kind).z(self.null[self.alike & (self.kinds == kind)]))
         found = np.concatenate(z)
-        return _Standing(axes=self.axes(*left), centre=found.mean(axis=0), spread=found.std(axis=0, ddof=1))
+        spread = found.std(axis=0, ddof=1)
+        return _Standing(
+            axes=self.axes(*left), centre=found.mean(axis=0), spread=np.where(spread > 0, spread, 1.0)
+        )  # fmt: skip
 
 
 def _logarithm(each: Experiments, own: Experiments) -> Floats:
