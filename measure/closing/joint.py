@@ -201,7 +201,9 @@ def _sentences(joint: Joint) -> list[str]:
         return [f"The base model is not rejected by markers and films together ({test}): no effect is needed."]
     if joint.conclusion is Conclusion.UNDECIDED:
         why = "; ".join(reason for one in (joint.markers, joint.films) for reason in one.open)
-        return [f"Nothing is decided: the base model is not rejected by markers and films together ({test}), but {why}."]
+        return [
+            f"Nothing is decided: the base model is not rejected by markers and films together ({test}), but {why}."
+        ]
     said = [f"The base model is rejected by markers and films together ({test})."]
     if joint.conclusion is Conclusion.OUTSIDE:
         said.append("No effect of the library explains what both kinds of recordings show.")

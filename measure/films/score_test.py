@@ -62,6 +62,111 @@ class Directions:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Axes:
+    """Of one V.
+
+    Attributes:
+        weights: (k, effect) from residuals to z.
+        white: (k, k) from residuals to coordinates in which V is one.
+    """
+
+    weights: Floats
+    white: Floats
+
+    @classmethod
+    def of(cls, residuals: Floats, changes: Floats) -> Axes:
+        """From residuals (n, k) and changes (effect, k)."""
+        spread = residuals.std(axis=0)
+        covariance, _ = shrunk_covariance(residuals / spread)
+        white = np.linalg.inv(np.linalg.cholesky(covariance)) / spread
+        along = white @ changes.T
+        length = np.linalg.norm(along, axis=0)
+        # An effect that changes nothing has no direction, and a z of 0.
+        return cls(weights=white.T @ (along / np.where(length > 0, length, 1.0)), white=white)
+
+    def z(self, residuals: Floats) -> Floats:
+        """(n, effect + 1) z_e, and z_0."""
+        k = self.white.shape[0]
+        misfit = np.square(residuals @ self.white.T).sum(axis=1)
+        root = (np.cbrt(misfit / k) - (1 - 2 / (9 * k))) / math.sqrt(2 / (9 * k))
+        return np.concatenate([residuals @ self.weights, root[:, None]], axis=1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Standing:
+    """By which experiments are brought to the scale of null flags of kinds that are left out.
+
+    Attributes:
+        axes: of V.
+        centre, spread: (effect + 1,) of these null flags.
+    """
+
+    axes: Axes
+    centre: Floats
+    spread: Floats
+
+    def of(self, residuals: Floats) -> Floats:
+        """(n, effect + 1) standardised z_e and z_0 of residuals (n, k)."""
+        return (self.axes.z(residuals) - self.centre) / self.spread
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scene:
+    """Residuals about the regression on the area weight.
+
+    Attributes:
+        own: (1, k) of the recordings.
+        base, null: (n, k) of simulations and null flags.
+        kinds: (null,) of numerics.
+        alike: (null,) whose weight is as that of the recordings.
+        changes: (effect, k).
+    """
+
+    own: Floats
+    base: Floats
+    null: Floats
+    kinds: NDArray[np.int64]
+    alike: Mask
+    changes: Floats
+    _known: dict[frozenset[int], Axes] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls, own: Experiments, base: Experiments, nulls: Experiments, kinds: NDArray[np.int64], changes: Floats
+    ) -> Scene:
+        """From summaries and weights as scales read them."""
+        at = [_logarithm(each, own) for each in (own, base, nulls)]
+        coefficients = np.linalg.lstsq(_regressors(at[1]), base.whole, rcond=None)[0]
+        residuals = [
+            each.whole - _regressors(one) @ coefficients for each, one in zip((own, base, nulls), at, strict=True)
+        ]
+        return cls(
+            own=residuals[0], base=residuals[1], null=residuals[2], kinds=kinds, changes=changes,
+            alike=np.asarray(np.abs(at[2]) < ALIKE, dtype=np.bool_),
+        )  # fmt: skip
+
+    def axes(self, *without: int) -> Axes:
+        """Of V without some kinds."""
+        key = frozenset(without)
+        if key not in self._known:
+            kept = ~np.isin(self.kinds, list(key))
+            self._known[key] = Axes.of(np.concatenate([self.base, self.null[kept]]), self.changes)
+        return self._known[key]
+
+    def standing(self, without: int | None) -> Standing:
+        """By null flags of all kinds but one; None for all."""
+        left = () if without is None else (without,)
+        found = np.concatenate([
+            self.axes(*left, kind).z(self.null[self.alike & (self.kinds == kind)])
+            for kind in np.unique(self.kinds[self.alike]).tolist() if kind not in left
+        ])  # fmt: skip
+        spread = found.std(axis=0, ddof=1)
+        return Standing(
+            axes=self.axes(*left), centre=found.mean(axis=0), spread=np.where(spread > 0, spread, 1.0)
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Scored:
     """What the test found.
 
@@ -113,7 +218,7 @@ def score(
         kinds: (null,) of their numerics.
         level: at which power is stated.
     """
-    scene = _Scene.of(own, base, nulls, kinds, directions.changes)
+    scene = Scene.of(own, base, nulls, kinds, directions.changes)
     whole = scene.standing(None)
     z = whole.of(scene.own)
     left = np.full((len(kinds), len(directions.changes) + 1), np.nan)
@@ -139,9 +244,7 @@ def score(
     )  # fmt: skip
 
 
-def _power(
-    scene: _Scene, apart: dict[int, _Standing], directions: Directions, critical: float | None
-) -> Floats:
+def _power(scene: Scene, apart: dict[int, Standing], directions: Directions, critical: float | None) -> Floats:
     """(effect,) share of null flags that are beyond a critical value once each effect acts on them."""
     found = np.zeros(len(directions.changes))
     if critical is None:
@@ -157,112 +260,6 @@ def _power(
         ]  # fmt: skip
         found[place] = float(np.concatenate(beyond).mean())
     return found
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Standing:
-    """By which experiments are brought to the scale of null flags of kinds that are left out.
-
-    Attributes:
-        axes: of V.
-        centre, spread: (effect + 1,) of these null flags.
-    """
-
-    axes: _Axes
-    centre: Floats
-    spread: Floats
-
-    def of(self, residuals: Floats) -> Floats:
-        """(n, effect + 1) standardised z_e and z_0 of residuals (n, k)."""
-        return (self.axes.z(residuals) - self.centre) / self.spread
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Axes:
-    """Of one V.
-
-    Attributes:
-        weights: (k, effect) from residuals to z.
-        white: (k, k) from residuals to coordinates in which V is one.
-    """
-
-    weights: Floats
-    white: Floats
-
-    @classmethod
-    def of(cls, residuals: Floats, changes: Floats) -> _Axes:
-        """From residuals (n, k) and changes (effect, k)."""
-        spread = residuals.std(axis=0)
-        covariance, _ = shrunk_covariance(residuals / spread)
-        white = np.linalg.inv(np.linalg.cholesky(covariance)) / spread
-        along = white @ changes.T
-        length = np.linalg.norm(along, axis=0)
-        # An effect that changes nothing has no direction, and a z of 0.
-        return cls(weights=white.T @ (along / np.where(length > 0, length, 1.0)), white=white)
-
-    def z(self, residuals: Floats) -> Floats:
-        """(n, effect + 1) z_e, and z_0."""
-        k = self.white.shape[0]
-        misfit = np.square(residuals @ self.white.T).sum(axis=1)
-        root = (np.cbrt(misfit / k) - (1 - 2 / (9 * k))) / math.sqrt(2 / (9 * k))
-        return np.concatenate([residuals @ self.weights, root[:, None]], axis=1)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Scene:
-    """Residuals about the regression on the area weight.
-
-    Attributes:
-        own: (1, k) of the recordings.
-        base, null: (n, k) of simulations and null flags.
-        kinds: (null,) of numerics.
-        alike: (null,) whose weight is as that of the recordings.
-        changes: (effect, k).
-    """
-
-    own: Floats
-    base: Floats
-    null: Floats
-    kinds: NDArray[np.int64]
-    alike: Mask
-    changes: Floats
-    _known: dict[frozenset[int], _Axes] = field(default_factory=dict)
-
-    @classmethod
-    def of(
-        cls, own: Experiments, base: Experiments, nulls: Experiments, kinds: NDArray[np.int64], changes: Floats
-    ) -> _Scene:
-        """From summaries and weights as scales read them."""
-        at = [_logarithm(each, own) for each in (own, base, nulls)]
-        coefficients = np.linalg.lstsq(_regressors(at[1]), base.whole, rcond=None)[0]
-        residuals = [
-            each.whole - _regressors(one) @ coefficients for each, one in zip((own, base, nulls), at, strict=True)
-        ]
-        return cls(
-            own=residuals[0], base=residuals[1], null=residuals[2], kinds=kinds, changes=changes,
-            alike=np.asarray(np.abs(at[2]) < ALIKE, dtype=np.bool_),
-        )  # fmt: skip
-
-    def axes(self, *without: int) -> _Axes:
-        """Of V without some kinds."""
-        key = frozenset(without)
-        if key not in self._known:
-            kept = ~np.isin(self.kinds, list(key))
-            self._known[key] = _Axes.of(np.concatenate([self.base, self.null[kept]]), self.changes)
-        return self._known[key]
-
-    def standing(self, without: int | None) -> _Standing:
-        """By null flags of all kinds but one; None for all."""
-        left = () if without is None else (without,)
-        z = []
-        for kind in np.unique(self.kinds[self.alike]).tolist():
-            if kind not in left:
-                z.append(self.axes(*left, kind).z(self.null[self.alike & (self.kinds == kind)]))
-        found = np.concatenate(z)
-        spread = found.std(axis=0, ddof=1)
-        return _Standing(
-            axes=self.axes(*left), centre=found.mean(axis=0), spread=np.where(spread > 0, spread, 1.0)
-        )  # fmt: skip
 
 
 def _logarithm(each: Experiments, own: Experiments) -> Floats:

@@ -10,8 +10,8 @@ from measure.films.departures import Departure
 from measure.observables import OBSERVABLES
 from measure.report.lead import lead
 from measure.report.sentences import listed
-from measure.verdict.quantity import number
 from measure.verdict.decided import NOT_REJECTED
+from measure.verdict.quantity import number
 from measure.verdict.record import Conclusion, Verdict
 
 _MOST = 4

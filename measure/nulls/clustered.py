@@ -76,7 +76,7 @@ class ClusteredNulls:
 
     def tests(self, level: float) -> bool:
         """Whether any statistic can be rejected at a level."""
-        return self.least <= level * (1 + 1e-9)
+        return self.count >= self.kinds_needed(level)
 
     def kinds_needed(self, level: float) -> int:
         """The fewest kinds, as large and as alike as these, by which a level can be tested."""

@@ -40,11 +40,14 @@ def lead(verdict: Verdict) -> str:
         return f"{heading(verdict)}."
     p = f"p = {probability(verdict.test.p_value.value)}"
     if verdict.conclusion is Conclusion.UNDECIDED:
-        return _closed(f"Nothing is decided: the base model is not rejected, {p}, but {'; '.join(verdict.open)}", verdict)
+        return _closed(
+            f"Nothing is decided: the base model is not rejected, {p}, but {'; '.join(verdict.open)}", verdict
+        )
     if verdict.conclusion is Conclusion.SUFFICIENT:
         does = "is not rejected" if erring(verdict) else "explains these recordings"
         return _closed(
-            f"The base model {does}, no effect is needed; {evidence(verdict.test)} that anything is missing, {p}", verdict
+            f"The base model {does}, no effect is needed; {evidence(verdict.test)} that anything is missing, {p}",
+            verdict,
         )
     return _closed(f"{_found(verdict)}; {_strength(verdict)}", verdict)
 

@@ -1,4 +1,4 @@
-"""When a base model that is not rejected is said to suffice, and where no model is said to explain what was observed."""
+"""When a base model that is not rejected is said to suffice, and where no model is said to explain recordings."""
 
 from __future__ import annotations
 
