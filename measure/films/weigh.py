@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flagdata.errors import InputError
 from flagdata.rng import stream
-from measure.calibrate.prior import CLOTH, Floats
+from measure.calibrate.prior import Floats
 from measure.films.evidence import Experiments, Fit, Hypothesis, Sight
-from measure.films.library import Weighable
+from measure.films.library import Suspicion, Weighable
+from measure.films.score_test import Directions
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -21,7 +23,6 @@ class Weighing:
         effects: that were weighed.
         base: (n,) logarithm of the base model's evidence.
         misfit: (n,) of the base model at its mode.
-        cloth: (n, 3) normal scores of area weight, bending and damping there.
         factors: (n, effect) logarithms of the Bayes factors against the base model [nat].
         left: (n, effect) misfit of the model with each.
     """
@@ -29,7 +30,6 @@ class Weighing:
     effects: tuple[Weighable, ...]
     base: Floats
     misfit: Floats
-    cloth: Floats
     factors: Floats
     left: Floats
 
@@ -37,8 +37,7 @@ class Weighing:
         """Of some experiments."""
         own = which if isinstance(which, slice) else np.asarray(which, dtype=np.int64)
         return Weighing(
-            effects=self.effects, base=self.base[own], misfit=self.misfit[own], cloth=self.cloth[own],
-            factors=self.factors[own],
+            effects=self.effects, base=self.base[own], misfit=self.misfit[own], factors=self.factors[own],
             left=self.left[own],
         )  # fmt: skip
 
@@ -64,7 +63,7 @@ def weigh(
     fits = [fitted(sights, observed, effect, seed=seed) for effect in effects]
     empty = np.zeros((len(base.evidence), 0))
     return Weighing(
-        effects=tuple(effects), base=base.evidence, misfit=base.misfit, cloth=base.mode[:, : len(CLOTH)],
+        effects=tuple(effects), base=base.evidence, misfit=base.misfit,
         factors=np.stack([one.evidence - base.evidence for one in fits], axis=1) if fits else empty,
         left=np.stack([one.misfit for one in fits], axis=1) if fits else empty,
     )  # fmt: skip
@@ -80,3 +79,33 @@ def fitted(
     """One model fitted to experiments; as `weigh`."""
     rng = stream(seed, "films", "weigh", "base" if effect is None else effect.name)
     return hypothesis(sights, effect).fit(observed, rng)
+
+
+def directions(sights: Sequence[Sight], effects: Sequence[Weighable], suspected: Suspicion | None) -> Directions:
+    """Along which the recordings are tested: the mean changes of their summaries by the effects' pairs.
+
+    Args:
+        effects: those that all sights' models know a response of.
+        suspected: one of them, along which alone is looked; None for all.
+
+    Raises:
+        InputError: too few pairs of the suspected one show the flag.
+    """
+    names = [one.name for one in effects]
+    if suspected is not None and suspected.name not in names:
+        raise InputError(
+            f"too few flags with {suspected.name} show what the recordings show", where="--suspect",
+            fix="suspect another effect, or leave it out",
+        )  # fmt: skip
+    changes = [np.concatenate([own.model.responses[name].change for own in sights]) for name in names]
+    size = sum(int(own.model.used.sum()) for own in sights)
+    return Directions(
+        changes=np.array(changes).reshape(len(names), size),
+        signs=np.array([int(one.low > 0) for one in effects], dtype=np.int64),
+        suspected=None if suspected is None else (names.index(suspected.name), suspected.sign),
+    )  # fmt: skip
+
+
+def expected(sights: Sequence[Sight], effect: Weighable) -> float:
+    """The strength at which these changes are, beyond null."""
+    return float(np.mean([own.model.responses[effect.name].expected for own in sights]))
