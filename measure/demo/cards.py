@@ -3,6 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Judgement(StrEnum):
+    """What a finding is beside its truth; the page shows the words."""
+
+    RIGHT = "right"
+    """It was inferred, and its interval or its names hold the truth."""
+    MISSED = "missed"
+    """It was inferred, and does not hold the truth."""
+    GIVEN = "given"
+    """It was typed by a person, not inferred."""
+    UNDECIDED = "not decided"
+    """The step states that the recording cannot decide it."""
+    REFUSED = "refused"
+    """The step gave no value, and why."""
+    OPEN = ""
+    """It is not judged."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,6 +36,7 @@ class Card:
         page: a page of the folder that has more; empty for none.
         commands: that were typed.
         seconds: that it took.
+        truths: what the step sought, beside what it found.
     """
 
     title: str
@@ -28,6 +47,7 @@ class Card:
     page: str
     commands: tuple[str, ...]
     seconds: float
+    truths: tuple[Truth, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,10 +58,10 @@ class Truth:
         what: it is.
         true: its value.
         found: what the steps gave.
-        right: whether that holds; None where it is not judged.
+        judgement: whether that holds.
     """
 
     what: str
     true: str
     found: str
-    right: bool | None
+    judgement: Judgement

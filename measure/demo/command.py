@@ -9,7 +9,6 @@ from pathlib import Path
 import click
 
 from flagdata.console import LocalPath, document, json_option, say
-from measure.demo.cards import Truth
 from measure.demo.transcript import Transcript
 
 SCHEMA = "flagdata.demo/1"
@@ -76,18 +75,17 @@ def demo(out: Path, seed: int, story: str, as_json: bool) -> None:
     chosen = Story(story)
     began = time.monotonic()
     say(f"This takes up to {MINUTES[chosen]} minutes on two idle cores.")
-    truths: list[Truth] = []
     with fresh_folder(out, schema=SCHEMA) as scratch:
         shell = Transcript(folder=scratch, aside=as_json)
         shell.show("init", "lake")
         if chosen is Story.MARKERS:
-            markers_step(shell, seed, truths)
+            markers_step(shell, seed)
         else:
-            recording = field_steps(shell, seed, truths)
+            recording = field_steps(shell, seed)
             if chosen is Story.FULL:
-                weighing_step(shell, recording, truths)
-                loop_step(shell, recording, truths)
-        write_index(scratch, shell.cards, truths, seconds=time.monotonic() - began)
+                weighing_step(shell, recording)
+                loop_step(shell, recording)
+        write_index(scratch, shell.cards, seconds=time.monotonic() - began)
     if as_json:
         document("demo", {"page": str(out / "index.html")})
     else:

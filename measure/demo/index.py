@@ -7,12 +7,12 @@ from pathlib import Path
 
 from flagdata.pages.render import render
 from flagdata.provenance import code_version
-from measure.demo.cards import Card, Truth
+from measure.demo.cards import Card
 
 
-def write_index(folder: Path, cards: Sequence[Card], truths: Sequence[Truth], *, seconds: float) -> Path:
+def write_index(folder: Path, cards: Sequence[Card], *, seconds: float) -> Path:
     """Write `index.html` into `folder`; it links to the other pages there."""
     target = folder / "index.html"
-    values = {"cards": cards, "truths": truths, "seconds": seconds, "version": f"flagdata {code_version()}"}
+    values = {"cards": cards, "seconds": seconds, "version": f"flagdata {code_version()}"}
     target.write_text(render("measure.demo", "index.html.j2", values), encoding="utf-8")
     return target

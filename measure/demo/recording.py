@@ -109,13 +109,13 @@ class RecordingRecipe:
     """
 
     seed: int
-    duration: float = 180.0
+    duration: float = 150.0
     rate: int = 30
     columns: int = 20
     step: float = 2.5e-3
     length: float = 1.5
     height: float = 1.0
-    intensity: float = 0.35
+    intensity: float = 0.2
     eddies: float = 60.0
     width: int = 400
     rows: int = 300
@@ -136,7 +136,7 @@ class RecordingRecipe:
     @property
     def wind(self) -> float:
         """Mean wind [m/s]."""
-        return self.drawn("wind", 2.8, 3.2)
+        return self.drawn("wind", 4.8, 5.2)
 
     @property
     def mesh(self) -> Mesh:

@@ -10,6 +10,7 @@ import time
 from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
@@ -17,19 +18,21 @@ import numpy as np
 from flagdata.console import progress, say
 from flagdata.lake import Lake
 from flagdata.pages.pictures import data_url, figure_url, moving
-from measure.demo.cards import Card, Truth
+from measure.demo.cards import Card, Judgement, Truth
 from measure.demo.page import recovered, write_page
 from measure.demo.recording import (
     AIR_RATE,
     BEFORE,
     CLOCK_SIGMA,
     SCALE_SIGMA,
+    Acting,
     Recording,
     RecordingRecipe,
     make_recording,
 )
 from measure.demo.transcript import Transcript
 from measure.estimate.artifact import read
+from measure.verdict.record import Conclusion
 
 SIZE = "1.5x1.0"
 """Of the flag, as its maker states it [m]."""
@@ -47,7 +50,7 @@ _SHOWN = 50  # frames of the film's moving picture
 _CLIPS = 2.4  # s from one window of the wind series to the next
 
 
-def field_steps(shell: Transcript, seed: int, truths: list[Truth]) -> Recording:
+def field_steps(shell: Transcript, seed: int) -> Recording:
     """From nothing to a film and a log on one clock, pairs of them, and the wind that is read off the film."""
     made = _film(shell, RecordingRecipe(seed=seed))
     began = time.monotonic()
@@ -62,24 +65,15 @@ def field_steps(shell: Transcript, seed: int, truths: list[Truth]) -> Recording:
         ):
             step.found += _head(shell.show("ingest", *arguments, "--lake", "lake"), 6)
     _aligned(shell, made)
-    lake = Lake.open(shell.folder / "lake")
-    (row,) = lake.rows("kind = 'recording'", at="demo").to_pylist()
-    clock = recovered(row, made.clock_offset)
-    truths.append(
-        Truth(
-            what="the log's clock minus the camera's", true=f"{clock.truth:+.2f} s",
-            found=f"{clock.offset:+.2f} s [{clock.low:+.2f}, {clock.high:+.2f}] 90 %", right=clock.covered,
-        )
-    )  # fmt: skip
     page = write_page(
         shell.folder, made=made, at="demo", transcript=tuple(shell.entries), seconds=time.monotonic() - began
     )
     shell.cards[-1] = replace(shell.cards[-1], page=page.name)
-    _measured(shell, made, truths)
+    _measured(shell, made)
     return made
 
 
-def weighing_step(shell: Transcript, made: Recording, truths: list[Truth]) -> None:
+def weighing_step(shell: Transcript, made: Recording) -> None:
     """The cloth weighed with the log beside the film."""
     noted = made.noted
     done = (
@@ -90,15 +84,14 @@ def weighing_step(shell: Transcript, made: Recording, truths: list[Truth]) -> No
     )
     with _Step(shell, "What the cloth weighs", done, page="weighed.html") as step:
         step.took(shell.attempt("calibrate", "flag", *_filmed(made), "--report", "weighed.html"))
-    truths.append(
-        Truth(
-            what="area weight, by the model without it", true=f"{made.area_weight:.3f} kg/m²",
-            found=_first(step.found), right=_contained(step.found, made.area_weight),
+        step.beside(
+            "area weight, by the model without what acts",
+            f"{made.area_weight:.3f} kg/m²",
+            _judged(step.found, made.area_weight),
         )
-    )  # fmt: skip
 
 
-def loop_step(shell: Transcript, made: Recording, truths: list[Truth]) -> None:
+def loop_step(shell: Transcript, made: Recording) -> None:
     """What the model of the filmed flag lacks."""
     weighed = f"{made.noted.area_weight:.3f}±{SCALE_SIGMA:g}"
     done = (
@@ -111,19 +104,24 @@ def loop_step(shell: Transcript, made: Recording, truths: list[Truth]) -> None:
             "close-loop", "flag", *_filmed(made), "--area-weight", weighed, "--nulls", str(KINDS), "--out", "loop"
         )
         step.took(None if printed is None else _verdict(printed))
-    if printed is None or made.acting is None:
-        return
-    verdict = json.loads((shell.folder / "loop" / "verdict.json").read_text(encoding="utf-8"))
-    named = verdict["named"]
-    right = made.acting.effect in named
-    found = _first(step.found)
-    if right and len(named) > 1:
-        found = (
-            f"one of {len(named)} effects; it is number {named.index(made.acting.effect) + 1} of them by probability"
-        )
-    truths.append(
-        Truth(what="what acts on the flag beside the model", true=made.acting.sentence, found=found, right=right)
-    )
+        if made.acting is not None:
+            document = None if printed is None else (shell.folder / "loop" / "verdict.json").read_text(encoding="utf-8")
+            _beside_what_acts(step, made.acting, None if document is None else json.loads(document))
+
+
+def _beside_what_acts(step: _Step, acting: Acting, verdict: dict[str, Any] | None) -> None:
+    """Put what acts on the flag beside what a verdict names; None where it was refused."""
+    what = "what acts on the flag beside the model"
+    if verdict is None:
+        step.beside(what, acting.sentence, Judgement.REFUSED)
+    elif verdict["conclusion"] == Conclusion.UNDECIDED:
+        step.beside(what, acting.sentence, Judgement.UNDECIDED)
+    elif acting.effect not in (named := verdict["named"]):
+        step.beside(what, acting.sentence, Judgement.MISSED)
+    else:
+        place = named.index(acting.effect) + 1
+        several = f"one of {len(named)} effects; it is number {place} of them by probability"
+        step.beside(what, acting.sentence, Judgement.RIGHT, found=several if len(named) > 1 else "")
 
 
 def _filmed(made: Recording) -> tuple[str, ...]:
@@ -137,7 +135,7 @@ def _filmed(made: Recording) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def markers_step(shell: Transcript, seed: int, truths: list[Truth]) -> None:
+def markers_step(shell: Transcript, seed: int) -> None:
     """What the model of a tracked flag lacks."""
     from measure.demo.tracked import TrackedRecipe, make_tracks
 
@@ -155,9 +153,9 @@ def markers_step(shell: Transcript, seed: int, truths: list[Truth]) -> None:
         models = [row["name"] for row in shell.read("ls", "--kind", "model", "--lake", "lake")["artifacts"]]
         with_effects = [name for name in models if not name.endswith("-base")]
         shell.show("simulate", (with_effects or models)[0], "--lake", "lake")
-    unit = "" if made.unit == "1" else f" {made.unit}"
-    true = f"{made.effect}, {made.parameter} {made.strength:g}{unit}"
-    truths.append(Truth(what="what acted on the tracked flag", true=true, found=_first(step.found), right=None))
+        unit = "" if made.unit == "1" else f" {made.unit}"
+        true = f"{made.effect}, {made.parameter} {made.strength:g}{unit}"
+        step.beside("what acted on the tracked flag", true, Judgement.OPEN)
 
 
 class _Step:
@@ -172,11 +170,16 @@ class _Step:
         self._shell, self._title, self._done, self._alt, self._page = shell, title, done, alt, page
         self._began, self._typed = time.monotonic(), len(shell.entries)
         self.found, self.picture = "", ""
+        self._truths: list[Truth] = []
 
     def took(self, printed: str | None) -> None:
         """What the step's command printed; None where it refused, and left no page."""
         self.found = printed or "Refused: the film does not pass a check of this command, which says which.\n"
         self._page = "" if printed is None else self._page
+
+    def beside(self, what: str, true: str, judgement: Judgement, *, found: str = "") -> None:
+        """Put a truth beside what the step found: the first line of it, or `found`."""
+        self._truths.append(Truth(what=what, true=true, found=found or _first(self.found), judgement=judgement))
 
     def __enter__(self) -> _Step:
         say("")
@@ -190,6 +193,7 @@ class _Step:
                 Card(
                     title=self._title, done=self._done, found=self.found.strip(), picture=self.picture, alt=self._alt,
                     page=self._page, commands=typed, seconds=time.monotonic() - self._began,
+                    truths=tuple(self._truths),
                 )
             )  # fmt: skip
 
@@ -225,9 +229,18 @@ def _aligned(shell: Transcript, made: Recording) -> None:
         shell.show("query", "--where", where, "--limit", "5", "--at", "demo", "--lake", "lake")
         shell.show("verify", "--lake", "lake")
         step.picture = data_url((shell.folder / "alignment.png").read_bytes(), "image/png")
+        (row,) = Lake.open(shell.folder / "lake").rows("kind = 'recording'", at="demo").to_pylist()
+        clock = recovered(row, made.clock_offset)
+        inferred = Judgement.RIGHT if clock.covered else Judgement.MISSED
+        step.beside(
+            "the log's clock minus the camera's",
+            f"{clock.truth:+.2f} s",
+            Judgement.GIVEN if estimated is None else inferred,
+            found=f"{clock.offset:+.2f} s [{clock.low:+.2f}, {clock.high:+.2f}] 90 %",
+        )
 
 
-def _measured(shell: Transcript, made: Recording, truths: list[Truth]) -> None:
+def _measured(shell: Transcript, made: Recording) -> None:
     done = "From the film alone, a network that was trained on simulated flags estimates the wind."
     alt = "The wind read off the film, beside the log and the true wind"
     with _Step(shell, "Wind from the film", done, alt=alt, page="measured.html") as step:
@@ -238,9 +251,8 @@ def _measured(shell: Transcript, made: Recording, truths: list[Truth]) -> None:
         step.took(None if printed is None else _first(printed))
         if printed is not None:
             step.picture = _series(shell.folder / "lake", made)
-    true = f"{_during(made).mean():.2f} m/s"
-    right = _contained(step.found, float(_during(made).mean()))
-    truths.append(Truth(what="mean wind at the flag", true=true, found=_first(step.found), right=right))
+        mean = float(_during(made).mean())
+        step.beside("mean wind at the flag", f"{mean:.2f} m/s", _judged(step.found, mean))
 
 
 def _during(made: Recording) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
@@ -284,13 +296,14 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def _contained(found: str, true: float) -> bool | None:
-    """Whether the first interval or bound of a text contains a value; None where it has none."""
+def _judged(found: str, true: float) -> Judgement:
+    """Judge the first interval or bound of a text by a true value; a text without one is a refusal."""
     ends = re.search(r"\[([\d.]+), ([\d.]+)\]|at least ([\d.]+)|at most ([\d.]+)", found)
     if ends is None:
-        return None
+        return Judgement.REFUSED
     low, high, least, most = ends.groups()
-    return float(low or least or "-inf") <= true <= float(high or most or "inf")
+    held = float(low or least or "-inf") <= true <= float(high or most or "inf")
+    return Judgement.RIGHT if held else Judgement.MISSED
 
 
 def _verdict(text: str) -> str:

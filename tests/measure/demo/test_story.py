@@ -6,6 +6,7 @@ import json
 import math
 import shlex
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -14,7 +15,8 @@ import pytest
 
 from flagdata.errors import FlagdataError
 from measure.demo import story
-from measure.demo.cards import Truth
+from measure.demo.cards import Card, Judgement
+from measure.demo.page import Recovered
 from measure.demo.recording import Acting
 from measure.demo.transcript import Transcript
 
@@ -71,12 +73,12 @@ def test_the_cloth_is_weighed_with_what_a_person_noted_and_the_truth_stands_besi
     acting = Acting(effect="tangential-linear-drag", parameter="coefficient", strength=0.2)
     noted = SimpleNamespace(azimuth=math.pi / 2, elevation=math.radians(20.2), distance=8.24)
     made = cast(Any, SimpleNamespace(noted=noted, area_weight=0.1754, acting=acting))
-    shell, truths = Transcript(folder=tmp_path), list[Truth]()
-    story.weighing_step(shell, made, truths)
+    shell = Transcript(folder=tmp_path)
+    story.weighing_step(shell, made)
     (command,) = shell.cards[-1].commands
     for words in ("--azimuth 90±3", "--elevation 20±2", "--distance 8.2", "--flag-size 1.5x1.0"):
         assert words in command.replace("'", "")
-    assert [truth.true for truth in truths] == ["0.175 kg/m²"]
+    assert [truth.true for truth in shell.cards[-1].truths] == ["0.175 kg/m²"]
 
 
 def test_the_loop_is_closed_with_the_scales_weight_and_its_finding_is_judged_by_the_truth(
@@ -87,30 +89,36 @@ def test_the_loop_is_closed_with_the_scales_weight_and_its_finding_is_judged_by_
     noted = SimpleNamespace(azimuth=math.pi / 2, elevation=math.radians(20.2), distance=8.24, area_weight=0.1731)
     made = cast(Any, SimpleNamespace(noted=noted, area_weight=0.1754, acting=acting))
     (tmp_path / "loop").mkdir()
-    for named, right, found in (
-        (["hem-mass"], True, "close-loop flag"),
-        (["wet-mass", "hem-mass", "lift"], True, "one of 3 effects; it is number 2 of them"),
-        (["lift", "shear"], False, "close-loop flag"),
-        ([], False, "close-loop flag"),
+    for conclusion, named, judgement, found in (
+        ("effect", ["hem-mass"], Judgement.RIGHT, "close-loop flag"),
+        ("effect", ["wet-mass", "hem-mass"], Judgement.RIGHT, "one of 2 effects; it is number 2 of them"),
+        ("effect", ["lift", "shear"], Judgement.MISSED, "close-loop flag"),
+        ("no effect needed", [], Judgement.MISSED, "close-loop flag"),
+        ("not decided", [], Judgement.UNDECIDED, "close-loop flag"),
     ):
-        (tmp_path / "loop" / "verdict.json").write_text(json.dumps({"named": named}))
-        shell, truths = Transcript(folder=tmp_path), list[Truth]()
-        story.weighing_step(shell, made, [])
-        story.loop_step(shell, made, truths)
+        (tmp_path / "loop" / "verdict.json").write_text(json.dumps({"conclusion": conclusion, "named": named}))
+        shell = Transcript(folder=tmp_path)
+        story.weighing_step(shell, made)
+        story.loop_step(shell, made)
         weighed, closed = (card.commands[0].replace("'", "").split() for card in shell.cards)
         assert closed[2:-4] == [*weighed[2:-2], "--area-weight", "0.173±0.003"]
-        (truth,) = truths
-        assert (truth.right, truth.true) == (right, "hem-mass, line_density 0.06 kg/m")
+        (truth,) = shell.cards[-1].truths
+        assert (truth.judgement, truth.true) == (judgement, "hem-mass, line_density 0.06 kg/m")
         assert truth.found.startswith(found)
 
 
-@pytest.mark.parametrize(("found", "true", "right"), [
-    ("wind 3.5 m/s [2.3, 5.0] 90 %; bending [9, 10]", 2.4, True), ("wind 3.5 m/s [2.3, 5.0] 90 %", 5.1, False),
-    ("Refused: no flag", 3.0, None), ("area weight at most 0.056 kg/m², 95 %", 0.05, True),
-    ("area weight at least 0.41 kg/m²", 0.4, False),
-])  # fmt: skip
-def test_a_finding_is_right_if_its_interval_contains_the_truth(found: str, true: float, right: bool | None) -> None:
-    assert story._contained(found, true) is right
+@pytest.mark.parametrize(
+    ("found", "true", "judgement"),
+    [
+        ("wind 3.5 m/s [2.3, 5.0] 90 %; bending [9, 10]", 2.4, Judgement.RIGHT),
+        ("wind 3.5 m/s [2.3, 5.0] 90 %", 5.1, Judgement.MISSED),
+        ("Refused: no flag", 3.0, Judgement.REFUSED),
+        ("area weight at most 0.056 kg/m², 95 %", 0.05, Judgement.RIGHT),
+        ("area weight at least 0.41 kg/m²", 0.4, Judgement.MISSED),
+    ],
+)
+def test_a_finding_is_right_if_its_interval_contains_the_truth(found: str, true: float, judgement: Judgement) -> None:
+    assert story._judged(found, true) is judgement
 
 
 def test_a_cloth_that_cannot_be_weighed_is_no_failure_of_the_demonstration(
@@ -118,30 +126,45 @@ def test_a_cloth_that_cannot_be_weighed_is_no_failure_of_the_demonstration(
 ) -> None:
     codes["calibrate"] = 3
     noted = SimpleNamespace(azimuth=1.5, elevation=0.3, distance=8.0)
-    shell, truths = Transcript(folder=tmp_path), list[Truth]()
-    story.weighing_step(shell, cast(Any, SimpleNamespace(noted=noted, area_weight=0.15, acting=None)), truths)
-    assert shell.cards[-1].found.startswith("Refused")
-    assert shell.cards[-1].page == ""
-    assert truths[0].found.startswith("Refused")
+    shell = Transcript(folder=tmp_path)
+    story.weighing_step(shell, cast(Any, SimpleNamespace(noted=noted, area_weight=0.15, acting=None)))
+    (card,) = shell.cards
+    assert (card.found.startswith("Refused"), card.page) == (True, "")
+    assert (card.truths[0].found.startswith("Refused"), card.truths[0].judgement) == (True, Judgement.REFUSED)
 
 
-def aligned(shell: Transcript) -> str:
-    (shell.folder / "alignment.png").write_bytes(b"png")
-    made = cast(Any, SimpleNamespace(noted=SimpleNamespace(clock=-12.34)))
-    story._aligned(shell, made)
-    return shell.cards[-1].found
+@pytest.fixture
+def aligned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, codes: dict[str, int]) -> Callable[[], Card]:
+    """Puts the clocks on one: the lake then has a recording whose offset is 0.3 s off a true one of −12.0 s."""
+
+    def step() -> Card:
+        shell = Transcript(folder=tmp_path)
+        (shell.folder / "alignment.png").write_bytes(b"png")
+        clock = Recovered(offset=-12.3, low=-13.1, high=-11.5, confidence=1.0, truth=-12.0)
+        monkeypatch.setattr(story, "recovered", lambda *_: clock)
+        lake = SimpleNamespace(rows=lambda *_, **__: SimpleNamespace(to_pylist=lambda: [{}]))
+        monkeypatch.setattr(story.Lake, "open", lambda _: lake)
+        made = cast(Any, SimpleNamespace(noted=SimpleNamespace(clock=-12.34), clock_offset=-12.0))
+        story._aligned(shell, made)
+        return shell.cards[-1]
+
+    return step
 
 
 def test_where_no_offset_is_found_the_noted_one_is_given_and_the_card_says_so(
-    codes: dict[str, int], tmp_path: Path
+    codes: dict[str, int], aligned: Callable[[], Card]
 ) -> None:
     codes["--search"] = 3
-    found = aligned(Transcript(folder=tmp_path))
-    assert "refused" in found
-    assert "--by given --offset -12.3 --offset-sigma 0.5" in found
+    card = aligned()
+    assert "refused" in card.found
+    assert "--by given --offset -12.3 --offset-sigma 0.5" in card.found
+    assert [truth.judgement for truth in card.truths] == [Judgement.GIVEN]
 
 
-def test_where_the_offset_is_found_none_is_given(codes: dict[str, int], tmp_path: Path) -> None:
-    found = aligned(Transcript(folder=tmp_path))
-    assert "refused" not in found
-    assert "--by given" not in found
+def test_where_the_offset_is_found_none_is_given(aligned: Callable[[], Card]) -> None:
+    card = aligned()
+    assert "refused" not in card.found
+    assert "--by given" not in card.found
+    (truth,) = card.truths
+    assert (truth.true, truth.found) == ("-12.00 s", "-12.30 s [-13.10, -11.50] 90 %")
+    assert truth.judgement is Judgement.RIGHT
