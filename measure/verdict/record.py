@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -186,6 +187,12 @@ class NullTest:
     def least(self) -> float:
         """The smallest p that so many nulls allow."""
         return 1 / (1 + (self.kinds if self.effective is None else self.effective))
+
+    @property
+    def kinds_needed(self) -> int:
+        """The fewest kinds by which the level can be tested, each as many independent nulls as these."""
+        each = 1.0 if self.effective is None else self.effective / self.kinds
+        return math.ceil((1 / self.level - 1) / each - 1e-9)
 
 
 @dataclass(frozen=True, kw_only=True)
