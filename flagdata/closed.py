@@ -27,7 +27,8 @@ class Closed:
     """A verdict.
 
     Attributes:
-        conclusion: "no effect needed", "effect", "one of", "partly explained", "none of the library" or "cannot test".
+        conclusion: "no effect needed", "not decided", "effect", "one of", "partly explained", "none of the library" or
+            "cannot test".
         named: the effect, or the effects that fit equally well; empty for none.
         sentence: the verdict in one line.
         words: the verdict as `flagdata close-loop` prints it.

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from scipy.stats import beta
 
 
-def clopper_pearson(hits: float, count: int, *, level: float) -> tuple[float, float]:
+def clopper_pearson(hits: float, count: float, *, level: float) -> tuple[float, float]:
     """The interval of a share, each side (1 − level)/2: Clopper and Pearson, Biometrika 26:404 (1934). 0 to 1
     of no cases.
 
     Args:
-        hits, count: in so many of so many; a sum of shares may stand for the hits.
+        hits, count: in so many of so many; neither has to be a whole number.
         level: of the interval, between 0 and 1.
     """
     tail = (1 - level) / 2

@@ -50,7 +50,7 @@ class ClosingTheLoopOnFilms:
 
     folder: Path
     simulations: int = 128
-    kinds: int = CRITERIA.simulated_kinds
+    kinds: int = CRITERIA.film_kinds
     workers: int = 1
 
     def __call__(self, given: Filmed, seed: int) -> Verdict:

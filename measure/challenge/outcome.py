@@ -11,6 +11,7 @@ from measure.challenge.answer_key import Acting, AnswerKey
 from measure.challenge.classes import class_of
 from measure.challenge.filing import Filing
 from measure.challenge.recipe import Kind
+from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.record import Conclusion
 
 FIELD = "corrective-field"
@@ -62,7 +63,7 @@ class Outcome:
     @property
     def detected(self) -> bool:
         """Whether the base model was rejected."""
-        return self.conclusion not in (None, Conclusion.UNTESTED, Conclusion.SUFFICIENT)
+        return self.conclusion is not None and self.conclusion not in NOT_REJECTED
 
     @property
     def true(self) -> tuple[str, ...]:

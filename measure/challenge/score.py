@@ -252,6 +252,8 @@ class Sheet:
             "control separated": self.separated,
             "control separated by a single recording": self.separated_singly,
             "interval covers the true strength": self.coefficients.covered,
+            "not decided": self.share(self.outcomes, lambda o: o.conclusion is Conclusion.UNDECIDED),
+            "not decided, of one effect": self.share(one, lambda o: o.conclusion is Conclusion.UNDECIDED),
             "data refused": self.share(self.outcomes, lambda o: o.refused),
         }
 

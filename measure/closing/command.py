@@ -180,7 +180,7 @@ def close_loop(
         if nulls is not None:
             raise UsageError(
                 "films count kinds of numerics, and markers recordings", where="--nulls",
-                fix="leave it out: 40 kinds are simulated for each",
+                fix="leave it out: 40 kinds are simulated for markers and 20 for films",
             )  # fmt: skip
     else:
         refuse_of_others(context, films=bool(films))

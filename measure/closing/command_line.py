@@ -31,7 +31,7 @@ def null_options(*, level: str) -> Callable[[_Command], _Command]:
         click.option(
             "--nulls", type=click.IntRange(min=1),
             help="Number of recordings without any effect to simulate for comparison, 160 or more; on films the number "
-            "of meshes and time-stepping methods, 40 by default.",
+            "of meshes and time-stepping methods, 20 by default.",
         ),
         click.option(
             "--bank", type=LocalPath(exists=True),

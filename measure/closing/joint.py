@@ -19,6 +19,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from measure.verdict.criteria import CRITERIA
+from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.quantity import estimate_text, known, number, probability, with_level
 from measure.verdict.record import Conclusion, Estimate, Verdict
 
@@ -91,7 +92,7 @@ def joined(markers: Verdict, films: Verdict, *, level: float, nominal: Mapping[s
     """
     both = (markers, films)
     tested = [one for one in both if one.conclusion is not Conclusion.UNTESTED]
-    rejecting = [one for one in tested if one.conclusion is not Conclusion.SUFFICIENT]
+    rejecting = [one for one in tested if one.conclusion not in NOT_REJECTED]
     named = tuple(
         name for name in (rejecting[0].named if rejecting else ()) if all(name in one.named for one in rejecting)
     )
@@ -107,7 +108,8 @@ def _conclusion(tested: Sequence[Verdict], rejecting: Sequence[Verdict], named: 
     if not tested:
         return Conclusion.UNTESTED
     if not rejecting:
-        return Conclusion.SUFFICIENT
+        open_ones = any(one.conclusion is Conclusion.UNDECIDED for one in tested)
+        return Conclusion.UNDECIDED if open_ones else Conclusion.SUFFICIENT
     if not named:
         return Conclusion.OUTSIDE
     if any(one.conclusion is Conclusion.PARTLY for one in rejecting):
@@ -197,6 +199,11 @@ def _sentences(joint: Joint) -> list[str]:
         return [f"Neither kind of recordings can test the base model at half of the level ({test})."]
     if joint.conclusion is Conclusion.SUFFICIENT:
         return [f"The base model is not rejected by markers and films together ({test}): no effect is needed."]
+    if joint.conclusion is Conclusion.UNDECIDED:
+        why = "; ".join(reason for one in (joint.markers, joint.films) for reason in one.open)
+        return [
+            f"Nothing is decided: the base model is not rejected by markers and films together ({test}), but {why}."
+        ]
     said = [f"The base model is rejected by markers and films together ({test})."]
     if joint.conclusion is Conclusion.OUTSIDE:
         said.append("No effect of the library explains what both kinds of recordings show.")

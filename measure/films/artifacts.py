@@ -13,7 +13,7 @@ from measure.films.run import Outcome
 from measure.films.words import words
 from measure.verdict.record import Verdict
 
-ANSWER = 2
+ANSWER = 3
 """Raised when the same recordings and options get another answer."""
 
 

@@ -26,7 +26,7 @@ from measure.estimate.source import Reading, box_of
 from measure.films.artifacts import answer_of
 from measure.films.command_line import Given
 from measure.films.design import PAIRS, TOGETHER, lasting
-from measure.films.library import weighable
+from measure.films.library import Suspicion, weighable
 from measure.films.models import models
 from measure.films.run import Options, solve, verdict_of
 from measure.verdict.criteria import CRITERIA
@@ -62,15 +62,17 @@ def close_films(
         )  # fmt: skip
     begun = time.monotonic()
     size = parse_size(given.flag_size)
+    flag = Flag(length=size.length, height=size.height, attachment=given.attachment)
     options = Options(
         calibration=Calibrating(
-            flag=Flag(length=size.length, height=size.height, attachment=given.attachment),
+            flag=flag,
             azimuth=AZIMUTH if given.azimuth is None else known(AZIMUTH, given.azimuth, where="--azimuth"),
             elevation=ELEVATION if given.elevation is None else known(ELEVATION, given.elevation, where="--elevation"),
             distance=given.distance, simulations=given.simulations, seed=seed,
         ),
         area_weight=None if given.area_weight is None else weight(given.area_weight),
-        level=CRITERIA.level if level is None else level, kinds=CRITERIA.simulated_kinds if nulls is None else nulls,
+        level=CRITERIA.level if level is None else level, kinds=CRITERIA.film_kinds if nulls is None else nulls,
+        suspected=None if given.suspect is None else Suspicion.parse(given.suspect, flag),
     )  # fmt: skip
     reading = Reading(crop=box_of(given.crop), flag=given.flag, aspect=size.aspect)
     with progress(None, label="observe", unit="window") as advance:

@@ -20,7 +20,7 @@ from flagdata.stated import Stated
 _Command = Callable[..., Any]
 OF_FILMS = (
     "flag_size", "attachment", "azimuth", "elevation", "distance", "area_weight", "crop", "flag", "first", "last",
-    "simulations", "cache", "log", "clock_offset",
+    "simulations", "cache", "log", "clock_offset", "suspect",
 )  # fmt: skip
 OF_MARKERS = (
     "recipe_path", "winds", "axis", "north", "offset", "sensor", "zone", "accept", "material", "density_uncertainty",
@@ -30,7 +30,7 @@ OF_MARKERS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Given:
-    """What the command line says of films; see `flagdata calibrate` for all but `area_weight`."""
+    """What the command line says of films; see `flagdata calibrate` for all but `area_weight` and `suspect`."""
 
     flag_size: str | None
     attachment: str
@@ -46,6 +46,7 @@ class Given:
     cache: Path | None
     log: str | None
     clock_offset: Stated | None
+    suspect: str | None
 
 
 def film_options(command: _Command) -> _Command:
@@ -78,6 +79,9 @@ def film_options(command: _Command) -> _Command:
                      help="Of films: simulated flags of the base model for each recording."),
         click.option("--cache", type=LocalPath(), metavar="FOLDER",
                      help="Of films: where simulations are kept; by default the user's cache folder."),
+        click.option("--suspect", metavar="EFFECT[+|-]",
+                     help="Of films: an effect that was suspected before they were looked at, as in lift or "
+                     "vertical-wind-; it alone is tested for, in that direction, and seen where it is weaker."),
     )  # fmt: skip
 
     @functools.wraps(command)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from flagdata.errors import UnknownNameError, UsageError
 from flagdata.tables import Range, Scale
 from measure.calibrate.prior import Uncertain
 from measure.calibrate.simulation import Flag
@@ -46,6 +47,52 @@ class Weighable:
         )  # fmt: skip
 
 
+@dataclass(frozen=True, kw_only=True)
+class Suspicion:
+    """An effect that is suspected before recordings are looked at.
+
+    Attributes:
+        name: effect.parameter.
+        sign: 1 for more of it, −1 for less.
+        words: as the user gave it, with the sign.
+    """
+
+    name: str
+    sign: int
+    words: str
+
+    @classmethod
+    def parse(cls, text: str, flag: Flag) -> Suspicion:
+        """From `lift`, `vertical-wind-` or `tilted-pole.lean+`.
+
+        Raises:
+            UnknownNameError: no effect that is weighed for the flag.
+            UsageError: an effect of several strengths, or of two signs without one, or one that has no such sign.
+        """
+        sign = {"+": 1, "-": -1}.get(text[-1:], 0)
+        wanted = text[:-1] if sign else text
+        weighed = {one.name: one for one in weighable(flag)}
+        found = [own for name, own in weighed.items() if wanted in (name, own.column.effect)]
+        if not found:
+            effects = dict.fromkeys(own.column.effect for own in weighed.values())
+            raise UnknownNameError.of("effect", wanted, [*effects, *weighed], where=WHERE)
+        if len(found) > 1:
+            each = " or ".join(one.name for one in found)
+            raise UsageError(f"{wanted} has several strengths", where=WHERE, fix=f"suspect one of them: {each}")
+        (one,) = found
+        if one.low > 0 and sign < 0:
+            raise UsageError(f"{wanted} cannot be less than none", where=WHERE, fix=f"give {wanted} without the sign")
+        if one.low < 0 and not sign:
+            raise UsageError(
+                f"{wanted} may be above or below {one.column.described.null:g}", where=WHERE,
+                fix=f"give the sign that is suspected, {wanted}+ or {wanted}-",
+            )  # fmt: skip
+        sign = sign or 1
+        return cls(name=one.name, sign=sign, words=f"{wanted}{'+' if sign > 0 else '-'}")
+
+
+WHERE = "--suspect"
+"""Where a suspicion is given."""
 _RANGES: dict[str, tuple[float, float]] = {
     "power-law-drag.exponent": (-0.5, 0.8),
     "tangential-linear-drag.coefficient": (0.03, 1.5),

@@ -42,6 +42,8 @@ class Response:
         inverse: (ZᵀZ)⁻¹ (3, 3).
         residual: r, the variance of pairs about the regression [base model's variance].
         excess: c [base model's variance].
+        expected: mean size of the pairs' strengths, in the effect's unit.
+        change: (k,) mean change by them, upwards: of pairs with a strength below null the opposite.
     """
 
     effect: Weighable
@@ -50,6 +52,8 @@ class Response:
     inverse: Floats
     residual: float
     excess: float
+    expected: float
+    change: Floats
 
     def features(self, strength: Floats, weight: Floats) -> Floats:
         """z (n, 3) at strengths beyond null (n,) and area weights (n,) [kg/m²]."""
@@ -121,6 +125,7 @@ def responded(
         effect=effect, logarithmic=logarithmic, coefficients=coefficients, inverse=inverse,
         residual=float(np.square(missed).sum() / (max(len(z) - z.shape[1], 1) * missed.shape[1])),
         excess=max(0.0, float((np.square(off + missed) / fresh).mean() - (np.square(off) / fitted).mean())),
+        expected=float(np.abs(strengths).mean()), change=(np.sign(strengths)[:, None] * change).mean(axis=0),
     )  # fmt: skip
 
 

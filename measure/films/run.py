@@ -25,19 +25,20 @@ from measure.calibrate.calibrate import Options as Calibrating
 from measure.calibrate.observed import Observed, constant_wind
 from measure.calibrate.prior import CLOTH, Floats
 from measure.calibrate.scatter import TAKEN_APART
-from measure.calibrate.simulation import OBSERVED
+from measure.films.departures import Departure, departures, root_mean_square
 from measure.films.evidence import Fit, Sight, quantiles
 from measure.films.judge import Judged, judge
-from measure.films.library import Weighable, weighable
+from measure.films.library import Suspicion, Weighable, weighable
+from measure.films.score_test import score
 from measure.films.sensitivity import SEEN, sensitivity
-from measure.films.simulations import Simulations, gathered, of_nulls, of_recordings, sight
-from measure.films.statement import Departure, stated
+from measure.films.simulations import Simulations, gathered, of_base, of_nulls, of_recordings, sight
+from measure.films.statement import stated
 from measure.films.unseen import compared
-from measure.films.weigh import Weighing, fitted, hypothesis, weigh
+from measure.films.weigh import Weighing, directions, expected, fitted, hypothesis, misfits, weigh
 from measure.forecasting.setting import Stage
-from measure.nulls.conformal import GroupedConformal
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Candidate, Conclusion, Estimate, NullTest, Parameter, Verdict
+from measure.verdict.decided import NOT_REJECTED
+from measure.verdict.record import Candidate, Estimate, NullTest, Parameter, Power, Verdict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +51,8 @@ class Options:
         level: of the test.
         kinds: of numerics among null experiments.
         only: names of the effects that are weighed; empty for all.
+        suspected: the effect with its sign that was suspected before the recordings were looked at, along which alone
+            is looked; None to look along all.
 
     Raises:
         UsageError: a level or number that makes no sense, or an effect that is not weighed.
@@ -58,8 +61,9 @@ class Options:
     calibration: Calibrating
     area_weight: tuple[float, float] | None = None
     level: float = CRITERIA.level
-    kinds: int = CRITERIA.simulated_kinds
+    kinds: int = CRITERIA.film_kinds
     only: tuple[str, ...] = ()
+    suspected: Suspicion | None = None
 
     def __post_init__(self) -> None:
         if not 0 < self.level < 1 or self.kinds < CRITERIA.fewest_kinds:
@@ -67,8 +71,8 @@ class Options:
                 f"{self.kinds} kinds of numerics cannot test at a level of {self.level!r}", where="close-loop",
                 fix=f"give a level between 0 and 1, and {CRITERIA.fewest_kinds} kinds or more",
             )  # fmt: skip
-        known = {one.name for one in weighable(self.calibration.flag)}
-        if unknown := set(self.only) - known:
+        known = [one.name for one in weighable(self.calibration.flag)]
+        if unknown := set(self.only) - set(known):
             raise UsageError(f"{', '.join(sorted(unknown))}: not weighed on films", fix=f"give {', '.join(known)}")
 
     @property
@@ -81,6 +85,7 @@ class Options:
         return {
             **self.calibration.recipe(), "area_weight": None if self.area_weight is None else list(self.area_weight),
             "test_level": self.level, "kinds": self.kinds, "only": list(self.only),
+            "suspected": None if self.suspected is None else self.suspected.words,
         }  # fmt: skip
 
 
@@ -94,6 +99,7 @@ class Outcome:
         judged: what was decided.
         base: the base model fitted to the recordings.
         best: the most probable effect's model fitted to them; None where nothing was weighed.
+        departures: of the observables from the base model, the farthest first.
         sensitivity: (effect,) standard errors by which each moves the recordings where it is strong.
         together: whether what is unknown of the cloth was taken as the same in all recordings.
     """
@@ -106,6 +112,7 @@ class Outcome:
     judged: Judged
     base: Fit
     best: tuple[Weighable, Fit] | None
+    departures: tuple[Departure, ...]
     sensitivity: Floats
     together: bool
 
@@ -164,17 +171,22 @@ def solve(
     )
     effects = tuple(one for one in effects if all(one.name in own.model.responses for own in sights))
     null, kinds = of_nulls(sights, recordings, simulations, options.area_weight, seed=seed)
+    model = of_base(sights, recordings, simulations, options.area_weight, seed=seed)
     seen = of_recordings(sights, recordings, options.area_weight)
-    own, nulls = weigh(sights, seen, effects, seed=seed), weigh(sights, null, effects, seed=seed)
-    judged = judge(own, nulls, kinds, level=options.level)
+    scored = score(seen, model, null, kinds, directions(sights, effects, options.suspected), level=options.level)
+    base = fitted(sights, seen, None, seed=seed)
+    departing = departures(recordings, sights, base)
+    own = weigh(sights, seen, effects, seed=seed)
+    judged = judge(
+        own, misfits(sights, null, effects), kinds, scored, level=options.level, departure=root_mean_square(departing)
+    )
     best = None
     if effects:
         first = effects[judged.confident[0]]
         best = first, fitted(sights, seen, first, seed=seed)
-    base = fitted(sights, seen, None, seed=seed)
     return Outcome(
         options=options, recordings=tuple(recordings), simulations=simulations, sights=sights, weighing=own,
-        judged=judged, base=base, best=best,
+        judged=judged, base=base, best=best, departures=departing,
         sensitivity=sensitivity(sights, effects, base, seen),
         together=hypothesis(sights, None).scatter.together,
     )  # fmt: skip
@@ -195,7 +207,11 @@ def verdict_of(outcome: Outcome) -> Verdict:
     verdict = Verdict(
         conclusion=judged.conclusion, named=named, words="", test=_test(outcome), parameters=_parameters(outcome),
         ranking=_ranking(outcome), comparisons=comparisons, residuals=(),
-        provenance={"seed": options.calibration.seed, "code": code_version(), "options": options.recipe()},
+        provenance={
+            "seed": options.calibration.seed, "code": code_version(), "criteria": CRITERIA.as_dict(),
+            "options": options.recipe(),
+        },
+        power=_power(outcome), open=judged.open,
         findings=tuple((f.kind, f.what) for f in outcome.findings if f.severity is not Severity.NOTE),
     )  # fmt: skip
     unseen = [
@@ -203,41 +219,36 @@ def verdict_of(outcome: Outcome) -> Verdict:
     ]
     return stated(
         verdict, outcome.recordings, weighed=options.area_weight is not None, unseen=tuple(dict.fromkeys(unseen)),
-        departing=departing(outcome),
+        departing=tuple(one for one in outcome.departures if abs(one.deviations) >= SEEN),
     )  # fmt: skip
 
 
-def departing(outcome: Outcome) -> tuple[Departure, ...]:
-    """Of each recording the observables' means that depart from those of the base model fitted to it, by two standard
-    deviations of replicates or more, the farthest first."""
-    found = []
-    cloth, places, _ = hypothesis(outcome.sights, None).values(outcome.base.scores[0])
-    for one, own, place in zip(outcome.recordings, outcome.sights, places, strict=True):
-        mean, _ = own.model.predict({**cloth, **place})
-        off = one.summary[own.model.used] - outcome.base.weights[0] @ mean
-        for column, size, sigma in zip(
-            np.flatnonzero(own.model.used).tolist(), off, own.model.base.deviations, strict=True
-        ):
-            if column < len(OBSERVED) and abs(size) >= SEEN * sigma:
-                found.append(
-                    Departure(
-                        recording=one.name, observable=OBSERVED[column], off=float(size), deviations=float(size / sigma)
-                    )
-                )  # fmt: skip
-    return tuple(sorted(found, key=lambda one: -abs(one.deviations)))
-
-
 def _test(outcome: Outcome) -> NullTest:
-    judged, level = outcome.judged, outcome.options.level
-    conformal, statistic = judged.conformal, judged.statistic
-    low, high = conformal.interval(statistic, level=CRITERIA.interval)
+    scored, level, suspected = outcome.judged.scored, outcome.options.level, outcome.options.suspected
+    nulls, statistic = scored.nulls, scored.statistic
+    low, high = nulls.interval(statistic, level=CRITERIA.interval)
     return NullTest(
-        statistic=statistic, null=conformal.null.tolist(), kinds=conformal.count, level=level,
-        p_value=Estimate(value=judged.p_value, low=low, high=high, unit="1", level=CRITERIA.interval),
-        critical=conformal.critical(level), open=low <= level <= high,
-        settling=conformal.settling(statistic, at=level, level=CRITERIA.interval) if low <= level <= high else None,
-        nulls=f"{len(conformal.null)} flags of {conformal.count} meshes and methods in the same minutes of wind, over "
+        statistic=statistic, null=nulls.null.tolist(), kinds=nulls.count, level=level,
+        p_value=Estimate(value=scored.p_value, low=low, high=high, unit="1", level=CRITERIA.interval),
+        critical=nulls.critical(level), open=low <= level <= high,
+        settling=nulls.settling(statistic, at=level, level=CRITERIA.interval) if low <= level <= high else None,
+        effective=nulls.effective, correlation=nulls.correlation, tail=nulls.tail(statistic),
+        suspected="" if suspected is None else suspected.words,
+        nulls=f"{len(nulls.null)} flags of {nulls.count} meshes and methods in the same minutes of wind, over "
         "the priors of cloth, view and anemometer",
+    )  # fmt: skip
+
+
+def _power(outcome: Outcome) -> tuple[Power, ...]:
+    """Of each effect, the surest first."""
+    effects, power = outcome.weighing.effects, outcome.judged.scored.power
+    return tuple(
+        Power(
+            effect=effects[place].column.effect, parameter=effects[place].column.parameter,
+            strength=expected(outcome.sights, effects[place]), unit=effects[place].column.unit,
+            share=float(power[place]),
+        )
+        for place in np.argsort(-power, kind="stable").tolist()
     )  # fmt: skip
 
 
@@ -287,22 +298,18 @@ def strength_of(outcome: Outcome, effect: Weighable, fit: Fit) -> Estimate:
 
 
 def _ranking(outcome: Outcome) -> tuple[Candidate, ...]:
-    judged, own, nulls = outcome.judged, outcome.weighing, outcome.judged.nulls
+    judged, own = outcome.judged, outcome.weighing
     seen = of_recordings(outcome.sights, outcome.recordings, outcome.options.area_weight)
-    if not own.effects:
-        return ()
-    largest = GroupedConformal(null=nulls.factors.max(axis=1), kinds=judged.conformal.kinds)
     made = []
     for place in np.argsort(-judged.probability).tolist():
         effect = own.effects[place]
         fit = fitted(outcome.sights, seen, effect, seed=outcome.options.calibration.seed)
-        factor = float(own.factors[0, place])
-        alone = GroupedConformal(null=nulls.factors[:, place], kinds=judged.conformal.kinds)
         made.append(
             Candidate(
                 effect=effect.column.effect, parameter=effect.column.parameter,
-                strength=strength_of(outcome, effect, fit), z=float("nan"), p_value=alone.p(factor),
-                p_family=largest.p(factor), gain=factor, gain_error=float("nan"), behind=0.0,
+                strength=strength_of(outcome, effect, fit), z=float(judged.scored.z[place]),
+                p_value=float(judged.scored.alone[place]), p_family=float(judged.scored.family[place]),
+                gain=float(own.factors[0, place]), gain_error=float("nan"), behind=0.0,
                 leftover=float(judged.leftover[place]), null=effect.column.described.null,
                 probability=float(judged.probability[place]), why_not=_why_not(outcome, place),
             )
@@ -314,7 +321,7 @@ def _why_not(outcome: Outcome, place: int) -> str:
     judged = outcome.judged
     if place in judged.named:
         return ""
-    if judged.conclusion in (Conclusion.UNTESTED, Conclusion.SUFFICIENT):
+    if judged.conclusion in NOT_REJECTED:
         return "the base model is not rejected"
     if judged.leftover[place] <= outcome.options.level:
         return "what remains with it is larger than in null experiments"

@@ -191,9 +191,41 @@ def of_nulls(
         found.append(summaries.reshape(len(seen), -1)[:, one.model.used])
     whole = np.all([np.isfinite(own).all(axis=1) for own in found], axis=0)
     made = Experiments(summaries=tuple(own[whole] for own in found))
-    if weighed is not None:
-        mean, sigma = weighed
-        share = sigma / mean
-        drawn = stream(seed, "films", "scale").standard_normal(len(whole))
-        made = replace(made, stated=(simulations.weights * np.exp(share * drawn))[whole], sigma=share)
-    return made, simulations.kinds[whole]
+    return _weighed(made, simulations.weights, whole, weighed, seed=seed, what="scale"), simulations.kinds[whole]
+
+
+def of_base(
+    sights: Sequence[Sight],
+    recordings: Sequence[Observed],
+    simulations: Simulations,
+    weighed: tuple[float, float] | None,
+    *,
+    seed: int,
+) -> Experiments:
+    """The base model's simulations with errors of numerics, of pixels and of the scale, those that show all. A cloth is
+    the same in all recordings."""
+    found = [
+        with_errors(own, base, seed=design.seed)[:, one.model.used]
+        for one, own, base, design in zip(sights, recordings, simulations.base, simulations.designs, strict=True)
+    ]
+    whole = np.all([np.isfinite(own).all(axis=1) for own in found], axis=0)
+    made = Experiments(summaries=tuple(own[whole] for own in found))
+    weights = simulations.designs[0].values()["area_weight"]
+    return _weighed(made, weights, whole, weighed, seed=seed, what="scale of the base model")
+
+
+def _weighed(
+    made: Experiments, weights: Floats, which: NDArray[np.bool_], weighed: tuple[float, float] | None, *, seed: int,
+    what: str,
+) -> Experiments:  # fmt: skip
+    """Experiments with their area weights as a scale reads them that is as good as the one of the recordings' cloth.
+
+    Args:
+        weights: (n,) of all that were simulated [kg/m²].
+        which: (n,) of them the experiments are of.
+    """
+    if weighed is None:
+        return made
+    share = weighed[1] / weighed[0]
+    read = weights * np.exp(share * stream(seed, "films", what).standard_normal(len(weights)))
+    return replace(made, stated=read[which], sigma=share)

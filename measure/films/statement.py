@@ -3,34 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from measure.calibrate.observed import Observed, constant_wind
+from measure.films.departures import Departure
 from measure.observables import OBSERVABLES
 from measure.report.lead import lead
 from measure.report.sentences import listed
+from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.quantity import number
 from measure.verdict.record import Conclusion, Verdict
 
-_NOTHING_MISSING = (Conclusion.SUFFICIENT, Conclusion.UNTESTED)
 _MOST = 4
 """Observables that are named."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Departure:
-    """An observable's mean beside that of the base model as calibrated.
-
-    Attributes:
-        recording, observable: which.
-        off: observed less predicted, in the observable's unit.
-        deviations: the same in standard deviations of replicates.
-    """
-
-    recording: str
-    observable: str
-    off: float
-    deviations: float
 
 
 def stated(
@@ -46,7 +31,7 @@ def stated(
     """
     return replace(
         verdict, words=lead(verdict), assumptions=assumptions(recordings, weighed=weighed, unseen=unseen),
-        proposal=missing(departing) if verdict.conclusion not in _NOTHING_MISSING else "",
+        proposal=missing(departing) if verdict.conclusion not in NOT_REJECTED else "",
         separating=separating(verdict, weighed=weighed),
     )  # fmt: skip
 

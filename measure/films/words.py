@@ -6,8 +6,9 @@ import textwrap
 from collections.abc import Iterator
 
 from measure.report import sentences
+from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.quantity import estimate_text, known, level_text, number, probability, share, with_level
-from measure.verdict.record import Candidate, Comparison, Conclusion, Verdict
+from measure.verdict.record import Candidate, Comparison, Verdict
 
 _WIDTH = 100
 _RUNNERS_UP = 3
@@ -43,6 +44,8 @@ def _items(verdict: Verdict) -> Iterator[tuple[str, str]]:
     yield "", sentences.heading(verdict)
     yield "", verdict.words
     yield "test", " ".join([sentences.test_sentence(verdict), sentences.test_remark(verdict.test)]).strip()
+    if power := sentences.power_text(verdict):
+        yield "power", power
     for candidate in sentences.named_candidates(verdict):
         yield (
             sentences.candidate_title(verdict, candidate),
@@ -53,7 +56,7 @@ def _items(verdict: Verdict) -> Iterator[tuple[str, str]]:
     for parameter in verdict.parameters:
         moved = f" → {with_level(parameter.after)}" if parameter.after is not None else ""
         yield parameter.name.replace("_", " "), f"{with_level(parameter.before)}{moved}"
-    if verdict.conclusion is not Conclusion.SUFFICIENT:
+    if verdict.conclusion not in NOT_REJECTED:
         for candidate in sentences.rejected(verdict)[:_RUNNERS_UP]:
             yield f"not {sentences.candidate_title(verdict, candidate)}", candidate.why_not
     if verdict.separating:

@@ -55,6 +55,7 @@ from measure.probes.lines import Line
 from measure.probes.statistics import Projection, Statistics, projected
 from measure.probes.wind_log import lags
 from measure.verdict.criteria import CRITERIA
+from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Verdict
 
 Floats = NDArray[np.float64]
@@ -158,7 +159,7 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
         evidence = fits.whitened.evidence(fits.whitened.found)
     set_up = SetUp(tolerance=setting.tolerance, attached=hoist_stands_still(setting.experiment))
     judgement, refits = judge(evidence, reference, level=options.level, set_up=set_up), dict[int, Refit | None]()
-    if judgement.conclusion not in (Conclusion.SUFFICIENT, Conclusion.UNTESTED):
+    if judgement.conclusion not in NOT_REJECTED:
         report("before and after", 0, 1)
         while new := [column for column in finalists(judgement) if column not in refits]:
             refits |= refit(fits, reference, new, workers=options.workers)

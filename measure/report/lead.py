@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 
 from measure.loop.selection import heterogeneous
-from measure.nulls.conformal import kinds_needed
 from measure.report.sentences import (
     candidate_title,
     contradicted,
+    erring_text,
     heading,
     listed,
     named_candidates,
     readable,
     shortened,
 )
+from measure.verdict.decided import erring
 from measure.verdict.quantity import known, number, probability, with_level
 from measure.verdict.record import Candidate, Conclusion, NullTest, Verdict
 
@@ -26,19 +27,30 @@ _NONE = "little or no"
 def lead(verdict: Verdict) -> str:
     """The sentence."""
     if verdict.conclusion is Conclusion.UNTESTED:
-        kinds = verdict.test.kinds
+        test = verdict.test
         return (
-            f"The base model cannot be tested at level {verdict.test.level:g}: with {kinds} numerical set-ups no p is "
-            f"below {probability(1 / (1 + kinds))}; at least {kinds_needed(verdict.test.level)} are needed."
+            f"The base model cannot be tested at level {test.level:g}: with {test.kinds} numerical set-ups no p is "
+            f"below {probability(test.least)}; at least {test.kinds_needed} are needed."
         )
     if verdict.conclusion is Conclusion.SUFFICIENT and contradicted(verdict):
         return f"{heading(verdict)}."
-    if verdict.conclusion is Conclusion.SUFFICIENT:
-        return (
-            "The base model explains these recordings, no effect is needed; "
-            f"{evidence(verdict.test)} that anything is missing, p = {probability(verdict.test.p_value.value)}."
+    p = f"p = {probability(verdict.test.p_value.value)}"
+    if verdict.conclusion is Conclusion.UNDECIDED:
+        return _closed(
+            f"Nothing is decided: the base model is not rejected, {p}, but {'; '.join(verdict.open)}", verdict
         )
-    return f"{_found(verdict)}; {_strength(verdict)}."
+    if verdict.conclusion is Conclusion.SUFFICIENT:
+        does = "is not rejected" if erring(verdict) else "explains these recordings"
+        return _closed(
+            f"The base model {does}, no effect is needed; {evidence(verdict.test)} that anything is missing, {p}",
+            verdict,
+        )
+    return _closed(f"{_found(verdict)}; {_strength(verdict)}", verdict)
+
+
+def _closed(said: str, verdict: Verdict) -> str:
+    """With where the model that is offered errs, if it does by more than may be called explained."""
+    return ". ".join([said, *([text] if (text := erring_text(verdict)) else [])]) + "."
 
 
 def evidence(test: NullTest) -> str:
@@ -77,15 +89,16 @@ def _found(verdict: Verdict) -> str:
         return "The base model lacks something that no effect of the library explains"
     named = named_candidates(verdict) or [c for c in verdict.ranking if not c.why_not]
     whole = explained(verdict)
+    explains = "removes" if erring(verdict) else "explains"
     if verdict.conclusion is Conclusion.ONE_OF:
         either = " or ".join(shortened([_sized(verdict, one) for one in named]))
-        does = f"explains {whole}" if whole else "explains what the base model lacks"
+        does = f"{explains} {whole}" if whole else f"{explains} what the base model lacks"
         return f"Adding one of {either} {does}; these recordings do not decide which"
     added = listed([_sized(verdict, one) for one in named])
     if verdict.conclusion is Conclusion.PARTLY:
-        does = f"explains {whole}, not all that is missing" if whole else "explains a part of what is missing"
+        does = f"{explains} {whole}, not all that is missing" if whole else f"{explains} a part of what is missing"
         return f"Adding {added} {does}: {_incomplete(verdict)}"
-    return f"Adding {added} explains {whole or 'what the base model lacks'}"
+    return f"Adding {added} {explains} {whole or 'what the base model lacks'}"
 
 
 def _sized(verdict: Verdict, candidate: Candidate) -> str:

@@ -23,6 +23,7 @@ from measure.verdict.record import Conclusion, Estimate, Residual, Verdict
 TONES = {
     Conclusion.UNTESTED: "open",
     Conclusion.SUFFICIENT: "settled",
+    Conclusion.UNDECIDED: "open",
     Conclusion.EFFECT: "settled",
     Conclusion.ONE_OF: "open",
     Conclusion.PARTLY: "open",
@@ -85,8 +86,8 @@ def opening(verdict: Verdict) -> dict[str, Any]:
         "lead": first, "rest": verdict.words.removeprefix(first).strip(),
         "overview": overview(verdict.comparisons, after=after), "after_label": after,
         "has_after": any(quantity.known(c.after) for c in verdict.comparisons),
-        "against": [*sentences.control_warnings(verdict), *sentences.reduction_warnings(verdict),
-                    *(text for _, text in verdict.findings)],
+        "against": [*sentences.error_warnings(verdict), *sentences.control_warnings(verdict),
+                    *sentences.reduction_warnings(verdict), *(text for _, text in verdict.findings)],
         "glossary": GLOSSARY,
     }  # fmt: skip
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from measure.verdict.quantity import display, estimate_text, known, level_text, number, probability, with_level
+from measure.verdict.decided import NOT_REJECTED, erring, times_floor
+from measure.verdict.quantity import display, estimate_text, known, level_text, number, probability, share, with_level
 from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Verdict
 
 CONTRADICTING = ("still-away-from-pins",)
@@ -28,12 +29,34 @@ def heading(verdict: Verdict) -> str:
     partly = f"the base model lacked {named}, and something more" if verdict.named else "something is still missing"
     return {
         Conclusion.UNTESTED: "The base model cannot be tested: there are too few kinds of nulls for the level",
-        Conclusion.SUFFICIENT: "No effect needed: the base model explains these recordings",
+        Conclusion.SUFFICIENT: f"No effect needed: {_suffices(verdict)}",
+        Conclusion.UNDECIDED: "Not decided: the base model is not rejected, and not shown to suffice either",
         Conclusion.EFFECT: f"The base model lacked {named}",
         Conclusion.ONE_OF: f"The base model lacked one of {either}: these recordings do not decide which",
         Conclusion.PARTLY: f"Partly explained: {partly}",
         Conclusion.OUTSIDE: "The base model lacks something that no effect of the library explains",
     }[verdict.conclusion]
+
+
+def _suffices(verdict: Verdict) -> str:
+    """What a base model that is not rejected does: it explains nothing that it errs on."""
+    return "the base model is not rejected" if erring(verdict) else "the base model explains these recordings"
+
+
+def erring_text(verdict: Verdict) -> str:
+    """Where the model that is offered as the answer errs by more than three floors, in a sentence; empty where it does
+    nowhere."""
+    found = erring(verdict)
+    if not found:
+        return ""
+    names = shortened([f"{one.what} by {number(times_floor(one, verdict), digits=2)}" for one in found])
+    model = f"the model {after_label(verdict)}" if verdict.named else "the base model"
+    return f"In floors, {model} errs on {listed(names)}: it does not explain that"
+
+
+def error_warnings(verdict: Verdict) -> list[str]:
+    """The same as a warning."""
+    return [f"{text}." for text in [erring_text(verdict)] if text]
 
 
 def contradicted(verdict: Verdict) -> list[str]:
@@ -53,7 +76,7 @@ def shortened(names: Sequence[str]) -> list[str]:
 
 def after_label(verdict: Verdict) -> str:
     """What the columns "after" are of."""
-    if verdict.conclusion in (Conclusion.UNTESTED, Conclusion.SUFFICIENT):
+    if verdict.conclusion in NOT_REJECTED:
         return "with an effect"
     if not verdict.named:
         return "with the corrective field"
@@ -82,24 +105,67 @@ def test_sentence(verdict: Verdict) -> str:
     if test.critical is None:
         says = "cannot be tested"
     value = "p" if leads_with_p(verdict) else f"p = {probability(p.value)}"
+    along = f" along {test.suspected} alone, suspected before the recordings were looked at," if test.suspected else ""
     return (
-        f"The base model {says} at level {test.level:g}: {as_large(test)} of {len(null)} groups of simulations deviate "
-        f"as much as the recordings (statistic {number(test.statistic)}). {value} is (1 + number of the {test.kinds} "
-        f"numerical set-ups whose simulations deviate as much) / {1 + test.kinds}, a set-up counting by the share of "
-        f"its groups; its sampling interval is [{probability(p.low)}, {probability(p.high)}] {level_text(p.level)}."
+        f"The base model {says}{along} at level {test.level:g}: {as_large(test)} of {len(null)} "
+        f"{'groups of simulations' if test.effective is None else 'null flags'} deviate as much as the recordings "
+        f"(statistic {number(test.statistic)}). {value} is {_counted(test)}; its sampling interval is "
+        f"[{probability(p.low)}, {probability(p.high)}] {level_text(p.level)}.{_tail(test)}"
     )
+
+
+def _counted(test: NullTest) -> str:
+    """How p is counted."""
+    if test.effective is None:
+        return (
+            f"(1 + number of the {test.kinds} numerical set-ups whose simulations deviate as much) / {1 + test.kinds}, "
+            "a set-up counting by the share of its groups"
+        )
+    flags = number(test.effective)
+    return (
+        f"(1 + {flags} × the share of null flags that deviate as much) / (1 + {flags}): so many independent ones are "
+        f"what those of {test.kinds} numerical set-ups count as, since flags of one set-up are correlated by "
+        f"{number(test.correlation, digits=2)}"
+    )
+
+
+def _tail(test: NullTest) -> str:
+    """What the tail of a distribution says beside it; empty where it was not taken."""
+    if test.tail is None:
+        return ""
+    return f" By the tail of Student's t, which extrapolates and decides nothing, it would be {probability(test.tail)}."
 
 
 def test_remark(test: NullTest) -> str:
     """What limits the test; empty where nothing does."""
     if test.critical is None:
         return (
-            f"With {test.kinds} kinds of numerics no p-value below {probability(1 / (1 + test.kinds))} is possible, so "
+            f"With {test.kinds} kinds of numerics no p-value below {probability(test.least)} is possible, so "
             f"that the test could not have rejected the base model at level {test.level:g}."
         )
     if test.p_value.value > test.level:
         return "An effect that is too weak to show in these recordings may still act."
     return ""
+
+
+def power_text(verdict: Verdict) -> str:
+    """How surely effects of their expected strengths are seen, in a sentence; empty where that is not known."""
+    if not verdict.power:
+        return ""
+    each = [
+        f"{title(one.effect, one.parameter)} {number(one.strength, digits=2)}"
+        f"{'' if one.unit == '1' else f' {one.unit}'} with {share(one.share)}"
+        for one in verdict.power
+    ]
+    return f"{power_mean(verdict)}: {', '.join(each)}."
+
+
+def power_mean(verdict: Verdict) -> str:
+    """The same on average, without a full stop."""
+    if not verdict.power:
+        return ""
+    mean = sum(one.share for one in verdict.power) / len(verdict.power)
+    return f"An effect of the strength that is expected of it would be seen with a chance of {share(mean)} on average"
 
 
 def as_large(test: NullTest) -> int:

@@ -50,6 +50,15 @@ class Criteria:
             2.5 ms ends elsewhere than at that of a cloth that is damped more (decision 029).
         near: factor of the level within which p lets more nulls be simulated: of 40 kinds, p is decided by one at 2/41.
         room: share of the squared error before that must lie above the floor, for a reduction to be a share of it.
+        film_kinds: kinds of numerics of eight flags each that are simulated for films, which are counted by flags: 160
+            of them put p of 5 % at the eighth farthest.
+        borderline: factor of the level within which p of a base model that is not rejected leaves it undecided; this
+            and the next two were fixed on 2026-11-28, before any verdict was made by them.
+        departure: root mean square departure of observables from the base model fitted to them, in their scatters,
+            above which it is not said to suffice.
+        least_power: mean chance of seeing an effect of its expected strength below which a base model that is not
+            rejected is not said to suffice.
+        errs: floors by which an observable has to err at most on unseen data, for a model to be said to explain it.
 
     Raises:
         UsageError: a level or share that is not between 0 and 1.
@@ -73,9 +82,14 @@ class Criteria:
     damping_factor: float = 1.1
     near: float = 2.0
     room: float = 0.02
+    film_kinds: int = 20
+    borderline: float = 2.0
+    departure: float = 2.0
+    least_power: float = 0.3
+    errs: float = 3.0
 
     def __post_init__(self) -> None:
-        for name in ("level", "interval", "strength_factor", "room"):
+        for name in ("level", "interval", "strength_factor", "room", "least_power"):
             value = getattr(self, name)
             if not 0 < value < 1:
                 raise UsageError(f"a {name} of {value!r}", where="criteria", fix="give one between 0 and 1")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -12,6 +13,7 @@ class Conclusion(StrEnum):
 
     UNTESTED = "cannot test"
     SUFFICIENT = "no effect needed"
+    UNDECIDED = "not decided"
     EFFECT = "effect"
     ONE_OF = "one of"
     PARTLY = "partly explained"
@@ -149,8 +151,8 @@ class NullTest:
         statistic: observed: how far the farthest column is from nulls' mean, in their standard deviations (see
             `measure.nulls.reference`).
         null: the same of every group of simulated nulls.
-        p_value: (1 + kinds of numerics at least as far)/(kinds + 1), see `measure.nulls.conformal`, with an interval of
-            the share of all kinds that are, by how many were simulated.
+        p_value: (1 + kinds of numerics at least as far)/(kinds + 1), see `measure.nulls.conformal`, or the same of
+            flags, see `effective`, with an interval of the share of all that are, by how many were simulated.
         kinds: of numerics among the nulls.
         level: at which it was judged.
         critical: the statistic beyond which the base model is rejected; None where there are too few kinds for any.
@@ -159,6 +161,12 @@ class NullTest:
             None in documents without it.
         settling: kinds of numerics whose interval would exclude it, if as large a share deviates as much; None where
             the test is not open, or 1,000 would not do.
+        effective: how many independent flags the nulls count as, see `measure.nulls.clustered`; None where kinds are
+            counted.
+        correlation: of flags of one kind, by which it is found.
+        tail: p by the tail of Student's t, beside the one that is counted.
+        suspected: the effect with its sign that was suspected before the recordings were looked at, along which alone
+            was looked; empty where none was.
     """
 
     statistic: float
@@ -170,6 +178,38 @@ class NullTest:
     nulls: str
     open: bool | None = None
     settling: int | None = None
+    effective: float | None = None
+    correlation: float | None = None
+    tail: float | None = None
+    suspected: str = ""
+
+    @property
+    def least(self) -> float:
+        """The smallest p that so many nulls allow."""
+        return 1 / (1 + (self.kinds if self.effective is None else self.effective))
+
+    @property
+    def kinds_needed(self) -> int:
+        """The fewest kinds by which the level can be tested, each as many independent nulls as these."""
+        each = 1.0 if self.effective is None else self.effective / self.kinds
+        return math.ceil((1 / self.level - 1) / each - 1e-9)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Power:
+    """The chance that an effect is seen.
+
+    Attributes:
+        effect, parameter: which.
+        strength: its expected one beyond null, in `unit`.
+        share: of null flags that are beyond the critical value once the effect acts on them so.
+    """
+
+    effect: str
+    parameter: str
+    strength: float
+    unit: str
+    share: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,6 +250,8 @@ class Verdict:
         apart: half misfit of the wrong-effect control less that of what was named, a segment, over all recordings left
             out in turn [nat]; None where no control was run.
         findings: remarks on the data (kind, text).
+        power: on films, of each effect that was weighed; empty on trajectories.
+        open: why nothing was decided, where the base model is not rejected and not said to suffice; empty elsewhere.
         provenance: seed, versions, parents, recipe.
         seconds: wall time.
     """
@@ -227,6 +269,8 @@ class Verdict:
     proposal: str = ""
     apart: Estimate | None = None
     findings: tuple[tuple[str, str], ...] = ()
+    power: tuple[Power, ...] = ()
+    open: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
 

@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from flagdata.rng import child_seed, stream
 from measure.calibrate.design import Design, read
@@ -33,17 +34,19 @@ from measure.calibrate.prior import Floats, Normal, Uncertain
 from measure.calibrate.simulation import Batch, Flag
 from measure.calibrate.wind import Log
 from measure.films.design import TOGETHER, lasting, nulls, pairs
+from measure.films.evidence import Experiments
 from measure.films.judge import Judged, judge
 from measure.films.library import Weighable, weighable
-from measure.films.simulations import Simulations, of_nulls, sight
-from measure.films.weigh import weigh
+from measure.films.score_test import score
+from measure.films.simulations import Simulations, of_base, of_nulls, sight
+from measure.films.weigh import Weighing, directions, weigh
 from sim.effects.anemometer_lag import AnemometerLag
 from sim.wind.spectral import VonKarman
 
 SEED = 20261127
 MEANS = (4.0, 6.5)  # m/s
 DURATION = 30.0  # s
-KINDS = int(os.environ.get("FLAGDATA_LOOP_ON_FILMS_KINDS", "40"))
+KINDS = int(os.environ.get("FLAGDATA_LOOP_ON_FILMS_KINDS", "20"))
 LEVEL = 0.05
 _BEFORE = 64.0  # s
 _INTENSITY, _LENGTH, _RATE = 0.18, 50.0, 10.0  # 1, m, Hz
@@ -137,12 +140,19 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         for one, design, base, own in zip(recordings, made.designs, made.base, made.pairs, strict=True)
     ]
     null, kinds = of_nulls(sights, recordings, made, None, seed=SEED)
-    weighed = weigh(sights, null, effects(), seed=SEED)
+    base = of_base(sights, recordings, made, None, seed=SEED)
+    weighed, along = weigh(sights, null, effects(), seed=SEED), directions(sights, effects(), None)
+
+    def found(own: Experiments, weighing: Weighing, place: int, by: NDArray[np.bool_]) -> Judged:
+        """One experiment judged by some of the null flags. How far it departs from the base model is left out, which
+        moves no rejection."""
+        scored = score(rows_of(own, [place]), base, rows_of(null, by), kinds[by], along, level=LEVEL)
+        others = weighed.misfits.rows(np.flatnonzero(by).tolist())
+        return judge(weighing.rows([place]), others, kinds[by], scored, level=LEVEL, departure=0.0)
+
     rows: list[dict[str, Any]] = []
     for number, kind in enumerate(kinds.tolist()):
-        others = np.flatnonzero(kinds != kind).tolist()
-        found = judge(weighed.rows([number]), weighed.rows(others), kinds[others], level=LEVEL)
-        rows.append(_row(None, 0.0, found))
+        rows.append(_row(None, 0.0, found(null, weighed, number, kinds != kind)))
     for number, effect in enumerate(weighable(FLAG), start=1):
         if effect in effects():
             batches = truths(effect, number)
@@ -153,9 +163,14 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             own = weigh(sights, true, effects(), seed=SEED)
             strengths = stronger(effect, child_seed(SEED, "truths", number))[whole]
             for place, strength in enumerate(strengths.tolist()):
-                rows.append(_row(effect, strength, judge(own.rows([place]), weighed, kinds, level=LEVEL)))
+                rows.append(_row(effect, strength, found(true, own, place, np.ones(len(kinds), dtype=np.bool_))))
     return {"recordings": list(chosen()), "kinds": KINDS, "effects": [one.name for one in effects()],
             **_summary(rows), "rows": rows}  # fmt: skip
+
+
+def rows_of(several: Experiments, which: NDArray[np.bool_] | Sequence[int]) -> Experiments:
+    """Some of several experiments of cloths that were not weighed."""
+    return Experiments(summaries=tuple(own[which] for own in several.summaries))
 
 
 def _row(effect: Weighable | None, strength: float, found: Judged) -> dict[str, Any]:
@@ -163,7 +178,9 @@ def _row(effect: Weighable | None, strength: float, found: Judged) -> dict[str, 
     return {
         "effect": None if effect is None else effect.name, "strength": strength, "p": found.p_value,
         "conclusion": found.conclusion.value, "named": [names[place] for place in found.named],
-        "parts": list(found.parts), "probability": None if effect is None else float(
+        "statistic": found.scored.statistic, "z": found.scored.z.tolist(), "whole": found.scored.whole,
+        "tail": found.scored.nulls.tail(found.scored.statistic), "power": found.scored.power.tolist(),
+        "probability": None if effect is None else float(
             found.probability[names.index(effect.name)]
         ),
     }  # fmt: skip
@@ -173,8 +190,10 @@ def _summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """How often which became of truths without and with an effect."""
     without, true = [one for one in rows if one["effect"] is None], [one for one in rows if one["effect"] is not None]
     rejected = [one for one in true if one["p"] <= LEVEL]
+    by_tail = [one["tail"] <= LEVEL for one in without]
     return {
-        "without": {"count": len(without), "rejected": sum(one["p"] <= LEVEL for one in without)},
+        "without": {"count": len(without), "rejected": sum(one["p"] <= LEVEL for one in without),
+                    "rejected by the tail": sum(by_tail)},
         "with": {
             "count": len(true), "rejected": len(rejected),
             "named alone": sum(one["named"] == [one["effect"]] for one in rejected),

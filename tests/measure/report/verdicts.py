@@ -113,10 +113,11 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
     """Of the kind asked for, on three recordings."""
     rng = np.random.default_rng(4)
     untested = conclusion is Conclusion.UNTESTED
-    sufficient = untested or conclusion is Conclusion.SUFFICIENT
+    sufficient = untested or conclusion in (Conclusion.SUFFICIENT, Conclusion.UNDECIDED)
     named = {
         Conclusion.UNTESTED: (),
         Conclusion.SUFFICIENT: (),
+        Conclusion.UNDECIDED: (),
         Conclusion.EFFECT: ("lift",),
         Conclusion.ONE_OF: ("lift", "shear"),
         Conclusion.PARTLY: ("lift",),
@@ -133,6 +134,7 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
             Conclusion.UNTESTED: "The base model cannot be tested at a level of 0.01 by 20 kinds of numerics.",
             Conclusion.SUFFICIENT: "With its parameters calibrated, the base model predicts all three recordings as "
             "well as it predicts data simulated from itself.",
+            Conclusion.UNDECIDED: "The base model is not rejected, and not shown to suffice.",
             Conclusion.EFFECT: "The air pushes sideways where the base model has only drag: with lift of coefficient "
             "0.62 the model predicts an unseen wind speed as well as it predicts itself.",
             Conclusion.ONE_OF: "Something that grows across the hoist is missing. Lift and shear predict unseen data "
@@ -186,6 +188,7 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
         proposal="The corrective field is tangential and grows as the square of the distance from the pole: f = k u² t."
         if conclusion in (Conclusion.OUTSIDE, Conclusion.PARTLY)
         else "",
+        open=("the observables depart too far",) if conclusion is Conclusion.UNDECIDED else (),
         findings=(("few-frames", "tunnel 4.0 m/s has 250 frames; 3 markers were filled over gaps of 2 frames."),),
         provenance={"seed": 17, "code": "0.1.0+abc1234", "parents": ["3f2a", "91bc"], "recipe": {"hash": "77aa"}},
         seconds=213.4,

@@ -83,7 +83,10 @@ def test_no_threshold_lives_outside_the_criteria() -> None:
     assert found == set()
 
 
-@pytest.mark.parametrize("name", ["loop/selection", "loop/run", "loop/refit", "nulls/conformal"])
+@pytest.mark.parametrize(
+    "name",
+    ["loop/selection", "loop/run", "loop/refit", "nulls/conformal", "nulls/clustered", "verdict/decided"],
+)
 def test_what_decides_compares_with_no_number_of_its_own(name: str) -> None:
     tree = ast.parse((MEASURE / f"{name}.py").read_text(encoding="utf-8"))
     compared = {value for node in ast.walk(tree) if isinstance(node, ast.Compare) for value in numbers(node)}
