@@ -68,7 +68,6 @@ LEAP = "".join(f"Feb 29 12:00:{k:02d} {POLAR[k % 6]}\n" for k in S)
 OF_DAY = "".join(f"12:00:{k:02d} {POLAR[k % 6]}\n" for k in S)
 ELAPSED = "time,wind_speed\n" + "".join(f"{k},{4 + k % 7 / 10}\n" for k in S)
 STRETCHES = "time,wind_speed\n" + "".join(f"{k % 20},{4 + k % 7 / 10}\n" for k in S)
-SITES = rows("time,site,wind_speed (m/s)\n", ISO + ",north,{v}\n" + ISO + ",south,{v}")
 WEATHERLINK = "\t\t\tWind\tWind\nDate\tTime\tTemp\tSpeed\tDir\n" + "".join(
     f"{25 + k}/05/26\t10:30a\t20.1\t{1.6 * k:.1f}\tNNE\n" for k in range(1, 4)
 )
@@ -331,13 +330,26 @@ def test_a_table_that_is_drafted_by_a_remedy_is_read_once_it_is_confirmed(case: 
     user.succeeds(*command, "--accept", re.findall(r"--accept (\w+)", ended.err)[0])
 
 
-def test_a_site_that_a_recipe_names_otherwise_than_the_file_is_named_as_sniff_lists_it(user: User) -> None:
-    (user.folder / "a.csv").write_text(SITES)
-    (user.folder / "FILE.toml").write_text(SITE_RECIPE.format("South"))
-    user.meets("table/table.py", "name a site as the file", "ingest", "a.csv", "--sensor", "FILE.toml")
-    user.follows("ingest", "--sniff", "a.csv", shows="north")
+@pytest.mark.parametrize("sites", [("north", "south"), ("north",)])
+def test_a_site_that_a_recipe_names_otherwise_than_the_file_is_named_as_the_file_writes_it(
+    user: User, sites: tuple[str, ...]
+) -> None:
+    lines = "\n".join(ISO + f",{site},{{v}}" for site in sites)
+    (user.folder / "a.csv").write_text(rows("time,site,wind_speed (m/s)\n", lines))
+    (user.folder / "FILE.toml").write_text(SITE_RECIPE.format("North"))
+    fix = user.types("ingest", "a.csv", "--sensor", "FILE.toml").err.partition("fix: ")[2]
+    assert re.findall("'(.*?)'", fix) == list(sites)
     (user.folder / "FILE.toml").write_text(SITE_RECIPE.format("north"))
-    user.succeeds("ingest", "a.csv", "--sensor", "FILE.toml")
+    user.succeeds("ingest", "a.csv", "--sensor", "FILE.toml", shows="samples +40,")
+
+
+def test_of_many_sites_the_first_are_named(user: User) -> None:
+    lines = "".join(f"2026-05-01T12:00:{k:02d}Z,{letter},5.0\n" for letter in "abcdefghijklmnop" for k in S)
+    (user.folder / "a.csv").write_text("time,site,wind_speed (m/s)\n" + lines)
+    (user.folder / "FILE.toml").write_text(SITE_RECIPE.format("A"))
+    err = user.types("ingest", "a.csv", "--sensor", "FILE.toml").err
+    assert "'a' or 'b'" in err
+    assert "'l', or one of 4 more" in err
 
 
 def test_a_count_that_starts_again_is_read_as_a_file_of_each_stretch(user: User) -> None:
@@ -352,12 +364,31 @@ def test_a_count_that_starts_again_is_read_as_a_file_of_each_stretch(user: User)
         user.follows("ingest", name, *start, f"2026-05-01T1{number}:00:00Z")
 
 
-def test_a_stream_whose_clock_stands_still_is_read_without_its_times(user: User) -> None:
-    (user.folder / "a.nmea").write_text("".join(mwv(1) for _ in S))
-    fixed, steady = ("--platform", "fixed"), ("--start", "2026-05-01T12:00:00Z", "--rate", 1)
-    user.meets("marks.py", "check that the receiver", "ingest", "a.nmea", *fixed)
-    (user.folder / "a.nmea").write_text(TIMELESS)
-    user.follows("ingest", "a.nmea", *fixed, *steady)
+STILL = nmea("GPZDA,120000.00,01,05,2026,00,00") + "\n"
+STREAMS = {
+    "a clock that stands still": STILL.join(mwv(k, time=False) for k in (*S, 0)),
+    "a receiver without a fix": (nmea("GPRMC,,V,,,,,,,,,,N") + "\n").join([TIMELESS] * 3),
+    "no sentence with a time": TIMELESS,
+    "one time": STILL + mwv(1, time=False) * 3,
+}
+"""Streams that do not say when each sentence came."""
+
+
+@pytest.mark.parametrize("name", STREAMS)
+def test_a_stream_without_times_that_go_on_is_read_at_the_rate_at_which_it_came(user: User, name: str) -> None:
+    (user.folder / "a.nmea").write_text(STREAMS[name])
+    fix = user.meets("marks.py", "if its wind came at a steady rate", "ingest", "a.nmea", "--platform", "fixed")
+    assert "column" not in fix
+    user.again("--start", "2026-05-01T12:00:00Z", "--rate", 1, shows="median rate 1 Hz")
+
+
+def test_a_stream_whose_clock_goes_on_later_keeps_its_times(user: User) -> None:
+    still = STILL.join(mwv(k, time=False) for k in range(1100))
+    (user.folder / "a.nmea").write_text(still + "".join(mwv(k) for k in S))
+    steady = ("--start", "2026-05-01T12:00:00Z", "--rate", 1)
+    ended = user.types("ingest", "a.nmea", "--platform", "fixed", *steady)
+    assert ended.code == 2
+    assert "--rate is not used" in ended.err
 
 
 def test_a_log_that_is_hours_off_comes_in_anew_by_the_zone_of_the_other(user: User) -> None:

@@ -41,10 +41,8 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     "not executed yet": (
         ("flagdata/lake/catalog.py", "it lists the refs that c"),
         ("flagdata/ingest/anemometer/samples/rules.py", "name both components, ea"),
-        ("flagdata/ingest/camera/container.py", "give the camera's frame"),
         ("flagdata/ingest/camera/joined.py", "ingest the files by them"),
         ("flagdata/ingest/camera/start.py", "declare its wind (flagda"),
-        ("flagdata/ingest/meshes/checks.py", "are its lengths in metre"),
         ("flagdata/align/bins.py", "check start times and zo"),
         ("flagdata/align/methods.py", "look at it with --plot F"),
         ("flagdata/api/recordings.py", "; look at them with flag"),
@@ -61,7 +59,6 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/ingest/anemometer/formats/described.py", "let its columns be drafted, and conf"),
         ("flagdata/ingest/anemometer/formats/described.py", "mend the line of units;"),
         ("flagdata/ingest/anemometer/formats/described.py", "to read the others, too,"),
-        ("flagdata/ingest/anemometer/formats/marks.py", "if they came at a steady"),
         ("flagdata/ingest/camera/clock.py", "cut the file there and i"),
         ("flagdata/ingest/camera/lerobot.py", "choose one: --episode 0"),
         ("flagdata/ingest/camera/lerobot.py", "choose one: --topic NAME"),
