@@ -9,6 +9,7 @@ from operator import xor
 
 import pytest
 
+from tests.flagdata.ingest.anemometer.test_format_exports import EDDYPRO, eddypro
 from tests.remedies.cases import OR, Case, heal
 from tests.remedies.test_winds import PLAIN, PLAIN_NAKED, RECIPE, STREAM, TIMELESS, ZONED, mwv, nmea, rows
 from tests.remedies.user import User
@@ -62,6 +63,10 @@ HOBO = rows(
 TOA5 = rows(
     '"TOA5","s","CR1000"\n"TIMESTAMP","RECORD","WS_Avg","WindDir_Avg"\n"TS","RN","m/s","degrees"\n"","","Avg","Avg"\n',
     '"2026-05-01 12:{m}:{s}",{k},{v},{d}',
+)
+TWO_SPEEDS = rows(
+    '"TOA5","s","CR1000"\n"TIMESTAMP","RECORD","WS_Avg","WS2_Avg"\n"TS","RN","m/s","m/s"\n"","","Smp","Smp"\n',
+    '"2026-05-01 12:{m}:{s}",{k},{v},{v}5',
 )
 SYSLOG = "".join(f"Feb 28 12:00:{k:02d} {POLAR[k % 6]}\n" for k in S)
 LEAP = "".join(f"Feb 29 12:00:{k:02d} {POLAR[k % 6]}\n" for k in S)
@@ -315,6 +320,23 @@ DRAFTED = [
         ("ingest a.csv --zone UTC --as delimited --columns '2=time,4=wind_speed[m/s]'",),
         files={"a.csv": FLUX},
     ),
+    Case(
+        "formats/described.py",
+        "let its columns be drafted, and conf",
+        "ingest a.dat --zone UTC",
+        ("ingest a.dat --zone UTC --as delimited --columns '1=time,3=wind_speed[m/s]'",),
+        files={
+            "a.dat": TOA5.replace("WS_Avg", "Cups_Avg").replace("WindDir_Avg", "Vane_Avg").replace("degrees", "deg")
+        },
+    ),
+    Case(
+        "formats/described.py",
+        "to read the others, too,",
+        "ingest a.dat --zone UTC",
+        ("ingest a.dat --zone UTC --as delimited --columns '1=time,4=wind_speed[m/s]' --name other",),
+        files={"a.dat": TWO_SPEEDS},
+        untried="--unit",
+    ),
 ]
 
 
@@ -328,6 +350,23 @@ def test_a_table_that_is_drafted_by_a_remedy_is_read_once_it_is_confirmed(case: 
     (command,) = map(shlex.split, case.then)
     ended = user.follows(*command, code=3, shows="repeat the command with --accept")
     user.succeeds(*command, "--accept", re.findall(r"--accept (\w+)", ended.err)[0])
+
+
+def test_units_that_lack_a_cell_are_read_by_the_columns_that_are_named(user: User) -> None:
+    (user.folder / "a.csv").write_text(eddypro([unit for name, unit in EDDYPRO.items() if name != "DOY"]))
+    fix = user.meets("formats/described.py", "mend the line of units;", "ingest", "a.csv", "--zone", "UTC")
+    (columns,) = re.findall(r'--columns "([^"]*)"', fix)
+    command = ("ingest", "a.csv", "--zone", "UTC", "--columns", columns, "--expect", "coarse")
+    ended = user.follows(*command, code=3, shows="--accept")
+    user.succeeds(*command, "--accept", re.findall(r"--accept (\w+)", ended.err)[0])
+
+
+def test_a_component_is_no_speed_and_is_named_with_the_other(user: User) -> None:
+    lines = (f"2026-05-01T12:00:{k:02d}Z,{-2 - k % 7 / 10:.1f},{1 + k % 5 / 10:.1f}\n" for k in S)
+    (user.folder / "a.csv").write_text("time,wind_speed,v\n" + "".join(lines))
+    fix = user.meets("samples/rules.py", "name both components, ea", "ingest", "a.csv", "--sensor", "generic-csv")
+    assert "wind_x[m/s] and wind_y[m/s]" in fix
+    user.follows("ingest", "a.csv", "--columns", "time,wind_x[m/s],wind_y[m/s]", "--azimuth", 270)
 
 
 @pytest.mark.parametrize("sites", [("north", "south"), ("north",)])

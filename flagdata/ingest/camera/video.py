@@ -170,7 +170,7 @@ class VideoSource:
                     fix="choose another with --stream",
                 )
             )  # fmt: skip
-        if telemetry_of(self._container) is not None and self._gps is None:
+        if self._options.start is None and telemetry_of(self._container) is not None and self._gps is None:
             found.append(
                 Finding(
                     kind="telemetry-without-time", severity=Severity.NOTE,
