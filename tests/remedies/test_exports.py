@@ -91,13 +91,30 @@ def gone_meanwhile(patch: pytest.MonkeyPatch, method: str, name: str) -> None:
 
 @pytest.mark.parametrize("verb", ["label", "withdraw"])
 def test_a_row_that_somebody_withdrew_meanwhile_is_not_listed(user: User, verb: str) -> None:
-    module = {"label": "lake/labels.py", "withdraw": "lake/withdrawal.py"}[verb]
-    command = {"label": ("label", "first", "a=1"), "withdraw": ("withdraw", "first", "-m", "x")}[verb]
+    rest = {"label": ("a=1",), "withdraw": ("-m", "x")}[verb]
     with pytest.MonkeyPatch.context() as patch:
         gone_meanwhile(patch, verb, "first")
-        fix = user.meets(module, "give ids of rows that fl", *command)
+        if verb == "label":
+            fix = user.meets("lake/labels.py", "give ids of rows that fl", verb, "first", *rest)
+        else:
+            fix = user.meets("lake/withdrawal.py", "give ids of rows that fl", verb, "first", *rest)
     assert "flagdata ls --at main" in fix
     listed = user.follows("ls", "--at", "main").out
     assert "first" not in listed
     (other,) = (line.split()[0] for line in listed.splitlines() if " mast " in line)
-    user.succeeds(verb, other, *command[2:])
+    user.succeeds(verb, other, *rest)
+
+
+def test_what_is_on_a_branch_that_somebody_deletes_meanwhile_is_not_listed(user: User) -> None:
+    plain = Lake.erase
+
+    def late(lake: Lake, *arguments: Any, **options: Any) -> Any:
+        Lake.open(lake.path).delete_branch("side", discard=True)
+        return plain(lake, *arguments, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Lake, "erase", late)
+        user.meets("lake/erasure.py", "flagdata ls --at REF lis", "withdraw", "third", "--everywhere", "-m", "asked")
+    listed = user.follows("ls", "--at", "main").out
+    (other,) = (line.split()[0] for line in listed.splitlines() if " mast " in line)
+    user.succeeds("withdraw", other, "--everywhere", "-m", "asked")
