@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import av
 import numpy as np
 import pytest
+from av.video.stream import VideoStream
 from PIL import Image
 
 from tests.remedies.cases import OR, Case, heal
@@ -128,7 +131,7 @@ def test_the_rate_of_a_gif_is_given(user: User, pictures: list[Image.Image]) -> 
 def test_a_raw_stream_is_a_film_whose_rate_is_given(user: User, form: tuple[str, str, str]) -> None:
     name, codec, pixels = form
     with av.open(name, "w", format=name.partition(".")[2]) as container:
-        stream = container.add_stream(codec, rate=50, options={"threads": "1"})
+        stream = cast(VideoStream, container.add_stream(codec, rate=50, options={"threads": "1"}))
         stream.height, stream.width, stream.pix_fmt = 48, 64, pixels
         for k in range(30):
             image = av.VideoFrame.from_ndarray(np.full((48, 64), 40 + 3 * k, np.uint8), format="gray")

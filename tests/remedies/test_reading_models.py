@@ -23,7 +23,7 @@ READ = "windows in the answer"
 
 def shown(patch: pytest.MonkeyPatch, *, seed: int, where: Place | None = None) -> None:
     """Let a film show the gusts of a seed, seen from a place."""
-    own = features(gusts(float(SECONDS), seed=seed), **({} if where is None else {"where": where}), seed=seed)
+    own = features(gusts(float(SECONDS), seed=seed), seed=seed, where=where)
     for module in (calibration, measuring):
         patch.setattr(module, "features_of", lambda *_, **__: own)
 
