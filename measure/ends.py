@@ -28,7 +28,7 @@ from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import ndtri
 
 WITHIN = 0.03
 """Share of the range's width that counts as its end, fixed on 2026-11-27 before any film was judged by the rule. A
@@ -136,7 +136,7 @@ def of_profile(
         limits: values that the quantity can have at all.
         larger: by how much standard errors are larger than the misfit says.
     """
-    within = misfit - misfit.min() - larger**2 * float(chi2.ppf(level, 1))  # below 0 inside
+    within = misfit - misfit.min() - (larger * float(ndtri((1 + level) / 2))) ** 2  # below 0 inside
     inside = np.flatnonzero(within <= 0)
     first, last = int(inside[0]), int(inside[-1])
     below, above = first == 0, last == len(values) - 1
