@@ -20,21 +20,27 @@ class Weighed:
 
     Attributes:
         unit: of all numbers.
-        value: the posterior's median; None where the recordings do not determine it.
-        sigma: its standard deviation.
-        interval: at the level.
-        assumed: what was assumed, at the same level.
+        value: the posterior's median; None where the recordings do not determine it, or bound it on one side only.
+        sigma: its standard deviation; None of a bound.
+        interval: at `level`, of a bound with an infinite end or one that the quantity cannot pass.
+        assumed: what was assumed, at the level of the answer.
+        bound: in words, where only a bound is known: "at least 0.41 kg/m²".
+        level: of the interval, or of the bound.
     """
 
     unit: str
     value: float | None
-    sigma: float
+    sigma: float | None
     interval: tuple[float, float]
     assumed: tuple[float, float]
+    bound: str | None = None
+    level: float = 0.9
 
     @property
     def text(self) -> str:
-        """Value, interval and unit; what was assumed where nothing is determined."""
+        """Value, interval and unit, or the bound; what was assumed where nothing is determined."""
+        if self.bound is not None:
+            return f"{self.bound}, {self.level * 100:.3g} %"
         if self.value is None:
             return f"not determined (assumed: {self.assumed[0]:.4g} to {self.assumed[1]:.4g} {self.unit})"
         return f"{self.value:.4g} [{self.interval[0]:.4g}, {self.interval[1]:.4g}] {self.unit}"
@@ -50,7 +56,8 @@ class Calibrated:
         quantities: "area_weight", "bending", "damping" as far as they are known.
         draws: name → (n,) draws of their joint posterior.
         withheld: why no weight is given, where no simulated flag looks like a recording; None where one does.
-        stated: the area weight as `flagdata.measure(area_weight=…)` takes it; None where it is not determined.
+        stated: the area weight as `flagdata.measure(area_weight=…)` takes it; None where it is not determined, or only
+            bounded.
         findings: what a reader has to know.
         document: everything, as `flagdata calibrate --json` writes it.
     """
@@ -69,7 +76,7 @@ class Calibrated:
         """The posterior's median [kg/m²].
 
         Raises:
-            RefusedError: it is withheld, or not determined.
+            RefusedError: it is withheld, not determined, or only bounded.
         """
         found = next(iter(self.quantities.values())).value
         if found is None:

@@ -9,6 +9,8 @@ draws bound the quantity on one side only:
 - *at most*: the same at the lower end;
 - *nothing*: at both ends; the quantity is not constrained.
 
+A profile of a likelihood over a range says the same where it is flat towards an end (`of_profile`).
+
 The bound is the end of the central interval on the other side, which holds with the level (1 + level)/2.
 
 An end of the range can be a limit of the quantity itself: no wind is slower than calm air, no cloth weighs less than
@@ -20,11 +22,13 @@ the limit, nothing lies beyond it, and the mean remains an estimate.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 WITHIN = 0.03
 """Share of the range's width that counts as its end, fixed on 2026-11-27 before any film was judged by the rule. A
@@ -67,11 +71,15 @@ class Span:
             digits: behind the point.
             unit: of a single end, with the space before it.
         """
+        return self.worded(lambda value: f"{value:.{digits}f}", unit)
+
+    def worded(self, number: Callable[[float], str], unit: str = "") -> str:
+        """The same with ends as `number` writes them."""
         if self.bound is Bound.LEAST:
-            return f"at least {self.low:.{digits}f}{unit}"
+            return f"at least {number(self.low)}{unit}"
         if self.bound is Bound.MOST:
-            return f"at most {self.high:.{digits}f}{unit}"
-        return "not constrained" if self.bound else f"[{self.low:.{digits}f}, {self.high:.{digits}f}]"
+            return f"at most {number(self.high)}{unit}"
+        return "not constrained" if self.bound else f"[{number(self.low)}, {number(self.high)}]"
 
     def ends(self) -> list[float | None]:
         """Both ends as JSON values; None for one at infinity."""
@@ -96,20 +104,60 @@ def bound_of(places: NDArray[np.floating]) -> Bound | None:
 
 
 def span(
-    draws: NDArray[np.floating], places: NDArray[np.floating], *, level: float, limits: tuple[float, float],
+    draws: NDArray[np.floating], places: NDArray[np.floating] | None, *, level: float, limits: tuple[float, float],
     assumed: tuple[float, float],
 ) -> Span:  # fmt: skip
     """The interval of a posterior.
 
     Args:
         draws: (n,) of it.
-        places: (m,) in their range of these draws, or of those that they are means of.
+        places: (m,) in their range of these draws, or of those that they are means of; None of a quantity whose
+            range has no ends, as that of a normal prior.
         level: of a central interval.
         limits: values that the quantity can have at all.
         assumed: the range that was simulated.
     """
     low, high = (float(end) for end in np.quantile(draws, [(1 - level) / 2, (1 + level) / 2]))
-    bound = bound_of(places)
+    bound = None if places is None else bound_of(places)
+    return _ended(low, high, bound, level=level, limits=limits, assumed=assumed)
+
+
+def of_profile(
+    values: NDArray[np.floating], misfit: NDArray[np.floating], *, level: float, limits: tuple[float, float],
+    larger: float = 1.0,
+) -> Span:  # fmt: skip
+    """The interval of a profile: values whose misfit is less than the least by the quantile of χ² at the level. Where
+    it still holds at an end of the values, the likelihood is flat towards that end, and only the other end is known.
+
+    Args:
+        values: (n,) ascending, the whole range that was looked at.
+        misfit: (n,) −2 ln likelihood at each, infinite where there is no model.
+        level: of an interval with two ends.
+        limits: values that the quantity can have at all.
+        larger: by how much standard errors are larger than the misfit says.
+    """
+    within = misfit - misfit.min() - (larger * float(ndtri((1 + level) / 2))) ** 2  # below 0 inside
+    inside = np.flatnonzero(within <= 0)
+    first, last = int(inside[0]), int(inside[-1])
+    below, above = first == 0, last == len(values) - 1
+    low = float(values[0]) if below else _crossing(values, within, first - 1)
+    high = float(values[-1]) if above else _crossing(values, within, last)
+    bound = Bound.NOTHING if below and above else Bound.MOST if below else Bound.LEAST if above else None
+    return _ended(low, high, bound, level=level, limits=limits, assumed=(float(values[0]), float(values[-1])))
+
+
+def _crossing(values: NDArray[np.floating], within: NDArray[np.floating], place: int) -> float:
+    """Where a profile crosses zero behind a place: halfway if it is infinite on one side."""
+    before, behind = float(within[place]), float(within[place + 1])
+    share = before / (before - behind) if math.isfinite(before) and math.isfinite(behind) else 0.5
+    return float(values[place] + share * (values[place + 1] - values[place]))
+
+
+def _ended(
+    low: float, high: float, bound: Bound | None, *, level: float, limits: tuple[float, float],
+    assumed: tuple[float, float],
+) -> Span:  # fmt: skip
+    """The interval that is left of a central one where its ends are not known."""
     if bound is None:
         return Span(low=max(low, limits[0]), high=min(high, limits[1]), level=level, bound=None, estimated=True)
     below, above = limits[0] >= assumed[0], limits[1] <= assumed[1]  # the range ends where the quantity does

@@ -185,6 +185,7 @@ def evidence(pair: Pair, options: ClockOptions, *, progress: Progress | None = N
 
     Raises:
         InputError: the wind log holds no wind speed, or nothing to compare.
+        RefusedError: film and log cannot both cover as long a time as is compared.
     """
     search = options.search or LagSearch()
     bins = wind_bins(pair.series())
@@ -195,6 +196,7 @@ def evidence(pair: Pair, options: ClockOptions, *, progress: Progress | None = N
         search, stamp_sigma=math.hypot(search.stamp_sigma, bins.sigma), response=response,
         response_sigma=sigma if options.response_sigma is None else options.response_sigma,
     )  # fmt: skip
+    _check_lengths(pair, bins.average, search)
     motion = pair.motion(progress=progress)
     generator = stream(0, "align", pair.camera.id, pair.wind.id)
     estimate = estimate_offset(motion, bins.average, search=search, generator=generator)
@@ -202,6 +204,19 @@ def evidence(pair: Pair, options: ClockOptions, *, progress: Progress | None = N
     if estimate.accepted:
         line = clock_line(motion, bins.average, estimate, search=search, generator=generator)
     return Evidence(motion=motion, wind=bins.average, estimate=estimate, line=line, response=search.response)
+
+
+def _check_lengths(pair: Pair, wind: WindAverage, search: LagSearch) -> None:
+    """Refuse a film or log that is shorter than what both must cover, before a frame is read."""
+    start, end = pair.span
+    film, log = (end - start) / NANOSECONDS, float(wind.time[-1] - wind.time[0]) / NANOSECONDS + wind.period
+    if min(film, log) < search.overlap - wind.period:
+        raise RefusedError(
+            f"{film:.0f} s of film beside {log:.0f} s of log: an offset is estimated from {search.overlap:g} s or more "
+            "that both cover",
+            where=f"{pair.camera.name} and {pair.wind.name}",
+            fix=f"give a longer film and log, or state the offset: {_GIVEN}",
+        )  # fmt: skip
 
 
 def estimated(pair: Pair, found: Evidence, *, recipe: Mapping[str, Any]) -> Outcome:

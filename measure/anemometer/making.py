@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from flagdata.errors import InputError
 from flagdata.lake import Lake
 from flagdata.lake.results import Placed
 from measure.anemometer.artifact import keep
-from measure.anemometer.calibration import ENOUGH, LEAST, Calibrated, calibrated, recorded
+from measure.anemometer.calibration import ENOUGH, LEAST, Calibrated, Recording, calibrated, recorded
+from measure.calibrate.leaving_out import usable
 from measure.estimate.similarity import FlagSize
-from measure.estimate.source import Reading, network, subjects
+from measure.estimate.source import Reading, Subject, network, subjects
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,7 +59,11 @@ def made(
         InputError, RefusedError: see `recorded` and `calibrated`.
         UsageError, UnknownNameError: nothing of these names.
     """
-    found = [subjects(source, query=None, lake=lake, at=branch, reading=reading)[0] for source in sources]
+
+    def opened(source: str) -> Subject:
+        return subjects(source, query=None, lake=lake, at=branch, reading=reading)[0]
+
+    found, unopened = usable(sources, opened, name=str)
     own = network(model, lake=lake, at=branch)
     seconds = sum(min(one.film.duration, math.inf if last is None else last) - first for one in found)
     if seconds < LEAST:
@@ -71,8 +76,12 @@ def made(
         if advance is not None:
             advance(count)
 
-    recordings = [recorded(one, own, size, first=first, last=last, advance=step) for one in found]
+    def look(one: Subject) -> Recording:
+        return recorded(one, own, size, first=first, last=last, advance=step)
+
+    recordings, unread = usable(found, look, name=lambda one: one.film.name)
     result = calibrated(recordings, network=own, size=size, level=level)
+    result = replace(result, findings=(*unopened, *unread, *result.findings))
     title = name if name is not None else f"{recordings[0].name}-anemometer"
     if lake is None or not commit:
         return Made(name=title, found=result, place=None)

@@ -18,7 +18,7 @@ from flagdata.stated import Stated
 from measure.calibrate.calibrate import Calibration, Options, calibrate
 from measure.calibrate.columns import TIME, Columns, known_columns
 from measure.calibrate.design import FAR
-from measure.calibrate.filmed import of_source
+from measure.calibrate.filmed import Opened, Sources, opened
 from measure.calibrate.known import known
 from measure.calibrate.observed import Observed, cut
 from measure.calibrate.prior import AZIMUTH, ELEVATION
@@ -55,18 +55,28 @@ def calibrated(
         ),
         distance=FAR if distance is None else distance, simulations=simulations, level=level, seed=seed,
     )  # fmt: skip
-    observed: list[Observed] = []
-    for number, one in enumerate(recordings, start=1):
+
+    def name(numbered: tuple[int, Arrays | Path | str]) -> str:
+        number, one = numbered
+        return f"recording {number}" if isinstance(one, Mapping) else str(one)
+
+    def opening(numbered: tuple[int, Arrays | Path | str]) -> Opened:
+        _, one = numbered
         if isinstance(one, Mapping):
-            own = of_arrays(one, name=f"recording {number}")
-            observed += [cut(each, start, end) if each.place is None else each for each in own]
-        else:
-            read, _ = of_source(
-                str(one), size, reading, lake=lake, at=at or "main", first=start, last=end, log=log,
-                offset=None if offset is None else Stated.of(offset),
-            )  # fmt: skip
-            observed += read
-    return _answer(calibrate(observed, options, folder=cache or user_cache() / "calibrate", workers=workers))
+            rows = of_arrays(one, name=name(numbered))
+            cuts = tuple(cut(each, start, end) if each.place is None else each for each in rows)
+            return Opened(name=name(numbered), parent=None, rows=cuts)
+        return opened(
+            str(one), size, reading, lake=lake, at=at or "main", first=start, last=end, log=log,
+            offset=None if offset is None else Stated.of(offset),
+        )  # fmt: skip
+
+    gathered = Sources.of(list(enumerate(recordings, start=1)), opening, name=name).read(size)
+    found = calibrate(
+        gathered.recordings, options, folder=cache or user_cache() / "calibrate", workers=workers,
+        left_out=gathered.left_out,
+    )  # fmt: skip
+    return _answer(found)
 
 
 def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
@@ -92,7 +102,9 @@ def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
 def _answer(found: Calibration) -> Calibrated:
     quantities = {
         one.name: Weighed(
-            unit=one.unit, value=one.value, sigma=one.sigma, interval=one.interval, assumed=one.assumed
+            unit=one.unit, value=one.value, sigma=one.sigma, interval=one.interval, assumed=one.assumed,
+            bound=one.span.worded(lambda value: f"{value:.4g}", f" {one.unit}") if one.bounded else None,
+            level=one.span.level,
         )
         for one in found.cloth
     }  # fmt: skip

@@ -17,15 +17,16 @@ from flagdata.rng import child_seed, stream
 from measure.calibrate import numerics
 from measure.calibrate.design import FAR, Design, simulated
 from measure.calibrate.emulator import Emulator, informative
-from measure.calibrate.observed import Observed, constant_wind
+from measure.calibrate.leaving_out import usable
+from measure.calibrate.observed import Observed, check_in_all, constant_wind
 from measure.calibrate.posterior import Posterior, Sight, posterior, weighed
 from measure.calibrate.prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Floats, Uncertain
 from measure.calibrate.scatter import TAKEN_APART
 from measure.calibrate.simulation import OBSERVED, Flag
-from measure.calibrate.summary import LEAST_IN_ALL, shown
-from measure.observables.observable import WINDOW
+from measure.calibrate.summary import shown
+from measure.ends import PILED, WITHIN, Bound, Span, span
 
-ANSWER = 3
+ANSWER = 4
 """Raised when the same recordings and options get another answer."""
 DETERMINED = 0.8
 """Share of the prior's spread, in ranks, below which a posterior is an answer: above it, it is the prior."""
@@ -37,9 +38,6 @@ _UNLIKE = 0.01
 recordings that are as the model has them one in a hundred."""
 _APART = 2.0
 """σ from which on a summary is named as what is unlike."""
-_NEAR, _LEANS = 0.05, 0.25
-"""Share of a prior next to either end of it, and of the posterior there from which on it leans on that end: five times
-as much as the prior."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,23 +76,36 @@ class Quantity:
 
     Attributes:
         name, unit: as in tables.
-        value: the posterior's median; None where the film does not determine it.
-        sigma: its standard deviation.
-        interval: at the level.
+        value: the posterior's median; None where the film does not determine it, or bounds it on one side only.
+        sigma: its standard deviation; None where it is bounded on one side only.
+        span: the interval at the level, or a bound (`measure.ends`).
         assumed: the prior's interval at the same level.
+        range: the ends of the prior; None of a normal one.
     """
 
     name: str
     unit: str
     value: float | None
-    sigma: float
-    interval: tuple[float, float]
+    sigma: float | None
+    span: Span
     assumed: tuple[float, float]
+    range: tuple[float, float] | None = None
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Its ends, of a bound one at infinity or where the quantity ends."""
+        return self.span.low, self.span.high
+
+    @property
+    def bounded(self) -> bool:
+        """Whether only a bound is known of it, since the posterior piles up where the prior ends."""
+        return self.value is None and self.span.bound in (Bound.LEAST, Bound.MOST)
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON values."""
+        """JSON values; an end of the interval that nothing bounds is null."""
         return {
-            "unit": self.unit, "value": self.value, "sigma": self.sigma, "interval": list(self.interval),
+            "unit": self.unit, "value": self.value, "sigma": self.sigma, "interval": self.span.ends(),
+            "level": self.span.level, "bound": None if self.span.bound is None else self.span.bound.value,
             "assumed": list(self.assumed), "determined": self.value is not None,
         }  # fmt: skip
 
@@ -187,9 +198,16 @@ class Calibration:
 
     @property
     def stated(self) -> str | None:
-        """The area weight as `flagdata measure --area-weight` takes it; None where it is not determined."""
+        """The area weight as `flagdata measure --area-weight` takes it; None where it is not determined or a bound."""
         weight = self.weight
-        return None if weight.value is None else f"{weight.value:.4g}±{weight.sigma:.2g}"
+        if weight.value is None or weight.sigma is None:
+            return None
+        return f"{weight.value:.4g}±{weight.sigma:.2g}"
+
+    @property
+    def weighs(self) -> bool:
+        """Whether anything is given of the area weight: a value or a bound."""
+        return self.withheld is None and (self.weight.value is not None or self.weight.bounded)
 
     @property
     def sentence(self) -> str:
@@ -199,6 +217,10 @@ class Calibration:
         windows = sum(len(one.observed.readings) for one in self.recordings)
         if self.withheld is not None:
             return f"area weight: withheld, since no simulated flag looks like {self.withheld}"
+        if weight.bounded:
+            low, high = weight.range or weight.assumed
+            bound = f"{weight.span.phrase(3, ' kg/m²')}, {weight.span.level * 100:.3g} %"
+            return f"area weight {bound}, n = {windows} windows (assumed: {low:.3f} to {high:.3f} kg/m²)"
         if weight.value is None:
             low, high = weight.assumed
             return f"area weight: not determined by {windows} windows (assumed: {low:.3f} to {high:.3f} kg/m²)"
@@ -220,7 +242,7 @@ class Calibration:
                 for one, place in zip(self.recordings, self.places, strict=True)
             ],
             "area_weight_stated": self.stated, "withheld": self.withheld,
-            "close_loop": None if weight.value is None else {
+            "close_loop": None if weight.value is None or weight.sigma is None else {
                 "density": weight.value, "density-uncertainty": weight.sigma / weight.value
             },
             "check": self.check.as_dict(), "options": self.options.recipe(), "level": self.options.level,
@@ -234,38 +256,36 @@ def calibrate(
     *,
     folder: Path,
     workers: int = 1,
+    left_out: Sequence[Finding] = (),
     advance: Callable[[int], object] | None = None,
 ) -> Calibration:
     """Weigh the cloth of one flag.
 
     Args:
         recordings: of it, each cut to what is to be used.
+        left_out: a warning for each recording of it that cannot be used.
         folder: where simulations are kept.
         workers: processes that simulate.
         advance: called with the number of flags that were simulated or found.
 
     Raises:
-        InputError: see `Observed`, `designs_of` and `Emulator.fit`.
+        InputError: see `Observed` and `designs_of`.
+        RefusedError: see `answered`.
     """
     made: list[tuple[Observed, Mapping[str, Floats], Floats]] = []
     for one, design in zip(recordings, designs_of(recordings, options), strict=True):
         readings = simulated(design, folder=folder, workers=workers, advance=advance)
         made.append((one, design.values(), readings))
-    return answered(made, options)
+    return answered(made, options, left_out=left_out)
 
 
 def designs_of(recordings: Sequence[Observed], options: Options) -> list[Design]:
     """What is simulated for each of several recordings of one cloth.
 
     Raises:
-        InputError: a recording that is given twice, or too few windows in all.
+        InputError: a recording that is given twice, or too short recordings in all.
     """
-    windows = sum(len(one.readings) for one in recordings)
-    if windows < LEAST_IN_ALL:
-        raise InputError(
-            f"{windows * WINDOW:g} s of film with a log beside them", where=", ".join(one.name for one in recordings),
-            fix=f"give {LEAST_IN_ALL * WINDOW:g} s or more in all; two minutes are better",
-        )  # fmt: skip
+    check_in_all(sum(one.duration for one in recordings), where=", ".join(one.name for one in recordings))
     names = [f"{one.source} {one.name} {one.first:g}" for one in recordings]
     twice = [one.name for place, one in enumerate(recordings) if names[place] in names[:place]]
     if twice:
@@ -304,7 +324,7 @@ class _Simulated:
         """With an emulator fitted to the simulations.
 
         Raises:
-            InputError: see `Emulator.fit`.
+            RefusedError: see `Emulator.fit`.
         """
         one = self.observed
         return Sight(
@@ -313,32 +333,48 @@ class _Simulated:
         )  # fmt: skip
 
 
-def answered(simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats]], options: Options) -> Calibration:
+def answered(
+    simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats]], options: Options, *,
+    left_out: Sequence[Finding] = (),
+) -> Calibration:  # fmt: skip
     """The answer from recordings, each with its simulations' values, name → (simulation,), and their readings
-    (simulation, window, observable).
+    (simulation, window, observable). Those whose simulations do not show what they show are left out.
+
+    Args:
+        left_out: a warning for each recording that is not among them.
 
     Raises:
-        InputError: see `Emulator.fit`.
+        RefusedError: simulations show nothing of any recording, see `informative` and `Emulator.fit`.
+        InputError: too little is left.
     """
-    made = []
-    for one, values, readings in simulations:
-        summaries = with_errors(one, readings, seed=options.seed)
-        looked = np.tile(shown(one.readings), 2 if one.projection.changes else 1)
-        used = informative(values, summaries, looked, name=one.name)
-        made.append(_Simulated(observed=one, values=values, summaries=summaries, used=used))
-    sights = [one.sight(options) for one in made]
+
+    def seen(one: tuple[Observed, Mapping[str, Floats], Floats]) -> tuple[_Simulated, Sight]:
+        observed, values, readings = one
+        summaries = with_errors(observed, readings, seed=options.seed)
+        looked = np.tile(shown(observed.readings), 2 if observed.projection.changes else 1)
+        used = informative(values, summaries, looked, name=observed.name)
+        own = _Simulated(observed=observed, values=values, summaries=summaries, used=used)
+        return own, own.sight(options)
+
+    both, unlike = usable(simulations, seen, name=lambda one: one[0].name)
+    left_out = (*left_out, *unlike)
+    made, sights = [own for own, _ in both], [own for _, own in both]
+    check_in_all(
+        sum(one.observed.duration for one in made), where=", ".join(one.observed.name for one in made),
+        left_out=left_out,
+    )  # fmt: skip
     found = posterior(sights, [one.observed.summary for one in made], seed=options.seed)
     fitted = tuple(
         _fitted(one, sight, found, place, options) for place, (one, sight) in enumerate(zip(made, sights, strict=True))
     )
     calibration = Calibration(
-        options=options, draws=found, recordings=fitted, check=left_out(made, options),
+        options=options, draws=found, recordings=fitted, check=checked(made, options),
         cloth=tuple(quantity(q, found.cloth[q.name], options.level) for q in CLOTH),
         places=tuple(
             tuple(quantity(q, place[q.name], options.level) for q in _placed(options)) for place in found.places
         ),
     )  # fmt: skip
-    findings = _findings(calibration)
+    findings = (*left_out, *_findings(calibration))
     if calibration.withheld is not None:
         calibration = replace(calibration, cloth=tuple(_assumed(q, options.level) for q in CLOTH))
     return replace(calibration, findings=findings)
@@ -355,15 +391,17 @@ def with_errors(observed: Observed, readings: Floats, *, seed: int) -> Floats:
 
 def quantity(about: Uncertain, draws: Floats, level: float) -> Quantity:
     """What draws of the posterior say of a quantity."""
-    tails = [(1 - level) / 2, (1 + level) / 2]
-    low, high = np.quantile(draws, tails).tolist()
-    assumed = about.at(np.array(tails)).tolist()
+    assumed = about.at(np.array([(1 - level) / 2, (1 + level) / 2])).tolist()
     shares = np.linspace(0.0, 1.0, 1001)
     ranks = np.interp(draws, about.at(shares), shares)
     determined = float(ranks.std()) < DETERMINED / math.sqrt(12)
+    # What is not determined has the prior's interval, which has no end where draws pile up.
+    places = ranks if determined and about.ends is not None else None
+    own = span(draws, places, level=level, limits=about.limits, assumed=about.ends or about.limits)
     return Quantity(
-        name=about.name, unit=about.unit, value=float(np.median(draws)) if determined else None,
-        sigma=float(draws.std()), interval=(low, high), assumed=(assumed[0], assumed[1]),
+        name=about.name, unit=about.unit, value=float(np.median(draws)) if determined and own.estimated else None,
+        sigma=float(draws.std()) if own.estimated else None, span=own, assumed=(assumed[0], assumed[1]),
+        range=about.ends,
     )  # fmt: skip
 
 
@@ -372,7 +410,7 @@ def _assumed(about: Uncertain, level: float) -> Quantity:
     return quantity(about, about.at(np.linspace(0.0, 1.0, 1001)), level)
 
 
-def left_out(made: Sequence[_Simulated], options: Options) -> Check:
+def checked(made: Sequence[_Simulated], options: Options) -> Check:
     """Weigh simulations of all recordings together, an eighth at a time, by emulators fitted to the others; of the
     first recording alone where the others are of other cloths."""
     weights = [one.values[CLOTH[0].name] for one in made]
@@ -457,7 +495,7 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
         fix = "give more simulations with --simulations"
         found.append(Finding(kind="narrow-intervals", severity=Severity.WARNING, what=what, fix=fix))
     found.extend(_leaning(calibration))
-    undetermined = [q.name.replace("_", " ") for q in calibration.cloth if q.value is None]
+    undetermined = [q.name.replace("_", " ") for q in calibration.cloth if q.value is None and not q.bounded]
     if undetermined:
         what = f"{', '.join(undetermined)}: the posterior is the prior's, so that no value is given"
         found.append(Finding(kind="not-determined", severity=Severity.NOTE, what=what))
@@ -465,20 +503,19 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
 
 
 def _leaning(calibration: Calibration) -> list[Finding]:
-    """Quantities with a value whose posterior leans on an end of the prior."""
+    """Quantities of which only a bound is known."""
     found = []
-    for about, own in zip(CLOTH, calibration.cloth, strict=True):
-        if own.value is None:
+    for own in calibration.cloth:
+        if not own.bounded or own.range is None:
             continue
-        draws = calibration.draws.cloth[about.name]
-        ends = about.at(np.array([0.0, _NEAR, 1 - _NEAR, 1.0])).tolist()
-        for end, share, side in (
-            (ends[0], float((draws < ends[1]).mean()), "less"), (ends[3], float((draws > ends[2]).mean()), "more"),
-        ):  # fmt: skip
-            if share > _LEANS:
-                what = (
-                    f"{about.name.replace('_', ' ')}: the posterior leans on the end of what is assumed, {end:.3g} "
-                    f"{about.unit}; the flag may have {side}"
-                )
-                found.append(Finding(kind="leans-on-prior", severity=Severity.WARNING, what=what))
+        most = own.span.bound is Bound.MOST
+        what = (
+            f"{own.name.replace('_', ' ')}: {PILED:.0%} of the posterior or more lie within {WITHIN:.0%} of the end of "
+            f"what is assumed, {own.range[0 if most else 1]:.3g} {own.unit}; {'less' if most else 'more'} would look "
+            "the same, so that only a bound is given"
+        )
+        fix = "check the flag's size and where the camera stood" + (
+            ", or weigh a piece of the cloth on a scale" if own is calibration.weight else ""
+        )
+        found.append(Finding(kind="leans-on-prior", severity=Severity.WARNING, what=what, fix=fix))
     return found

@@ -108,8 +108,8 @@ def calibrate(
     `wind`, the logged mean over the row [m/s], or with a --log of the lake; or rows against `wind` alone, each with
     its `duration` [s]. Its other columns are observables by their names (droop, extension, middle-speed, frequency,
     bandwidth, amplitude-up, amplitude-across, area), each perhaps with a unit, as in `droop [deg]`, and with
-    NAME-sigma, what it is off by. Several recordings are of one flag. Where no simulated flag looks like it, no weight
-    is given, and the exit code is 3.
+    NAME-sigma, what it is off by. Several recordings are of one flag; one that cannot be used is
+    left out, with a warning. Where no weight is given, neither a value nor a bound, the exit code is 3.
 
     \b
       flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --azimuth 70±7 --report page.html
@@ -130,7 +130,7 @@ def calibrate(
     from measure.calibrate.artifact import artifact, keep
     from measure.calibrate.calibrate import Options
     from measure.calibrate.calibrate import calibrate as calibrated
-    from measure.calibrate.filmed import of_sources
+    from measure.calibrate.filmed import Sources
     from measure.calibrate.known import known
     from measure.calibrate.page import page
     from measure.calibrate.prior import AZIMUTH, ELEVATION
@@ -146,14 +146,20 @@ def calibrate(
         lake.check_writable()
     size = parse_size(flag_size)
     reading = Reading(crop=box_of(crop), flag=flag, aspect=size.aspect)
+    weighable = None
+    if only != "anemometer":
+        weighable = Sources.open(
+            sources, size, reading, lake=lake, at=branch, first=first, last=last, log=log, offset=offset
+        )
     anemometer = None
     if only != "weight":
         anemometer = _anemometer(
             sources, size, reading, only=only, name=name, model=model, lake=lake, branch=branch, commit=not read_only,
             first=first, last=last, level=level,
         )  # fmt: skip
-    if only == "anemometer" and anemometer is not None:
-        _report(anemometer, report, as_json=as_json)
+    if weighable is None:
+        if anemometer is not None:
+            _report(anemometer, report, as_json=as_json)
         return
     options = Options(
         flag=Flag(length=size.length, height=size.height, attachment=attachment),
@@ -162,15 +168,14 @@ def calibrate(
         distance=distance, simulations=simulations, level=level, seed=seed,
     )  # fmt: skip
     with progress(None, label="observe", unit="window") as advance:
-        observed, parents = of_sources(
-            sources, size, reading, lake=lake, at=branch, first=first, last=last, log=log, offset=offset,
-            advance=advance,
-        )  # fmt: skip
+        gathered = weighable.read(size, advance=advance)
+    observed, parents = gathered.recordings, gathered.parents
     say(announced(simulations * sum(one.duration for one in observed), workers=workers))
     with progress(simulations * len(observed), label="calibrate", unit="flag") as advance:
         found = calibrated(
-            observed, options, folder=(cache or user_cache() / "calibrate"), workers=workers, advance=advance
-        )
+            observed, options, folder=(cache or user_cache() / "calibrate"), workers=workers,
+            left_out=gathered.left_out, advance=advance,
+        )  # fmt: skip
     wanted = None
     if lake is not None and not read_only:
         wanted = placed(lake, artifact(found, reading, parents), branch=branch).artifact.id
@@ -189,7 +194,7 @@ def calibrate(
         document("calibrate", {**found.as_dict(), "artifact": wanted, "anemometer": own})
     else:
         _print(found)
-    if found.withheld is not None:
+    if not found.weighs:
         raise click.exceptions.Exit(RefusedError.exit_code)
 
 
@@ -288,7 +293,11 @@ def _print(found: Calibration) -> None:
     echo(found.sentence)
     for one in found.cloth[1:]:
         row = shown(one)
-        value = f"{row['value']} {row['interval']} {row['unit']}" if row["value"] else "not determined"
+        value = "not determined"
+        if row["value"]:
+            value = f"{row['value']} {row['interval']} {row['unit']}"
+        elif row["bounded"]:
+            value = f"{row['interval']} {row['unit']}, {row['level']}"
         echo(f"{row['name']}: {value} (assumed: {row['assumed']})")
     for recording, place in zip(found.recordings, found.places, strict=True):
         fitted = ", ".join(f"{row['name']} {row['interval']} {row['unit']}".strip() for row in map(shown, place))

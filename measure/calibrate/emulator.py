@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError
+from flagdata.errors import RefusedError
 from flagdata.rng import stream
 from measure.calibrate.prior import CLOTH, Floats, Uncertain
 from measure.refine.metamodel import Metamodel, least
@@ -66,14 +66,14 @@ class Emulator:
             name: of the recording.
 
         Raises:
-            InputError: too few simulations show what the recording shows.
+            RefusedError: too few simulations show what the recording shows.
         """
         used = shown & (np.isfinite(summaries).mean(axis=0) > SHOWN_BY)
         complete = np.asarray(np.isfinite(summaries[:, used]).all(axis=1) & used.any(), dtype=np.bool_)
         x, y = regressors(values)[complete], summaries[complete][:, used]
         needed = least(x.shape[1] + 1, y.shape[1]) + 8
         if len(x) < needed:
-            raise InputError(
+            raise RefusedError(
                 f"{len(x)} of {len(summaries)} simulations show what the film shows, and {needed} are needed",
                 where=name,
                 fix="check --flag-size, --attachment and --azimuth: flags that were simulated so look otherwise; or "
@@ -112,7 +112,7 @@ def informative(
     """(k,) those of the shown summaries that depend on what is regressed on.
 
     Raises:
-        InputError: none does.
+        RefusedError: none does.
     """
     used = shown & (np.isfinite(summaries).mean(axis=0) > SHOWN_BY)
     complete = np.isfinite(summaries[:, used]).all(axis=1)
@@ -121,7 +121,7 @@ def informative(
         return used  # the fit refuses it
     useful = _left_out(x, y) / y.std(axis=0) < INFORMATIVE
     if not useful.any():
-        raise InputError(
+        raise RefusedError(
             "what the film shows does not depend on the cloth in these simulations", where=name,
             fix="give more simulations with --simulations, or windows with more wind",
         )  # fmt: skip

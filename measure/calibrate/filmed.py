@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,7 +15,8 @@ from flagdata.findings import Finding
 from flagdata.lake import Lake
 from flagdata.stated import Stated
 from measure.calibrate.beside import joined
-from measure.calibrate.observed import LONGEST, Excerpt, Observed, check_duration, cut, first_part
+from measure.calibrate.leaving_out import usable
+from measure.calibrate.observed import LONGEST, Excerpt, Observed, check_duration, check_in_all, cut, first_part
 from measure.calibrate.simulation import OBSERVED
 from measure.calibrate.tables import of_table
 from measure.calibrate.wind import Log
@@ -24,6 +27,7 @@ from measure.observables import OBSERVABLES
 from measure.observables.observable import WINDOW
 from measure.observables.watching import watched
 
+S = TypeVar("S")
 _TABLES = (".csv", ".parquet")
 _LOST = 0.2
 """Share of the frames that could not be registered from which on a film is refused."""
@@ -35,32 +39,190 @@ def is_table(source: str) -> bool:
     return path.suffix.lower() in _TABLES and path.is_file()
 
 
-def of_source(
-    source: str, size: FlagSize, reading: Reading, *, lake: Lake | None, at: str, first: float, last: float | None,
-    log: str | None = None, offset: Stated | None = None, advance: Callable[[int], object] | None = None,
-) -> tuple[tuple[Observed, ...], str | None]:  # fmt: skip
-    """What a table or a recording of a lake shows from `first` to `last` [s], and the id of the recording, or of
-    the log beside a table.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Part:
+    """A part of a film with the log beside it, before any of its pictures is read.
 
-    A table of rows against wind is a recording a row, everything else is one.
+    Attributes:
+        film: whole.
+        log: on its clock.
+        source: identity of the film.
+        first, end: of the part [s].
+        findings: on its length.
+    """
+
+    film: ConditionedFilm
+    log: Log
+    source: str
+    first: float
+    end: float
+    findings: tuple[Finding, ...] = ()
+
+    @classmethod
+    def of(cls, film: ConditionedFilm, log: Log, *, source: str, first: float = 0.0, last: float | None = None) -> Part:
+        """From `first` to `last` [s], `LONGEST` at most.
+
+        Raises:
+            InputError: it is too short, or the log does not cover it.
+        """
+        end = min(film.duration, math.inf if last is None else last)
+        findings: tuple[Finding, ...] = ()
+        if end - first > LONGEST + WINDOW:
+            findings, end = (first_part(end - first),), first + LONGEST
+        check_duration(end - first, where=film.name)
+        log.cut(first, end)
+        return cls(film=film, log=log, source=source, first=first, end=end, findings=findings)
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.end - self.first
+
+    def read(self, size: FlagSize, *, advance: Callable[[int], object] | None = None) -> Observed:
+        """What its windows show.
+
+        Args:
+            advance: called with the number of windows that were read.
+
+        Raises:
+            RefusedError: no flag is found, or the camera moves and cannot be steadied.
+        """
+        film, first = self.film, self.first
+        seen = watched(film, size, first=first, last=self.end, advance=advance)
+        findings = (*self.findings, *film.findings())
+        if lost := [one for one in findings if one.kind == "camera-lost" and (one.value or 0.0) > _LOST]:
+            raise RefusedError(
+                f"the camera may move, and cannot be followed: {lost[0].what}", where=film.name,
+                fix="film from a tripod, or choose a part with --start and --end",
+            )  # fmt: skip
+        nothing = [math.nan] * len(OBSERVED)
+        readings = [
+            nothing if window is None else [OBSERVABLES[name].of_film(window).value for name in OBSERVED]
+            for window in seen.windows
+        ]
+        return Observed(
+            name=film.name, source=self.source, first=first, readings=np.array(readings),
+            log=self.log.cut(first, first + len(readings) * seen.seconds),
+            sigma=np.array([OBSERVABLES[name].sigma for name in OBSERVED]), findings=findings,
+            excerpt=Excerpt.of(seen.windows),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Opened:
+    """A source before any of its pictures is read.
+
+    Attributes:
+        name: by which it was asked for.
+        parent: the recording of a lake, or the log beside a table; None where it is neither.
+        part: of a film; None of a table.
+        rows: what a table shows: a recording a row of rows against wind, everything else is one; empty for a film.
+    """
+
+    name: str
+    parent: str | None
+    part: Part | None = None
+    rows: tuple[Observed, ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return sum(one.duration for one in self.rows) if self.part is None else self.part.duration
+
+    def read(self, size: FlagSize, *, advance: Callable[[int], object] | None = None) -> tuple[Observed, ...]:
+        """Its recordings; as `Part.read`."""
+        return self.rows if self.part is None else (self.part.read(size, advance=advance),)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Gathered:
+    """The recordings of one flag that can be used.
+
+    Attributes:
+        recordings: in order.
+        parents: artifacts that they were read from.
+        left_out: a warning for each source that cannot be used.
+    """
+
+    recordings: tuple[Observed, ...]
+    parents: tuple[str, ...]
+    left_out: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sources:
+    """Sources of one flag, opened, of which there is enough to weigh it.
+
+    Attributes:
+        opened: those that can be used as far as that shows without reading pictures.
+        left_out: a warning for each of the others.
+    """
+
+    opened: tuple[Opened, ...]
+    left_out: tuple[Finding, ...]
+
+    @classmethod
+    def open(
+        cls, sources: Sequence[str], size: FlagSize, reading: Reading, *, lake: Lake | None, at: str, first: float,
+        last: float | None, log: str | None = None, offset: Stated | None = None,
+    ) -> Sources:  # fmt: skip
+        """Open sources by their names; as `opened` and `of`."""
+
+        def one(source: str) -> Opened:
+            return opened(source, size, reading, lake=lake, at=at, first=first, last=last, log=log, offset=offset)
+
+        return cls.of(sources, one, name=str)
+
+    @classmethod
+    def of(cls, sources: Sequence[S], opening: Callable[[S], Opened], *, name: Callable[[S], str]) -> Sources:
+        """Open sources and add up how long they are; as `usable`.
+
+        Raises:
+            InputError: all of them together are too short.
+            RefusedError: none of several can be used.
+        """
+        found, left_out = usable(sources, opening, name=name)
+        check_in_all(sum(own.duration for own in found), where=", ".join(own.name for own in found), left_out=left_out)
+        return cls(opened=tuple(found), left_out=left_out)
+
+    def read(self, size: FlagSize, *, advance: Callable[[int], object] | None = None) -> Gathered:
+        """Read them, and leave out what cannot be used; as `Opened.read`."""
+
+        def one(source: Opened) -> tuple[Opened, tuple[Observed, ...]]:
+            return source, source.read(size, advance=advance)
+
+        found, unread = usable(self.opened, one, name=lambda own: own.name)
+        recordings, left_out = tuple(each for _, own in found for each in own), (*self.left_out, *unread)
+        check_in_all(
+            sum(one.duration for one in recordings), where=", ".join(one.name for one in recordings), left_out=left_out
+        )
+        parents = dict.fromkeys(source.parent for source, _ in found if source.parent is not None)
+        return Gathered(recordings=recordings, parents=tuple(parents), left_out=left_out)
+
+
+def opened(
+    source: str, size: FlagSize, reading: Reading, *, lake: Lake | None, at: str, first: float, last: float | None,
+    log: str | None = None, offset: Stated | None = None,
+) -> Opened:  # fmt: skip
+    """A table or a recording of a lake from `first` to `last` [s], before pictures are read.
 
     Args:
         reading: how a film is read.
         log: a wind artifact of the lake, beside a table that has no wind of its own.
         offset: seconds added to the table's clock to reach the log's; None to estimate it.
-        advance: called with the number of a film's windows that were read.
 
     Raises:
         UsageError: a table, and a crop or a flag's number; a film, and a log or an offset; no lake that a log is in.
-        InputError: a film without a log, or a log that does not cover it.
-        FlagdataError: nothing of that name; a film in which no flag is found.
+        InputError: a film without a log, or a log that does not cover it; too short a part.
+        FlagdataError: nothing of that name.
     """
     if is_table(source):
         if reading.crop is not None or reading.flag is not None:
             raise UsageError(
                 "a table of observables has no pictures", where="--crop, --flag", fix="give them to flagdata observe"
             )
-        return _of_table(Path(source), size, lake=lake, at=at, first=first, last=last, log=log, offset=offset)
+        rows, parent = _of_table(Path(source), size, lake=lake, at=at, first=first, last=last, log=log, offset=offset)
+        return Opened(name=source, parent=parent, rows=rows)
     if log is not None or offset is not None:
         raise UsageError(
             "a recording has its log and its clock",
@@ -68,23 +230,8 @@ def of_source(
             fix="give them with a table of observables",
         )
     (subject,) = subjects(source, query=None, lake=lake, at=at, reading=reading)
-    found = of_film(subject, size, first=first, last=last, advance=advance)
-    return (found,), None if subject.artifact is None else subject.artifact.id
-
-
-def of_sources(
-    sources: Sequence[str], size: FlagSize, reading: Reading, *, lake: Lake | None, at: str, first: float,
-    last: float | None, log: str | None, offset: Stated | None, advance: Callable[[int], object] | None = None,
-) -> tuple[list[Observed], tuple[str, ...]]:  # fmt: skip
-    """The recordings of several sources, and the artifacts that they were read from; as `of_source`."""
-    read = [
-        of_source(
-            source, size, reading, lake=lake, at=at, first=first, last=last, log=log, offset=offset, advance=advance
-        )
-        for source in sources
-    ]
-    parents = tuple(dict.fromkeys(parent for _, parent in read if parent is not None))
-    return [one for own, _ in read for one in own], parents
+    part = part_of(subject, first=first, last=last)
+    return Opened(name=source, parent=None if subject.artifact is None else subject.artifact.id, part=part)
 
 
 def _of_table(
@@ -106,15 +253,11 @@ def _of_table(
     return found, parent
 
 
-def of_film(
-    subject: Subject, size: FlagSize, *, first: float, last: float | None,
-    advance: Callable[[int], object] | None = None,
-) -> Observed:  # fmt: skip
-    """The windows of a film whose recording holds a log; the other parameters as for `of_source`.
+def part_of(subject: Subject, *, first: float, last: float | None) -> Part:
+    """The part of a film whose recording holds a log, from `first` to `last` [s].
 
     Raises:
-        InputError: no log beside it, or one that does not cover the film.
-        RefusedError: no flag is found, or the camera moves and cannot be steadied.
+        InputError: no log beside it, or one that does not cover the film; too short a part.
     """
     film, wind = subject.film, None if subject.record is None else subject.record.wind()
     if wind is None or film.start is None:
@@ -124,43 +267,4 @@ def of_film(
         )  # fmt: skip
     clock = None if subject.artifact is None else subject.artifact.clock_sigma
     log = Log.of(wind, start=film.start, clock=clock or 0.0)
-    return with_log(film, log, size, source=subject.identity, first=first, last=last, advance=advance)
-
-
-def with_log(
-    film: ConditionedFilm, log: Log, size: FlagSize, *, source: str, first: float = 0.0, last: float | None = None,
-    advance: Callable[[int], object] | None = None,
-) -> Observed:  # fmt: skip
-    """The windows of a film beside a log on its clock; the other parameters as for `of_source`.
-
-    Args:
-        source: identity of the film.
-
-    Raises:
-        InputError: a log that does not cover it.
-        RefusedError: no flag is found, or the camera moves and cannot be steadied.
-    """
-    end = min(film.duration, math.inf if last is None else last)
-    findings: tuple[Finding, ...] = ()
-    if end - first > LONGEST + WINDOW:
-        findings, end = (first_part(end - first),), first + LONGEST
-    check_duration(end - first, where=film.name)
-    log.cut(first, end)  # refuses before the film is read
-    seen = watched(film, size, first=first, last=end, advance=advance)
-    findings += film.findings()
-    if lost := [one for one in findings if one.kind == "camera-lost" and (one.value or 0.0) > _LOST]:
-        raise RefusedError(
-            f"the camera may move, and cannot be followed: {lost[0].what}", where=film.name,
-            fix="film from a tripod, or choose a part with --start and --end",
-        )  # fmt: skip
-    nothing = [math.nan] * len(OBSERVED)
-    readings = [
-        nothing if window is None else [OBSERVABLES[name].of_film(window).value for name in OBSERVED]
-        for window in seen.windows
-    ]
-    return Observed(
-        name=film.name, source=source, first=first, readings=np.array(readings),
-        log=log.cut(first, first + len(readings) * seen.seconds),
-        sigma=np.array([OBSERVABLES[name].sigma for name in OBSERVED]), findings=findings,
-        excerpt=Excerpt.of(seen.windows),
-    )  # fmt: skip
+    return Part.of(film, log, source=subject.identity, first=first, last=last)

@@ -22,7 +22,7 @@ def known(about: Uncertain, stated: Stated, *, where: str) -> Uncertain:
         raise UsageError(f"{stated.text}°", where=where, fix=f"give degrees from {least:g} to {most:g}, as in 70±7")
     low, high = math.radians(stated.low), math.radians(stated.high)
     if low < high:
-        return replace(about, prior=Range(low=low, high=high), source="stated")
+        return replace(about, prior=Range(low=low, high=high), source="stated", limits=(low, high))
     sigma = math.radians(stated.sigma)
     # An azimuth is to the wind, whose direction is not better known than it is lined up.
     total = math.hypot(sigma, DIRECTION) if about.name == "azimuth" else max(sigma, math.radians(1.0))

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from flagdata.errors import InputError
+from flagdata.errors import InputError, RefusedError
 from flagdata.findings import Finding, Severity
 from measure.calibrate import pixels
 from measure.calibrate.prior import Floats
 from measure.calibrate.simulation import OBSERVED
-from measure.calibrate.summary import LEAST_WINDOWS, SHOWN, Projection, shown
+from measure.calibrate.summary import LEAST_IN_ALL, LEAST_WINDOWS, SHOWN, Projection, shown
 from measure.calibrate.wind import STEADY, Log
 from measure.observables.film import FilmWindow
 from measure.observables.observable import WINDOW
@@ -60,7 +60,8 @@ class Observed:
         excerpt: some of its film; None where there is no film.
 
     Raises:
-        InputError: shapes that disagree, too few windows, or no observable in enough of them.
+        InputError: shapes that disagree, or too few windows.
+        RefusedError: no observable is shown in enough of them.
     """
 
     name: str
@@ -81,7 +82,7 @@ class Observed:
             )
         check_duration(len(self.readings) * WINDOW, where=self.name)
         if not shown(self.readings).any():
-            raise InputError(
+            raise RefusedError(
                 f"no observable could be read in {SHOWN:.0%} of the windows: what is followed may not be the flag",
                 where=self.name,
                 fix="look at the film with flagdata observe --picture, and choose the flag with --crop or --flag",
@@ -160,6 +161,24 @@ def check_duration(seconds: float, *, where: str) -> None:
         raise InputError(
             f"{max(seconds, 0.0):.3g} s of film with a log beside them", where=where,
             fix=f"give {LEAST_WINDOWS * WINDOW:g} s or more; two minutes are better",
+        )  # fmt: skip
+
+
+def check_in_all(seconds: float, *, where: str, left_out: Sequence[Finding] = ()) -> None:
+    """Refuse recordings of one flag that are together too short to weigh it.
+
+    Args:
+        where: their names.
+        left_out: a warning for each of those that do not count.
+
+    Raises:
+        InputError: so they are.
+    """
+    if seconds < LEAST_IN_ALL * WINDOW - 1e-9:
+        without = "".join(f"; {one.what}" for one in left_out)
+        raise InputError(
+            f"{seconds:.3g} s of film with a log beside them{without}", where=where,
+            fix=f"give {LEAST_IN_ALL * WINDOW:g} s or more in all; two minutes are better",
         )  # fmt: skip
 
 

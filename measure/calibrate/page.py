@@ -31,6 +31,7 @@ def page(found: Calibration, provenance: Mapping[str, str], *, sections: Sequenc
     check = found.check
     values = {
         "name": ", ".join(one.observed.name for one in found.recordings), "sentence": found.sentence,
+        "tone": "settled" if found.weight.value is not None else "open" if found.weighs else "missed",
         "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in found.findings],
         "level": f"{found.options.level * 100:.3g} %", "cloth": [shown(q) for q in found.cloth],
         "stated": found.stated, "posterior": None if found.withheld else _posterior(found),
@@ -49,14 +50,17 @@ def page(found: Calibration, provenance: Mapping[str, str], *, sections: Sequenc
 
 
 def shown(one: Quantity) -> dict[str, str]:
-    """A quantity as text: angles in degrees."""
+    """A quantity as text: angles in degrees, and as `interval` what its values can be: both ends, or a bound with its
+    level."""
     turn = 180 / math.pi if one.name in _DEGREES else 1.0
-    (low, high), (least, most) = one.interval, one.assumed
+    least, most = one.assumed
     unit = "" if one.unit == "1" else one.unit
+    known = one.span.worded(lambda value: f"{value * turn:.3g}")
     return {
         "name": one.name.replace("_", " "), "unit": "°" if one.name in _DEGREES else unit,
-        "value": "" if one.value is None else f"{one.value * turn:.3g}",
-        "interval": f"[{low * turn:.3g}, {high * turn:.3g}]", "assumed": f"{least * turn:.3g} to {most * turn:.3g}",
+        "value": "" if one.value is None else f"{one.value * turn:.3g}", "bounded": "yes" if one.bounded else "",
+        "interval": known, "level": f"{one.span.level * 100:.3g} %",
+        "assumed": f"{least * turn:.3g} to {most * turn:.3g}",
     }  # fmt: skip
 
 

@@ -57,12 +57,15 @@ class Uncertain:
         unit: SI.
         prior: its distribution.
         source: what the prior is from.
+        limits: values that the quantity can have at all, or that the user states: beyond an end of the prior that lies
+            there is nothing.
     """
 
     name: str
     unit: str
     prior: Range | Normal
     source: str
+    limits: tuple[float, float] = (-math.inf, math.inf)
 
     @property
     def degrees(self) -> str:
@@ -70,6 +73,11 @@ class Uncertain:
         if isinstance(self.prior, Normal):
             return f"{math.degrees(self.prior.mean):.3g} ± {math.degrees(self.prior.sigma):.2g}°"
         return f"{math.degrees(self.prior.low):.3g} to {math.degrees(self.prior.high):.3g}°"
+
+    @property
+    def ends(self) -> tuple[float, float] | None:
+        """Of the prior; None of a normal one."""
+        return None if isinstance(self.prior, Normal) else (self.prior.low, self.prior.high)
 
     def at(self, share: Floats) -> Floats:
         """Values of shares in [0, 1)."""
@@ -81,6 +89,9 @@ class Uncertain:
         return low + (high - low) * share
 
 
+_POSITIVE = (0.0, math.inf)
+
+
 def _log(low: float, high: float) -> Range:
     return Range(low=low, high=high, scale=Scale.LOG)
 
@@ -89,14 +100,16 @@ CLOTH = (
     Uncertain(
         name="area_weight", unit="kg/m²", prior=_log(0.05, 0.45),
         source="flag cloths are sold from 50 g/m² (spun polyester) to 350 g/m² (denim, wool bunting: 150 to 240)",
+        limits=_POSITIVE,
     ),
     Uncertain(
         name="bending", unit="N·m", prior=_log(3e-6, 6e-4),
         source="mean coefficient of the fabrics of Wang et al. 2011, a tenth to ten times, as Runia et al. 2020 search",
+        limits=_POSITIVE,
     ),
     Uncertain(
         name="damping", unit="s", prior=_log(2.5e-4, 4e-2),
-        source="hardly ever measured; what the nulls of verdicts vary it by",
+        source="hardly ever measured; what the nulls of verdicts vary it by", limits=_POSITIVE,
     ),
 )  # fmt: skip
 """What is sought."""

@@ -54,13 +54,13 @@ class Filmed:
             FlagdataError: no flag is found.
         """
         from flagdata.film import CameraFilm
-        from measure.calibrate.filmed import with_log
+        from measure.calibrate.filmed import Part
         from measure.estimate.conditioned import ConditionedFilm
         from measure.estimate.similarity import FlagSize
 
         size = FlagSize(length=self.flag.length, height=self.flag.height)
         return tuple(
-            with_log(ConditionedFilm(CameraFilm(path), aspect=size.aspect), log, size, source=name)
+            Part.of(ConditionedFilm(CameraFilm(path), aspect=size.aspect), log, source=name).read(size)
             for name, (path, log) in self.recordings.items()
         )
 

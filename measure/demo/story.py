@@ -285,9 +285,12 @@ def _cores() -> int:
 
 
 def _contained(found: str, true: float) -> bool | None:
-    """Whether the first interval of a text contains a value; None where it has none."""
-    ends = re.search(r"\[([\d.]+), ([\d.]+)\]", found)
-    return None if ends is None else float(ends[1]) <= true <= float(ends[2])
+    """Whether the first interval or bound of a text contains a value; None where it has none."""
+    ends = re.search(r"\[([\d.]+), ([\d.]+)\]|at least ([\d.]+)|at most ([\d.]+)", found)
+    if ends is None:
+        return None
+    low, high, least, most = ends.groups()
+    return float(low or least or "-inf") <= true <= float(high or most or "inf")
 
 
 def _verdict(text: str) -> str:

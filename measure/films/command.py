@@ -13,7 +13,7 @@ from flagdata.errors import UsageError
 from flagdata.lake import Lake
 from flagdata.stated import Stated
 from measure.calibrate.calibrate import Options as Calibrating
-from measure.calibrate.filmed import of_sources
+from measure.calibrate.filmed import Sources
 from measure.calibrate.known import known
 from measure.calibrate.prior import AZIMUTH, ELEVATION
 from measure.calibrate.simulation import Flag
@@ -75,22 +75,25 @@ def close_films(
         suspected=None if given.suspect is None else Suspicion.parse(given.suspect, flag),
     )  # fmt: skip
     reading = Reading(crop=box_of(given.crop), flag=given.flag, aspect=size.aspect)
+    opened = Sources.open(
+        sources, size, reading, lake=lake, at=branch, first=given.first, last=given.last, log=given.log,
+        offset=given.clock_offset,
+    )  # fmt: skip
     with progress(None, label="observe", unit="window") as advance:
-        read, parents = of_sources(
-            sources, size, reading, lake=lake, at=branch, first=given.first, last=given.last, log=given.log,
-            offset=given.clock_offset, advance=advance,
-        )  # fmt: skip
-    recordings = distinct(read)
+        gathered = opened.read(size, advance=advance)
+    recordings = distinct(gathered.recordings)
     processes = workers or len(os.sched_getaffinity(0))
     say(announced(workload([one.duration for one in recordings], options), workers=processes))
     outcome = solve(
         recordings, options, folder=given.cache or user_cache() / "calibrate", workers=processes, stage=stage_bars(),
     )  # fmt: skip
-    verdict = replace(verdict_of(outcome), seconds=time.monotonic() - begun)
+    verdict = verdict_of(outcome)
+    left_out = tuple((one.kind, one.what) for one in gathered.left_out)
+    verdict = replace(verdict, findings=(*left_out, *verdict.findings), seconds=time.monotonic() - begun)
     called = name or recordings[0].name
     return answer_of(
         verdict, outcome, name=called, models=models(verdict, outcome, name=called), reading=reading.recipe(),
-        parents=parents,
+        parents=gathered.parents,
     )  # fmt: skip
 
 

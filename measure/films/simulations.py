@@ -111,7 +111,7 @@ def sight(
         windows: a part of it, of which means alone are modelled; None for all of it.
 
     Raises:
-        InputError: as `Emulator.fit`.
+        RefusedError: as `Emulator.fit`.
     """
     seen = observed if windows is None else part_of(observed, windows)
     summaries = with_errors(seen, base if windows is None else base[:, windows], seed=design.seed)

@@ -22,13 +22,19 @@ class Conclusion(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """A value with its interval: `value [low, high]` at `level`, in `unit`."""
+    """A value with its interval: `value [low, high]` at `level`, in `unit`.
+
+    Attributes:
+        bound: "at-least" or "at-most" where it is known on one side only: `value` is then that bound, and the other end
+            is infinite or one that the quantity cannot pass; "nothing" where all of the range looks alike.
+    """
 
     value: float
     low: float
     high: float
     unit: str
     level: float = 0.9
+    bound: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -59,6 +59,13 @@ CASES = [
     ),
     Case(
         "align/methods.py",
+        "use --by given --offset SECONDS",
+        "align first mast",
+        ("align first mast --by given --offset 1 --offset-sigma 0.1",),
+        shows="recording",
+    ),
+    Case(
+        "align/methods.py",
         "leave it out, or use --by given",
         "align first mast --offset-sigma 0.1",
         ("align first mast --by given --offset 1 --offset-sigma 0.1",),

@@ -74,7 +74,7 @@ CASES = [
         (JOINED,),
         files={"t.csv": WINDLESS},
         shows="simulating flags",
-        code=1,
+        code=3,
     ),
     Case(
         "calibrate/beside.py",
@@ -219,13 +219,13 @@ def test_windows_with_more_wind_show_the_cloth(user: User, monkeypatch: pytest.M
 @pytest.mark.usefixtures("cheap")
 def test_more_simulations_widen_intervals_that_are_too_narrow(user: User, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is found of simulations left out stands in: few are held of 64."""
-    plain = calibrate.left_out
+    plain = calibrate.checked
 
-    def left_out(made: Any, options: calibrate.Options) -> calibrate.Check:
+    def checked(made: Any, options: calibrate.Options) -> calibrate.Check:
         found = plain(made, options)
         return calibrate.Check(count=found.count, held=found.count * (options.simulations > 100), error=found.error)
 
-    monkeypatch.setattr(calibrate, "left_out", left_out)
+    monkeypatch.setattr(calibrate, "checked", checked)
     (user.folder / "t.csv").write_text(GUSTY)
     user.meets(
         "calibrate/calibrate.py",

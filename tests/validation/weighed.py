@@ -304,7 +304,7 @@ def weigh(
     one = Observed(name=name, source="", readings=found, log=own.log, sigma=sigma)
     answer = answered([(one, own.values(), base)], stated)
     (fitted,), weight = answer.recordings, answer.weight
-    low, high = weight.interval
+    low, high = weight.span.ends()
     return {
         "name": name, "truth": truth["area_weight"], "value": weight.value, "low": low, "high": high,
         "misfit": fitted.misfit, "withheld": answer.withheld, "damping": truth["damping"], "code": truth["code"],
@@ -349,7 +349,7 @@ def score(rows: Sequence[Row]) -> dict[str, Any]:
 def page(sheet: Mapping[str, Any]) -> str:
     """The sheet in Markdown."""
     lines = ["# Simulated flags weighed", "", f"{sheet['seconds']:g} s each.", ""]
-    lines += ["| seen as | flags | weight withheld | median error | in the 90 % interval |", "|---|---|---|---|---|"]
+    lines += ["| seen as | flags | no value | median error | in the 90 % interval |", "|---|---|---|---|---|"]
     for name in ("geometry", "films"):
         own = sheet[name]
         error = "" if own["median_error"] is None else f"{own['median_error']:.1%}"
@@ -361,10 +361,11 @@ def page(sheet: Mapping[str, Any]) -> str:
     left_out = f"Of {check['count']} simulations left out {check['held']} lie in their intervals, median error "
     lines += ["", f"{left_out}{check['median_error']:.1%}.", "", heading, "|---|---|---|---|---|---|---|"]
     for row in (*sheet["geometry"]["flags"], *sheet["films"]["flags"]):
-        found = "withheld" if row["value"] is None else f"{row['value']:.3f}"
+        found = "no value" if row["value"] is None else f"{row['value']:.3f}"
+        low, high = ("" if row[end] is None else f"{row[end]:.3f}" for end in ("low", "high"))
         misfit = "" if row["misfit"] is None else f"{row['misfit']:.2g}"
         lines.append(
             f"| {row['name']} | {row['code']} | {row['damping'] * 1e3:.2f} | {row['truth']:.3f} | {found} | "
-            f"{row['low']:.3f} to {row['high']:.3f} | {misfit} |"
+            f"{low} to {high} | {misfit} |"
         )
     return "\n".join(lines) + "\n"

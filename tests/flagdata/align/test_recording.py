@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from flagdata.align.recording import Pair
 from flagdata.cli import root
 from flagdata.errors import ConflictError, RefusedError, UsageError
 from flagdata.lake import Artifact, Lake
@@ -181,6 +182,18 @@ def test_stamps_of_whole_seconds_add_their_own_uncertainty(gusty: tuple[Path, st
     said = run("align", camera, wind, "--by", "stamps", "--offset-sigma", "0.4", "--dry-run", "--lake", str(folder))
     assert said["recording"] is None
     assert said["clock"]["sigma"] == pytest.approx(np.hypot(0.4, 1 / np.sqrt(12)))  # type: ignore[index]
+
+
+def test_a_film_shorter_than_what_is_compared_is_refused_before_a_frame_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    camera, wind = fill(lake, steady=False, seconds=100)
+    monkeypatch.setattr(Pair, "motion", lambda *_, **__: pytest.fail("frames are read"))
+    with pytest.raises(RefusedError, match="100 s of film beside 300 s of log") as refused:
+        run("align", camera, wind, "--lake", str(lake.path))
+    assert "is estimated from 120 s or more that both cover" in refused.value.what
+    assert refused.value.exit_code == 3
 
 
 def test_a_steady_wind_is_refused_and_nothing_is_committed(tmp_path: Path) -> None:

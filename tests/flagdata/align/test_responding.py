@@ -12,6 +12,7 @@ from flagdata.align import methods
 from flagdata.align.lag import LagSearch
 from flagdata.align.methods import ClockOptions, Method, evidence, responding
 from flagdata.errors import UsageError
+from flagdata.timebase import NANOSECONDS
 
 
 @pytest.mark.parametrize(
@@ -44,11 +45,14 @@ def test_what_the_user_states_counts(
         searched.append(search)
         return SimpleNamespace(accepted=False)
 
-    average = SimpleNamespace(speed=np.array([2.0, 4.0]))
+    times = np.array([0, 150]) * NANOSECONDS
+    average = SimpleNamespace(speed=np.array([2.0, 4.0]), time=times, period=1.0)
     monkeypatch.setattr(methods, "wind_bins", lambda series: SimpleNamespace(average=average, sigma=0.1))
     monkeypatch.setattr(methods, "estimate_offset", estimate)
     named = SimpleNamespace(id="a")
-    pair = SimpleNamespace(series=lambda: None, motion=lambda progress: None, camera=named, wind=named)
+    pair = SimpleNamespace(
+        series=lambda: None, motion=lambda progress: None, camera=named, wind=named, span=times.tolist()
+    )
     found = evidence(cast(Any, pair), ClockOptions(**cast(Any, stated)))
     assert (searched[0].response, searched[0].response_sigma) == pytest.approx(expected)
     assert found.response == pytest.approx(expected[0])

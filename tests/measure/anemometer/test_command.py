@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter
 from flagdata.schema import Kind
 from flagdata.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
-from measure.anemometer import calibration, measuring
+from measure.anemometer import calibration, making, measuring
 from measure.calibrate.command import calibrate
 from measure.estimate.command import measure
 from measure.estimate.source import network
@@ -125,3 +125,25 @@ def test_a_table_makes_no_reading_model(tmp_path: Path) -> None:
     done = _run(calibrate, table, "--flag-size", "1.5x1.0", "--only", "anemometer")
     assert isinstance(done.exception, UsageError)
     assert "no pictures" in str(done.exception)
+
+
+def test_a_recording_that_cannot_be_looked_at_is_left_out_of_two_and_named(
+    lake: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before the first film is looked at its camera is found to be lost."""
+    plain, asked = making.recorded, list[str]()
+
+    def recorded(subject: Any, *given: Any, **named: Any) -> Any:
+        asked.append(subject.film.name)
+        if len(asked) == 1:
+            raise RefusedError("the picture changes at once", where=subject.film.name, fix="choose a part")
+        return plain(subject, *given, **named)
+
+    monkeypatch.setattr(making, "recorded", recorded)
+    given = ("monday", "monday", "--lake", lake, "--flag-size", "1.5x1.0", "--only", "anemometer", "--json")
+    done = _run(calibrate, *given)
+    assert done.exit_code == 0, done.output
+    said = json.loads(done.stdout)["anemometer"]
+    assert [one["name"] for one in said["recordings"]] == ["monday"]
+    assert said["findings"][0]["what"] == "monday is left out: the picture changes at once"
+    assert "monday is left out: the picture changes at once; choose a part" in done.stderr

@@ -5,19 +5,23 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from flagdata.errors import InputError
+from flagdata.errors import InputError, RefusedError
 from flagdata.stated import parse
+from flagdata.tables import Range
 from measure.calibrate import calibrate as module
 from measure.calibrate.calibrate import Calibration, Options, calibrate
 from measure.calibrate.design import Design
 from measure.calibrate.observed import Observed
+from measure.calibrate.page import page as written
 from measure.calibrate.prior import CLOTH, Floats, Normal, Uncertain, draws
 from measure.calibrate.simulation import OBSERVED, Flag
 from measure.calibrate.wind import Log
+from measure.ends import Bound
 from tests.measure.calibrate.conftest import readings
 
 _AZIMUTH = Uncertain(
@@ -44,6 +48,12 @@ def _sigma(places: int) -> float:
     return math.hypot(0.06 / math.sqrt(places), 0.0085 / 0.3)
 
 
+def _spread(found: Calibration) -> float:
+    """Standard deviation of the weight that is given."""
+    assert found.weight.sigma is not None
+    return found.weight.sigma
+
+
 def _found(*recordings: Observed) -> Calibration:
     return calibrate(recordings, _OPTIONS, folder=Path("unused"))
 
@@ -60,7 +70,7 @@ def test_the_weight_is_known_as_well_as_twice_the_gain(plain: Calibration) -> No
     weight = plain.weight
     # The ratio is known to 1 %, the gain to 3 %, and what numerics add to 3 %: the weight to 7 %.
     assert weight.value == pytest.approx(0.17, rel=0.05)
-    assert weight.sigma / 0.17 == pytest.approx(_sigma(1), rel=0.2)
+    assert _spread(plain) / 0.17 == pytest.approx(_sigma(1), rel=0.2)
 
 
 def test_damping_is_determined_and_bending_is_not(plain: Calibration) -> None:
@@ -73,7 +83,7 @@ def test_damping_is_determined_and_bending_is_not(plain: Calibration) -> None:
 @pytest.mark.usefixtures("cheap")
 def test_a_second_recording_with_an_error_of_its_own_narrows_the_weight(plain: Calibration) -> None:
     one, two = plain, _found(_observed(0.17), _observed(0.17, seed=10))
-    assert two.weight.sigma / one.weight.sigma == pytest.approx(_sigma(2) / _sigma(1), rel=0.15)
+    assert _spread(two) / _spread(one) == pytest.approx(_sigma(2) / _sigma(1), rel=0.15)
     assert len(two.places) == 2
 
 
@@ -102,11 +112,59 @@ def test_the_weight_of_a_flag_that_no_simulation_looks_like_is_withheld(plain: C
 
 
 @pytest.mark.usefixtures("cheap")
-def test_a_posterior_at_an_end_of_the_prior_is_warned_of(plain: Calibration) -> None:
-    leaning = [one.what for one in _found(_observed(0.052)).findings if one.kind == "leans-on-prior"]
-    assert leaning
-    assert leaning[0].startswith("area weight: the posterior leans on the end of what is assumed, 0.05 kg/m²")
+@pytest.mark.parametrize(
+    ("true", "words", "side", "end"),
+    [(0.045, "at most 0.0", Bound.MOST, "0.05"), (0.5, "at least 0.4", Bound.LEAST, "0.45")],
+)
+def test_of_a_cloth_beyond_the_prior_a_bound_is_reported_and_no_number(
+    plain: Calibration, true: float, words: str, side: Bound, end: str
+) -> None:
+    found = _found(_observed(true))
+    assert found.weight.span.bound is side
+    assert found.weight.span.low <= true <= found.weight.span.high  # beyond the prior, and not left out
+    assert found.sentence.startswith(f"area weight {words}")
+    assert " kg/m², 95 %, n = 48 windows" in found.sentence
+    said = found.as_dict()
+    weight = said["cloth"]["area_weight"]
+    assert (weight["value"], weight["sigma"], weight["determined"], weight["level"]) == (None, None, False, 0.95)
+    assert weight["bound"] == side.value
+    assert weight["interval"][0 if side is Bound.LEAST else 1] == pytest.approx(float(end), rel=0.15)
+    assert (said["area_weight_stated"], said["close_loop"], found.stated) == (None, None, None)
+    assert found.weighs
+    (leaning,) = [one for one in found.findings if one.kind == "leans-on-prior"]
+    assert leaning.what.startswith("area weight: 10% of the posterior or more lie within 3% of the end of what")
+    assert f"{end} kg/m²" in leaning.what
     assert "leans-on-prior" not in {finding.kind for finding in plain.findings}
+    assert "not-determined" not in {f.kind for f in found.findings if "area weight" in f.what}
+
+
+@pytest.mark.usefixtures("cheap")
+def test_a_bound_has_no_settled_box_and_no_line_to_copy_on_its_page(plain: Calibration) -> None:
+    page = written(_found(_observed(0.045)), {})
+    assert '<p class="verdict open"><b>area weight at most 0.0' in page
+    assert "--area-weight" not in page
+    assert '<p class="verdict settled"><b>area weight 0.1' in written(plain, {})
+
+
+def _uniform(low: float, high: float, *, stated: bool) -> Uncertain:
+    limits = (low, high) if stated else (-math.inf, math.inf)
+    return Uncertain(name="azimuth", unit="rad", prior=Range(low=low, high=high), source="", limits=limits)
+
+
+def test_a_range_that_the_user_states_ends_an_interval_and_one_that_is_assumed_does_not() -> None:
+    draws = np.linspace(0.95, 1.0, 1000)
+    assumed = module.quantity(_uniform(0.0, 1.0, stated=False), draws, 0.9)
+    assert (assumed.value, assumed.interval) == (None, (pytest.approx(0.9525, abs=1e-3), math.inf))
+    stated = module.quantity(_uniform(0.0, 1.0, stated=True), draws, 0.9)
+    assert stated.value == pytest.approx(0.975)
+    assert stated.interval == (pytest.approx(0.9525, abs=1e-3), 1.0)
+
+
+def test_a_normal_prior_has_no_end_that_a_posterior_could_lean_on() -> None:
+    """A view that was misjudged by three standard deviations is a value, far from what was assumed."""
+    found = module.quantity(_AZIMUTH, math.radians(91) + 0.01 * np.sin(np.arange(1000)), 0.9)
+    assert found.value == pytest.approx(math.radians(91), abs=1e-3)
+    assert found.span.bound is None
 
 
 @pytest.mark.usefixtures("cheap")
@@ -121,7 +179,7 @@ def test_an_error_of_pixels_widens_the_interval() -> None:
     sigma = np.zeros(len(OBSERVED))
     sigma[0] = 0.06  # of 0.3 ln weight: 20 %
     other = Observed(name="film", source="x", readings=own.readings, log=own.log, sigma=sigma)
-    assert _found(other).weight.sigma / 0.17 == pytest.approx(math.hypot(0.06, 0.2), rel=0.35)
+    assert _spread(_found(other)) / 0.17 == pytest.approx(math.hypot(0.06, 0.2), rel=0.35)
 
 
 def test_windows_lie_about_what_simulations_of_the_answer_show(plain: Calibration) -> None:
@@ -145,8 +203,41 @@ def test_too_few_simulations_are_refused(monkeypatch: pytest.MonkeyPatch) -> Non
         return np.full((design.count, 48, len(OBSERVED)), np.nan)
 
     monkeypatch.setattr(module, "simulated", failed)
-    with pytest.raises(InputError, match="0 of 128 simulations show what the film shows"):
+    with pytest.raises(RefusedError, match="0 of 128 simulations show what the film shows"):
         _found(_observed(0.17))
+
+
+@pytest.mark.usefixtures("cheap")
+def test_a_recording_that_simulations_do_not_show_is_left_out_of_two_and_named(
+    monkeypatch: pytest.MonkeyPatch, plain: Calibration
+) -> None:
+    """The weight is that of the other alone."""
+    cheaply = module.simulated
+
+    def half(design: Design, **given: Any) -> Floats:
+        every = cheaply(design, **given)
+        return np.full_like(every, np.nan) if "0.3" in design.recording else every
+
+    monkeypatch.setattr(module, "simulated", half)
+    found = _found(_observed(0.3), _observed(0.17))
+    assert [one.observed.name for one in found.recordings] == ["flag 0.17"]
+    (left,) = [one for one in found.findings if one.kind == "left-out"]
+    assert left.what.startswith("flag 0.3 is left out: 0 of 128 simulations show what the film shows")
+    assert found.weight.value == pytest.approx(plain.weight.value, rel=0.03)
+
+
+@pytest.mark.usefixtures("cheap")
+def test_what_is_left_has_to_be_long_enough_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    cheaply = module.simulated
+
+    def half(design: Design, **given: Any) -> Floats:
+        every = cheaply(design, **given)
+        return np.full_like(every, np.nan) if "0.3" in design.recording else every
+
+    monkeypatch.setattr(module, "simulated", half)
+    short = replace(_observed(0.17), readings=_observed(0.17).readings[:6])
+    with pytest.raises(InputError, match=r"15 s of film with a log beside them; flag 0\.3 is left out: 0 of 128"):
+        _found(_observed(0.3), short)
 
 
 def test_draws_fill_the_priors_range_evenly() -> None:
@@ -165,8 +256,8 @@ def test_rows_of_one_place_share_the_anemometers_gain() -> None:
     apart = [_observed(0.17, speed=np.full(190, wind), seed=number) for number, wind in enumerate(winds)]
     together = [replace(one, place="tunnel") for one in apart]
     shared = _found(*together)
-    assert shared.weight.sigma / 0.17 == pytest.approx(_sigma(1), rel=0.2)
-    assert _found(*apart).weight.sigma / 0.17 == pytest.approx(_sigma(3), rel=0.2)
+    assert _spread(shared) / 0.17 == pytest.approx(_sigma(1), rel=0.2)
+    assert _spread(_found(*apart)) / 0.17 == pytest.approx(_sigma(3), rel=0.2)
     assert len({place[0].value for place in shared.places}) == 1
     assert "constant-wind" not in {finding.kind for finding in shared.findings}
 

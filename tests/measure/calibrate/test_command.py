@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 from pyarrow import csv
 
+from flagdata.errors import InputError, RefusedError
 from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter
 from flagdata.schema import Kind
@@ -24,13 +25,15 @@ from measure.estimate.similarity import FlagSize
 from tests.measure.calibrate.conftest import readings
 
 
-def _table(path: Path, *, windows: int = 48, heading: str | None = None) -> Path:
+def _table(
+    path: Path, *, windows: int = 48, heading: str | None = None, weight: float = 0.2, seed: int = 3
+) -> Path:  # fmt: skip
     speed = 5.0 + 1.5 * np.sin(np.arange(windows) / 1.7)
     values = {
-        "area_weight": np.array([0.2]), "gain": np.array([1.0]), "damping": np.array([0.01]),
+        "area_weight": np.array([weight]), "gain": np.array([1.0]), "damping": np.array([0.01]),
         "azimuth": np.array([math.radians(70)]),
     }  # fmt: skip
-    own = readings(values, speed, seed=3)[0, :, :3]
+    own = readings(values, speed, seed=seed)[0, :, :3]
     names = heading or "time,wind,droop,extension,middle-speed"
     rows = [
         f"{2.5 * number},{u},{','.join(map(str, row))}"
@@ -78,6 +81,65 @@ def test_a_weight_that_is_withheld_is_exit_code_3_and_no_option(tmp_path: Path) 
     assert done.exit_code == 3
     assert done.stdout.startswith("area weight: withheld, since no simulated flag looks like t: area")
     assert "--area-weight" not in done.output
+
+
+@pytest.mark.usefixtures("cheap")
+def test_a_cloth_lighter_than_any_of_the_prior_is_bounded_and_no_option_is_given(tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    table = _table(tmp_path / "t.csv", weight=0.045)
+    done = _run(table, "--flag-size", "1.5x1.0", "--azimuth", "70±7", "--report", page)
+    assert done.exit_code == 0, done.output
+    assert done.stdout.startswith("area weight at most 0.0")
+    assert "only a bound is given" in done.stderr
+    assert "--area-weight" not in done.output + page.read_text()
+
+
+@pytest.mark.usefixtures("cheap")
+def test_a_weight_that_is_not_determined_is_exit_code_3(tmp_path: Path) -> None:
+    """Of what is shown only the damping and the view remain."""
+    table = _table(tmp_path / "t.csv", heading="time,wind,bandwidth,extension,middle-speed")
+    rows = [line.split(",") for line in table.read_text().splitlines()]
+    table.write_text("\n".join(",".join([*row[:2], *row[3:]]) for row in rows) + "\n")
+    done = _run(table, "--flag-size", "1.5x1.0", "--azimuth", "70±7")
+    assert done.stdout.startswith("area weight: not determined by 48 windows")
+    assert done.exit_code == 3
+    assert "--area-weight" not in done.output
+
+
+@pytest.mark.usefixtures("cheap")
+def test_one_bad_recording_of_three_is_left_out_with_a_warning_that_names_it(tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    (tmp_path / "hidden.csv").write_text(
+        "\n".join(["time,wind,droop", *(f"{2.5 * number},5.0," for number in range(20))]) + "\n"
+    )
+    good = [_table(tmp_path / f"{name}.csv", seed=seed) for seed, name in ((3, "monday"), (4, "tuesday"))]
+    given = (tmp_path / "hidden.csv", *good, "--flag-size", "1.5x1.0", "--azimuth", "70±7")
+    done = _run(*given, "--json", "--report", page)
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    assert [one["name"] for one in found["recordings"]] == ["monday", "tuesday"]
+    assert found["cloth"]["area_weight"]["value"] == pytest.approx(0.2, rel=0.08)
+    (left,) = [one for one in found["findings"] if one["kind"] == "left-out"]
+    assert left["what"].startswith(f"{tmp_path}/hidden.csv is left out: no observable could be read in 60%")
+    assert "hidden.csv is left out: no observable could be read" in page.read_text()
+
+
+def test_of_three_bad_recordings_no_weight_is_given_and_each_is_named(tmp_path: Path) -> None:
+    paths = [tmp_path / f"{name}.csv" for name in ("monday", "tuesday", "wednesday")]
+    for path in paths:
+        path.write_text("\n".join(["time,wind,droop", *(f"{2.5 * number},5.0," for number in range(20))]) + "\n")
+    done = _run(*paths, "--flag-size", "1.5x1.0")
+    assert isinstance(done.exception, RefusedError)
+    assert done.exception.exit_code == 3
+    assert done.exception.what.startswith("none of 3 recordings can be used: ")
+    assert all(f"{path}: no observable could be read" in done.exception.what for path in paths)
+
+
+def test_recordings_that_are_together_too_short_are_refused_before_anything_is_read(tmp_path: Path) -> None:
+    done = _run(_table(tmp_path / "t.csv", windows=6), "--flag-size", "1.5x1.0")
+    assert isinstance(done.exception, InputError)
+    assert done.exception.what == "15 s of film with a log beside them"
+    assert "give 20 s or more in all" in done.exception.fix
 
 
 @pytest.mark.parametrize(

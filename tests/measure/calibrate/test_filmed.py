@@ -14,6 +14,7 @@ from flagdata.signals import Sensor, WindSeries
 from measure.calibrate import filmed
 from measure.calibrate.simulation import OBSERVED
 from measure.estimate.similarity import FlagSize
+from measure.estimate.source import Reading as Pictures
 from measure.observables import Reading
 
 _SIZE = FlagSize(length=1.5, height=1.0)
@@ -48,7 +49,7 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("shown")
 def test_two_minutes_are_read_with_the_log_on_the_films_clock() -> None:
-    found = filmed.of_film(_subject(), _SIZE, first=10.0, last=None)
+    found = filmed.part_of(_subject(), first=10.0, last=None).read(_SIZE)
     assert found.readings.shape == (48, len(OBSERVED))
     assert np.isnan(found.readings[2]).all()
     assert found.readings[5, 0] == 5.0
@@ -63,23 +64,56 @@ def test_two_minutes_are_read_with_the_log_on_the_films_clock() -> None:
 @pytest.mark.usefixtures("shown")
 def test_a_log_that_ends_before_the_film_is_refused() -> None:
     with pytest.raises(InputError, match="does not cover"):
-        filmed.of_film(_subject(logged=100.0), _SIZE, first=0.0, last=None)
+        filmed.part_of(_subject(logged=100.0), first=0.0, last=None).read(_SIZE)
 
 
 @pytest.mark.usefixtures("shown")
 def test_a_camera_that_cannot_be_steadied_is_refused() -> None:
     lost = Finding(kind="camera-lost", severity=Severity.WARNING, what="40 % of the frames", value=0.4)
     with pytest.raises(RefusedError, match="the camera may move"):
-        filmed.of_film(_subject(findings=(lost,)), _SIZE, first=0.0, last=None)
+        filmed.part_of(_subject(findings=(lost,)), first=0.0, last=None).read(_SIZE)
 
 
 def test_a_film_without_a_log_is_refused() -> None:
     subject = _subject()
     subject.record = None
     with pytest.raises(InputError, match="no log of the wind"):
-        filmed.of_film(subject, _SIZE, first=0.0, last=None)
+        filmed.part_of(subject, first=0.0, last=None).read(_SIZE)
 
 
 def test_a_film_too_short_to_weigh_is_refused_by_its_length_before_its_log_is_cut() -> None:
     with pytest.raises(InputError, match=r"0\.5 s of film with a log"):
-        filmed.of_film(_subject(), _SIZE, first=0.0, last=0.5)
+        filmed.part_of(_subject(), first=0.0, last=0.5).read(_SIZE)
+
+
+def _named(patch: pytest.MonkeyPatch, durations: dict[str, float]) -> None:
+    """Recordings of a lake by their names, none of whose pictures may be read."""
+
+    def subjects(source: str, **_: object) -> list[Any]:
+        own = _subject()
+        own.film.name, own.film.duration = source, durations[source]
+        return [own]
+
+    def watched(*_: object, **__: object) -> Any:
+        raise AssertionError("pictures are read")
+
+    patch.setattr(filmed, "subjects", subjects)
+    patch.setattr(filmed, "watched", watched)
+
+
+def test_films_that_are_together_too_short_are_refused_before_a_picture_is_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    _named(monkeypatch, {"monday": 15.0, "tuesday": 4.0})
+    with pytest.raises(InputError, match=r"15 s of film with a log beside them; tuesday is left out: 4 s of film"):
+        filmed.Sources.open(
+            ("monday", "tuesday"), _SIZE, Pictures(), lake=None, at="main", first=0.0, last=None
+        )  # fmt: skip
+
+
+def test_a_film_whose_length_is_enough_is_opened_and_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    _named(monkeypatch, {"monday": 60.0})
+    found = filmed.Sources.open(("monday",), _SIZE, Pictures(), lake=None, at="main", first=0.0, last=None)
+    assert [one.duration for one in found.opened] == [60.0]
+    with pytest.raises(AssertionError, match="pictures are read"):
+        found.read(_SIZE)

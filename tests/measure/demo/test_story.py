@@ -106,7 +106,8 @@ def test_the_loop_is_closed_with_the_scales_weight_and_its_finding_is_judged_by_
 
 @pytest.mark.parametrize(("found", "true", "right"), [
     ("wind 3.5 m/s [2.3, 5.0] 90 %; bending [9, 10]", 2.4, True), ("wind 3.5 m/s [2.3, 5.0] 90 %", 5.1, False),
-    ("Refused: no flag", 3.0, None),
+    ("Refused: no flag", 3.0, None), ("area weight at most 0.056 kg/m², 95 %", 0.05, True),
+    ("area weight at least 0.41 kg/m²", 0.4, False),
 ])  # fmt: skip
 def test_a_finding_is_right_if_its_interval_contains_the_truth(found: str, true: float, right: bool | None) -> None:
     assert story._contained(found, true) is right
