@@ -12,7 +12,12 @@ from flagdata import html
 
 @dataclass(frozen=True, kw_only=True)
 class Strength:
-    """The strength of an effect that was named, with its interval, in the effect's own unit."""
+    """The strength of an effect that was named, with its interval, in the effect's own unit.
+
+    Attributes:
+        bound: "at-least" or "at-most" where it is known on one side only, and `value` is that bound; "nothing" where it
+            is not determined; None of an interval with two ends.
+    """
 
     parameter: str
     value: float
@@ -20,6 +25,7 @@ class Strength:
     high: float
     unit: str
     level: float
+    bound: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -23,6 +23,7 @@ import click
 from flagdata.addresses import lake_place, local_path
 from flagdata.errors import FlagdataError, LimitError, UnforeseenError
 from flagdata.extras import missing
+from flagdata.findings import Finding
 from flagdata.printable import printable, printable_lines
 from flagdata.storage import Place, StoreError
 
@@ -125,6 +126,11 @@ def say(text: str, *, mark: str | None = None) -> None:
         coloured = mark in _COLOURS and not os.environ.get("NO_COLOR")
         shown = f"{click.style(f'{mark}:', fg=_COLOURS[mark], bold=True) if coloured else f'{mark}:'} {shown}"
     click.echo(shown, err=True)  # which takes the colour out where stderr is no terminal
+
+
+def say_finding(finding: Finding) -> None:
+    """A finding for people, on stderr: what was found, and what to do about it."""
+    say(finding.what + (f"; {finding.fix}" if finding.fix else ""), mark=finding.severity.value)
 
 
 def say_beside_bars(text: str) -> None:

@@ -9,6 +9,8 @@ draws bound the quantity on one side only:
 - *at most*: the same at the lower end;
 - *nothing*: at both ends; the quantity is not constrained.
 
+A profile of a likelihood over a range says the same where it is flat towards an end (`of_profile`).
+
 The bound is the end of the central interval on the other side, which holds with the level (1 + level)/2.
 
 An end of the range can be a limit of the quantity itself: no wind is slower than calm air, no cloth weighs less than
@@ -26,6 +28,7 @@ from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 WITHIN = 0.03
 """Share of the range's width that counts as its end, fixed on 2026-11-27 before any film was judged by the rule. A
@@ -116,6 +119,45 @@ def span(
     """
     low, high = (float(end) for end in np.quantile(draws, [(1 - level) / 2, (1 + level) / 2]))
     bound = None if places is None else bound_of(places)
+    return _ended(low, high, bound, level=level, limits=limits, assumed=assumed)
+
+
+def of_profile(
+    values: NDArray[np.floating], misfit: NDArray[np.floating], *, level: float, limits: tuple[float, float],
+    larger: float = 1.0,
+) -> Span:  # fmt: skip
+    """The interval of a profile: values whose misfit is less than the least by the quantile of χ² at the level. Where
+    it still holds at an end of the values, the likelihood is flat towards that end, and only the other end is known.
+
+    Args:
+        values: (n,) ascending, the whole range that was looked at.
+        misfit: (n,) −2 ln likelihood at each, infinite where there is no model.
+        level: of an interval with two ends.
+        limits: values that the quantity can have at all.
+        larger: by how much standard errors are larger than the misfit says.
+    """
+    within = misfit - misfit.min() - (larger * float(ndtri((1 + level) / 2))) ** 2  # below 0 inside
+    inside = np.flatnonzero(within <= 0)
+    first, last = int(inside[0]), int(inside[-1])
+    below, above = first == 0, last == len(values) - 1
+    low = float(values[0]) if below else _crossing(values, within, first - 1)
+    high = float(values[-1]) if above else _crossing(values, within, last)
+    bound = Bound.NOTHING if below and above else Bound.MOST if below else Bound.LEAST if above else None
+    return _ended(low, high, bound, level=level, limits=limits, assumed=(float(values[0]), float(values[-1])))
+
+
+def _crossing(values: NDArray[np.floating], within: NDArray[np.floating], place: int) -> float:
+    """Where a profile crosses zero behind a place: halfway if it is infinite on one side."""
+    before, behind = float(within[place]), float(within[place + 1])
+    share = before / (before - behind) if math.isfinite(before) and math.isfinite(behind) else 0.5
+    return float(values[place] + share * (values[place + 1] - values[place]))
+
+
+def _ended(
+    low: float, high: float, bound: Bound | None, *, level: float, limits: tuple[float, float],
+    assumed: tuple[float, float],
+) -> Span:  # fmt: skip
+    """The interval that is left of a central one where its ends are not known."""
     if bound is None:
         return Span(low=max(low, limits[0]), high=min(high, limits[1]), level=level, bound=None, estimated=True)
     below, above = limits[0] >= assumed[0], limits[1] <= assumed[1]  # the range ends where the quantity does

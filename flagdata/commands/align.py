@@ -11,7 +11,7 @@ import click
 
 from flagdata.commands.durations import DURATION
 from flagdata.commands.sections import LongCommand
-from flagdata.console import LocalPath, document, echo, json_option, lake_option, progress, say
+from flagdata.console import LocalPath, document, echo, json_option, lake_option, progress, say, say_finding
 from flagdata.printable import SHORT
 from flagdata.timebase import NANOSECONDS
 
@@ -223,7 +223,7 @@ def _warn_of_clocks(pair: Pair, options: ClockOptions) -> None:
         (start + shift, end + shift), (pair.wind.start, pair.wind.end), names=(pair.camera.name, pair.wind.name)
     )
     if found is not None:
-        say(f"{found.what}; {found.fix}", mark="warning")
+        say_finding(found)
 
 
 def _outcome(pair: Pair, options: ClockOptions, *, recipe: dict[str, Any], plot: Path | None) -> Outcome:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from flagdata.console import document, echo, progress, say
+from flagdata.console import document, echo, progress, say, say_finding
 
 if TYPE_CHECKING:
     from flagdata.align.logs import LogClock
@@ -58,7 +58,7 @@ def align_logs(
         names=(pair.sensor.name, pair.reference.name),
     )  # fmt: skip
     if apart is not None:
-        say(f"{apart.what}; {apart.fix}", mark="warning")
+        say_finding(apart)
     with progress(None, label="comparing", unit="part") as advance:
         found = log_clock(
             pair.reference_series, pair.sensor_series, names=pair.names, search=search,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.console import document, echo, json_option, lake_option, progress, say
+from flagdata.console import document, echo, json_option, lake_option, progress, say, say_finding
 from flagdata.printable import counted, size_text
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def _report(tag: str, place: str, done: Transfer, *, as_json: bool) -> None:
         )  # fmt: skip
         return
     for finding in done.findings:
-        say(f"{finding.what}; {finding.fix}", mark=finding.severity.value)
+        say_finding(finding)
     refs = f", {counted(len(done.refs), 'ref')} ({', '.join(done.refs)})" if done.refs else ""
     say(f"{counted(done.versions, 'version')}, {counted(len(done.objects), 'object')}, {size_text(done.size)}{refs}")
     echo(f"{place} is at version {done.head}")

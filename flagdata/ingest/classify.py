@@ -13,7 +13,7 @@ from flagdata.ingest.markers import COLUMNS, is_marker_table
 from flagdata.ingest.mcap.bags import is_bag, other_bag
 
 if TYPE_CHECKING:
-    from flagdata.ingest.camera import CameraProbe
+    from flagdata.ingest.camera.probing import Pictured
 
 CAMERA = "camera"
 MESHES = "meshes"
@@ -47,7 +47,7 @@ def guesses(path: Path, *, topic: str | None = None, encoding: str | None = None
     found = sniff(path, encoding=encoding)
     if found[0].kind != "other":
         return found
-    seen = _probe(path)
+    seen = _pictured(path) if path.is_file() else None
     if seen is None:
         return found
     reason = f"FFmpeg reads it as {seen.container} with {seen.codec} video"
@@ -137,10 +137,10 @@ def _of_mcap(path: Path, topic: str | None) -> tuple[Guess, ...]:
     return (Guess(format="MCAP", score=0.0, reasons=(reason,), kind="other", fix="give a file that has such a topic"),)
 
 
-def _probe(path: Path) -> CameraProbe | None:
-    from flagdata.ingest.camera import probe  # decoders of video, which a wind's log needs none of
+def _pictured(path: Path) -> Pictured | None:
+    from flagdata.ingest.camera.probing import pictured  # decoders of video, which a wind's log needs none of
 
     try:
-        return probe(path)
+        return pictured(path)
     except FlagdataError:
         return None

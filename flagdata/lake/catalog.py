@@ -420,6 +420,11 @@ class Catalog:
         """Compare what the Delta library reads for a version with what was noted of it: the newest checkpoint up to it,
         and the entries after that. Those that no summary covers were compared when the history was read."""
         newest = max((number for number in self._entries.checkpoints() if number <= version), default=-1)
+        for place in (self._log / _HINT, self._log / f"{newest:020d}{CHECKPOINT}"):
+            if isinstance(place, Path) and place.exists() and not place.is_file():  # of a pipe it would wait for ever
+                raise CorruptError(
+                    f"{place.name} of the catalog's log is no regular file", where=str(place), fix=_DELETE
+                )
         noted = self._summaries.checkpoints.get(newest)
         if noted is not None:
             path = self._log / f"{newest:020d}{CHECKPOINT}"

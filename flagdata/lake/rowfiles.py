@@ -19,6 +19,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from flagdata.buffers import owned
 from flagdata.catalog_sql import dataset_of
 from flagdata.errors import CorruptError
 from flagdata.files import open_regular
@@ -121,7 +122,7 @@ class RowFiles:
         if name in self._contents:
             return self._contents[name]
         with self._reading(name), open_regular(self._folder / name) as stream:
-            content = pa.py_buffer(stream.read())
+            content = owned(stream.read())
             where = str(self._folder / name)
             noted = self._noted(name)
             if noted and hashlib.sha256(content).hexdigest() not in noted:

@@ -7,8 +7,8 @@ GLOSSARY: dict[str, str] = {
     "effect": "A force or fault that the base model leaves out and the library can add: lift, added mass, a slow cup.",
     "null": "An experiment simulated from the base model itself, with another mesh or time-stepping scheme: what its "
     "errors look like where nothing is missing.",
-    "numerical set-up": "A mesh and time-stepping scheme of the nulls. Of markers p counts set-ups, not simulations; of "
-    "films it counts simulated flags, as fewer ones where those of a set-up are alike.",
+    "numerical set-up": "A mesh and time-stepping scheme of the nulls. Of markers p counts set-ups, not simulations; "
+    "of films it counts simulated flags, as fewer ones where those of a set-up are alike.",
     "p": "The share of numerical set-ups, or of null flags, that deviate from the base model as much as the recordings "
     "do, the recordings counted as one more. A small p is evidence that something is missing.",
     "evidence": "Words for p: very strong up to 0.001, strong up to 0.01, moderate up to 0.05, weak up to 0.1, "

@@ -206,7 +206,7 @@ class Calibration:
 
     @property
     def weighs(self) -> bool:
-        """Whether anything is said of the area weight: a value or a bound."""
+        """Whether anything is given of the area weight: a value or a bound."""
         return self.withheld is None and (self.weight.value is not None or self.weight.bounded)
 
     @property

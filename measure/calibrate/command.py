@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from flagdata.commands.durations import DURATION
 from flagdata.commands.sections import LongCommand
 from flagdata.commands.statements import STATED
-from flagdata.console import LakePlace, LocalPath, document, echo, following, json_option, progress, say
+from flagdata.console import LakePlace, LocalPath, document, echo, following, json_option, progress, say, say_finding
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.findings import Severity
 from flagdata.printable import SHORT
@@ -243,7 +243,7 @@ def _anemometer(
     say(f"the flag as an anemometer {done.found.sentence}")
     for finding in done.found.findings:
         if finding.severity is not Severity.NOTE:
-            say(finding.what + (f"; {finding.fix}" if finding.fix else ""), mark=finding.severity.value)
+            say_finding(finding)
     if done.place is not None:
         say(f"{done.place.artifact.id[:SHORT]}  reading model, {done.place.sentence}")
         say(f"for flagdata measure: --model {done.name}")
@@ -306,6 +306,6 @@ def _print(found: Calibration) -> None:
     say(f"  intervals of {check.held} of {check.count} simulations left out contain their weight, median error "
         f"{check.error:.1%}")  # fmt: skip
     for finding in found.findings:
-        say(finding.what + (f"; {finding.fix}" if finding.fix else ""), mark=finding.severity.value)
+        say_finding(finding)
     if found.stated is not None:
         say(f"for flagdata measure: --area-weight {found.stated}")

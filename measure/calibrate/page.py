@@ -50,7 +50,7 @@ def page(found: Calibration, provenance: Mapping[str, str], *, sections: Sequenc
 
 
 def shown(one: Quantity) -> dict[str, str]:
-    """A quantity as text: angles in degrees, and as `interval` what is known of it: both ends, or a bound with its
+    """A quantity as text: angles in degrees, and as `interval` what its values can be: both ends, or a bound with its
     level."""
     turn = 180 / math.pi if one.name in _DEGREES else 1.0
     least, most = one.assumed

@@ -119,7 +119,7 @@ def _answer(verdict: Verdict) -> Closed:
     strengths = {
         one.effect: Strength(
             parameter=one.parameter, value=one.strength.value, low=one.strength.low, high=one.strength.high,
-            unit=one.strength.unit, level=one.strength.level,
+            unit=one.strength.unit, level=one.strength.level, bound=one.strength.bound,
         )
         for one in sentences.named_candidates(verdict)
     }  # fmt: skip

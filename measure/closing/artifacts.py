@@ -174,7 +174,7 @@ def fingerprint(experiment: Experiment) -> str:
 def _measurement(answer: Answer) -> Artifact:
     verdict = answer.verdict
     fitted = {p.name: (p.after or p.before).value for p in verdict.parameters}
-    fitted |= {f"{c.effect}.{c.parameter}": c.strength.value for c in answer.effects}
+    fitted |= {f"{c.effect}.{c.parameter}": c.strength.value for c in answer.effects if c.strength.bound is None}
     report = {
         "schema": "flagdata.close-loop-report/1", "conclusion": verdict.conclusion.value, "named": list(verdict.named),
         "words": verdict.words, "p_value": verdict.test.p_value.value, "separating": verdict.separating,

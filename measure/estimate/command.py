@@ -13,7 +13,18 @@ import click
 from flagdata.commands.durations import DURATION
 from flagdata.commands.sections import LongCommand
 from flagdata.commands.statements import STATED
-from flagdata.console import LakePlace, LocalPath, csv_rows, document, echo, following, json_option, progress, say
+from flagdata.console import (
+    LakePlace,
+    LocalPath,
+    csv_rows,
+    document,
+    echo,
+    following,
+    json_option,
+    progress,
+    say,
+    say_finding,
+)
 from flagdata.errors import RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.printable import SHORT
@@ -334,7 +345,7 @@ def _several(job: _Job, found: Sequence[Subject], *, as_json: bool) -> None:
 def _warn(findings: Sequence[Finding]) -> None:
     for finding in findings:
         if finding.severity is not Severity.NOTE:
-            say(finding.what, mark=finding.severity.value)
+            say_finding(finding)
 
 
 def _report(done: _Done, *, series: bool) -> None:

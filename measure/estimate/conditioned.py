@@ -141,7 +141,11 @@ class ConditionedFilm:
         faults = reasons(watch, found, follower)
         if cut.partly:  # what is left shows the whole flag
             faults = tuple(fault for fault in faults if fault.kind != "cut-off")
-        own = [*_of_camera(found, follower), *_of_flag(found, self.reference), *_of_aspect(found, self._aspect)]
+        own = [
+            *_of_camera(found, follower),
+            *_of_flag(found, self.reference, given=self._flag is not None),
+            *_of_aspect(found, self._aspect),
+        ]
         if all(fault.kind != "cut-off" for fault in faults):
             own += cut.findings()
         return (*self._film.findings(), *own, *faults)
@@ -226,7 +230,8 @@ def _of_camera(found: Conditioning, follower: Follower) -> list[Finding]:
     return notes
 
 
-def _of_flag(found: Conditioning, reference: NDArray[np.uint8] | None) -> list[Finding]:
+def _of_flag(found: Conditioning, reference: NDArray[np.uint8] | None, *, given: bool) -> list[Finding]:
+    """What was found of the flag; several are no matter where its number was given."""
     if found.region is None or reference is None:
         return []
     height, width = reference.shape
@@ -240,7 +245,7 @@ def _of_flag(found: Conditioning, reference: NDArray[np.uint8] | None) -> list[F
             + (f", {beyond:.0%} of which lie beyond the picture and were padded" if beyond > 0 else ""),
         )
     ]  # fmt: skip
-    if len(found.regions) > 1:
+    if len(found.regions) > 1 and not given:
         notes.append(
             Finding(
                 kind="several-flags-found", severity=Severity.WARNING, count=len(found.regions),

@@ -86,14 +86,12 @@ class Fit:
     Attributes:
         evidence: (n,) logarithms of p(y | e).
         misfit: (n,) squared standardised distance at the mode, that of the scores from their prior included.
-        mode: (n, dimension) normal scores there.
         scores: (n, draw, dimension) of importance samples.
         weights: (n, draw) of them, of sum 1.
     """
 
     evidence: Floats
     misfit: Floats
-    mode: Floats
     scores: Floats
     weights: Floats
 
@@ -146,12 +144,7 @@ class Hypothesis:
     def fit(self, observed: Experiments, rng: np.random.Generator) -> Fit:
         """Fit it to experiments, each by itself."""
         n, d = len(observed), self.dimension
-        modes = []
-        for begin in _STARTS if self.effect is not None else (0.0,):
-            at = np.zeros((n, d))
-            if self.effect is not None:
-                at[:, -1] = begin
-            modes.append(self._climbed(at, observed))
+        modes = self._modes(observed)
         drawn, density = [], []
         size = _DRAWS // len(modes)
         for at, curvature, _ in modes:
@@ -166,12 +159,24 @@ class Hypothesis:
         ratio = self.log_posterior(flat, observed.repeated(scores.shape[1])).reshape(n, -1) - proposal
         evidence = logsumexp(ratio, axis=1) - np.log(scores.shape[1])
         misfits = np.array([misfit for _, _, misfit in modes])
-        best = np.argmin(misfits, axis=0)
         return Fit(
             evidence=evidence, misfit=misfits.min(axis=0), scores=scores,
-            mode=np.array([at for at, _, _ in modes])[best, np.arange(n)],
             weights=np.exp(ratio - logsumexp(ratio, axis=1, keepdims=True)),
         )  # fmt: skip
+
+    def misfit(self, observed: Experiments) -> Floats:
+        """(n,) that of `fit`, without the rest of it."""
+        return np.array([misfit for _, _, misfit in self._modes(observed)]).min(axis=0)
+
+    def _modes(self, observed: Experiments) -> list[tuple[Floats, Floats, Floats]]:
+        """Of the posterior, from each start, as `_climbed`."""
+        found = []
+        for begin in _STARTS if self.effect is not None else (0.0,):
+            at = np.zeros((len(observed), self.dimension))
+            if self.effect is not None:
+                at[:, -1] = begin
+            found.append(self._climbed(at, observed))
+        return found
 
     def _climbed(self, at: Floats, observed: Experiments) -> tuple[Floats, Floats, Floats]:
         """A mode (n, d) from a start, the curvature there (n, d, d), and the misfit (n,)."""

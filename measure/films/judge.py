@@ -19,7 +19,7 @@ from scipy.special import logsumexp
 
 from measure.calibrate.prior import Floats
 from measure.films.score_test import Scored
-from measure.films.weigh import Weighing
+from measure.films.weigh import Misfits, Weighing
 from measure.nulls.clustered import ClusteredNulls
 from measure.verdict.decided import undecided
 from measure.verdict.record import Conclusion
@@ -62,13 +62,13 @@ class Judged:
 
 
 def judge(
-    own: Weighing, nulls: Weighing, kinds: NDArray[np.int64], scored: Scored, *, level: float, departure: float
+    own: Weighing, nulls: Misfits, kinds: NDArray[np.int64], scored: Scored, *, level: float, departure: float
 ) -> Judged:
     """Judge one experiment.
 
     Args:
         own: of it alone.
-        nulls: of null flags.
+        nulls: what models leave of null flags.
         kinds: (null,) of their numerics.
         scored: how it was tested.
         level: of the tests.
@@ -81,7 +81,7 @@ def judge(
     count = 1 + int(np.searchsorted(np.cumsum(probability[order]), CONFIDENCE - 1e-9))
     confident = tuple(int(place) for place in order[:count])
     leftover = np.array([
-        ClusteredNulls(null=nulls.left[:, place], kinds=kinds).p(float(own.left[0, place]))
+        ClusteredNulls(null=nulls.left[:, place], kinds=kinds).p(float(own.misfits.left[0, place]))
         for place in range(len(own.effects))
     ])  # fmt: skip
 
@@ -100,7 +100,7 @@ def judge(
         return judged(Conclusion.OUTSIDE)
     if any(leftover[place] > level for place in confident):
         return judged(Conclusion.EFFECT if len(confident) == 1 else Conclusion.ONE_OF, confident)
-    excess = float(own.misfit[0] - np.median(nulls.misfit))
-    explained = float(own.misfit[0] - own.left[0, confident[0]])
+    excess = float(own.misfits.base[0] - np.median(nulls.base))
+    explained = float(own.misfits.base[0] - own.misfits.left[0, confident[0]])
     part = explained >= PART * excess
     return judged(Conclusion.PARTLY, confident[:1]) if part else judged(Conclusion.OUTSIDE)

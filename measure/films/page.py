@@ -36,7 +36,7 @@ def page(verdict: Verdict, outcome: Outcome) -> str:
         "test_sentence": sentences.test_sentence(verdict), "remark": sentences.test_remark(verdict.test),
         "named": sentences.named_candidates(verdict), "after_label": after, "level": level_of(verdict),
         "has_control": any(quantity.known(c.control) for c in verdict.comparisons),
-        "null": figures.null_distribution(verdict.test), "power": sentences.power_text(verdict),
+        "null": figures.null_distribution(verdict.test), "power": sentences.power_mean(verdict),
         "shares": sorted(verdict.power, key=lambda one: -one.share), "whole": outcome.judged.scored.whole,
         "title": lambda c: sentences.candidate_title(verdict, c),
         "recordings": [

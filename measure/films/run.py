@@ -34,7 +34,7 @@ from measure.films.sensitivity import SEEN, sensitivity
 from measure.films.simulations import Simulations, gathered, of_base, of_nulls, of_recordings, sight
 from measure.films.statement import stated
 from measure.films.unseen import compared
-from measure.films.weigh import Weighing, directions, expected, fitted, hypothesis, weigh
+from measure.films.weigh import Weighing, directions, expected, fitted, hypothesis, misfits, weigh
 from measure.forecasting.setting import Stage
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import NOT_REJECTED
@@ -176,8 +176,10 @@ def solve(
     scored = score(seen, model, null, kinds, directions(sights, effects, options.suspected), level=options.level)
     base = fitted(sights, seen, None, seed=seed)
     departing = departures(recordings, sights, base)
-    own, nulls = weigh(sights, seen, effects, seed=seed), weigh(sights, null, effects, seed=seed)
-    judged = judge(own, nulls, kinds, scored, level=options.level, departure=root_mean_square(departing))
+    own = weigh(sights, seen, effects, seed=seed)
+    judged = judge(
+        own, misfits(sights, null, effects), kinds, scored, level=options.level, departure=root_mean_square(departing)
+    )
     best = None
     if effects:
         first = effects[judged.confident[0]]

@@ -16,30 +16,41 @@ from measure.films.score_test import Directions
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Misfits:
+    """What models leave of experiments at their modes.
+
+    Attributes:
+        base: (n,) of the base model.
+        left: (n, effect) of the model with each.
+    """
+
+    base: Floats
+    left: Floats
+
+    def rows(self, which: Sequence[int]) -> Misfits:
+        """Of some experiments."""
+        own = np.asarray(which, dtype=np.int64)
+        return Misfits(base=self.base[own], left=self.left[own])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Weighing:
     """What experiments say of each effect.
 
     Attributes:
         effects: that were weighed.
-        base: (n,) logarithm of the base model's evidence.
-        misfit: (n,) of the base model at its mode.
         factors: (n, effect) logarithms of the Bayes factors against the base model [nat].
-        left: (n, effect) misfit of the model with each.
+        misfits: what the models leave.
     """
 
     effects: tuple[Weighable, ...]
-    base: Floats
-    misfit: Floats
     factors: Floats
-    left: Floats
+    misfits: Misfits
 
-    def rows(self, which: slice | Sequence[int]) -> Weighing:
+    def rows(self, which: Sequence[int]) -> Weighing:
         """Of some experiments."""
-        own = which if isinstance(which, slice) else np.asarray(which, dtype=np.int64)
-        return Weighing(
-            effects=self.effects, base=self.base[own], misfit=self.misfit[own], factors=self.factors[own],
-            left=self.left[own],
-        )  # fmt: skip
+        own = np.asarray(which, dtype=np.int64)
+        return Weighing(effects=self.effects, factors=self.factors[own], misfits=self.misfits.rows(which))
 
 
 def hypothesis(sights: Sequence[Sight], effect: Weighable | None) -> Hypothesis:
@@ -61,12 +72,21 @@ def weigh(
     """
     base = fitted(sights, observed, None, seed=seed)
     fits = [fitted(sights, observed, effect, seed=seed) for effect in effects]
-    empty = np.zeros((len(base.evidence), 0))
     return Weighing(
-        effects=tuple(effects), base=base.evidence, misfit=base.misfit,
-        factors=np.stack([one.evidence - base.evidence for one in fits], axis=1) if fits else empty,
-        left=np.stack([one.misfit for one in fits], axis=1) if fits else empty,
+        effects=tuple(effects), factors=_side_by_side([one.evidence - base.evidence for one in fits], len(observed)),
+        misfits=Misfits(base=base.misfit, left=_side_by_side([one.misfit for one in fits], len(observed))),
     )  # fmt: skip
+
+
+def misfits(sights: Sequence[Sight], observed: Experiments, effects: Sequence[Weighable]) -> Misfits:
+    """Those of `weigh`, without Bayes factors."""
+    left = [hypothesis(sights, effect).misfit(observed) for effect in effects]
+    return Misfits(base=hypothesis(sights, None).misfit(observed), left=_side_by_side(left, len(observed)))
+
+
+def _side_by_side(columns: Sequence[Floats], count: int) -> Floats:
+    """(count, column), also of none."""
+    return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
 
 
 def fitted(

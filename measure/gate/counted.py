@@ -51,7 +51,7 @@ def _all(watch: FilmWatch, found: Conditioning, follower: Follower) -> Iterator[
     cuts = watch.cuts()
     if cuts:
         times = "once" if len(cuts) == 1 else f"{len(cuts)} times"
-        yield _reason("scene-cut", len(cuts), f"{times}, first at {cuts[0]:.1f} s")
+        yield _reason("scene-cut", len(cuts), f"{times}, first at {cuts[0]:.2f} s")
     if watch.brightness < _DARK or watch.contrast < _FLAT:
         what = f"its brightest hundredth has gray level {watch.brightness:.0f} of 255, its contrast is "
         yield _reason("too-dark", watch.brightness, f"{what}{watch.contrast:.1f}")

@@ -21,7 +21,7 @@ class Reason:
 REASONS: dict[str, Reason] = {
     "scene-cut": Reason(
         sentence="the picture changes at once, as where two scenes are joined",
-        fix="choose a part of the film between two such places by --start and --end",
+        fix="choose a part of the film between two such places, three frames from each, by --start and --end",
     ),
     "too-few-frames": Reason(sentence="there are too few frames", fix="give a longer film"),
     "low-frame-rate": Reason(sentence="there are too few frames a second", fix="film at 25 frames a second or more"),

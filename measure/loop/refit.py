@@ -21,6 +21,7 @@ from measure.forecasting.segments import Segments
 from measure.inference.evidence import Evidence, left_together
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop.gauss_newton import DivergedError, Refined, refine
+from measure.loop.profile import Profile, profiled
 from measure.loop.validation import LeftOut, left_out
 from measure.nulls.reference import Reference
 
@@ -99,12 +100,14 @@ class Refit:
         gains: (segment,) held-out gain: see `inference.gains`.
         leftover: p-value of the global test on what it leaves.
         evidence: of what it leaves.
+        profile: of the misfit across its strengths; None where it was not looked at.
     """
 
     coefficient: float
     gains: Floats
     leftover: float
     evidence: Evidence
+    profile: Profile | None = None
 
 
 def refit(fits: Fits, reference: Reference, candidates: Sequence[int], *, workers: int = 1) -> dict[int, Refit | None]:
@@ -132,6 +135,7 @@ def refit(fits: Fits, reference: Reference, candidates: Sequence[int], *, worker
         return Refit(
             coefficient=fitted.model.effects[0][1], gains=gains,
             leftover=reference.p_left_by(evidence, names(), [column]), evidence=evidence,
+            profile=profiled(fits.forecaster, fits.segments, fits.whitened, fitted.model),
         )  # fmt: skip
 
     with ThreadPoolExecutor(max_workers=workers) as pool:

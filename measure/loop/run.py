@@ -420,7 +420,8 @@ def _ranking(solved: Solved, larger: Refined | None) -> tuple[Candidate, ...]:
     made: list[Candidate] = []
     for weighed in solved.judgement.ranking:
         candidate = weighed.candidate
-        if larger is not None and weighed.column in solved.acting and weighed.measured is None:
+        alone = candidate.strength.bound is None and weighed.measured is None
+        if larger is not None and weighed.column in solved.acting and alone:
             candidate = replace(candidate, strength=solved.strength(weighed, larger))
         made.append(candidate)
     return tuple(made)

@@ -382,13 +382,18 @@ def _weigh(
     if refitted is not None:
         gained, value, left = refitted.gains, refitted.coefficient, refitted.evidence
     about = null + (value if refitted else 0.0)
-    by_recording = _each(left, [column], column, about=about, larger=error / fit.of(column)[1], unit=effect.unit)
+    larger = error / fit.of(column)[1]
+    bounded = None if refitted is None or refitted.profile is None else refitted.profile.estimate(larger=larger)
+    # Where all strengths beyond a bound do the same, slopes at one of them say nothing of those of single recordings.
+    by_recording = (
+        () if bounded is not None else _each(left, [column], column, about=about, larger=larger, unit=effect.unit)
+    )
     return Weighed(
         column=column, error=error, gains=gained, recording=evidence.recording,
         admissible=effect.described.admits(null + value) and not lost,
         candidate=Candidate(
             effect=effect.effect, parameter=effect.parameter, null=null,
-            strength=strength(null, value, error, effect.unit),
+            strength=bounded or strength(null, value, error, effect.unit),
             z=z, p_value=reference.p_alone(statistic, column),
             p_family=reference.p_family(statistic, column), gain=float(gained.sum()),
             gain_error=total_error(gained, evidence.recording), behind=0.0, leftover=leftover,

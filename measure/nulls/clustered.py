@@ -1,6 +1,6 @@
 """How rare a statistic is among null flags that come in kinds of numerics and are alike within a kind to some degree.
 
-n flags of kinds of m each, whose statistic has the intraclass correlation ρ, tell as much of how often one more flag is
+n flags of kinds of m each, whose statistic has the intraclass correlation ρ, show as much of how often one more flag is
 as far as
 
     n' = n / (1 + (m − 1) ρ)
@@ -51,7 +51,7 @@ class ClusteredNulls:
 
     @cached_property
     def correlation(self) -> float:
-        """ρ of normal scores, from 0 to 1; 1 of a single kind, of which nothing can be told."""
+        """ρ of normal scores, from 0 to 1; 1 of a single kind, which shows nothing of it."""
         if self.count < 2:
             return 1.0
         if self.count == len(self.null):

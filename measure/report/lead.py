@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from measure.loop.selection import heterogeneous
-from measure.nulls.conformal import kinds_needed
 from measure.report.sentences import (
     candidate_title,
     contradicted,
@@ -29,12 +28,9 @@ def lead(verdict: Verdict) -> str:
     """The sentence."""
     if verdict.conclusion is Conclusion.UNTESTED:
         test = verdict.test
-        needed = kinds_needed(test.level)
-        if test.effective is not None:
-            needed = math.ceil((1 / test.level - 1) * test.kinds / test.effective - 1e-9)
         return (
             f"The base model cannot be tested at level {test.level:g}: with {test.kinds} numerical set-ups no p is "
-            f"below {probability(test.least)}; at least {needed} are needed."
+            f"below {probability(test.least)}; at least {test.kinds_needed} are needed."
         )
     if verdict.conclusion is Conclusion.SUFFICIENT and contradicted(verdict):
         return f"{heading(verdict)}."

@@ -157,11 +157,15 @@ def power_text(verdict: Verdict) -> str:
         f"{'' if one.unit == '1' else f' {one.unit}'} with {share(one.share)}"
         for one in verdict.power
     ]
+    return f"{power_mean(verdict)}: {', '.join(each)}."
+
+
+def power_mean(verdict: Verdict) -> str:
+    """The same on average, without a full stop."""
+    if not verdict.power:
+        return ""
     mean = sum(one.share for one in verdict.power) / len(verdict.power)
-    return (
-        f"An effect of the strength that is expected of it would be seen with a chance of {share(mean)} on average: "
-        f"{', '.join(each)}."
-    )
+    return f"An effect of the strength that is expected of it would be seen with a chance of {share(mean)} on average"
 
 
 def as_large(test: NullTest) -> int:

@@ -1,4 +1,4 @@
-"""When a base model that is not rejected is said to suffice, and where no model is said to explain recordings."""
+"""When a base model that is not rejected suffices, and where no model explains recordings."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from measure.verdict.quantity import known, number
 from measure.verdict.record import Comparison, Conclusion, Verdict
 
 NOT_REJECTED = (Conclusion.UNTESTED, Conclusion.SUFFICIENT, Conclusion.UNDECIDED)
-"""Conclusions in which nothing is said to be missing."""
+"""Conclusions that state nothing to be missing."""
 
 
 def undecided(p: float, *, level: float, departure: float, power: Sequence[float]) -> tuple[str, ...]:
-    """Why a base model that is not rejected is not said to suffice, in sentences; nothing where it is.
+    """Why a base model that is not rejected is not shown to suffice, in sentences; nothing where it does.
 
     Args:
         p: of the base model, above the level.

@@ -21,6 +21,7 @@ _MOST_DIGITS = 4  # of a number that comes with one
 _WIDEST = 1e5  # from here on, and below 1e-3, powers of ten
 _NARROWEST = 1e-3
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_BOUNDS = {"at-least": "at least", "at-most": "at most"}
 _THOUSANDTHS = {"m": "mm", "s": "ms"}
 
 
@@ -77,7 +78,7 @@ def probability(value: float | None) -> str:
 
 
 def estimate_text(estimate: Estimate | None, *, shown: Display | None = None) -> str:
-    """`6.2 m/s [5.7, 6.8]`, without the level, which a table's caption or `with_level` states."""
+    """`6.2 m/s [5.7, 6.8]` or `at least 5.7 m/s`, without the level, which a table's caption or `with_level` states."""
     return " ".join(estimate_parts(estimate, shown=shown)).rstrip()
 
 
@@ -85,6 +86,8 @@ def estimate_parts(estimate: Estimate | None, *, shown: Display | None = None) -
     """`6.2 m/s` and `[5.7, 6.8]`; the second is empty where there is no interval."""
     if estimate is None or not known(estimate):
         return NONE, ""
+    if estimate.bound is not None:
+        return _bounded(estimate, estimate.bound, shown), ""
     inside = shown or display((estimate.value, estimate.low, estimate.high), estimate.unit)
     value, low, high = (inside.factor * v for v in (estimate.value, estimate.low, estimate.high))
     half = (high - low) / 2
@@ -104,9 +107,21 @@ def estimate_parts(estimate: Estimate | None, *, shown: Display | None = None) -
     return f"{_fixed(value, place)}{power}{inside.suffix}", ends
 
 
+def _bounded(estimate: Estimate, bound: str, shown: Display | None) -> str:
+    """`at least 900 N/m²`."""
+    if bound not in _BOUNDS:
+        return "not determined"
+    inside = shown or display((estimate.value,), estimate.unit)
+    return f"{_BOUNDS[bound]} {number(inside.factor * estimate.value, digits=2)}{inside.suffix}"
+
+
 def with_level(estimate: Estimate) -> str:
     """`6.2 m/s [5.7, 6.8] 90 %`."""
-    return f"{estimate_text(estimate)} {level_text(estimate.level)}" if known(estimate) else NONE
+    if not known(estimate):
+        return NONE
+    if estimate.bound is not None and estimate.bound not in _BOUNDS:
+        return estimate_text(estimate)
+    return f"{estimate_text(estimate)} {level_text(estimate.level)}"
 
 
 def in_errors(value: float | None) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -21,13 +22,19 @@ class Conclusion(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """A value with its interval: `value [low, high]` at `level`, in `unit`."""
+    """A value with its interval: `value [low, high]` at `level`, in `unit`.
+
+    Attributes:
+        bound: "at-least" or "at-most" where it is known on one side only: `value` is then that bound, and the other end
+            is infinite or one that the quantity cannot pass; "nothing" where all of the range looks alike.
+    """
 
     value: float
     low: float
     high: float
     unit: str
     level: float = 0.9
+    bound: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,6 +193,12 @@ class NullTest:
     def least(self) -> float:
         """The smallest p that so many nulls allow."""
         return 1 / (1 + (self.kinds if self.effective is None else self.effective))
+
+    @property
+    def kinds_needed(self) -> int:
+        """The fewest kinds by which the level can be tested, each as many independent nulls as these."""
+        each = 1.0 if self.effective is None else self.effective / self.kinds
+        return math.ceil((1 / self.level - 1) / each - 1e-9)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -52,6 +52,8 @@ from tests.s3 import BUCKET, SECRETS, moto
 POINTS = 20
 LONGEST = 180
 """Seconds after which a command counts as hanging."""
+MAKING = 3600
+"""Seconds that a scene may take to be made."""
 NOW = timedelta(0)
 _KILLED = -signal.SIGKILL
 _ORPHAN = b"of an ingest that was given up"
@@ -233,7 +235,7 @@ def _invoked(arguments: Sequence[str]) -> int:
 class Child:
     """A forked process, which may use a store; its parent must not."""
 
-    def __init__(self, work: Callable[[], object], folder: Path) -> None:
+    def __init__(self, work: Callable[[], object], folder: Path, *, longest: int = LONGEST) -> None:
         self._folder = folder
         folder.mkdir(parents=True, exist_ok=True)
         self.pid = os.fork()
@@ -242,7 +244,7 @@ class Child:
             for name, stream in (("stdout", 1), ("stderr", 2)):
                 os.dup2(os.open(folder / name, os.O_CREAT | os.O_WRONLY | os.O_TRUNC), stream)
             signal.signal(signal.SIGALRM, signal.SIG_DFL)
-            signal.alarm(LONGEST)
+            signal.alarm(longest)
             code = 70
             try:
                 result = work()
@@ -470,7 +472,7 @@ def campaign(names: Sequence[str], results: Path, *, points: int, scratch: Path)
                 continue
             folder = scratch / group
             folder.mkdir()
-            code, scene, said = Child(partial(make, folder), scratch / "made").ended()
+            code, scene, said = Child(partial(make, folder), scratch / "made", longest=MAKING).ended()
             assert code == 0, said
             bucket = Bucket(store)
             code, cloned, said = Child(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from measure.ends import Bound, Span, bound_of, limits_of, span
+from measure.ends import Bound, Span, bound_of, limits_of, of_profile, span
 
 ANY = (-math.inf, math.inf)
 
@@ -76,3 +76,25 @@ def test_draws_at_both_ends_constrain_nothing() -> None:
     found = of(np.repeat([0.1, 5.0, 9.9], 10), limits_of("wind_speed"))
     assert (found.ends(), found.estimated) == ([0.0, None], False)
     assert found.phrase(1) == "not constrained"
+
+
+def profiled(misfit: NDArray[np.float64], *, larger: float = 1.0) -> Span:
+    return of_profile(np.linspace(0.0, 10.0, len(misfit)), misfit, level=0.9, limits=ANY, larger=larger)
+
+
+def test_the_profile_of_a_normal_likelihood_has_its_central_interval() -> None:
+    values = np.linspace(0.0, 10.0, 2001)
+    for larger in (1.0, 2.0):
+        found = profiled(((values - 5.0) / 0.7) ** 2, larger=larger)
+        half = 1.6449 * 0.7 * larger
+        assert (found.low, found.high) == (pytest.approx(5 - half, abs=0.01), pytest.approx(5 + half, abs=0.01))
+        assert (found.bound, found.level) == (None, 0.9)
+
+
+def test_a_profile_whose_interval_reaches_an_end_of_its_values_is_a_bound_of_half_of_the_rest() -> None:
+    values = np.linspace(0.0, 10.0, 2001)
+    least = profiled(((values - 9.5) / 0.7) ** 2)
+    assert (least.bound, least.level, least.high) == (Bound.LEAST, pytest.approx(0.95), math.inf)
+    assert least.low == pytest.approx(9.5 - 1.6449 * 0.7, abs=0.01)
+    assert profiled(((values - 0.5) / 0.7) ** 2).bound is Bound.MOST
+    assert profiled(0 * values).bound is Bound.NOTHING

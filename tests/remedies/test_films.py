@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import cast
+
+import av
 import numpy as np
 import pytest
+from av.video.stream import VideoStream
 from PIL import Image
 
 from tests.remedies.cases import OR, Case, heal
@@ -56,6 +60,30 @@ def test_what_a_remedy_says_heals(case: Case, user: User) -> None:
     heal(user, case)
 
 
+def test_a_cloth_whose_texture_is_in_millimetres_is_exported_in_metres(user: User) -> None:
+    """The unit of its positions is named as the next message says."""
+
+    def export(places: str, texture: str) -> None:
+        for path in (user.folder / "meshes").iterdir():
+            lines = (line.split() for line in original[path.name].splitlines())
+            factor = {"v": units[places], "vt": units[texture]}
+            rows = ([w, *(f"{factor[w] * float(x):g}" if w in factor else x for x in rest)] for w, *rest in lines)
+            path.write_text("\n".join(map(" ".join, rows)) + "\n")
+
+    units = {"m": 1, "mm": 1000}
+    original = {path.name: path.read_text() for path in (user.folder / "meshes").iterdir()}
+    command = ("ingest", "meshes", "--rate", 25)
+    export("mm", "mm")
+    refused = user.types(*command)
+    assert "a cloth of 500 m by its texture coordinates" in refused.err
+    assert "fix:   export it with texture coordinates in metres\n" in refused.err
+    export("mm", "m")
+    user.meets("meshes/checks.py", "name the unit of the positions by --unit", *command)
+    user.again("--unit", "mm")
+    export("m", "m")
+    user.succeeds(*command)
+
+
 @pytest.fixture
 def pictures(user: User) -> list[Image.Image]:
     """Thirty pictures, in the folder pics too."""
@@ -97,6 +125,21 @@ def test_the_rate_of_a_gif_is_given(user: User, pictures: list[Image.Image]) -> 
     pictures[0].save(user.folder / "b.gif", save_all=True, append_images=pictures[1:], duration=0)
     user.meets("camera/gif.py", "give the rate at which the camera ran", "ingest", "b.gif", *start)
     user.again("--true-fps", 25)
+
+
+@pytest.mark.parametrize("form", [("a.h264", "libx264", "yuv420p"), ("a.mjpeg", "mjpeg", "yuvj420p")])
+def test_a_raw_stream_is_a_film_whose_rate_is_given(user: User, form: tuple[str, str, str]) -> None:
+    name, codec, pixels = form
+    with av.open(name, "w", format=name.partition(".")[2]) as container:
+        stream = cast(VideoStream, container.add_stream(codec, rate=50, options={"threads": "1"}))
+        stream.height, stream.width, stream.pix_fmt = 48, 64, pixels
+        for k in range(30):
+            image = av.VideoFrame.from_ndarray(np.full((48, 64), 40 + 3 * k, np.uint8), format="gray")
+            container.mux(stream.encode(image.reformat(format=pixels)))
+        container.mux(stream.encode(None))
+    start = ("--start", "2026-05-01T12:00:00Z")
+    user.meets("camera/container.py", "give the camera's frame", "ingest", name, *start)
+    user.again("--sequence-fps", 50, shows=r"\(0.560 s\)")
 
 
 def test_files_that_are_no_chapters_are_ingested_by_themselves(user: User) -> None:

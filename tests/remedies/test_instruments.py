@@ -9,6 +9,7 @@ from operator import xor
 
 import pytest
 
+from tests.flagdata.ingest.anemometer.test_format_exports import EDDYPRO, eddypro
 from tests.remedies.cases import OR, Case, heal
 from tests.remedies.test_winds import PLAIN, PLAIN_NAKED, RECIPE, STREAM, TIMELESS, ZONED, mwv, nmea, rows
 from tests.remedies.user import User
@@ -63,12 +64,15 @@ TOA5 = rows(
     '"TOA5","s","CR1000"\n"TIMESTAMP","RECORD","WS_Avg","WindDir_Avg"\n"TS","RN","m/s","degrees"\n"","","Avg","Avg"\n',
     '"2026-05-01 12:{m}:{s}",{k},{v},{d}',
 )
+TWO_SPEEDS = rows(
+    '"TOA5","s","CR1000"\n"TIMESTAMP","RECORD","WS_Avg","WS2_Avg"\n"TS","RN","m/s","m/s"\n"","","Smp","Smp"\n',
+    '"2026-05-01 12:{m}:{s}",{k},{v},{v}5',
+)
 SYSLOG = "".join(f"Feb 28 12:00:{k:02d} {POLAR[k % 6]}\n" for k in S)
 LEAP = "".join(f"Feb 29 12:00:{k:02d} {POLAR[k % 6]}\n" for k in S)
 OF_DAY = "".join(f"12:00:{k:02d} {POLAR[k % 6]}\n" for k in S)
 ELAPSED = "time,wind_speed\n" + "".join(f"{k},{4 + k % 7 / 10}\n" for k in S)
 STRETCHES = "time,wind_speed\n" + "".join(f"{k % 20},{4 + k % 7 / 10}\n" for k in S)
-SITES = rows("time,site,wind_speed (m/s)\n", ISO + ",north,{v}\n" + ISO + ",south,{v}")
 WEATHERLINK = "\t\t\tWind\tWind\nDate\tTime\tTemp\tSpeed\tDir\n" + "".join(
     f"{25 + k}/05/26\t10:30a\t20.1\t{1.6 * k:.1f}\tNNE\n" for k in range(1, 4)
 )
@@ -316,6 +320,23 @@ DRAFTED = [
         ("ingest a.csv --zone UTC --as delimited --columns '2=time,4=wind_speed[m/s]'",),
         files={"a.csv": FLUX},
     ),
+    Case(
+        "formats/described.py",
+        "let its columns be drafted, and conf",
+        "ingest a.dat --zone UTC",
+        ("ingest a.dat --zone UTC --as delimited --columns '1=time,3=wind_speed[m/s]'",),
+        files={
+            "a.dat": TOA5.replace("WS_Avg", "Cups_Avg").replace("WindDir_Avg", "Vane_Avg").replace("degrees", "deg")
+        },
+    ),
+    Case(
+        "formats/described.py",
+        "to read the others, too,",
+        "ingest a.dat --zone UTC",
+        ("ingest a.dat --zone UTC --as delimited --columns '1=time,4=wind_speed[m/s]' --name other",),
+        files={"a.dat": TWO_SPEEDS},
+        untried="--unit",
+    ),
 ]
 
 
@@ -331,13 +352,43 @@ def test_a_table_that_is_drafted_by_a_remedy_is_read_once_it_is_confirmed(case: 
     user.succeeds(*command, "--accept", re.findall(r"--accept (\w+)", ended.err)[0])
 
 
-def test_a_site_that_a_recipe_names_otherwise_than_the_file_is_named_as_sniff_lists_it(user: User) -> None:
-    (user.folder / "a.csv").write_text(SITES)
-    (user.folder / "FILE.toml").write_text(SITE_RECIPE.format("South"))
-    user.meets("table/table.py", "name a site as the file", "ingest", "a.csv", "--sensor", "FILE.toml")
-    user.follows("ingest", "--sniff", "a.csv", shows="north")
+def test_units_that_lack_a_cell_are_read_by_the_columns_that_are_named(user: User) -> None:
+    (user.folder / "a.csv").write_text(eddypro([unit for name, unit in EDDYPRO.items() if name != "DOY"]))
+    fix = user.meets("formats/described.py", "mend the line of units;", "ingest", "a.csv", "--zone", "UTC")
+    (columns,) = re.findall(r'--columns "([^"]*)"', fix)
+    command = ("ingest", "a.csv", "--zone", "UTC", "--columns", columns, "--expect", "coarse")
+    ended = user.follows(*command, code=3, shows="--accept")
+    user.succeeds(*command, "--accept", re.findall(r"--accept (\w+)", ended.err)[0])
+
+
+def test_a_component_is_no_speed_and_is_named_with_the_other(user: User) -> None:
+    lines = (f"2026-05-01T12:00:{k:02d}Z,{-2 - k % 7 / 10:.1f},{1 + k % 5 / 10:.1f}\n" for k in S)
+    (user.folder / "a.csv").write_text("time,wind_speed,v\n" + "".join(lines))
+    fix = user.meets("samples/rules.py", "name both components, ea", "ingest", "a.csv", "--sensor", "generic-csv")
+    assert "wind_x[m/s] and wind_y[m/s]" in fix
+    user.follows("ingest", "a.csv", "--columns", "time,wind_x[m/s],wind_y[m/s]", "--azimuth", 270)
+
+
+@pytest.mark.parametrize("sites", [("north", "south"), ("north",)])
+def test_a_site_that_a_recipe_names_otherwise_than_the_file_is_named_as_the_file_writes_it(
+    user: User, sites: tuple[str, ...]
+) -> None:
+    lines = "\n".join(ISO + f",{site},{{v}}" for site in sites)
+    (user.folder / "a.csv").write_text(rows("time,site,wind_speed (m/s)\n", lines))
+    (user.folder / "FILE.toml").write_text(SITE_RECIPE.format("North"))
+    fix = user.types("ingest", "a.csv", "--sensor", "FILE.toml").err.partition("fix: ")[2]
+    assert re.findall("'(.*?)'", fix) == list(sites)
     (user.folder / "FILE.toml").write_text(SITE_RECIPE.format("north"))
-    user.succeeds("ingest", "a.csv", "--sensor", "FILE.toml")
+    user.succeeds("ingest", "a.csv", "--sensor", "FILE.toml", shows="samples +40,")
+
+
+def test_of_many_sites_the_first_are_named(user: User) -> None:
+    lines = "".join(f"2026-05-01T12:00:{k:02d}Z,{letter},5.0\n" for letter in "abcdefghijklmnop" for k in S)
+    (user.folder / "a.csv").write_text("time,site,wind_speed (m/s)\n" + lines)
+    (user.folder / "FILE.toml").write_text(SITE_RECIPE.format("A"))
+    err = user.types("ingest", "a.csv", "--sensor", "FILE.toml").err
+    assert "'a' or 'b'" in err
+    assert "'l', or one of 4 more" in err
 
 
 def test_a_count_that_starts_again_is_read_as_a_file_of_each_stretch(user: User) -> None:
@@ -352,12 +403,31 @@ def test_a_count_that_starts_again_is_read_as_a_file_of_each_stretch(user: User)
         user.follows("ingest", name, *start, f"2026-05-01T1{number}:00:00Z")
 
 
-def test_a_stream_whose_clock_stands_still_is_read_without_its_times(user: User) -> None:
-    (user.folder / "a.nmea").write_text("".join(mwv(1) for _ in S))
-    fixed, steady = ("--platform", "fixed"), ("--start", "2026-05-01T12:00:00Z", "--rate", 1)
-    user.meets("marks.py", "check that the receiver", "ingest", "a.nmea", *fixed)
-    (user.folder / "a.nmea").write_text(TIMELESS)
-    user.follows("ingest", "a.nmea", *fixed, *steady)
+STILL = nmea("GPZDA,120000.00,01,05,2026,00,00") + "\n"
+STREAMS = {
+    "a clock that stands still": STILL.join(mwv(k, time=False) for k in (*S, 0)),
+    "a receiver without a fix": (nmea("GPRMC,,V,,,,,,,,,,N") + "\n").join([TIMELESS] * 3),
+    "no sentence with a time": TIMELESS,
+    "one time": STILL + mwv(1, time=False) * 3,
+}
+"""Streams that do not say when each sentence came."""
+
+
+@pytest.mark.parametrize("name", STREAMS)
+def test_a_stream_without_times_that_go_on_is_read_at_the_rate_at_which_it_came(user: User, name: str) -> None:
+    (user.folder / "a.nmea").write_text(STREAMS[name])
+    fix = user.meets("marks.py", "if its wind came at a steady rate", "ingest", "a.nmea", "--platform", "fixed")
+    assert "column" not in fix
+    user.again("--start", "2026-05-01T12:00:00Z", "--rate", 1, shows="median rate 1 Hz")
+
+
+def test_a_stream_whose_clock_goes_on_later_keeps_its_times(user: User) -> None:
+    still = STILL.join(mwv(k, time=False) for k in range(1100))
+    (user.folder / "a.nmea").write_text(still + "".join(mwv(k) for k in S))
+    steady = ("--start", "2026-05-01T12:00:00Z", "--rate", 1)
+    ended = user.types("ingest", "a.nmea", "--platform", "fixed", *steady)
+    assert ended.code == 2
+    assert "--rate is not used" in ended.err
 
 
 def test_a_log_that_is_hours_off_comes_in_anew_by_the_zone_of_the_other(user: User) -> None:

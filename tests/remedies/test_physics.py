@@ -45,6 +45,23 @@ CASES = [
         shows="first",
     ),
     Case(
+        "evaluation/report.py",
+        "give a name, and the fol",
+        "evaluate shipped --name out/table",
+        ("evaluate shipped --name table --out out",),
+        shows="unknown data set",
+        code=2,
+    ),
+    Case(
+        "training/checkpoint.py",
+        "give a new or empty fold",
+        "train wave --run run",
+        ("train wave --run new",),
+        files={"run/notes.txt": "mine"},
+        shows="unknown data set",
+        code=2,
+    ),
+    Case(
         "sim/blender/command.py",
         "leave out --folder and --python",
         "blender-setup --check --folder x --python y",

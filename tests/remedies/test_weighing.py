@@ -54,6 +54,10 @@ WINDLESS = table("time,area", np.linspace(0.9, 0.8, 30))
 DROOPING = table("time,droop,extension,middle-speed", shown(gusts(30)))
 JOINED = f"calibrate t.csv {SIZED} --log mast --offset 1777629605±0.1"
 """The table's clock begins at 0, the log at the scene's time."""
+GAP = "time,wind_speed (m/s),wind_direction (deg)\n" + "".join(
+    f"2026-05-01T10:0{k // 60}:{k % 60:02d}Z,{5 + k % 10 / 10},{200 + k % 9}\n" for k in range(180) if not 75 < k < 100
+)
+"""A log of three minutes that was interrupted."""
 CASES = [
     Case(
         "calibrate/beside.py",
@@ -121,6 +125,23 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
+        "calibrate/wind.py",
+        "choose a part of the fil",
+        f"calibrate long.csv {SIZED} --log mast --offset 1777629605±0.1",
+        (f"calibrate long.csv {SIZED} --log mast --offset 1777629605±0.1 --start 0s --end 100s",),
+        files={"long.csv": table("time,droop,extension,middle-speed", shown(gusts(60)))},
+        shows=WEIGHED,
+    ),
+    Case(
+        "calibrate/wind.py",
+        "choose a part without ga",
+        f"calibrate t.csv {SIZED} --log gap --offset 1777629605±0.1",
+        (f"calibrate t.csv {SIZED} --log gap --offset 1777629605±0.1 --start 0s --end 60s",),
+        files={"t.csv": table("time,droop,extension,middle-speed", shown(gusts(40))), "gap.csv": GAP},
+        before=("ingest gap.csv",),
+        shows=WEIGHED,
+    ),
+    Case(
         "calibrate/observed.py",
         "choose others with --start and --end",
         f"calibrate t.csv {SIZED}",
@@ -142,6 +163,14 @@ def test_a_log_of_a_table_is_in_a_lake(user: User, monkeypatch: pytest.MonkeyPat
     monkeypatch.delenv("FLAGDATA_LAKE")
     user.meets("calibrate/filmed.py", "name the lake that it was ingested into", *JOINED.split())
     user.again("--lake", "lake")
+
+
+@pytest.mark.usefixtures("cheap")
+def test_the_weight_that_was_found_is_given_to_a_measurement(user: User) -> None:
+    (user.folder / "t.csv").write_text(GUSTY)
+    said = user.meets("calibrate/command.py", "measure: --area-weight", "calibrate", "t.csv", *SIZED.split())
+    weight = said.partition("--area-weight ")[2].split()[0]
+    user.follows("measure", "second.mp4", "--area-weight", weight, code=1, shows="s of film, a measurement takes")
 
 
 def simulated(patch: pytest.MonkeyPatch, shows: Any) -> None:

@@ -217,7 +217,7 @@ CASES = [
     ),
     Case(
         "marks.py",
-        "record ZDA, RMC, GGA or GLL sentences too",
+        "if its wind came at a steady rate",
         "ingest a.nmea",
         ("ingest a.nmea --start 2026-05-01T12:00:00Z --rate 1",),
         files={"a.nmea": TIMELESS},

@@ -147,7 +147,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         """One experiment judged by some of the null flags. How far it departs from the base model is left out, which
         moves no rejection."""
         scored = score(rows_of(own, [place]), base, rows_of(null, by), kinds[by], along, level=LEVEL)
-        others = weighed.rows(np.flatnonzero(by).tolist())
+        others = weighed.misfits.rows(np.flatnonzero(by).tolist())
         return judge(weighing.rows([place]), others, kinds[by], scored, level=LEVEL, departure=0.0)
 
     rows: list[dict[str, Any]] = []

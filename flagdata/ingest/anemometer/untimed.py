@@ -27,7 +27,7 @@ from flagdata.timebase import NANOSECONDS, iso
 
 _NUMBER = re.compile(r"\s*[-+]?(\d+([.,]\d*)?|[.,]\d+)\s*")
 _WIND = re.compile(r"[$!](?P<key>[A-Z0-9]{2}(?:MWV,[^,]*,[RT]|MWD|VWR|VWT|MDA))")
-_TIMED = re.compile(r"^\\|[$!][A-Z0-9]{2}(?:ZDA|RMC|GGA|GLL),[^,]*\d{4}")
+_TIMED = re.compile(r"^\\|[$!][A-Z0-9]{2}(?:(?:ZDA|RMC|GGA),|GLL,(?:[^,]*,){4})(?P<time>[^,*]*\d{4}[^,*]*)")
 _CLOCK_BEFORE = re.compile(
     r"\s*[\[(<\"]?(?:(?P<month>[A-Za-z]{3})\s+(?P<day>\d{1,2})\s+)?"
     r"(?P<time>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9})?)[\])>\"]?[\s,;>:-]+"
@@ -66,7 +66,7 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
         text, found = _table(source, rate, start, where)
         return _counted(source, text, rate, start, found)
     if sum(bool(_WIND.search(line)) for line in lines) and sum(line.startswith(("$", "!", "\\")) for line in lines):
-        _refuse_times(sum(bool(_TIMED.search(line)) for line in lines) > 1, where)
+        _refuse_times(_runs(_all_lines(source)), where)
         text = [line for line in _sentences(source, rate, start) if _TIMED.search(line.partition(" ")[2]) is None]
     else:
         _refuse_times(any(split_stamp(line)[0] for line in lines), where)
@@ -163,6 +163,21 @@ def _counted(source: TextFile, text: Sequence[str], rate: float, start: int, fou
     often = f"at {rate:g} Hz" if rate >= 1 else f"every {1 / rate:g} s"
     what = f"its rows carry no time: counted {often} from {iso(start)}, as given; rows that were lost are not noticed"
     return TableText.of(source, text, [Finding(kind=RATE_GIVEN, severity=Severity.WARNING, what=what), *found])
+
+
+def _runs(lines: Iterable[str]) -> bool:
+    """Whether lines of a stream state more than one time, as those of a clock do that does not stand still.
+
+    A line with a TAG block states a time of its own.
+    """
+    times: set[str] = set()
+    for number, line in enumerate(lines):
+        found = _TIMED.search(line)
+        if found is not None:
+            times.add(found["time"] or f"line {number}")
+        if len(times) > 1:
+            return True
+    return False
 
 
 def _refuse_times(said: bool, where: str) -> None:

@@ -20,6 +20,8 @@ BROKEN = (
     Image.DecompressionBombError,
 )  # fmt: skip
 """What Pillow raises on a picture that is damaged."""
+DEEP = "I;16"
+"""How Pillow's names of modes of 16 bits begin."""
 STILLS = ("JPEG", "PNG", "WEBP")
 """Formats in which other programs' data sets hold single pictures."""
 
@@ -79,7 +81,7 @@ def luma_of_frame(frame: av.VideoFrame, *, codec: str) -> Luma:
 def luma_of_image(image: Image.Image) -> Luma:
     """Loads the pixels. A JPEG's own Y' is taken as it is; RGB is weighted by Rec. 601, see `luma_of_frame`."""
     image.draft("L", image.size)
-    if image.mode.startswith("I;16"):
+    if image.mode.startswith(DEEP):
         words = np.asarray(image).astype(np.float32)
         return Luma(image=Image.fromarray(words), black=0.0, white=65535.0)
     if image.mode in ("I", "F"):

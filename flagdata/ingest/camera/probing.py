@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
+
+import av.error
 
 from flagdata.addresses import local_path
 from flagdata.errors import TimeError
 from flagdata.findings import Finding
 from flagdata.ingest.camera.chapters import chapter_of
+from flagdata.ingest.camera.container import check_file, open_container, packets
 from flagdata.ingest.camera.geometry import upright_size
 from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.start import Start, find_start
 from flagdata.ingest.camera.stream import open_source
 from flagdata.timebase import iso
+
+_LOOKED_THROUGH = 1000
+"""Packets among which a picture comes, be the file damaged: more than lie between key frames."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +64,34 @@ class CameraProbe:
             "start_sigma": self.start.sigma if self.start else None,
             "findings": [finding.as_dict() for finding in self.findings],
         }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pictured:
+    """The container and the codec of a file that holds pictures, whether or not it says when they were taken."""
+
+    container: str
+    codec: str
+
+
+def pictured(path: Path) -> Pictured | None:
+    """Decode the first picture of a file; `None` where none of its packets gives one.
+
+    Raises:
+        NotFoundError, InputError, LimitError: as `open_camera`.
+    """
+    limits = CameraOptions().limits
+    check_file(path, limits)
+    container, stream = open_container(path, limits, threads=1)
+    with container:
+        for packet in islice(packets(container, stream), _LOOKED_THROUGH):
+            try:
+                frames = packet.decode()
+            except av.error.FFmpegError:
+                continue
+            if frames:
+                return Pictured(container=container.format.name, codec=stream.codec_context.name)
+    return None
 
 
 def probe(path: Path | str, options: CameraOptions | None = None) -> CameraProbe:

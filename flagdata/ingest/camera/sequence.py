@@ -14,17 +14,14 @@ from PIL import Image
 from flagdata.errors import InputError, LimitError, TimeError
 from flagdata.files import is_beside
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera import depth
 from flagdata.ingest.camera.damage import resized, undecoded
-from flagdata.ingest.camera.luma import BROKEN, Luma, luma_of_image
+from flagdata.ingest.camera.luma import BROKEN, DEEP, Luma, luma_of_image
 from flagdata.ingest.camera.options import CameraOptions, exact
 from flagdata.ingest.camera.picture_names import ordered
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import survey
 from flagdata.ingest.camera.stills import PICTURES, Head, heads, open_picture, size_of_most, taken
-
-_DEEP = "I;16"
-_DEPTHS = (10, 12, 14, 16)
-"""Bits of gray of the cameras that store it in 16."""
 
 
 class SequenceSource:
@@ -108,30 +105,18 @@ class SequenceSource:
             )
         ]
 
-    def _depth(self) -> tuple[float, list[Finding]]:
-        """The white of images of 16 bits by the brightest gray of all, since cameras of fewer bits store theirs so."""
+    def _depth(self) -> tuple[float, tuple[Finding, ...]]:
+        """The white of images of 16 bits by the brightest gray of all."""
         brightest = 0
         for path, head in zip(self._paths, self._heads, strict=True):
-            if head is None or not head.mode.startswith(_DEEP) or brightest >> _DEPTHS[-2]:
+            if head is None or not head.mode.startswith(DEEP) or depth.fills(brightest):
                 continue
             try:
                 with open_picture(path, self._limits) as image:
                     brightest = max(brightest, int(np.asarray(image).max()))
             except BROKEN:
                 continue
-        bits = next(bits for bits in _DEPTHS if not brightest or not brightest >> bits)
-        if not brightest or bits == _DEPTHS[-1]:
-            return 65535.0, []
-        return float(2**bits - 1), [
-            Finding(
-                kind="depth-by-content",
-                severity=Severity.WARNING,
-                value=float(bits),
-                what=f"no pixel of these images of 16 bits is brighter than {brightest}: they are read as gray of "
-                f"{bits} bits, 0 to {2**bits - 1}",
-                fix="if they are only dark, convert them to 8 bits first",
-            )
-        ]
+        return depth.white(brightest, which="these images")
 
     def _describe(self, rate: Fraction, findings: list[Finding]) -> SourceFacts:
         """Facts from the first image that can be read."""
@@ -179,7 +164,7 @@ class SequenceSource:
     def _luma(self, image: Image.Image, index: int) -> Luma:
         """The luma of an open image, turned as most of them are stored."""
         luma = luma_of_image(image)
-        if image.mode.startswith(_DEEP):
+        if image.mode.startswith(DEEP):
             luma = replace(luma, white=self._white)
         head = self._heads[index]
         if head is None or head.orientation == self._orientation:

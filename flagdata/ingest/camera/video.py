@@ -170,7 +170,7 @@ class VideoSource:
                     fix="choose another with --stream",
                 )
             )  # fmt: skip
-        if telemetry_of(self._container) is not None and self._gps is None:
+        if self._options.start is None and telemetry_of(self._container) is not None and self._gps is None:
             found.append(
                 Finding(
                     kind="telemetry-without-time", severity=Severity.NOTE,
@@ -242,7 +242,8 @@ class VideoSource:
 
     def _decode(self) -> Iterator[tuple[int | None, av.VideoFrame]]:
         """(stamp, frame) in order of presentation."""
-        ordered = _DecodeOrderStamps(self._timing) if self._container.format.name in BY_DECODE_ORDER else None
+        form = self._container.format.name
+        ordered = _DecodeOrderStamps(self._timing) if form in BY_DECODE_ORDER else None
         damaged = False
         flagged: set[int | None] = set()
         count = 0
@@ -271,6 +272,8 @@ class VideoSource:
                     continue
                 own = frame.pts if frame.pts is not None else frame.dts
                 shown = ordered.shown(own) if ordered is not None else own
+                if form in UNTIMED:  # FFmpeg's numbers are at its own rate, or none
+                    shown = self._damage.shown + self._damage.packets
                 self._damage.shown += 1
                 if frame.is_corrupt or (flagged and own in flagged):
                     self._damage.corrupt += 1

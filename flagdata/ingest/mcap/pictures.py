@@ -24,10 +24,11 @@ from PIL import Image
 
 from flagdata.errors import InputError, LimitError, TimeError
 from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera import depth
 from flagdata.ingest.camera.clock import restart, restarted
 from flagdata.ingest.camera.damage import resized, undecoded
 from flagdata.ingest.camera.geometry import Orientation
-from flagdata.ingest.camera.luma import BROKEN, STILLS, Luma, luma_of_frame, luma_of_image
+from flagdata.ingest.camera.luma import BROKEN, DEEP, STILLS, Luma, luma_of_frame, luma_of_image
 from flagdata.ingest.camera.options import CameraOptions
 from flagdata.ingest.camera.source import Picture, SourceFacts
 from flagdata.ingest.camera.stamps import survey
@@ -54,8 +55,6 @@ _PLAIN = {  # encoding → (mode for Pillow, how the bytes of a pixel lie)
 _DEPTH = re.compile(r"\b(?:16UC1|16SC1|32SC1|32FC1|64FC1|compressedDepth)\b", re.IGNORECASE)
 _LOOKED = (5, 4, 1)
 """Runs of pictures, and pictures of each, that are looked at for their brightest gray; see `TopicSource.samples`."""
-_FAINT = 4
-"""Words of 16 bits of which not a quarter is used hold 14 bits or fewer."""
 _BYTES_OF = {"L": 1, "RGB": 3, "BGR": 3, "RGBX": 4, "BGRX": 4}
 
 
@@ -113,7 +112,7 @@ class TopicSource:
         _, width, height, codec, pixel_format, _ = first
         self._size = (width, height)
         self._white: float | None = None
-        findings += self._stretched(pixel_format)
+        findings += self._depth(pixel_format)
         self._pictures = decoded
         self._head = first
         self.facts = SourceFacts(
@@ -122,32 +121,25 @@ class TopicSource:
             sequence=False, findings=tuple(findings), stamped=timing.origin,
         )  # fmt: skip
 
-    def _stretched(self, pixel_format: str) -> Iterator[Finding]:
-        """Take the brightest gray for white, where pictures of 16 bits would be next to black.
+    def _depth(self, pixel_format: str) -> tuple[Finding, ...]:
+        """Settle the white of pictures of 16 bits by the brightest gray of those looked at.
 
         Raises:
-            InputError: such pictures in colour, of which Pillow keeps 8 bits.
+            InputError: they are of fewer bits, but of a form whose white cannot be set.
         """
         if "16" not in pixel_format:
-            return
+            return ()
         looked = [picture.luma() for run in self.samples(*_LOOKED) for picture in run]
-        brightest = max((float(np.asarray(one.image).max()) for one in looked), default=0.0)
-        white = looked[0].white if looked else 0.0
-        if not 0 < brightest < white / _FAINT:
-            return
-        what = f"the pictures of 16 bits reach {brightest / white:.1%} of white at most in {len(looked)} looked at"
-        if pixel_format != "I;16":
+        brightest = max((int(np.asarray(one.image).max()) for one in looked), default=0)
+        which = f"the {len(looked)} pictures looked at"
+        white, found = depth.white(brightest, which=which, otherwise="; if they are depths, choose another topic")
+        if found and not pixel_format.startswith(DEEP):
+            what = f"{which} are of 16 bits, and none of their pixels is brighter than {brightest}"
             raise InputError(
                 f"{what}: they would be next to black", where=self._where, fix="write them with 8 bits a colour"
             )
-        self._white = brightest
-        yield Finding(
-            kind="depth-by-content",
-            severity=Severity.WARNING,
-            value=brightest / white,
-            what=f"{what}: gray {brightest:.0f} was taken as white, and what is brighter is cut off",
-            fix="none needed for a camera of 10 to 14 bits; if these are depths, choose another topic",
-        )
+        self._white = white if found else None
+        return found
 
     def _picture(self, one: _Shown) -> Picture:
         if self._white is None:

@@ -39,7 +39,9 @@ def check_units(sequence: MeshSequence | RaggedMeshSequence, *, where: str) -> N
     size = float(np.max(rest.max(axis=0) - rest.min(axis=0)))
     if not _SMALLEST <= size <= _LARGEST:
         raise InputError(
-            f"a cloth of {size:.4g} m", where=where, fix="are its lengths in metres? Name their unit by --unit"
+            f"a cloth of {size:.4g} m by its texture coordinates, which are its shape at rest in metres",
+            where=where,
+            fix="export it with texture coordinates in metres",
         )
 
 

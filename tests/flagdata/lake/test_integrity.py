@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import random
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -25,7 +26,7 @@ from flagdata.lake.transfer import clone, transfer
 from flagdata.provenance import digest
 from flagdata.schema import Kind, catalog_schema
 from flagdata.storage import Place, RemotePath
-from tests.flagdata.lake.conftest import overwrite
+from tests.flagdata.lake.conftest import LINKS, overwrite
 from tests.flagdata.lake.test_transfer import no_bar
 
 NOW = timedelta(0)
@@ -473,3 +474,19 @@ def test_an_entry_that_a_summary_covers_is_compared_where_an_old_version_is_read
     assert Lake.open(lake.path).rows().num_rows == right[-1]
     overwrite(path, content)
     assert [Lake.open(lake.path).rows(at=at).num_rows for at in ("3", "4", None)] == right
+
+
+@pytest.mark.disk(LINKS)
+@pytest.mark.timeout(60)
+def test_a_pipe_in_place_of_what_the_delta_library_reads_is_named_and_nobody_waits(lake: Lake, put_text: Put) -> None:
+    put_text(lake, "gusts")
+    hint = lake.path / "catalog" / "_delta_log" / "_last_checkpoint"
+    hint.unlink(missing_ok=True)
+    os.mkfifo(hint)
+    for _ in range(2):
+        with pytest.raises(CorruptError, match="_last_checkpoint of the catalog's log is no regular file") as error:
+            Lake.open(lake.path).rows()
+    assert error.value.where == str(hint)
+    assert str(error.value.fix).startswith("delete _last_checkpoint")
+    hint.unlink()
+    assert Lake.open(lake.path).rows()["name"].to_pylist() == ["gusts"]

@@ -83,6 +83,14 @@ def test_a_fitter_that_names_nothing_is_never_wrong_on_nulls_and_finds_nothing()
     assert [gate.name for gate in result.gates if gate.met] == ["false positives on nulls"]
 
 
+def test_what_is_not_decided_is_neither_detected_nor_a_false_positive_and_is_counted() -> None:
+    result = sheet(lambda k: verdict(Conclusion.UNDECIDED))
+    assert result.false_positives.value == 0
+    assert result.shares["detected: one effect"].value == 0
+    assert result.shares["not decided"].value == result.shares["not decided, of one effect"].value == 1
+    assert sheet(lambda k: verdict(Conclusion.SUFFICIENT)).shares["not decided"].value == 0
+
+
 def test_who_guesses_scores_what_chance_gives() -> None:
     """Always rejecting, with one of five effects at random: top-1 is 1/5, every null a false positive; of the claims,
     right are 1/5 on one effect and 2/5 on pairs, none elsewhere: 0.6/4 of all."""

@@ -40,6 +40,9 @@ def both(markers: Verdict, films: Verdict) -> Joint:
         ((Conclusion.SUFFICIENT, 0.4), (Conclusion.SUFFICIENT, 0.7), Conclusion.SUFFICIENT, 0.8),
         ((Conclusion.SUFFICIENT, 0.9), (Conclusion.SUFFICIENT, 0.7), Conclusion.SUFFICIENT, 1.0),
         ((Conclusion.EFFECT, 0.02), (Conclusion.SUFFICIENT, 0.3), Conclusion.EFFECT, 0.04),
+        ((Conclusion.SUFFICIENT, 0.4), (Conclusion.UNDECIDED, 0.03), Conclusion.UNDECIDED, 0.06),
+        ((Conclusion.UNTESTED, 0.4), (Conclusion.UNDECIDED, 0.3), Conclusion.UNDECIDED, 0.6),
+        ((Conclusion.EFFECT, 0.02), (Conclusion.UNDECIDED, 0.03), Conclusion.EFFECT, 0.04),
         ((Conclusion.UNTESTED, 0.1), (Conclusion.UNTESTED, 0.1), Conclusion.UNTESTED, 1.0),
         ((Conclusion.UNTESTED, 0.001), (Conclusion.EFFECT, 0.02), Conclusion.EFFECT, 0.04),
         ((Conclusion.OUTSIDE, 0.02), (Conclusion.EFFECT, 0.02), Conclusion.OUTSIDE, 0.04),
@@ -52,6 +55,14 @@ def test_the_joint_p_is_twice_the_smaller_and_each_kind_that_rejects_has_its_say
     found = both(judged(*markers), judged(*films))
     assert found.conclusion is conclusion
     assert found.p_value == pytest.approx(p)
+
+
+def test_a_joint_answer_that_is_not_decided_has_the_reasons_and_calls_no_effect_needless() -> None:
+    found = both(judged(Conclusion.SUFFICIENT, 0.4), judged(Conclusion.UNDECIDED, 0.2))
+    for said in (found.words, joint_page(found)):
+        assert "Nothing is decided" in said
+        assert found.films.open[0] in said
+        assert "no effect is needed" not in said
 
 
 def test_what_may_be_missing_is_what_both_kinds_leave() -> None:

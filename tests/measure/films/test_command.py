@@ -20,6 +20,7 @@ from measure.films.sources import films_among
 from measure.loop.run import Options as LoopOptions
 from measure.observables.observable import WINDOW
 from measure.observe.trajectory import Experiment
+from measure.verdict.criteria import CRITERIA
 from measure.verdict.record import Conclusion, Estimate, Parameter, Verdict
 from sim.run.reading import load
 from tests.measure.films.conftest import EFFECTS, recording
@@ -63,6 +64,9 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
     assert verdict["schema"] == "flagdata.verdict/1"
     assert verdict["named"] == ["tangential-linear-drag"]
     assert 0 < verdict["seconds"] < 300
+    assert {one["effect"] for one in verdict["power"]} == {"lift", "shear", "tangential-linear-drag"}
+    assert verdict["test"]["effective"] <= len(verdict["test"]["null"])
+    assert verdict["provenance"]["criteria"]["hash"] == CRITERIA.hash
     assert {path.name for path in out.iterdir()} == {"report.html", "verdict.json", "base.toml", "model.toml"}
     text = (out / "report.html").read_text()
     assert "Adding tangential-linear-drag (coefficient " in text
@@ -76,6 +80,9 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
     again = json.loads(run(*given, "--out", tmp_path / "other", "--json").stdout)
     assert again["artifacts"]["existing"]
     assert again["artifacts"]["measurement"] == verdict["artifacts"]["measurement"]
+    suspected = json.loads(run(*given, "--suspect", "lift", "--out", tmp_path / "suspected", "--json").stdout)
+    assert suspected["test"]["suspected"] == "lift+"
+    assert not suspected["artifacts"]["existing"]
     words = run(*given, "--out", tmp_path / "third").stdout
     assert "Adding tangential-linear-drag (coefficient " in " ".join(words.split())
     assert max(map(len, words.splitlines())) <= 100
@@ -91,6 +98,8 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
         (("--flag-size", "1.5x1.0", "--area-weight", "0"), "give one above 0"),
         (("--flag-size", "1.5x1.0", "--crop", "0,0,9,9"), "a table of observables has no pictures"),
         (("--flag-size", "1.5x1.0", "--nulls", "2"), "kinds"),
+        (("--flag-size", "1.5x1.0", "--suspect", "lifft"), "did you mean 'lift'"),
+        (("--flag-size", "1.5x1.0", "--suspect", "vertical-wind"), "vertical-wind+ or vertical-wind-"),
         (("--flag-size", "1.5x1.0", "--start", "40s"), "s of film with a log beside them"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -97,6 +98,24 @@ def test_too_few_kinds_of_numerics_cannot_test(cheap: list[int], tmp_path: Path)
     found = close_loop(both(), options(kinds=4), folder=tmp_path)
     assert found.conclusion is Conclusion.UNTESTED
     assert "with 4 numerical set-ups no p is below 0.1" in found.words  # of eight flags at most
+
+
+def test_recordings_that_would_show_none_of_the_effects_decide_nothing(cheap: list[int], tmp_path: Path) -> None:
+    found = close_loop(both(), options(only=("hem-mass.line_density",)), folder=tmp_path)  # which moves nothing here
+    assert found.conclusion is Conclusion.UNDECIDED
+    assert any("would have been seen with a chance of" in reason for reason in found.open)
+    assert found.power[0].share < 0.1
+    assert all(reason in found.words for reason in found.open)
+
+
+def test_the_power_is_that_of_effects_at_the_mean_strength_of_their_priors(plain: Verdict) -> None:
+    seen = {one.effect: one for one in plain.power}
+    assert list(seen) == [one.effect for one in sorted(plain.power, key=lambda one: -one.share)]
+    # 0.2 · 2.3/8 for lift, whose noise of a mean is 0.02/√20, and as much for the others.
+    assert min(one.share for one in plain.power) > 0.9
+    low, high = 0.3, 8.0
+    assert seen["lift"].strength == pytest.approx((high - low) / math.log(high / low), rel=0.05)
+    assert plain.open == ()
 
 
 def test_an_effect_that_is_not_weighed_is_refused() -> None:

@@ -100,7 +100,7 @@ def test_a_cut_to_another_scene_has_its_instant(plain: Frames) -> None:
     other = 255 - np.roll(plain, WIDTH // 3, axis=2)
     fault = counted(np.concatenate([plain[:25], other[25:]]))[0]
     assert (fault.kind, fault.value) == ("scene-cut", 1.0)
-    assert "once, first at 1.0 s" in fault.what
+    assert "once, first at 1.00 s" in fault.what
 
 
 def test_a_loop_is_counted_by_the_frames_that_look_like_others(plain: Frames) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -27,6 +28,11 @@ from measure.nulls import bank as banks
 from measure.nulls.simulation import NullBatch
 from measure.observe.trajectory import Experiment, Specimen, Trajectory
 from measure.probes.statistics import projected
+from measure.report.document import as_document, from_document
+from measure.report.lead import lead
+from measure.report.page import page
+from measure.report.words import words
+from measure.verdict.quantity import number
 from measure.verdict.record import Conclusion, Verdict
 from sim.cloth import Cloth
 from sim.effects import EFFECTS, Effect
@@ -138,6 +144,23 @@ def test_a_strong_effect_is_named_and_helps_where_it_was_not_fitted(dragged: Ver
     assert fast.control is not None
     assert fast.after.high < fast.control.low
     assert fast.reduction.low > 0
+
+
+def test_a_hoist_that_is_attached_is_as_stiff_as_a_bound_and_the_bound_holds(specimen: Specimen, bank: Path) -> None:
+    """From some stiffness on nothing changes, and a fit ends anywhere."""
+    true = 17_000.0
+    attached = recorded(specimen, EFFECTS["full-hoist"](stiffness=true), seed=77)
+    verdict = close_loop(attached, Options(bank=bank, level=0.1))
+    assert "full-hoist" in verdict.named
+    (found,) = [c for c in verdict.ranking if c.effect == "full-hoist"]
+    assert (found.strength.bound, found.strength.level) == ("at-least", 0.95)
+    assert 0 < found.strength.low < true < found.strength.high
+    assert found.strength.value == found.strength.low
+    assert from_document(json.loads(json.dumps(as_document(verdict), allow_nan=False))).ranking == verdict.ranking
+    said = f"stiffness at least {number(found.strength.low, digits=2)} N/m² 95 %"
+    for text in (lead(verdict), words(verdict), page(verdict)):
+        assert said.removesuffix(" 95 %") in text.replace("\N{NO-BREAK SPACE}", " ")
+    assert said in lead(verdict)
 
 
 def test_a_verdict_that_rests_on_few_kinds_says_that_another_draw_could_decide_otherwise(dragged: Verdict) -> None:

@@ -68,7 +68,7 @@ def test_flags_that_are_unlike_count_one_by_one_and_those_that_are_alike_as_thei
     assert single.effective == KINDS
 
 
-def test_of_one_kind_nothing_is_told() -> None:
+def test_one_kind_shows_nothing() -> None:
     one = ClusteredNulls(null=np.arange(8.0), kinds=np.zeros(8, dtype=np.int64))
     assert one.effective == 1.0
     assert not one.tests(0.3)

@@ -37,6 +37,7 @@ METHOD = {
     "nulls/simulation": {"SETTLE", "_FINER", "_STEPS", "_SAMPLED", "_UNEVEN", "_HALVINGS", "_GENTLE"},
     "nulls/winds": {"_STEADY", "_EVERY"},
     "loop/gauss_newton": {"ROUNDS", "_FEW", "_HALVINGS", "STAYS", "_LONGEST", "_TRIED"},
+    "loop/profile": {"COUNT", "BEYOND", "_WITHIN_THE_END", "_AT_THE_END"},
     "loop/residuals": {"_SHOWN"},
     "loop/run": {"_FLOOR_COPIES", "_LOOKS"},
     "loop/selection": {"GUST_COLUMN"},

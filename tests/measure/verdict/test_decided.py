@@ -1,4 +1,4 @@
-"""When a base model that is not rejected is said to suffice, and where nothing is said to be explained."""
+"""When a base model that is not rejected suffices, and where no model explains recordings."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ def test_all_doubts_are_stated_together() -> None:
 
 
 @pytest.mark.parametrize(("p", "departure", "power"), [(0.1001, 2.0, (0.3,)), (1.0, 0.0, (0.1, 0.5))])
-def test_at_the_thresholds_themselves_nothing_is_doubted(p: float, departure: float, power: tuple[float, ...]) -> None:
+def test_at_the_thresholds_themselves_it_suffices(p: float, departure: float, power: tuple[float, ...]) -> None:
     assert undecided(p, level=0.05, departure=departure, power=power) == ()
 
 
-def test_what_is_not_decided_is_said_with_its_reasons_and_no_effect_is_called_needless() -> None:
+def test_what_is_not_decided_is_reported_with_its_reasons_and_no_effect_is_called_needless() -> None:
     one = verdict(Conclusion.UNDECIDED)
     assert one.conclusion in NOT_REJECTED
     said = lead(one)
@@ -108,7 +108,7 @@ def test_the_power_is_stated_for_each_effect_and_on_average() -> None:
     assert power_text(verdict(Conclusion.SUFFICIENT)) == ""
 
 
-def test_a_suspicion_is_said_to_have_been_stated_beforehand_and_flags_are_counted_as_what_they_are() -> None:
+def test_a_suspicion_is_reported_as_stated_beforehand_and_flags_are_counted_as_what_they_are() -> None:
     whole = verdict(Conclusion.SUFFICIENT)
     counted = replace(whole.test, effective=152.0, correlation=0.01, tail=0.34, kinds=20, suspected="lift+")
     said = sentences.test_sentence(replace(whole, test=counted))

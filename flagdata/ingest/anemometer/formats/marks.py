@@ -22,10 +22,9 @@ DAY = 86_400 * NANOSECONDS
 # The receiver sends ZDA at the second itself; RMC, GGA and GLL state the time of a fix and may come late.
 _TRUST = ("ZDA", "RMC", "GGA", "GLL")
 NO_TIME = "the stream carries no time"
-NO_TIME_FIX = (
-    "record ZDA, RMC, GGA or GLL sentences too, or log with a stamp before each line; "
-    "if its wind came at a steady rate that is known: --start TIME --rate HZ, with the instant of the first"
-)
+_STEADY_FIX = "if its wind came at a steady rate that is known: --start TIME --rate HZ, with the instant of the first"
+NO_TIME_FIX = f"record ZDA, RMC, GGA or GLL sentences too, or log with a stamp before each line; {_STEADY_FIX}"
+_STILL_FIX = f"check that the receiver has a fix: the times of its ZDA, RMC, GGA or GLL go on with one; {_STEADY_FIX}"
 BURST = 4
 """Lines about a single mark that are of its second: 4800 baud carry five sentences of 82 characters, the mark too."""
 FEW = 10
@@ -123,8 +122,7 @@ class TimeLine:
             raise TimeError(
                 "the stream's clock stands still",
                 where=f"{where}, line {at[0]}",
-                fix="check that the receiver has a fix; if the wind came at a steady rate that is known, leave out "
-                "the columns of the time and give --start TIME --rate HZ",
+                fix=_STILL_FIX,
             )
         spacing = float(np.median(np.diff(marks))) / NANOSECONDS
         time = self.bursts.placed(lines, winds, at, marks) if winds else None
@@ -149,8 +147,7 @@ class TimeLine:
             f"the stream carries one time, in line {at[0]}: {len(lines)} wind sentences are taken as of the second "
             "about it, in their order"
         )
-        fix = "if they came at a steady rate that is known: --start TIME --rate HZ, with the instant of the first"
-        found = (Finding(kind="one-time", severity=Severity.WARNING, count=len(lines), what=what, fix=fix),)
+        found = (Finding(kind="one-time", severity=Severity.WARNING, count=len(lines), what=what, fix=_STEADY_FIX),)
         return Placed(time=mark + (lines - at[0]) * pace, spacing=1.0, marks=1, kind=kind, findings=found)
 
     def _kind(self, where: str) -> str:

@@ -24,6 +24,8 @@ from flagdata.ingest.anemometer.text.columns import Columns
 from flagdata.schema import CHANNELS, SampleFlag
 from flagdata.units import unit
 
+_LISTED = 12
+"""Names of sites that an error lists."""
 _ROUND = 1e-6
 """rad, by which an angle is off after its conversion."""
 _SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
@@ -112,6 +114,8 @@ class _Gathered:
     bad_stamps: list[int] = field(default_factory=list)
     distant: int = 0
     blank: list[int] = field(default_factory=list)
+    others: set[str] = field(default_factory=set)
+    """What the column of the sites says in blocks that have no row of the one wanted."""
 
     def columns(self) -> list[_Column]:
         return [*self.channels.values(), *self.extra.values()]
@@ -124,9 +128,10 @@ class _Gathered:
     def add(self, line: NDArray[np.int64], block: Block, recipe: Recipe) -> None:
         if self.rows is not None and recipe.rows is not None:
             wanted = _among(block, self.rows, (recipe.rows.value,))
-            line, block = line[wanted], _where(block, wanted)
-            if not len(line):
+            if not wanted.any():
+                self.others.update(map(str.strip, map(str, cells_of(block, self.rows))))
                 return
+            line, block = line[wanted], _where(block, wanted)
         stamps = self.clock.parse(block)
         keep = stamps.valid
         if self.host is not None:
@@ -311,6 +316,12 @@ def read_table(
     return Table(reading=reading, extra={name: column.value(order) for name, column in gathered.extra.items()})
 
 
+def _listed(names: Collection[str]) -> str:
+    """The first of the names, and how many more there are."""
+    shown = [repr(name) for name in sorted(names)[:_LISTED]]
+    return " or ".join(shown) + (f", or one of {len(names) - _LISTED} more" if len(names) > _LISTED else "")
+
+
 def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str) -> tuple[Finding, ...]:
     """Rows left out for their stamps.
 
@@ -324,7 +335,7 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str)
     if count == 0 and not bad and recipe.rows is not None:
         raise InputError(
             f"no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which names the site", where=where,
-            fix="name a site as the file writes it, or the wind's column by its heading; ingest --sniff lists them",
+            fix=f"name a site as the file writes it: {_listed(gathered.others)}",
         )  # fmt: skip
     if count == 0:
         refused = InputError if recipe.rows is None else NothingMeasuredError  # of several sites the others are read

@@ -18,6 +18,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from flagdata.buffers import owned
+
 _LF, _CR, _QUOTE = 10, 13, 34
 
 
@@ -112,7 +114,7 @@ class Lines:
         if not kept:
             return Columns(cells=[pa.array([], pa.string()) for _ in range(count)])
         table = csv.read_csv(
-            pa.BufferReader(kept),
+            pa.BufferReader(owned(kept)),
             read_options=csv.ReadOptions(use_threads=False, block_size=len(kept) + 1, column_names=names),
             parse_options=csv.ParseOptions(delimiter=chr(self.shape.delimiter), ignore_empty_lines=False),
             convert_options=csv.ConvertOptions(

@@ -1,0 +1,120 @@
+"""Remedies of exports, of alignments by the contents, of large answers, and of rows that go while a command runs."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flagdata import selection
+from flagdata.ingest.camera import CameraOptions
+from flagdata.ingest.store import CameraIngest, Labels, ingest_camera
+from flagdata.lake import Lake
+from tests.remedies.cases import Case, heal
+from tests.remedies.user import User
+
+FAR = "align first mast --centre 50000 --search 10"
+CASES = [
+    Case(
+        "align/bins.py",
+        "check start times and zo",
+        FAR,
+        ("align first mast --centre 0 --search 60",),
+        shows="no offset can be estimated: film and wind log share",
+        code=3,
+    ),
+]
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_what_a_remedy_says_heals(case: Case, user: User) -> None:
+    heal(user, case)
+
+
+def test_a_film_that_cannot_be_aligned_is_looked_at_or_its_offset_given(user: User) -> None:
+    fix = user.meets("align/methods.py", "look at it with --plot FILE.png", "align", "first", "mast")
+    user.follows("align", "first", "mast", "--plot", "FILE.png", code=3, shows="plot: FILE.png")
+    assert (user.folder / "FILE.png").stat().st_size > 1000
+    assert "--by given --offset SECONDS --offset-sigma SECONDS" in fix
+    user.succeeds("align", "first", "mast", "--by", "given", "--offset", 1, "--offset-sigma", "0.1")
+
+
+def sized(name: str, size: int) -> None:
+    """The film `second` in frames of that size, as programs ingest it."""
+    options = CameraIngest(camera=CameraOptions(size=size))
+    ingest_camera(Lake.open("lake"), Path("second.mp4"), options, labels=Labels(name=name))
+
+
+def test_films_of_one_size_are_chosen(user: User) -> None:
+    sized("small", 64)
+    command = ("export", "lerobot", "--to", "out", "--frames", "png", "--where")
+    user.meets("export/lerobot.py", "a data set of LeRobot ha", *command, "kind = 'camera'")
+    user.follows(*command, "name = 'small'")
+
+
+def test_frames_of_an_odd_size_are_exported_as_png(user: User) -> None:
+    sized("odd", 63)
+    command = ("export", "lerobot", "--to", "out", "--where", "name = 'odd'")
+    user.meets("export/lerobot.py", "export with --frames png", *command)
+    user.again("--frames", "png")
+
+
+def test_sql_that_gives_more_than_can_be_held_is_limited_or_written(
+    user: User, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A smaller limit stands for millions of values."""
+    monkeypatch.setattr(selection, "CELL_LIMIT", 5000)
+    large = "select range as a from range(60000)"
+    user.meets("flagdata/selection.py", "aggregate in SQL, or giv", "query", "--json", "--sql", large)
+    user.succeeds("query", "--json", "--sql", f"select count(*) as n from ({large})", shows="60000")
+    user.succeeds("query", "--json", "--sql", f"{large} limit 100")
+    user.follows("query", "--csv", "--sql", large)
+    user.follows("query", "--arrow", "a.arrow", "--sql", large)
+
+
+def gone_meanwhile(patch: pytest.MonkeyPatch, method: str, name: str) -> None:
+    """Let somebody else withdraw a row between a command's look at the lake and its commit."""
+    plain: Callable[..., Any] = getattr(Lake, method)
+    withdraw = Lake.withdraw
+    first = itertools.count()
+
+    def late(lake: Lake, *arguments: Any, **options: Any) -> Any:
+        if not next(first):
+            withdraw(Lake.open(lake.path), [lake.artifact(name).id], "meanwhile")
+        return plain(lake, *arguments, **options)
+
+    patch.setattr(Lake, method, late)
+
+
+@pytest.mark.parametrize("verb", ["label", "withdraw"])
+def test_a_row_that_somebody_withdrew_meanwhile_is_not_listed(user: User, verb: str) -> None:
+    rest = {"label": ("a=1",), "withdraw": ("-m", "x")}[verb]
+    with pytest.MonkeyPatch.context() as patch:
+        gone_meanwhile(patch, verb, "first")
+        if verb == "label":
+            fix = user.meets("lake/labels.py", "give ids of rows that fl", verb, "first", *rest)
+        else:
+            fix = user.meets("lake/withdrawal.py", "give ids of rows that fl", verb, "first", *rest)
+    assert "flagdata ls --at main" in fix
+    listed = user.follows("ls", "--at", "main").out
+    assert "first" not in listed
+    (other,) = (line.split()[0] for line in listed.splitlines() if " mast " in line)
+    user.succeeds(verb, other, *rest)
+
+
+def test_what_is_on_a_branch_that_somebody_deletes_meanwhile_is_not_listed(user: User) -> None:
+    plain = Lake.erase
+
+    def late(lake: Lake, *arguments: Any, **options: Any) -> Any:
+        Lake.open(lake.path).delete_branch("side", discard=True)
+        return plain(lake, *arguments, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Lake, "erase", late)
+        user.meets("lake/erasure.py", "flagdata ls --at REF lis", "withdraw", "third", "--everywhere", "-m", "asked")
+    listed = user.follows("ls", "--at", "main").out
+    (other,) = (line.split()[0] for line in listed.splitlines() if " mast " in line)
+    user.succeeds("withdraw", other, "--everywhere", "-m", "asked")
