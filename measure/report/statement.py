@@ -187,7 +187,10 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         f"{number(clock, digits=2)} s in time"
     )
     held = "rigidly" if math.isinf(specimen.stiffness) else f"by springs of {number(specimen.stiffness)} N/m"
-    places = "" if specimen.anchors_given else ", tied at their mean observed places"
+    if experiment.carried:
+        places = ", carried where the markers at them go"
+    else:
+        places = "" if specimen.anchors_given else ", tied at their mean observed places"
     between = (
         "intervals of these include the scatter between simulators of other authors, "
         f"{100 * CRITERIA.density_between:.0f} % in density, a factor of {math.exp(CRITERIA.bending_between):.1f} in "
