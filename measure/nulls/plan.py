@@ -19,6 +19,7 @@ from measure.nulls.simulation import NullBatch
 from measure.observe.trajectory import described
 from measure.verdict.criteria import CRITERIA
 
+_CARRIED = ", carried along the recordings' own ways from other instants on"
 FEWEST_NULLS = CRITERIA.simulated_kinds * banks.WINDS
 """So many at least are simulated: each kind of numerics is a batch, and p-values count the kinds."""
 
@@ -106,7 +107,7 @@ def load_bank(folder: Path, setting: Setting) -> NullBank:
     """
     bank = banks.load(folder, words=f"over priors, from {folder.name}")
     check(bank, setting, where=str(folder))
-    return bank
+    return replace(bank, words=bank.words + _CARRIED) if bank.carried else bank
 
 
 def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None:
@@ -175,8 +176,8 @@ def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: S
     folder = kept_in(setting, seed=seed)
     banks.build(folder, wanted, workers=workers, progress=count)
     total = banks.WINDS * len(wanted)
-    held = ", carried along the recordings' own ways from other instants on" if setting.experiment.carried else ""
-    words = f"{total} recordings of {len(wanted)} meshes and methods, over the priors of the cloth{held}"
+    words = f"{total} recordings of {len(wanted)} meshes and methods, over the priors of the cloth"
+    words += _CARRIED if setting.experiment.carried else ""
     return banks.load(folder, words=words, kinds=len(wanted))
 
 
