@@ -124,8 +124,8 @@ def page(document: dict[str, Any]) -> str:
 
 _DATA = (
     "{seconds:g} s of one repeat of each of four programmes, {rate:g} Hz, in still air, by a mesh of {vertices} "
-    "vertices; {kinds} kinds of nulls, carried along the same ways from other instants on, judged at 0.05. Controls are "
-    "made along these ways by a mesh and steps of their own and judged by the same nulls."
+    "vertices; {kinds} kinds of nulls, carried along the same ways from other instants on, judged at 0.05. Controls "
+    "are made along these ways by a mesh and steps of their own and judged by the same nulls."
 )
 
 

@@ -45,7 +45,8 @@ def test_a_way_is_that_of_the_recording_or_its_reverse_where_it_does_not_turn() 
         assert made.times[0] == -SETTLE
         assert made.times[-1] >= 20.0
         instant = (made.places[:, 0, 2] - SEATS[0, 1]) / 0.01
-        assert -1e-6 <= instant.min() and instant.max() <= SECONDS + 1e-6
+        assert instant.min() >= -1e-6
+        assert instant.max() <= SECONDS + 1e-6
         np.testing.assert_allclose(
             made.places[:, 0, 1], FAR * np.sin(2 * math.pi * FREQUENCY * instant), rtol=0, atol=1e-4
         )

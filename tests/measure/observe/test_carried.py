@@ -10,12 +10,10 @@ import pytest
 import torch
 
 from flagdata.errors import InputError, UsageError
-from measure.closing.close import close_loop
 from measure.forecasting.alignment import aligned
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.segments import Segments
-from measure.loop.run import Options
 from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
 from measure.observe.recipe import parse
 from measure.observe.trajectory import Experiment
@@ -85,11 +83,6 @@ def test_predictions_follow_attachments_that_move(swung: Observation) -> None:
 def test_pins_that_move_without_being_declared_are_refused(swung: Observation) -> None:
     with pytest.raises(InputError, match="not held there"):
         observe([swung], replace(SETUP, carried=False))
-
-
-def test_a_verdict_on_attachments_that_move_is_refused_before_anything_is_simulated(swung: Observation) -> None:
-    with pytest.raises(InputError, match="attachments move"):
-        close_loop(observe([swung], SETUP).experiment, Options())
 
 
 def test_recordings_agree_on_whether_the_cloth_is_carried(swung: Observation) -> None:
