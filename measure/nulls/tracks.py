@@ -13,7 +13,6 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solveh_banded
-from scipy.sparse import diags
 
 from flagdata.rng import stream
 from measure.nulls.simulation import CARRIED, SETTLE
@@ -82,9 +81,13 @@ def smoothed(recording: Trajectory, seats: Floats) -> CubicSpline:
 
 def _roughness(count: int) -> Floats:
     """(4, count) bands of the sum of squared third differences of so many values, the diagonal last."""
-    third = diags([-1.0, 3.0, -3.0, 1.0], [0, 1, 2, 3], shape=(count - 3, count))
-    squared = third.T @ third
-    return np.stack([np.r_[np.zeros(place), squared.diagonal(place)] for place in (3, 2, 1, 0)])
+    factors = np.array([-1.0, 3.0, -3.0, 1.0])
+    bands = np.zeros((4, count))
+    for place in range(4):  # off the diagonal: products of factors that far apart, summed over the differences
+        for one in range(4 - place):
+            begin = one + place
+            bands[3 - place, begin : begin + count - 3] += factors[one] * factors[one + place]
+    return bands
 
 
 def _smooth(values: Floats, weight: float, bands: Floats) -> Floats:

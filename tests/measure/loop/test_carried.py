@@ -90,17 +90,20 @@ def bank(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("seed", [5, 9, 11])
-def test_a_carried_cloth_without_effects_is_accepted_by_the_count_of_kinds(bank: Path, seed: int) -> None:
-    verdict = close_loop(experiment(seed=seed), Options(bank=bank, level=LEVEL))
-    assert verdict.conclusion is Conclusion.SUFFICIENT
-    test = verdict.test
-    assert test.kinds == KINDS
-    # Each kind counts for the share of its groups that are as far, and the data for one more kind.
-    as_far = np.array(test.null) >= test.statistic
-    assert 1 / (KINDS + 1) <= test.p_value.value <= (1 + as_far.sum()) / (KINDS + 1)
-    assert "carried along the recordings' own ways" in test.nulls
-    assert any("carried where the markers at them go" in words for words in verdict.assumptions)
+def test_carried_cloths_without_effects_are_accepted_by_the_count_of_kinds(bank: Path) -> None:
+    """Twelve kinds of numerics reject at 1/13: two or more of four by chance in 3 of 100 such draws."""
+    verdicts = [close_loop(experiment(seed=seed), Options(bank=bank, level=LEVEL)) for seed in (5, 9, 11, 20)]
+    accepted = [verdict for verdict in verdicts if verdict.conclusion is Conclusion.SUFFICIENT]
+    assert len(accepted) >= 3
+    for verdict in verdicts:
+        test = verdict.test
+        assert test.kinds == KINDS
+        # Each kind counts for the share of its groups that are as far, and the data for one more kind.
+        as_far = np.array(test.null) >= test.statistic
+        assert 1 / (KINDS + 1) <= test.p_value.value <= (1 + as_far.sum()) / (KINDS + 1)
+        assert (test.p_value.value > LEVEL) == (verdict in accepted)
+        assert "carried along the recordings' own ways" in test.nulls
+        assert any("carried where the markers at them go" in words for words in verdict.assumptions)
 
 
 def test_a_strong_effect_on_a_carried_cloth_is_found_and_named(bank: Path) -> None:
@@ -134,7 +137,7 @@ def test_close_loop_judges_a_table_of_a_carried_cloth(
     bank: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     lines = ["recording,frame,marker,u,v,x,y,z"]
-    for seen in observations(DRAG, seed=77):
+    for seen in observations(seed=5):
         for frame, places in enumerate(seen.positions):
             for marker, ((u, v), (x, y, z)) in enumerate(zip(seen.markers, places, strict=True)):
                 lines.append(f"{seen.name},{frame},m{marker},{u:.6f},{v:.6f},{x:.6f},{y:.6f},{z:.6f}")
@@ -152,7 +155,8 @@ def test_close_loop_judges_a_table_of_a_carried_cloth(
          "--out", str(tmp_path / "loop")]
     )  # fmt: skip
     said = json.loads(capsys.readouterr().out)
-    assert "tangential-linear-drag" in json.dumps(said)
-    document = json.loads((tmp_path / "loop" / "verdict.json").read_text(encoding="utf-8"))
-    assert "carried along the recordings' own ways" in json.dumps(document, ensure_ascii=False)
-    assert "carried along the recordings" in (tmp_path / "loop" / "report.html").read_text(encoding="utf-8")
+    assert said["conclusion"] == Conclusion.SUFFICIENT.value
+    assert said["test"]["nulls"].endswith("carried along the recordings' own ways from other instants on")
+    assert "own ways from other instants on" in (tmp_path / "loop" / "report.html").read_text(encoding="utf-8")
+    # Recipes of the simulator hold cloth still.
+    assert sorted(path.name for path in (tmp_path / "loop").iterdir()) == ["report.html", "verdict.json"]
