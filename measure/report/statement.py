@@ -106,7 +106,8 @@ def clocks(experiment: Experiment, late: Sequence[float]) -> tuple[str, ...]:
 def unweighed(verdict: Verdict) -> tuple[str, ...]:
     """Which effects of the library a cloth cannot have as it is held; nothing where it can have all."""
     weighed = {(candidate.effect, candidate.parameter) for candidate in verdict.ranking}
-    missing = [column.effect for column in library() if (column.effect, column.parameter) not in weighed]
+    absent = [column.effect for column in library() if (column.effect, column.parameter) not in weighed]
+    missing = list(dict.fromkeys(absent))
     return (f"not weighed, since the cloth cannot have it as it is held: {listed(missing)}",) if missing else ()
 
 

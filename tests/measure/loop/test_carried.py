@@ -150,10 +150,12 @@ def test_close_loop_judges_a_table_of_a_carried_cloth(
         f'[cloth]\nwidth = {SIZE}\nheight = {SIZE}\nvertices = {VERTICES}\n[material]\nname = "camel-ponte-roma"\n'
         f'[pins]\nat = "top-corners"\ncarried = true\n{takes}\n', encoding="utf-8",
     )  # fmt: skip
-    main(
-        ["close-loop", "--recipe", str(recipe), "--bank", str(bank), "--level", str(LEVEL), "--json",
-         "--out", str(tmp_path / "loop")]
-    )  # fmt: skip
+    with pytest.raises(SystemExit) as ended:
+        main(
+            ["close-loop", "--recipe", str(recipe), "--bank", str(bank), "--level", str(LEVEL), "--json",
+             "--out", str(tmp_path / "loop")]
+        )  # fmt: skip
+    assert ended.value.code == 0
     said = json.loads(capsys.readouterr().out)
     assert said["conclusion"] == Conclusion.SUFFICIENT.value
     assert said["test"]["nulls"].endswith("carried along the recordings' own ways from other instants on")
