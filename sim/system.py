@@ -24,6 +24,12 @@ from sim.state import State
 from sim.wind import Wind
 
 
+class InapplicableError(UsageError):
+    """An effect that a cloth cannot have as it is held."""
+
+    kind = "inapplicable"
+
+
 class Effect(Protocol):
     """A force the base model lacks."""
 
@@ -191,7 +197,7 @@ class System:
 
     def __post_init__(self) -> None:
         if self.motion is not None and self.ties:
-            raise UsageError(
+            raise InapplicableError(
                 "ties beside handles whose anchors move one by one", where="system",
                 fix="leave out the effects that loosen or add attachments, or move all handles together",
             )  # fmt: skip

@@ -16,7 +16,6 @@ def close_loop(experiment: Experiment, options: Options, *, stage: Stage | None 
         stage: called with progress.
 
     Raises:
-        InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked at before), or whose
-            attachments move.
+        InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked at before).
     """
     return stated(solve(experiment, options, stage=stage))

@@ -45,12 +45,15 @@ class NamedModel:
 
 
 def models(verdict: Verdict, experiment: Experiment, *, name: str, seed: int) -> tuple[NamedModel, ...]:
-    """The base model as calibrated and, where effects act, the larger one.
+    """The base model as calibrated and, where effects act, the larger one; none of a carried cloth, since recipes hold
+    cloth still.
 
     Args:
         name: that theirs begin with.
         seed: of their starts.
     """
+    if experiment.carried:
+        return ()
     turned = aligned(experiment)
     common = _common(turned, seed)
     made = [_model(f"{name}-base", verdict, common, turned.specimen, ())]

@@ -24,8 +24,9 @@ def aligned(experiment: Experiment) -> Experiment:
     specimen = experiment.specimen
     if specimen.gravity[0] or specimen.gravity[1] or specimen.gravity[2] >= 0:
         raise InputError(f"gravity is {specimen.gravity!r}", where="specimen", fix="turn the data so that z points up")
-    base = specimen.anchors[np.argmin(specimen.anchors[:, 2])]
-    turns = [_turn(recording, base) for recording in experiment.recordings]
+    lowest = int(np.argmin(specimen.anchors[:, 2]))
+    base = specimen.anchors[lowest]
+    turns = [_turn(recording, lowest, base) for recording in experiment.recordings]
     recordings = tuple(
         replace(
             recording, positions=(recording.positions - base) @ turn.T,
@@ -38,10 +39,12 @@ def aligned(experiment: Experiment) -> Experiment:
     return Experiment(specimen=moved, recordings=recordings)
 
 
-def _turn(recording: Trajectory, base: Floats) -> Floats:
-    """(3, 3) rotation about z that takes the mean wind, or in calm the flag's mean direction, to +x."""
+def _turn(recording: Trajectory, lowest: int, base: Floats) -> Floats:
+    """(3, 3) rotation about z that takes the mean wind, or in calm the cloth's mean direction from its lowest
+    attachment, to +x."""
     toward = recording.wind.velocity.mean(axis=0)[:2]
     if np.hypot(*toward) < _CALM:
-        toward = np.nanmean(recording.positions - base, axis=(0, 1))[:2]
+        held = base if recording.attachments is None else recording.attachments[:, lowest, None]
+        toward = np.nanmean(recording.positions - held, axis=(0, 1))[:2]
     cosine, sine = toward / max(float(np.hypot(*toward)), 1e-12)
     return np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])

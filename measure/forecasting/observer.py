@@ -31,13 +31,12 @@ from measure.forecasting.segments import Segments
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen
 from sim.anchors import AnchorTracks
-from sim.effects.effect import InapplicableError
 from sim.handles import Handles
 from sim.integrate.joint_batch import JointBatch
 from sim.integrate.split import SplitEuler
 from sim.scene import Scene, assemble
 from sim.state import State
-from sim.system import System
+from sim.system import InapplicableError, System
 
 Floats = NDArray[np.float64]
 

@@ -155,8 +155,14 @@ class Segments:
         return cls(items=tuple(items), markers=first.markers, cut=cut)
 
     def tied(self, anchors: Sequence[Floats]) -> Segments:
-        """With cloths tied where each recording's (held, 3) are [m]."""
-        return replace(self, items=tuple(replace(item, anchors=anchors[item.recording]) for item in self.items))
+        """With cloths tied where each recording's (held, 3) are [m]; but those that are carried."""
+        return replace(
+            self,
+            items=tuple(
+                item if item.attachments is not None else replace(item, anchors=anchors[item.recording])
+                for item in self.items
+            ),
+        )
 
     def select(self, indices: Iterable[int]) -> Segments:
         """Some of them."""

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.errors import InputError, UsageError
+from flagdata.errors import UsageError
 from flagdata.provenance import code_version
 from flagdata.rng import child_seed
 from measure.forecasting.calibration import THETA, Calibration
@@ -119,17 +119,11 @@ def solve(experiment: Experiment, options: Options, *, stage: Stage | None = Non
         stage: called with progress.
 
     Raises:
-        InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked at before), or whose
-            attachments move.
+        InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked at before).
     """
     began = time.perf_counter()
     torch.set_num_threads(1)
     report = stage or (lambda what, done, total: None)
-    if experiment.carried:
-        raise InputError(
-            "a verdict on a cloth whose attachments move: null experiments of such cloths are not simulated",
-            where="close-loop", fix="hold the cloth still, or compare its forecasts (measure.forecasting.observer)",
-        )  # fmt: skip
     setting = Setting.of(experiment, workers=options.workers)
     report("sensitivities", 0, 1)
     found, projection = _looked_at(setting)

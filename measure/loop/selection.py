@@ -90,7 +90,8 @@ class Judgement:
         line: of the errors' spectra that the first of the ranking leaves, where it alone would reject the model.
         course: how the wind varies, by the errors that the first leaves, where that alone would and it is not
             turbulence.
-        direction: by how much the wind is turned from where its logs have it, counter-clockwise [rad].
+        direction: by how much the wind is turned from where its logs have it, counter-clockwise [rad]; None in still
+            air.
         departed: columns of what the recordings show of the set-up against what was declared.
     """
 
@@ -138,7 +139,9 @@ def judge(
     ]
     direction, declared = turned(evidence, reference), set_up or SetUp()
     beyond = beyond_tolerance(direction, declared.tolerance)
-    weighed = [_within(w, direction, declared.tolerance) if w.column == names().index(TURNED) else w for w in weighed]
+    if direction is not None:
+        place = names().index(TURNED)
+        weighed = [_within(w, direction, declared.tolerance) if w.column == place else w for w in weighed]
     ranking = _ranked([*weighed, _gusts(evidence, reference, float(statistics[len(names())]))])
     departing = {names().index(name) for name, shown in ((TURNED, beyond), (HOIST, declared.attached)) if shown}
     departed = [w for w in ranking if w.column in departing]

@@ -21,7 +21,7 @@ from measure.forecasting.segments import Segments
 from measure.forecasting.setting import Setting
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop.gauss_newton import Refined, finished
-from measure.nulls import winds
+from measure.nulls import tracks, winds
 from measure.nulls.simulation import NullBatch
 from measure.observe.anchors import as_seen
 from measure.verdict.criteria import CRITERIA
@@ -251,7 +251,7 @@ def numerical_floor(
     """Errors of segments simulated from a model by other numerics and predicted by it.
 
     Args:
-        recordings: of the experiment, in whose winds is simulated.
+        recordings: of the experiment, in whose winds and by whose ways is simulated.
         copies: simulations of each.
 
     Returns:
@@ -261,11 +261,13 @@ def numerical_floor(
     simulated = np.tile(recordings, copies)
     speeds = tuple(float(u) for u in setting.speeds[simulated])
     own = child_seed(seed, "floor")
+    recorded, specimen = setting.experiment.recordings, setting.experiment.specimen
     batch = NullBatch(
-        specimen=setting.experiment.specimen, markers=first.markers, rate=1 / setting.segments.period,
+        specimen=specimen, markers=first.markers, rate=1 / setting.segments.period,
         duration=_DURATION, noise=first.noise, calibrations=(model.calibration,) * len(simulated), speeds=speeds,
-        winds=winds.like(setting.experiment.recordings, speeds, duration=_DURATION, seed=own),
-        seed=own, effects=model.acting,
+        winds=winds.like(recorded, speeds, duration=_DURATION, seed=own),
+        tracks=tracks.like(recorded, specimen.seats, len(speeds), duration=_DURATION, seed=own), seed=own,
+        effects=model.acting,
     )  # fmt: skip
     made = batch.simulate()
     segments = Segments.of(made)

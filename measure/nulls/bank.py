@@ -41,14 +41,16 @@ from sim.integrate.split import SplitEuler
 WINDS = 4
 """Recordings of a batch: one cloth in so many winds, one experiment of one kind of numerics. What experiments leave
 differs by their numerics more than by the cloth, and only kinds count in the test, so that each has one cloth."""
-_VERSION = 4
+_VERSION = 5
 """Raised whenever the arrays of a batch mean something else; 2: one cloth a batch, the damping by its logarithm;
-3: sensitivities of how cloth bends in double precision; 4: what recordings settle at."""
+3: sensitivities of how cloth bends in double precision; 4: what recordings settle at; 5: whether cloths are carried."""
 _SEGMENTS = (
     "recording", "r", "response", "error", "marker_error", "lines", "speeds", "calibration", "noise", "period", "cloth",
     "turned", "turning", "moment", "course", "course_curvature", "settled",
 )  # fmt: skip
 """Arrays with a row for each segment."""
+_SINGLE = ("duration", "anchors_told", "carried")
+"""Arrays of one value for the batch."""
 _DENSITY, _BENDING, _DAMPING = (0.8, 1.25), (0.2, 5.0), (0.25e-3, 40e-3)
 Progress = Callable[[int], object]
 
@@ -156,7 +158,8 @@ def _cache(folder: Path, batch: NullBatch, index: int) -> None:
         buffer, version=np.array(_VERSION), columns=np.array(names()), recording=own.recording, r=own.r,
         response=own.response, error=own.error, marker_error=own.marker_error, lines=own.lines, speeds=nulls.speeds,
         calibration=nulls.calibration, noise=nulls.noise, period=nulls.period, cloth=nulls.cloth,
-        duration=np.array(duration), anchors_told=np.array(batch.specimen.anchors_given), turned=own.turning.r,
+        duration=np.array(duration), anchors_told=np.array(batch.specimen.anchors_given),
+        carried=np.array(bool(batch.tracks)), turned=own.turning.r,
         turning=own.turning.response, moment=own.turning.error, course=own.course.score,
         course_curvature=own.course.curvature, settled=own.settled,
     )  # fmt: skip
@@ -171,7 +174,7 @@ def _content(path: Path) -> Mapping[str, np.ndarray]:
     """The contents of a file of a bank, each of the batch's segments in all its arrays."""
     rebuild = "delete it and build the bank again"
     content = read_arrays(path, what="a batch of nulls", fix=rebuild)
-    if not set(content) >= {*_SEGMENTS, "version", "columns", "duration", "anchors_told"}:
+    if not set(content) >= {*_SEGMENTS, *_SINGLE, "version", "columns"}:
         raise CorruptError("it lacks arrays of this version", where=str(path), fix="build the bank again")
     if content["version"].ravel().tolist() != [_VERSION]:
         raise CorruptError("its arrays are those of another version", where=str(path), fix="build the bank again")
@@ -183,12 +186,10 @@ def _content(path: Path) -> Mapping[str, np.ndarray]:
         name for name, kind in kinds.items()
         if content[name].dtype.kind not in kind or content[name].shape[:1] != (segments,)
     ]  # fmt: skip
-    single = all(
-        content[name].size == 1 and content[name].dtype.kind in "biuf" for name in ("duration", "anchors_told")
-    )
+    single = all(content[name].size == 1 and content[name].dtype.kind in "biuf" for name in _SINGLE)
     if wrong or not segments or not single:
         raise CorruptError(
-            f"its arrays do not fit one another: {', '.join(wrong) or 'recording, duration or anchors_told'}",
+            f"its arrays do not fit one another: {', '.join(wrong or ('recording', *_SINGLE))}",
             where=str(path), fix=rebuild,
         )  # fmt: skip
     return content
@@ -228,6 +229,7 @@ def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
     parts: list[Nulls] = []
     durations: set[float] = set()
     given: set[bool] = set()
+    carried: set[bool] = set()
     count = 0
     for path in paths:
         content = _content(path)
@@ -249,13 +251,16 @@ def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
         )  # fmt: skip
         durations.add(round(float(content["duration"]), 1))
         given.add(bool(content["anchors_told"]))
+        carried.add(bool(content["carried"]))
         count = int(own.recording.max()) + 1
-    if len(durations) > 1 or len(given) > 1:
+    if len(durations) > 1 or len(given) > 1 or len(carried) > 1:
         lengths = ", ".join(f"{d:g} s" for d in sorted(durations))
         raise CorruptError(
-            f"segments of {lengths}, anchors {' and '.join('given' if g else 'taken from recordings' for g in given)}",
+            f"segments of {lengths}, anchors {' and '.join('given' if g else 'taken from recordings' for g in given)}, "
+            f"cloths {' and '.join('carried' if c else 'held still' for c in carried)}",
             where=str(folder), fix="build a bank of one design into a folder of its own",
         )  # fmt: skip
     return NullBank(
-        nulls=Nulls.joined(parts), columns=names(), duration=durations.pop(), words=words, anchors_given=given.pop()
-    )
+        nulls=Nulls.joined(parts), columns=names(), duration=durations.pop(), words=words, anchors_given=given.pop(),
+        carried=carried.pop(),
+    )  # fmt: skip

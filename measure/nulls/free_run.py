@@ -1,4 +1,4 @@
-"""The model run freely in the winds of recordings, and by how much these settle elsewhere."""
+"""The model run freely in the winds of recordings, carried as they are, and by how much these settle elsewhere."""
 
 from __future__ import annotations
 
@@ -19,15 +19,17 @@ _COPIES = 2
 
 
 def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> Floats:
-    """(recording, quantity) what recordings settle at less what a model does in the same winds.
+    """(recording, quantity) what recordings settle at less what a model does in the same winds, held where they show it
+    to be held.
 
     Args:
         batch: the model's cloth, calibrations, winds and effects, one a recording.
     """
     count = len(recordings)
+    tracks = tuple(recording.track for recording in recordings if recording.track is not None)
     copies = replace(
         batch, calibrations=batch.calibrations * _COPIES, speeds=batch.speeds * _COPIES, winds=batch.winds * _COPIES,
-        seed=child_seed(batch.seed, "free"),
+        tracks=tracks * _COPIES, seed=child_seed(batch.seed, "free"),
     )  # fmt: skip
     runs, period = copies.as_fitted(), 1 / batch.rate
     modelled = np.stack([settled(batch.markers, runs[..., place], period=period) for place in range(runs.shape[-1])])

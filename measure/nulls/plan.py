@@ -12,13 +12,14 @@ from flagdata.provenance import array_hash, recipe_hash
 from flagdata.rng import child_seed
 from measure.forecasting.setting import Setting, Stage
 from measure.nulls import bank as banks
-from measure.nulls import winds
+from measure.nulls import tracks, winds
 from measure.nulls.conformal import GroupedConformal, kinds_needed
 from measure.nulls.reference import NullBank
 from measure.nulls.simulation import NullBatch
 from measure.observe.trajectory import described
 from measure.verdict.criteria import CRITERIA
 
+_CARRIED = ", carried along the recordings' own ways from other instants on"
 FEWEST_NULLS = CRITERIA.simulated_kinds * banks.WINDS
 """So many at least are simulated: each kind of numerics is a batch, and p-values count the kinds."""
 
@@ -106,20 +107,26 @@ def load_bank(folder: Path, setting: Setting) -> NullBank:
     """
     bank = banks.load(folder, words=f"over priors, from {folder.name}")
     check(bank, setting, where=str(folder))
-    return bank
+    return replace(bank, words=bank.words + _CARRIED) if bank.carried else bank
 
 
 def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None:
     """Refuse nulls that do not fit the recordings.
 
     Raises:
-        InputError: segments of another length, or anchors known in another way.
+        InputError: segments of another length, anchors known in another way, or cloths held in another way.
     """
     if bank.anchors_given != setting.experiment.specimen.anchors_given:
         ways = ("taken from where the recordings show the attachments", "given")
         raise InputError(
             f"the bank's anchors were {ways[bank.anchors_given]}, those of the recordings are "
             f"{ways[not bank.anchors_given]}",
+            where=where, fix="simulate nulls for these recordings: leave the bank out",
+        )  # fmt: skip
+    if bank.carried != setting.experiment.carried:
+        ways = ("held still", "carried")
+        raise InputError(
+            f"the bank's cloths were {ways[bank.carried]}, that of the recordings is {ways[not bank.carried]}",
             where=where, fix="simulate nulls for these recordings: leave the bank out",
         )  # fmt: skip
     if abs(bank.duration - setting.segments.duration) > 0.1 * bank.duration:
@@ -130,8 +137,9 @@ def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None
 
 
 def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
-    """Nulls over the priors of the cloth, of the winds of an experiment: a batch for each kind of numerics. Those of
-    one cloth hold as many segments as the data, and are as noisy as the noisiest of its recordings."""
+    """Nulls over the priors of the cloth, of the winds of an experiment and carried as it is: a batch for each kind of
+    numerics. Those of one cloth hold as many segments as the data, and are as noisy as the noisiest of its recordings.
+    """
     segments, recordings = setting.segments, setting.experiment.recordings
     made = [
         banks.prior_batch(
@@ -143,9 +151,15 @@ def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
         for index in range(kinds)
     ]  # fmt: skip
     return [
-        replace(batch, winds=winds.like(recordings, batch.speeds, duration=batch.duration, seed=batch.seed))
+        replace(
+            batch, winds=winds.like(recordings, batch.speeds, duration=batch.duration, seed=batch.seed),
+            tracks=tracks.like(
+                recordings, setting.experiment.specimen.seats, len(batch.speeds), duration=batch.duration,
+                seed=batch.seed,
+            ),
+        )
         for batch in made
-    ]
+    ]  # fmt: skip
 
 
 def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: Stage) -> NullBank:
@@ -163,6 +177,7 @@ def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: S
     banks.build(folder, wanted, workers=workers, progress=count)
     total = banks.WINDS * len(wanted)
     words = f"{total} recordings of {len(wanted)} meshes and methods, over the priors of the cloth"
+    words += _CARRIED if setting.experiment.carried else ""
     return banks.load(folder, words=words, kinds=len(wanted))
 
 
@@ -173,7 +188,7 @@ def kept_in(setting: Setting, *, seed: int) -> Path:
 
 
 def design_hash(setting: Setting) -> str:
-    """SHA-256 of all of an experiment that shapes its nulls: cloth, markers, rate, noise, lengths and winds."""
+    """SHA-256 of all of an experiment that shapes its nulls: cloth, markers, rate, noise, lengths, winds and ways."""
     segments, recordings = setting.segments, setting.experiment.recordings
     content, arrays = described(setting.experiment.specimen)
     del content["density-uncertainty"]  # nulls are judged under it, not made by it
@@ -181,6 +196,6 @@ def design_hash(setting: Setting) -> str:
         "period": segments.period, "noise": setting.design.noise, "segments": len(segments),
         "lengths": [float(r.times[-1]) for r in recordings],
     }  # fmt: skip
-    return array_hash(
-        content, [*arrays, segments.markers, *(w for r in recordings for w in (r.wind.times, r.wind.velocity))]
-    )
+    blown = [part for r in recordings for part in (r.wind.times, r.wind.velocity)]
+    ways = [r.attachments for r in recordings if r.attachments is not None]
+    return array_hash(content, [*arrays, segments.markers, *blown, *ways])

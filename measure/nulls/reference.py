@@ -84,6 +84,7 @@ class NullBank:
         duration: of a segment [s].
         words: how they were made.
         anchors_given: whether they were predicted with the anchors they were simulated with.
+        carried: whether their attachments move.
 
     Raises:
         InputError: too few of them, or all of the same numerics.
@@ -94,6 +95,7 @@ class NullBank:
     duration: float
     words: str
     anchors_given: bool = True
+    carried: bool = False
 
     def __post_init__(self) -> None:
         kinds = len(np.unique(self.nulls.numerics))

@@ -19,8 +19,10 @@ from flagdata.rng import stream
 from measure.forecasting.calibration import Calibration
 from measure.forecasting.observer import SegmentWind
 from measure.nulls.stiffness import StiffnessFactors
+from measure.observe.anchors import carried
 from measure.observe.interpolation import onto
-from measure.observe.trajectory import Specimen, Trajectory, WindTrack
+from measure.observe.trajectory import AttachmentTrack, Specimen, Trajectory, WindTrack
+from sim.anchors import AnchorTracks
 from sim.effects import Effect, apply
 from sim.handles import Handles
 from sim.integrate import Integrator
@@ -36,7 +38,10 @@ Floats = NDArray[np.float64]
 SETTLE = 3.0  # s, before the first frame; a flag of 1.5 m has forgotten a start from rest after two swings
 _FINER = (1.3, 1.75)
 _STEPS = (1e-3, 2e-3)  # s, of backward Euler
+_LEVEL = 1e-6  # of the cloth's size: attachments that lie less apart along u are on one vertical
 _SAMPLED = 0.05  # s, of winds that blow
+CARRIED = 0.01
+"""Between samples of the ways of attachments [s]."""
 _UNEVEN = 0.2  # share of the spacing by which inner vertices are moved at most
 _HALVINGS = 3  # of the step of a run that diverges
 _GENTLE = 1e-3  # s of damping: up to it the explicit method is the cheaper one
@@ -55,6 +60,7 @@ class NullBatch:
         calibrations: one a recording.
         speeds: of the wind, along +x, one a recording [m/s].
         winds: that blow in place of steady ones of these speeds, one a recording; none where they are steady.
+        tracks: of attachments that are carried, one a recording; none where they are held still at the anchors.
         seed: of the numerics, the starts and the noise.
         stiffness: how its tables of stiffness differ from the nominal ones.
         effects: what acts beside the base model: none for nulls proper, those named for the floor of a larger model.
@@ -70,6 +76,7 @@ class NullBatch:
     seed: int
     stiffness: StiffnessFactors = field(default_factory=StiffnessFactors)
     winds: tuple[WindTrack, ...] = ()
+    tracks: tuple[AttachmentTrack, ...] = ()
     effects: tuple[Effect, ...] = ()
 
     def simulate(self) -> list[Trajectory]:
@@ -77,13 +84,14 @@ class NullBatch:
         flat, held = self._mesh()
         seen = np.einsum("mv,fvcb->fmcb", onto(flat.rest, self.markers), self._frames(flat, held))
         jitter = self.noise * stream(self.seed, "null", "markers").standard_normal(seen.shape)
-        return [
+        made = [
             Trajectory(
                 name=f"null {self.seed}-{place}", markers=self.markers, positions=seen[..., place] + jitter[..., place],
                 rate=self.rate, wind=wind, noise=self.noise,
             )
             for place, wind in enumerate(self.winds or [WindTrack.constant((u, 0.0, 0.0)) for u in self.speeds])
         ]  # fmt: skip
+        return [carried(recording, self.specimen.seats) for recording in made] if self.tracks else made
 
     @property
     def effort(self) -> float:
@@ -144,16 +152,13 @@ class NullBatch:
     def _run(self, flat: Mesh, held: tuple[int, ...], integrator: Integrator, damped: float) -> Floats:
         """The same by a method that damps by itself so much [s]; if it diverges, the first frame that is not finite."""
         specimen = self.specimen
-        lowest = specimen.held[int(np.argmin(specimen.anchors[:, 2]))]
-        offset = flat.rest - specimen.mesh.rest[lowest]
-        start = specimen.anchors[np.argmin(specimen.anchors[:, 2])] + np.stack(
-            [offset[:, 0], 0 * offset[:, 0], offset[:, 1]], axis=1
-        )
-        roughness = 2e-3 * stream(self.seed, "null", "start").standard_normal((len(self.speeds), *start.shape))
+        first = np.array([-self._begins])
+        begun = [track.at(first)[0] for track in self.tracks] or [specimen.anchors] * len(self.speeds)
+        roughness = 2e-3 * stream(self.seed, "null", "start").standard_normal((len(self.speeds), len(flat.rest), 3))
         scenes = []
-        for calibration, rough, speed in zip(self.calibrations, roughness, self.speeds, strict=True):
-            position = start + rough
-            position[list(held)] = specimen.anchors
+        for calibration, rough, speed, anchors in zip(self.calibrations, roughness, self.speeds, begun, strict=True):
+            position = _hung(flat.rest, specimen.seats, anchors) + rough
+            position[list(held)] = anchors
             material = calibration.material(self.stiffness.of(specimen.material))
             scenes.append(
                 Scene(
@@ -165,6 +170,8 @@ class NullBatch:
         system, state = assemble(scenes)
         if self.winds:  # before the effects, of which some change the wind
             system = replace(system, wind=self._blowing(system))
+        if self.tracks:
+            system = replace(system, motion=self._carrying(system))
         system, state = apply(self.effects, system, state)
         frames = []
         with torch.no_grad():
@@ -176,12 +183,27 @@ class NullBatch:
                     frames.append(state.position.double().numpy().copy())
         return np.stack(frames)
 
+    @property
+    def _begins(self) -> float:
+        """When the recording's first frame is, since the start of the run [s]."""
+        return (round(SETTLE * self.rate) + 1) / self.rate
+
+    def _times(self, period: float) -> Floats:
+        """(n,) of a run, so far apart, since the recording's first frame [s]."""
+        return np.arange(math.ceil((SETTLE + self.duration) / period) + 2, dtype=np.float64) * period - self._begins
+
     def _blowing(self, system: System) -> SegmentWind:
         """The winds since the start of the run."""
-        times = np.arange(math.ceil((SETTLE + self.duration) / _SAMPLED) + 1, dtype=np.float64) * _SAMPLED - SETTLE
+        times = self._times(_SAMPLED)
         samples = np.stack([wind.at(times) for wind in self.winds], axis=-1)
         blown = torch.as_tensor(samples, dtype=system.cloth.dtype, device=system.cloth.device)
         return SegmentWind(period=_SAMPLED, samples=blown)
+
+    def _carrying(self, system: System) -> AnchorTracks:
+        """The ways of the attachments since the start of the run."""
+        places = np.stack([track.at(self._times(CARRIED)) for track in self.tracks], axis=-1)
+        moved = torch.as_tensor(places - places[0], dtype=system.cloth.dtype, device=system.cloth.device)
+        return AnchorTracks(start=0.0, period=CARRIED, samples=moved)
 
     def _method(self, halvings: int = 0) -> tuple[Integrator, float]:
         """A method for these dampings with steps that were halved so often, and the damping it adds by itself [s]."""
@@ -190,6 +212,22 @@ class NullBatch:
         step = _STEPS[stream(self.seed, "null", "method").integers(len(_STEPS))] / 2**halvings
         base = BackwardEuler(step=step, tolerance=1e-4)
         return SplitEuler(base=base) if self.effects else base, step
+
+
+def _hung(rest: Floats, seats: Floats, anchors: Floats) -> Floats:
+    """(vertex, 3) of a plane upright cloth below or beside its anchors (held, 3) [m], turned about the vertical as they
+    are; one that is held along a vertical stands along +x.
+
+    Args:
+        rest, seats: (vertex, 2) of the cloth, (held, 2) of its attachments [m].
+    """
+    lowest = int(np.argmin(anchors[:, 2]))
+    along, (x, y) = seats[:, 0] - seats[:, 0].mean(), (anchors[:, :2] - anchors[:, :2].mean(axis=0)).T
+    level = np.ptp(along) > _LEVEL * np.ptp(rest)
+    angle = math.atan2(float(along @ y), float(along @ x)) if level else 0.0
+    offset = rest - seats[lowest]
+    turned = [math.cos(angle) * offset[:, 0], math.sin(angle) * offset[:, 0], offset[:, 1]]
+    return anchors[lowest] + np.stack(turned, axis=1)
 
 
 def irregular(flat: Mesh, spacing: float, rng: np.random.Generator) -> Mesh:

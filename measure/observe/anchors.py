@@ -24,6 +24,12 @@ def anchors_of(recordings: Sequence[Trajectory], seats: Floats) -> Floats:
     return np.mean(means, axis=0)
 
 
+def carried(recording: Trajectory, seats: Floats) -> Trajectory:
+    """The recording with its attachments where its markers say that points (held, 2) of the cloth go."""
+    held = np.einsum("sm,fmi->fsi", onto(recording.markers, seats), recording.positions)
+    return replace(recording, attachments=held)
+
+
 def _tracked_mean(recording: Trajectory) -> Floats:
     """(marker, 3) mean over the frames in which each was tracked [m]; over all frames where none was."""
     if recording.seen is None:

@@ -12,11 +12,10 @@ import numpy as np
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from measure.observe import cloth, noise
-from measure.observe.anchors import anchors_of
+from measure.observe.anchors import anchors_of, carried
 from measure.observe.checks import attachment, frames, inertia, shape, surroundings
 from measure.observe.common import at_same_points, at_same_rate
 from measure.observe.gaps import fill_positions
-from measure.observe.interpolation import onto
 from measure.observe.observation import Known, Observation
 from measure.observe.pins import hold
 from measure.observe.setup import Hold, Setup
@@ -54,9 +53,7 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
     mesh, held = hold(mesh, _pins(known, setup, low))
     seats = mesh.rest[list(held)]
     if setup.carried:
-        recordings = tuple(
-            replace(r, attachments=np.einsum("sm,fmi->fsi", onto(r.markers, seats), r.positions)) for r in recordings
-        )
+        recordings = tuple(carried(recording, seats) for recording in recordings)
     specimen = Specimen(
         mesh=mesh, material=_material(known, setup), mass_known=setup.mass_known,
         density_uncertainty=setup.density_uncertainty, held=held,

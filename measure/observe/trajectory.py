@@ -98,6 +98,43 @@ class WindTrack:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class AttachmentTrack:
+    """Where the attachments of a carried cloth go, linear between samples and still before and after them.
+
+    Attributes:
+        times: (n,) since the recording's first frame [s], increasing.
+        places: (n, held, 3) [m].
+
+    Raises:
+        InputError: shapes that disagree, values that are not finite, times that do not increase.
+    """
+
+    times: Floats
+    places: Floats
+
+    def __post_init__(self) -> None:
+        times, places = _frozen(self.times), _frozen(self.places)
+        if times.ndim != 1 or not len(times) or places.ndim != 3 or places.shape[::2] != (len(times), 3):
+            raise InputError(
+                f"{times.shape} times with places of shape {places.shape}", where="attachments",
+                fix="give (n,) seconds and (n, held, 3) metres",
+            )  # fmt: skip
+        if not (np.isfinite(times).all() and np.isfinite(places).all()) or (np.diff(times) <= 0).any():
+            raise InputError(
+                "times that do not increase, or a value that is not finite", where="attachments",
+                fix="sort the track and fill its gaps",
+            )  # fmt: skip
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "places", places)
+
+    def at(self, times: Floats) -> Floats:
+        """(k, held, 3) [m] at times (k,) [s]."""
+        flat = self.places.reshape(len(self.times), -1)
+        found = np.stack([np.interp(times, self.times, values) for values in flat.T], axis=-1)
+        return found.reshape(len(times), *self.places.shape[1:])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Trajectory:
     """One recording: tracked points at a constant rate.
 
@@ -162,6 +199,11 @@ class Trajectory:
         """(frame,) since the first frame [s]."""
         return np.arange(len(self.positions)) / self.rate
 
+    @property
+    def track(self) -> AttachmentTrack | None:
+        """Where its attachments go; None where they are held still."""
+        return None if self.attachments is None else AttachmentTrack(times=self.times, places=self.attachments)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Specimen:
@@ -202,6 +244,11 @@ class Specimen:
                 where="specimen", fix="give one finite (x, y, z) for each attached vertex",
             )  # fmt: skip
         object.__setattr__(self, "anchors", anchors)
+
+    @property
+    def seats(self) -> Floats:
+        """(held, 2) where the attachments are on the flat cloth [m]."""
+        return self.mesh.rest[list(self.held)]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -75,7 +75,7 @@ class Course(Rows):
     @property
     def _together(self) -> Floats:
         """(segment, window − 1, part) weights of products of neighbours."""
-        return np.sqrt(self._own[:, :-1] * self._own[:, 1:])
+        return np.sqrt(self._own[:, :-1]) * np.sqrt(self._own[:, 1:])  # a product of two that are tiny is none
 
     @property
     def _own(self) -> Floats:

@@ -77,12 +77,12 @@ class Spectrum:
 
     def _with_the_wind(self, values: Floats) -> Floats:
         """(segment, reduced frequency, shape · axis) of (frequency, segment, shape · axis); NaN where the frames are
-        too few a second."""
+        too few a second, or where there is no wind that anything could be shed in."""
         frequency = self._frequency
         found = np.full((values.shape[1], len(REDUCED), values.shape[2]), np.nan)
         for place, speed in enumerate(self.speeds):
             sought = REDUCED * speed
-            seen = sought < frequency[-1] - _EDGE
+            seen = (sought > 0) & (sought < frequency[-1] - _EDGE)
             found[place, seen] = values[np.rint(sought[seen] / frequency[1]).astype(int), place]
         return found
 

@@ -106,7 +106,8 @@ def clocks(experiment: Experiment, late: Sequence[float]) -> tuple[str, ...]:
 def unweighed(verdict: Verdict) -> tuple[str, ...]:
     """Which effects of the library a cloth cannot have as it is held; nothing where it can have all."""
     weighed = {(candidate.effect, candidate.parameter) for candidate in verdict.ranking}
-    missing = [column.effect for column in library() if (column.effect, column.parameter) not in weighed]
+    absent = [column.effect for column in library() if (column.effect, column.parameter) not in weighed]
+    missing = list(dict.fromkeys(absent))
     return (f"not weighed, since the cloth cannot have it as it is held: {listed(missing)}",) if missing else ()
 
 
@@ -187,7 +188,10 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         f"{number(clock, digits=2)} s in time"
     )
     held = "rigidly" if math.isinf(specimen.stiffness) else f"by springs of {number(specimen.stiffness)} N/m"
-    places = "" if specimen.anchors_given else ", tied at their mean observed places"
+    if experiment.carried:
+        places = ", carried where the markers at them go"
+    else:
+        places = "" if specimen.anchors_given else ", tied at their mean observed places"
     between = (
         "intervals of these include the scatter between simulators of other authors, "
         f"{100 * CRITERIA.density_between:.0f} % in density, a factor of {math.exp(CRITERIA.bending_between):.1f} in "

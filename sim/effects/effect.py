@@ -23,12 +23,6 @@ from sim.system import System
 from sim.wind import Wind
 
 
-class InapplicableError(UsageError):
-    """An effect that a cloth cannot have as it is held."""
-
-    kind = "inapplicable"
-
-
 class Effect(Parametrised, ABC):
     """Something that acts on cloth and that the base model lacks."""
 

@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from sim.cloth import Cloth
-from sim.effects.effect import ForceEffect, InapplicableError
+from sim.effects.effect import ForceEffect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 from sim.effects.quantities import AIR_DENSITY, AirDensity
 from sim.effects.reactive_loading import momentum_rates
@@ -44,7 +44,7 @@ from sim.inertia import mean_normals, rest_areas
 from sim.kernel.given import Given
 from sim.mesh import Mesh
 from sim.state import State
-from sim.system import System
+from sim.system import InapplicableError, System
 
 _ALONG, _ACROSS = 10, 4
 """Modes along the cloth and over its height, at most; as in the C++."""

@@ -10,11 +10,11 @@ import torch
 from torch import Tensor
 
 from sim.cloth import Cloth
-from sim.effects.effect import Effect, InapplicableError
+from sim.effects.effect import Effect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 from sim.handles import Handles, full_hoist
 from sim.state import State
-from sim.system import Springs, System
+from sim.system import InapplicableError, Springs, System
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from sim.effects.effect import Effect
 from sim.effects.geometry import horizontal, left_of, norm
 from sim.effects.parameter import Value, strength
 from sim.state import State
-from sim.system import System
+from sim.system import InapplicableError, System
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +49,11 @@ class TiltedPole(Effect):
     def apply(self, system: System, state: State) -> tuple[System, State]:
         if not len(system.held):
             raise UsageError("nothing holds the cloth", where="tilted pole", fix="give handles")
+        if system.motion is not None:
+            raise InapplicableError(
+                "a pole that tilts, where attachments are carried", where="tilted pole",
+                fix="leave it out: their ways are those that are given",
+            )  # fmt: skip
         fly = horizontal(state.position.mean(0) - system.anchors.mean(0), axis=0)
         length = norm(fly, axis=0)
         if bool((length == 0).any()):

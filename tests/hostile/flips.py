@@ -108,7 +108,14 @@ def of_a_bank(folder: Path) -> Kept:
     arrays: dict[str, Any] = {name: draw.normal(size=(6, 5)) for name in bank._SEGMENTS}
     arrays |= {"recording": np.arange(6), "cloth": np.array(["a" * 64] * 6), "columns": np.array(bank.names())}
     path = folder / "nulls-0000.npz"
-    np.savez(path, version=np.array(bank._VERSION), duration=np.array(2.0), anchors_told=np.array(True), **arrays)
+    np.savez(
+        path,
+        version=np.array(bank._VERSION),
+        duration=np.array(2.0),
+        anchors_told=np.array(True),
+        carried=np.array(False),
+        **arrays,
+    )
     return Kept(files=[path], read=lambda: {name: one.tolist() for name, one in bank._content(path).items()})
 
 

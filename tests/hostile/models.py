@@ -78,7 +78,7 @@ def arrays() -> dict[str, np.ndarray]:
     return {
         **dict.fromkeys(bank._SEGMENTS, rows), "recording": np.arange(2), "columns": np.array(["a", "b"]),
         "cloth": np.array(["x", "y"]), "duration": np.array(1.0), "anchors_told": np.array(True),
-        "version": np.array(bank._VERSION),
+        "carried": np.array(False), "version": np.array(bank._VERSION),
     }  # fmt: skip
 
 

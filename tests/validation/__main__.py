@@ -8,6 +8,7 @@ VALIDATIONS = {
     "anemometer": "tests.validation.anemometer",
     "arcsim": "tests.validation.arcsim",
     "arcsim-jittered": "tests.validation.arcsim_jittered",
+    "carried-cloth": "tests.validation.carried_cloth",
     "card-flag": "tests.validation.card_flag",
     "clock-recovery": "tests.validation.clock_recovery",
     "datasets": "tests.validation.datasets",

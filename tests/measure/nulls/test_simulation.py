@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,8 @@ from flagdata.errors import FlagdataError
 from measure.forecasting.calibration import Calibration
 from measure.nulls.simulation import NullBatch
 from measure.nulls.stiffness import StiffnessFactors
-from measure.observe.trajectory import Specimen, WindTrack
+from measure.observe.trajectory import AttachmentTrack, Specimen, WindTrack
+from sim import handles
 from sim.effects.vertical_wind import VerticalWind
 
 
@@ -66,6 +68,26 @@ def test_an_effect_on_the_wind_acts_on_one_that_blows(specimen: Specimen) -> Non
     (without,) = _in(replace(rising, effects=()), level).simulate()
     np.testing.assert_allclose(same.positions, steady.positions, rtol=0, atol=1e-5)
     assert np.abs(without.positions - same.positions).max() > 1e-2
+
+
+def test_a_carried_null_is_held_where_its_way_goes_at_every_frame(specimen: Specimen) -> None:
+    """Two upper corners on ways of their own, one to and fro and one up and down, turned by 40° from the x axis."""
+    held = handles.top_corners(specimen.mesh.rest)
+    turned = specimen.mesh.rest[list(held), 0, None] * [math.cos(0.7), math.sin(0.7), 0.0] + [0.0, 0.0, 2.0]
+    times = np.arange(-4.0, 3.0, 0.01)
+    moved = np.zeros((len(times), 2, 3))
+    moved[:, :, 1] = 0.1 * np.sin(4 * times)[:, None]
+    moved[:, 1, 2] = 0.02 * np.sin(7 * times)
+    way = AttachmentTrack(times=times, places=turned + moved)
+    nulls = replace(
+        batch(specimen, speed=0.0), specimen=replace(specimen, held=held, anchors=turned, stiffness=math.inf),
+        stiffness=StiffnessFactors(), tracks=(way,), duration=1.0,
+    )  # fmt: skip
+    (recording,) = nulls.simulate()
+    assert recording.attachments is not None
+    # At up to 0.4 m/s, half a millisecond of an explicit step is 0.2 mm; a frame of 40 ms would be 16 mm.
+    np.testing.assert_allclose(recording.attachments, way.at(recording.times), rtol=0, atol=4e-4)
+    assert np.ptp(recording.positions[:, :, 1]) > 0.1
 
 
 def _in(nulls: NullBatch, wind: WindTrack) -> NullBatch:

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from scipy.special import k0, k1
 
 from sim.effects import apply
-from sim.effects.effect import InapplicableError
 from sim.effects.finite_span_loading import FiniteSpanLoading, cosines, profile_over_height, relative_masses, strip_mass
 from sim.material import named
 from sim.mesh import grid
 from sim.scene import assemble, flag
+from sim.system import InapplicableError
 
 
 def potential_flow(wavenumber: float, *, panels: int = 80) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
