@@ -72,7 +72,7 @@ class Store:
             with disk_errors("asking for the store's time", self.path):
                 return self.path.now()
         try:
-            with TemporaryFile(dir=self.staging) as file:
+            with TemporaryFile(dir=str(self.staging)) as file:
                 return os.fstat(file.fileno()).st_mtime
         except OSError:
             return time.time()
