@@ -108,7 +108,8 @@ def unweighed(verdict: Verdict) -> tuple[str, ...]:
     weighed = {(candidate.effect, candidate.parameter) for candidate in verdict.ranking}
     absent = [column.effect for column in library() if (column.effect, column.parameter) not in weighed]
     missing = list(dict.fromkeys(absent))
-    return (f"not weighed, since the cloth cannot have it as it is held: {listed(missing)}",) if missing else ()
+    why = "not weighed, since the cloth cannot have it as it is held and in its wind"
+    return (f"{why}: {listed(missing)}",) if missing else ()
 
 
 def separating(verdict: Verdict) -> str:
