@@ -38,8 +38,16 @@ def chart(found: Measured, flag: Example) -> tuple[Image.Image, float, float]:
     windows = found.windows
     middle = (windows.start + windows.end) / 2
     speed, low, high = (of["wind_speed"] for of in (windows.value, windows.low, windows.high))
-    axes.errorbar(middle, speed, yerr=(speed - low, high - speed), fmt="o", ms=4, lw=1.2, color="#00796b",
-                  label="read off the film, 90 %")  # fmt: skip
+    axes.errorbar(
+        middle,
+        speed,
+        yerr=(speed - low, high - speed),
+        fmt="o",
+        ms=4,
+        lw=1.2,
+        color="#00796b",
+        label="read off the film, 90 %",
+    )
     during, logged = log_on_film(flag)
     axes.plot(during, logged, color="#c62828", lw=1.2, label="cup anemometer")
     axes.axhline(flag.truth["wind_speed"], color="0.35", lw=1, ls="--", label="simulated, mean")
@@ -75,9 +83,15 @@ def moving(found: Measured, flag: Example) -> bytes:
         pictures.append(whole)
     written = io.BytesIO()
     pictures[0].save(
-        written, "WEBP", save_all=True, append_images=pictures[1:], loop=0, quality=45, method=4,
+        written,
+        "WEBP",
+        save_all=True,
+        append_images=pictures[1:],
+        loop=0,
+        quality=45,
+        method=4,
         duration=round(1000 * _EVERY / film.rate),
-    )  # fmt: skip
+    )
     return written.getvalue()
 
 

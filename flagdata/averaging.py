@@ -49,9 +49,10 @@ def average(series: WindSeries, period: float = 1.0, *, channel: str = "wind_spe
         raise UsageError(f"an averaging period of {period} s", where="period", fix="give seconds above 0")
     if channel not in series.channels:
         raise InputError(
-            f"the log of {series.sensor.name} has no channel {channel}", where=", ".join(sorted(series.channels)),
+            f"the log of {series.sensor.name} has no channel {channel}",
+            where=", ".join(sorted(series.channels)),
             fix="name one that it has; apparent or estimated wind is no ground truth",
-        )  # fmt: skip
+        )
     length = round(period * NANOSECONDS)
     speed = series.channels[channel]
     usable = ((series.flags & UNUSABLE) == 0) & np.isfinite(speed)
@@ -62,9 +63,13 @@ def average(series: WindSeries, period: float = 1.0, *, channel: str = "wind_spe
     if len(starts) == 0:
         empty = np.zeros(0)
         return WindAverage(
-            time=np.zeros(0, dtype=np.int64), speed=empty, sigma=empty, direction=empty,
-            count=np.zeros(0, dtype=np.int32), period=period,
-        )  # fmt: skip
+            time=np.zeros(0, dtype=np.int64),
+            speed=empty,
+            sigma=empty,
+            direction=empty,
+            count=np.zeros(0, dtype=np.int32),
+            period=period,
+        )
     mean = np.add.reduceat(speed, starts) / count
     scatter = _scatter(speed, starts, count, mean)
     direction = np.full(len(starts), np.nan)

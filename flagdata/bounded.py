@@ -57,8 +57,10 @@ class Child:
         code = f"import sys; sys.path[:] = {sys.path!r}; from flagdata.bounded import run; run({serve!r}, {memory})"
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", code],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
         self._pipes = cast(tuple[IO[bytes], IO[bytes]], (self._process.stdin, self._process.stdout))
         self._owner = os.getpid()
         self._ready = False

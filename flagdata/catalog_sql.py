@@ -97,10 +97,20 @@ class Answers:
 
         self._duckdb: Any = duckdb
         self._open: dict[int, _Answer] = {}
-        _Answer(duckdb, Question(
-            rows=catalog_schema().empty_table(), labels=(), sql="select 1 a", where=None, order="", columns=(),
-            limit=None, memory=_FIRST, shown=None,
-        )).total()  # fmt: skip
+        _Answer(
+            duckdb,
+            Question(
+                rows=catalog_schema().empty_table(),
+                labels=(),
+                sql="select 1 a",
+                where=None,
+                order="",
+                columns=(),
+                limit=None,
+                memory=_FIRST,
+                shown=None,
+            ),
+        ).total()
 
     def __call__(self, message: tuple[Any, ...]) -> Any:
         """The answer to (verb, number of the question, what else it takes).
@@ -219,8 +229,9 @@ class _Answer:
         if block.num_rows == 1 and (block.nbytes > ROW_BYTES or sum(map(_leaves, block.columns)) > ROW_LIMIT):
             raise LimitError(
                 f"one row of the result has more than {ROW_LIMIT:,} values or {ROW_BYTES >> 20} MiB",
-                where=self.question.shown, fix="aggregate in SQL, or unnest its lists: unnest(...)",
-            )  # fmt: skip
+                where=self.question.shown,
+                fix="aggregate in SQL, or unnest its lists: unnest(...)",
+            )
         yield block
 
 

@@ -18,77 +18,113 @@ from flagdata.errors import UnknownNameError, UsageError
 
 # group → what it is about, and its verbs: where the click command is, one line of help shown without importing it
 GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
-    "field": ("recordings from the field", {
-        "ingest": ("flagdata.commands.ingest:ingest", "Bring camera files, anemometer logs and mesh sequences in."),
-        "align": ("flagdata.commands.align:align", "Put a camera and an anemometer, or two anemometers, on one clock."),
-        "realign": ("flagdata.commands.align:realign", "Rewrite a recording with another clock model."),
-        "declare": ("flagdata.commands.declare:declare", "State the constant wind of a film, as of a wind tunnel."),
-        "declare-cloths": (
-            "flagdata.commands.declare_cloths:declare_cloths",
-            "Ingest films of measured cloths, by a table.",
-        ),
-        "recover": ("flagdata.commands.upkeep:recover", "Salvage a record that was cut off."),
-    }),
-    "look": ("what a lake holds", {
-        "ls": ("flagdata.commands.artifacts:ls", "List artifacts."),
-        "show": ("flagdata.commands.artifacts:show", "Show one artifact, its parents and its report."),
-        "lineage": ("flagdata.commands.looking:lineage", "Show what an artifact was made from, and what from it."),
-        "view": (
-            "flagdata.commands.looking:view",
-            "Look at a lake in the browser: artifacts, films beside winds, SQL.",
-        ),
-        "query": ("flagdata.commands.query:query", "Select rows of the catalog by filter or SQL."),
-        "log": ("flagdata.commands.lake:log", "List commits."),
-        "diff": ("flagdata.commands.lake:diff", "Rows and objects added and removed between two versions."),
-        "du": ("flagdata.commands.looking:du", "Show what takes space, by kind and by version."),
-        "catalog": (
-            "flagdata.commands.catalog:catalog",
-            "List the scenes, sensors, effects, materials, data sets and models by name.",
-        ),
-    }),
-    "physics": ("wind and cloth from recordings, and simulation", {
-        "measure": (
-            "measure.estimate.command:measure",
-            "Measure wind and cloth from a film, with intervals, or refuse.",
-        ),
-        "observe": ("measure.observables.command:observe", "Read droop, extension, speed and frequency off a film."),
-        "calibrate": ("measure.calibrate.command:calibrate", "Weigh a filmed flag's cloth with the log of the wind."),
-        "close-loop": ("measure.closing.command:close_loop", "Find what the model of a cloth lacks, and add it."),
-        "propose": ("measure.propose.command:propose", "Propose an effect that the library lacks, and test it."),
-        "simulate": ("sim.commands:simulate", "Simulate cloth in the wind: mesh sequences from a recipe or a scene."),
-        "challenge": ("measure.challenge.command:challenge", "Benchmark close-loop on blind data sets."),
-    }),
-    "learn": ("data sets and networks", {
-        "build": ("sim.datasets.command:build", "Build a data set: sequences, their films, ground truth and a card."),
-        "train": ("models.training.command:train", "Train a network on the clips of a lake, and commit it."),
-        "evaluate": ("models.evaluation.command:evaluate", "Evaluate trained networks on test clips, in one table."),
-    }),
-    "lake": ("versions, copies and upkeep", {
-        "init": ("flagdata.commands.lake:init", "Create an empty lake."),
-        "tag": ("flagdata.commands.lake:tag", "Name a version for good, list or delete tags."),
-        "branch": ("flagdata.commands.lake:branch", "Begin, list or delete branches."),
-        "merge": ("flagdata.commands.lake:merge", "Commit on main what a branch changed."),
-        "label": ("flagdata.commands.label:label", "Put columns of your own on artifacts."),
-        "withdraw": ("flagdata.commands.lake:withdraw", "Hide artifacts from a branch; tags still show them."),
-        "export": (
-            "flagdata.commands.export:export",
-            "Write WebDataset, Parquet, LeRobot, Zarr, MP4 + CSV, MCAP, CSV of the wind or OBJ folders.",
-        ),
-        "push": ("flagdata.commands.transfer:push", "Move versions to another lake."),
-        "pull": ("flagdata.commands.transfer:pull", "Bring versions of another lake in."),
-        "clone": ("flagdata.commands.transfer:clone", "Make a lake with all versions of another."),
-        "verify": ("flagdata.commands.upkeep:verify", "Re-hash every object."),
-        "doctor": ("flagdata.commands.upkeep:doctor", "Find and explain what is wrong with a lake, or a data set."),
-        "gc": ("flagdata.commands.upkeep:gc", "Delete unreferenced files."),
-        "expire": ("flagdata.commands.upkeep:expire", "Let old versions expire, with a trace."),
-    }),
-    "project": ("this installation", {
-        "demo": ("measure.demo.command:demo", "Make a synthetic recording and run every step on it."),
-        "blender-setup": ("sim.blender.command:blender_setup", "Make the environment that Blender renders in."),
-        "completion": ("flagdata.commands.completion:completion", "Print the completion of commands for a shell."),
-        "help": ("flagdata.commands.help:help_", "Show the help of flagdata, or of a command."),
-    }),
-}  # fmt: skip
+    "field": (
+        "recordings from the field",
+        {
+            "ingest": ("flagdata.commands.ingest:ingest", "Bring camera files, anemometer logs and mesh sequences in."),
+            "align": (
+                "flagdata.commands.align:align",
+                "Put a camera and an anemometer, or two anemometers, on one clock.",
+            ),
+            "realign": ("flagdata.commands.align:realign", "Rewrite a recording with another clock model."),
+            "declare": ("flagdata.commands.declare:declare", "State the constant wind of a film, as of a wind tunnel."),
+            "declare-cloths": (
+                "flagdata.commands.declare_cloths:declare_cloths",
+                "Ingest films of measured cloths, by a table.",
+            ),
+            "recover": ("flagdata.commands.upkeep:recover", "Salvage a record that was cut off."),
+        },
+    ),
+    "look": (
+        "what a lake holds",
+        {
+            "ls": ("flagdata.commands.artifacts:ls", "List artifacts."),
+            "show": ("flagdata.commands.artifacts:show", "Show one artifact, its parents and its report."),
+            "lineage": ("flagdata.commands.looking:lineage", "Show what an artifact was made from, and what from it."),
+            "view": (
+                "flagdata.commands.looking:view",
+                "Look at a lake in the browser: artifacts, films beside winds, SQL.",
+            ),
+            "query": ("flagdata.commands.query:query", "Select rows of the catalog by filter or SQL."),
+            "log": ("flagdata.commands.lake:log", "List commits."),
+            "diff": ("flagdata.commands.lake:diff", "Rows and objects added and removed between two versions."),
+            "du": ("flagdata.commands.looking:du", "Show what takes space, by kind and by version."),
+            "catalog": (
+                "flagdata.commands.catalog:catalog",
+                "List the scenes, sensors, effects, materials, data sets and models by name.",
+            ),
+        },
+    ),
+    "physics": (
+        "wind and cloth from recordings, and simulation",
+        {
+            "measure": (
+                "measure.estimate.command:measure",
+                "Measure wind and cloth from a film, with intervals, or refuse.",
+            ),
+            "observe": (
+                "measure.observables.command:observe",
+                "Read droop, extension, speed and frequency off a film.",
+            ),
+            "calibrate": (
+                "measure.calibrate.command:calibrate",
+                "Weigh a filmed flag's cloth with the log of the wind.",
+            ),
+            "close-loop": ("measure.closing.command:close_loop", "Find what the model of a cloth lacks, and add it."),
+            "propose": ("measure.propose.command:propose", "Propose an effect that the library lacks, and test it."),
+            "simulate": (
+                "sim.commands:simulate",
+                "Simulate cloth in the wind: mesh sequences from a recipe or a scene.",
+            ),
+            "challenge": ("measure.challenge.command:challenge", "Benchmark close-loop on blind data sets."),
+        },
+    ),
+    "learn": (
+        "data sets and networks",
+        {
+            "build": (
+                "sim.datasets.command:build",
+                "Build a data set: sequences, their films, ground truth and a card.",
+            ),
+            "train": ("models.training.command:train", "Train a network on the clips of a lake, and commit it."),
+            "evaluate": (
+                "models.evaluation.command:evaluate",
+                "Evaluate trained networks on test clips, in one table.",
+            ),
+        },
+    ),
+    "lake": (
+        "versions, copies and upkeep",
+        {
+            "init": ("flagdata.commands.lake:init", "Create an empty lake."),
+            "tag": ("flagdata.commands.lake:tag", "Name a version for good, list or delete tags."),
+            "branch": ("flagdata.commands.lake:branch", "Begin, list or delete branches."),
+            "merge": ("flagdata.commands.lake:merge", "Commit on main what a branch changed."),
+            "label": ("flagdata.commands.label:label", "Put columns of your own on artifacts."),
+            "withdraw": ("flagdata.commands.lake:withdraw", "Hide artifacts from a branch; tags still show them."),
+            "export": (
+                "flagdata.commands.export:export",
+                "Write WebDataset, Parquet, LeRobot, Zarr, MP4 + CSV, MCAP, CSV of the wind or OBJ folders.",
+            ),
+            "push": ("flagdata.commands.transfer:push", "Move versions to another lake."),
+            "pull": ("flagdata.commands.transfer:pull", "Bring versions of another lake in."),
+            "clone": ("flagdata.commands.transfer:clone", "Make a lake with all versions of another."),
+            "verify": ("flagdata.commands.upkeep:verify", "Re-hash every object."),
+            "doctor": ("flagdata.commands.upkeep:doctor", "Find and explain what is wrong with a lake, or a data set."),
+            "gc": ("flagdata.commands.upkeep:gc", "Delete unreferenced files."),
+            "expire": ("flagdata.commands.upkeep:expire", "Let old versions expire, with a trace."),
+        },
+    ),
+    "project": (
+        "this installation",
+        {
+            "demo": ("measure.demo.command:demo", "Make a synthetic recording and run every step on it."),
+            "blender-setup": ("sim.blender.command:blender_setup", "Make the environment that Blender renders in."),
+            "completion": ("flagdata.commands.completion:completion", "Print the completion of commands for a shell."),
+            "help": ("flagdata.commands.help:help_", "Show the help of flagdata, or of a command."),
+        },
+    ),
+}
 
 VERBS: dict[str, tuple[str, str]] = {verb: entry for _, verbs in GROUPS.values() for verb, entry in verbs.items()}
 

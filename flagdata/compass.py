@@ -12,16 +12,28 @@ _ROSE = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WS
 _POINT = 22.5
 _DEGREES = {name: number * _POINT for number, name in enumerate(_ROSE)}
 _WORDS: dict[str, tuple[str, str, str, str]] = {
-    "en": ("NORTH", "EAST", "SOUTH", "WEST"), "de": ("NORD", "OST", "SÜD", "WEST"),
-    "nl": ("NOORD", "OOST", "ZUID", "WEST"), "fr": ("NORD", "EST", "SUD", "OUEST"),
-    "it": ("NORD", "EST", "SUD", "OVEST"), "es": ("NORTE", "ESTE", "SUR", "OESTE"),
-    "pt": ("NORTE", "LESTE", "SUL", "OESTE"), "no": ("NORD", "ØST", "SØR", "VEST"),
-    "da": ("NORD", "ØST", "SYD", "VEST"), "sv": ("NORR", "ÖST", "SÖDER", "VÄST"),
-}  # fmt: skip
+    "en": ("NORTH", "EAST", "SOUTH", "WEST"),
+    "de": ("NORD", "OST", "SÜD", "WEST"),
+    "nl": ("NOORD", "OOST", "ZUID", "WEST"),
+    "fr": ("NORD", "EST", "SUD", "OUEST"),
+    "it": ("NORD", "EST", "SUD", "OVEST"),
+    "es": ("NORTE", "ESTE", "SUR", "OESTE"),
+    "pt": ("NORTE", "LESTE", "SUL", "OESTE"),
+    "no": ("NORD", "ØST", "SØR", "VEST"),
+    "da": ("NORD", "ØST", "SYD", "VEST"),
+    "sv": ("NORR", "ÖST", "SÖDER", "VÄST"),
+}
 """North, east, south and west."""
 _JOINED = {
-    "NOR": "N", "NORD": "N", "SUR": "S", "SUD": "S", "ESTE": "E", "OESTE": "W", "LES": "E", "LESTE": "E",
-}  # fmt: skip
+    "NOR": "N",
+    "NORD": "N",
+    "SUR": "S",
+    "SUD": "S",
+    "ESTE": "E",
+    "OESTE": "W",
+    "LES": "E",
+    "LESTE": "E",
+}
 """How Spanish and Portuguese begin the names of points between."""
 
 
@@ -40,10 +52,7 @@ def _spelled(words: Sequence[str]) -> dict[str, float]:
 def _iberian() -> dict[str, float]:
     """NORESTE, SUROESTE, NORDESTE, ESTENORESTE and the like."""
     ends = {"E": "ESTE", "W": "OESTE"}
-    between = {
-        start + ends[east]: side + east
-        for start, side in _JOINED.items() if side in "NS" for east in ends
-    }  # fmt: skip
+    between = {start + ends[east]: side + east for start, side in _JOINED.items() if side in "NS" for east in ends}
     found = {name: _DEGREES[point] for name, point in between.items()}
     for name, point in between.items():
         for start, side in _JOINED.items():
@@ -93,8 +102,9 @@ _KANJI = {"N": "北", "E": "東", "S": "南", "W": "西"}
 # Japanese joins the letters as English does (北東, 東北東); Chinese puts east and west first (东北, 东东北).
 _FAR_EAST = {
     "".join(_KANJI[letter] for letter in spelled): _DEGREES[point]
-    for point in _ROSE for spelled in {point, point[:-2] + point[-2:][::-1]}
-}  # fmt: skip
+    for point in _ROSE
+    for spelled in {point, point[:-2] + point[-2:][::-1]}
+}
 _NAMES: dict[str, float] = (
     {name: degrees for words in _WORDS.values() for name, degrees in _spelled(words).items()}
     | _iberian()
@@ -119,22 +129,57 @@ BY_UNIT: Mapping[str, Mapping[str, float]] = {
 }
 """Points, upper-case → degrees, by the unit of a column of them."""
 _HEADINGS = {
-    "points-de": ("richtung",), "points-nl": ("richting",),
-    "points-es": ("viento", "vento", "vent", "dirección", "direccion", "direzione"), "points-pt": ("vento", "direção"),
-}  # fmt: skip
+    "points-de": ("richtung",),
+    "points-nl": ("richting",),
+    "points-es": ("viento", "vento", "vent", "dirección", "direccion", "direzione"),
+    "points-pt": ("vento", "direção"),
+}
 """Words of a heading that identify its language."""
 STILL = frozenset(
     {
-        "c", "calm", "calm wind", "calm winds", "calm, no wind", "still", "calma", "calmo", "windstille", "calme",
-        "штиль", "штиль, безветрие", "stil", "stille", "vindstille", "windstil", "no wind",
-        "静穏", "静风", "靜風", "無風", "无风", "静稳",
+        "c",
+        "calm",
+        "calm wind",
+        "calm winds",
+        "calm, no wind",
+        "still",
+        "calma",
+        "calmo",
+        "windstille",
+        "calme",
+        "штиль",
+        "штиль, безветрие",
+        "stil",
+        "stille",
+        "vindstille",
+        "windstil",
+        "no wind",
+        "静穏",
+        "静风",
+        "靜風",
+        "無風",
+        "无风",
+        "静稳",
     }
-)  # fmt: skip
+)
 """Words for calm air: a speed of 0 and no direction."""
 CALM = STILL | {
-    "none", "variable", "vrb", "var", "cvr", "cv", "cal", "umlaufend", "variabel", "風向不定", "风向不定", "不定",
-    "переменное направление", "ветер переменного направления", "variable wind direction",
-}  # fmt: skip
+    "none",
+    "variable",
+    "vrb",
+    "var",
+    "cvr",
+    "cv",
+    "cal",
+    "umlaufend",
+    "variabel",
+    "風向不定",
+    "风向不定",
+    "不定",
+    "переменное направление",
+    "ветер переменного направления",
+    "variable wind direction",
+}
 """What stands in a column of points where there is no direction."""
 
 

@@ -61,18 +61,24 @@ def json_option(command: F) -> F:
 def lake_option(command: F) -> F:
     """Adds `--lake DIR` (argument `lake_path`), also read from the environment variable FLAGDATA_LAKE."""
     return click.option(
-        "--lake", "lake_path", envvar="FLAGDATA_LAKE", default=".", show_default=True, metavar="DIR",
+        "--lake",
+        "lake_path",
+        envvar="FLAGDATA_LAKE",
+        default=".",
+        show_default=True,
+        metavar="DIR",
         help="The lake's folder, or s3://bucket/prefix; also FLAGDATA_LAKE.",
-    )(command)  # fmt: skip
+    )(command)
 
 
 def at_option(command: F) -> F:
     """Adds `--at REF`."""
     return click.option(
-        "--at", metavar="REF",
+        "--at",
+        metavar="REF",
         help="Tag, branch, version number, commit, or main at a time: 2026-11-26 (its end, UTC), 3.days.ago; the head "
         "of main by default.",
-    )(command)  # fmt: skip
+    )(command)
 
 
 def document(tag: str, content: Mapping[str, Any]) -> None:
@@ -195,10 +201,12 @@ def foreseen(error: Exception) -> FlagdataError:
     if isinstance(error, OSError):
         what = " ".join((error.strerror or str(error)).split())  # without strerror where a library of C++ raised it
         return FlagdataError(
-            f"the system refused: {what}", where=None if error.filename is None else str(error.filename),
-            fix=error.fix if isinstance(error, StoreError)
+            f"the system refused: {what}",
+            where=None if error.filename is None else str(error.filename),
+            fix=error.fix
+            if isinstance(error, StoreError)
             else "check that the file is there, its permissions and the space on the disk",
-        )  # fmt: skip
+        )
     if isinstance(error, MemoryError):
         return LimitError("there is not enough memory for this", fix="ask for less at a time, or use a larger machine")
     frames = traceback.extract_tb(error.__traceback__)

@@ -8,9 +8,17 @@ from contextlib import contextmanager
 from flagdata.errors import MissingExtraError
 
 EXTRAS = {
-    "torch": "physics", "cv2": "physics", "safetensors": "physics", "matplotlib": "physics", "sklearn": "learn",
-    "psutil": "learn", "dask": "cluster", "distributed": "cluster", "xarray": "xarray", "warp": "gpu",
-}  # fmt: skip
+    "torch": "physics",
+    "cv2": "physics",
+    "safetensors": "physics",
+    "matplotlib": "physics",
+    "sklearn": "learn",
+    "psutil": "learn",
+    "dask": "cluster",
+    "distributed": "cluster",
+    "xarray": "xarray",
+    "warp": "gpu",
+}
 """Module → extra of pyproject.toml. Excel sheets and object storage name theirs where they are opened."""
 _CPU = "without an NVIDIA card first: pip install torch --index-url https://download.pytorch.org/whl/cpu; then: "
 

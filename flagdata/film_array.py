@@ -44,14 +44,16 @@ class Frames:
         shape = np.shape(self.images)
         if len(shape) not in (3, 4) or shape[3:] not in ((), (3,)) or self.images.dtype != np.uint8:
             raise InputError(
-                f"frames of shape {shape} and type {self.images.dtype}", where=self.name,
+                f"frames of shape {shape} and type {self.images.dtype}",
+                where=self.name,
                 fix="give (n, height, width) or (n, height, width, 3) of type uint8",
-            )  # fmt: skip
+            )
         if shape[0] < 2 or np.shape(self.time) != shape[:1] or not bool((np.diff(self.time) > 0).all()):
             raise InputError(
-                f"{shape[0]} frames with times of shape {np.shape(self.time)}", where=self.name,
+                f"{shape[0]} frames with times of shape {np.shape(self.time)}",
+                where=self.name,
                 fix="give two frames or more, each with its time, in order",
-            )  # fmt: skip
+            )
 
     def __len__(self) -> int:
         return len(self.images)
@@ -122,15 +124,17 @@ def collected(film: Film, *, first: float, last: float | None) -> Frames:
         size += image.nbytes
         if size > LARGEST:
             raise LimitError(
-                f"the frames from {first:g} s on take more than {LARGEST >> 30} GiB", where=film.name,
+                f"the frames from {first:g} s on take more than {LARGEST >> 30} GiB",
+                where=film.name,
                 fix=f"give an end of {time:.1f} s or less",
-            )  # fmt: skip
+            )
         images.append(image)
         times.append(time)
     if len(images) < 2:
         raise InputError(
-            f"{len(images)} frames from {first:g} s on", where=film.name,
+            f"{len(images)} frames from {first:g} s on",
+            where=film.name,
             fix=f"choose a part of its {film.duration:.2f} s",
-        )  # fmt: skip
+        )
     start = None if film.start is None else film.start + round(times[0] * NANOSECONDS)
     return Frames(images=np.stack(images), time=np.array(times) - times[0], name=film.name, start=start)

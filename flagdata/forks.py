@@ -31,5 +31,6 @@ class OneProcess:
         elif self._user != own:
             raise FlagdataError(
                 f"{self._what} was used before this process was forked, and cannot be used in the child",
-                where=f"process {own}", fix=self._fix,
-            )  # fmt: skip
+                where=f"process {own}",
+                fix=self._fix,
+            )

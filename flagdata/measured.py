@@ -122,9 +122,10 @@ class Measured:
         """
         if self.given is None:
             raise RefusedError(
-                self.verdict, where=self.film,
+                self.verdict,
+                where=self.film,
                 fix=self.reasons[0].fix or "look at it with anyway=True",
-            )  # fmt: skip
+            )
         return self.given
 
     @property
@@ -159,8 +160,10 @@ class Measured:
         return f"Measured({self.film}: {mark}{self.given.sentence})"
 
     def _repr_html_(self) -> str:
-        rows = {} if self.given is None else {
-            name.replace("_", " "): one.text for name, one in self.given.quantities.items()
-        }  # fmt: skip
+        rows = (
+            {}
+            if self.given is None
+            else {name.replace("_", " "): one.text for name, one in self.given.quantities.items()}
+        )
         rows |= {"film": f"{self.duration:.2f} s at {self.rate:.4g} Hz", "gate": self.verdict}
         return table(repr(self), rows | {f"{one.severity.value} {one.kind}": one.what for one in self.findings})

@@ -71,8 +71,9 @@ def check_folder(path: Path, *, schema: str | None = None) -> None:
             raise ConflictError(
                 f"the folder holds what this command did not write there, or what was changed since: "
                 f"{', '.join(others[:_NAMED])}{more}",
-                where=str(path), fix="move away what you want to keep and remove the folder, or name another one",
-            )  # fmt: skip
+                where=str(path),
+                fix="move away what you want to keep and remove the folder, or name another one",
+            )
 
 
 def check_files(folder: Path, *names: str, command: str | None = None) -> None:

@@ -38,9 +38,10 @@ def check_stated(file: pq.FileMetaData, size: int, *, where: str, fix: str) -> N
     most = max(HELD, EXPANSION * size)
     if stated > most:
         raise LimitError(
-            f"a Parquet file of {size} bytes states {file.num_rows} rows, which take {stated} bytes", where=where,
+            f"a Parquet file of {size} bytes states {file.num_rows} rows, which take {stated} bytes",
+            where=where,
             fix=f"at most {most} are read: {fix}",
-        )  # fmt: skip
+        )
 
 
 def read_parquet(path: Path, columns: Sequence[str] | None = None) -> pa.Table:

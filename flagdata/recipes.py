@@ -100,9 +100,10 @@ class Shelf:
             return self.named(source)
         if not is_name(path.stem):
             raise InputError(
-                f"a {self.noun} cannot be called {path.stem!r}", where=source,
+                f"a {self.noun} cannot be called {path.stem!r}",
+                where=source,
                 fix=f"rename the file: 1 to {NAME_LIMIT} printable characters",
-            )  # fmt: skip
+            )
         return read_recipe(path)
 
 

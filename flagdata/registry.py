@@ -34,9 +34,13 @@ class Registry(Mapping[str, Any]):
     """
 
     def __init__(
-        self, noun: str, table: Mapping[str, str], *, group: str | None = None,
+        self,
+        noun: str,
+        table: Mapping[str, str],
+        *,
+        group: str | None = None,
         accepts: Callable[[Any], bool] = lambda entry: True,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._noun = noun
         self._own = dict(table)
         self._group = group
@@ -56,9 +60,10 @@ class Registry(Mapping[str, Any]):
         if len(added) + (name in self._own) > 1:
             by = [*(["flagdata"] if name in self._own else []), *map(_package, added)]
             raise PlugInError(
-                f"the {self._noun} {name!r} is defined twice: by {' and by '.join(by)}", where=added[-1].value,
+                f"the {self._noun} {name!r} is defined twice: by {' and by '.join(by)}",
+                where=added[-1].value,
                 fix="rename the entry point of the installed package, or uninstall it",
-            )  # fmt: skip
+            )
         if added:
             return self._loaded(added[0])
         if name not in self._own:
@@ -73,9 +78,10 @@ class Registry(Mapping[str, Any]):
             found, why = None, f"{type(error).__name__}: {error}"
         if why is not None:
             raise PlugInError(
-                f"the {self._noun} {entry.name!r} of {_package(entry)} cannot be used: {why}", where=entry.value,
+                f"the {self._noun} {entry.name!r} of {_package(entry)} cannot be used: {why}",
+                where=entry.value,
                 fix="repair the package, or uninstall it",
-            )  # fmt: skip
+            )
         return found
 
     def package(self, name: str) -> str | None:

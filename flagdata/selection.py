@@ -125,12 +125,18 @@ class Selection:
         self._ask(
             "open",
             Question(
-                rows=stored, labels=tuple(labels), sql=request.sql,
-                where=request.where if isinstance(request.where, str) else None, order=request.order or DEFAULT_ORDER,
-                columns=request.columns or tuple(CATALOG), limit=request.limit, memory=MEMORY, shown=_shown(request),
+                rows=stored,
+                labels=tuple(labels),
+                sql=request.sql,
+                where=request.where if isinstance(request.where, str) else None,
+                order=request.order or DEFAULT_ORDER,
+                columns=request.columns or tuple(CATALOG),
+                limit=request.limit,
+                memory=MEMORY,
+                shown=_shown(request),
             ),
             closed,
-        )  # fmt: skip
+        )
         weakref.finalize(self, self._process.closed.append, self._number)
 
     def total(self) -> int:
@@ -165,8 +171,9 @@ class Selection:
             if self.request.sql is not None and (cells > self._held[0] or size > self._held[1]):
                 raise LimitError(
                     f"the SQL gives more than {self._held[0]:,} values or {self._held[1] >> 20} MiB",
-                    where=self.request.sql, fix="aggregate in SQL, or give a limit; --csv and --arrow write any number",
-                )  # fmt: skip
+                    where=self.request.sql,
+                    fix="aggregate in SQL, or give a limit; --csv and --arrow write any number",
+                )
         return pa.Table.from_batches(batches, schema=stream.schema)
 
     def _schema(self, raw: pa.Schema) -> pa.Schema:
@@ -196,14 +203,16 @@ class Selection:
             if ended.late:
                 self._left = 0.0
                 raise LimitError(
-                    f"the query took longer than {self.request.time_limit:g} s", where=_shown(self.request),
+                    f"the query took longer than {self.request.time_limit:g} s",
+                    where=_shown(self.request),
                     fix="narrow it down; `flagdata query --time-limit SECONDS` allows more",
-                ) from None  # fmt: skip
+                ) from None
             self._check_rows()
             raise UsageError(
-                "it needs more memory than there is", where=_shown(self.request),
+                "it needs more memory than there is",
+                where=_shown(self.request),
                 fix=f"narrow it down, or aggregate in SQL: it may take {MEMORY / 1e9:g} GB",
-            ) from None  # fmt: skip
+            ) from None
         self._left -= time.monotonic() - begun
         if isinstance(answer, UsageError):
             self._check_rows()
@@ -249,7 +258,11 @@ def select(
         NotFoundError: no such ref.
     """
     request = Request(
-        where=where, columns=None if columns is None else tuple(columns), order=order, sql=sql, limit=limit,
+        where=where,
+        columns=None if columns is None else tuple(columns),
+        order=order,
+        sql=sql,
+        limit=limit,
         time_limit=time_limit,
-    )  # fmt: skip
+    )
     return Selection(lake.scan(lake.view(at)), request).table()

@@ -48,10 +48,11 @@ class Wind:
         course = f"{known.mean():.2f} m/s, {known.min():.2f} to {known.max():.2f} m/s" if len(known) else "none"
         last = self.time[-1] if len(self) else 0.0
         return {
-            "samples": f"{len(self)} in {last:.1f} s from {iso(self.start)}", "speed": course,
+            "samples": f"{len(self)} in {last:.1f} s from {iso(self.start)}",
+            "speed": course,
             "sensor": self.sensor.name,
             **{f"{one.severity.value} {one.kind}": one.what for one in self.findings},
-        }  # fmt: skip
+        }
 
     def __repr__(self) -> str:
         rows = self._rows()
@@ -88,8 +89,9 @@ class Motion:
         course = f"{known.mean():.2f}, {known.min():.2f} to {known.max():.2f}" if len(known) else "none"
         return {
             "pairs of frames": f"{len(self)}, to {self.time[-1] if len(self) else 0.0:.2f} s",
-            "energy [gray levels/s]": course, **{f"{one.severity.value} {one.kind}": one.what for one in self.findings},
-        }  # fmt: skip
+            "energy [gray levels/s]": course,
+            **{f"{one.severity.value} {one.kind}": one.what for one in self.findings},
+        }
 
     def __repr__(self) -> str:
         energy = self._rows()["energy [gray levels/s]"]

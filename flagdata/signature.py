@@ -12,9 +12,14 @@ import zlib
 from pathlib import Path
 
 _COMMENTS = {
-    ".html": "<!-- {} -->\n", ".htm": "<!-- {} -->\n", ".md": "<!-- {} -->\n", ".svg": "<!-- {} -->\n",
-    ".toml": "# {}\n", ".py": "# {}\n", ".pdf": "% {}\n",
-}  # fmt: skip
+    ".html": "<!-- {} -->\n",
+    ".htm": "<!-- {} -->\n",
+    ".md": "<!-- {} -->\n",
+    ".svg": "<!-- {} -->\n",
+    ".toml": "# {}\n",
+    ".py": "# {}\n",
+    ".pdf": "% {}\n",
+}
 _OBJECT_END = b"\n}\n"  # of JSON that is indented
 _WORDS = "written by flagdata"
 _TAIL = 512  # bytes at the end of a file that hold its statement

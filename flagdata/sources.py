@@ -51,9 +51,10 @@ def film_at(
 def frames_have_instants() -> UsageError:
     """The error of options of files that are given for films of a lake."""
     return UsageError(
-        "the frames of a lake have their instants", where="--true-fps, --sequence-fps",
+        "the frames of a lake have their instants",
+        where="--true-fps, --sequence-fps",
         fix="leave the options out; they belong to ingest",
-    )  # fmt: skip
+    )
 
 
 def named(
@@ -91,6 +92,8 @@ def stored_film(lake: Lake, artifact: Artifact) -> RecordFilm:
         raise InputError(f"the {artifact.kind} has no frames of its own", where=artifact.name, fix="name its recording")
     clip = artifact.kind is Kind.CLIP
     return RecordFilm(
-        lake.record_place(artifact.object), name=artifact.name,
-        first=(artifact.frame_first or 0) if clip else 0, count=artifact.frame_count if clip else None,
-    )  # fmt: skip
+        lake.record_place(artifact.object),
+        name=artifact.name,
+        first=(artifact.frame_first or 0) if clip else 0,
+        count=artifact.frame_count if clip else None,
+    )

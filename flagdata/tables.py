@@ -326,9 +326,10 @@ class Table:
         for end in ends(given):
             if abs(end) > _TURN:
                 raise InputError(
-                    f"{key} is {end:.4g} rad, more than a whole turn", where=self.where,
+                    f"{key} is {end:.4g} rad, more than a whole turn",
+                    where=self.where,
                     fix=f"give radians, or degrees as {degrees} = {end:.4g}",
-                )  # fmt: skip
+                )
         return given
 
     def one_angle(self, key: str, default: float) -> float:

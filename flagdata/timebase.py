@@ -53,9 +53,10 @@ def zone(name: str, *, where: str | None = None) -> tzinfo:
         places = sorted(name for name in available_timezones() if "/" in name and not name.startswith("Etc/"))
         close = difflib.get_close_matches(text, places, n=1)
         raise UnknownNameError(
-            f"unknown time zone {name!r}", where=where,
+            f"unknown time zone {name!r}",
+            where=where,
             fix=f"did you mean {close[0]!r}?" if close else "give a name such as Europe/Amsterdam, or +02:00, or UTC",
-        ) from None  # fmt: skip
+        ) from None
 
 
 def _abbreviated(text: str, clocks: Mapping[str, str], where: str | None) -> UnknownNameError:
@@ -63,10 +64,11 @@ def _abbreviated(text: str, clocks: Mapping[str, str], where: str | None) -> Unk
     shown = " or ".join(f"{offset} (as in {place})" for offset, place in clocks.items())
     offsets, places = (" or ".join(dict.fromkeys(names)) for names in (clocks, clocks.values()))
     return UnknownNameError(
-        f"{text!r} is an abbreviation, no name of a time zone: it may mean {shown}", where=where,
+        f"{text!r} is an abbreviation, no name of a time zone: it may mean {shown}",
+        where=where,
         fix=f"give the offset that the clock kept, {offsets}; if it was set in summer and winter, give the place whose "
         f"time it followed, {places}",
-    )  # fmt: skip
+    )
 
 
 def from_datetime(moment: datetime, *, nanosecond: int = 0) -> int:

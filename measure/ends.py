@@ -104,9 +104,13 @@ def bound_of(places: NDArray[np.floating]) -> Bound | None:
 
 
 def span(
-    draws: NDArray[np.floating], places: NDArray[np.floating] | None, *, level: float, limits: tuple[float, float],
+    draws: NDArray[np.floating],
+    places: NDArray[np.floating] | None,
+    *,
+    level: float,
+    limits: tuple[float, float],
     assumed: tuple[float, float],
-) -> Span:  # fmt: skip
+) -> Span:
     """The interval of a posterior.
 
     Args:
@@ -123,9 +127,13 @@ def span(
 
 
 def of_profile(
-    values: NDArray[np.floating], misfit: NDArray[np.floating], *, level: float, limits: tuple[float, float],
+    values: NDArray[np.floating],
+    misfit: NDArray[np.floating],
+    *,
+    level: float,
+    limits: tuple[float, float],
     larger: float = 1.0,
-) -> Span:  # fmt: skip
+) -> Span:
     """The interval of a profile: values whose misfit is less than the least by the quantile of χ² at the level. Where
     it still holds at an end of the values, the likelihood is flat towards that end, and only the other end is known.
 
@@ -154,9 +162,14 @@ def _crossing(values: NDArray[np.floating], within: NDArray[np.floating], place:
 
 
 def _ended(
-    low: float, high: float, bound: Bound | None, *, level: float, limits: tuple[float, float],
+    low: float,
+    high: float,
+    bound: Bound | None,
+    *,
+    level: float,
+    limits: tuple[float, float],
     assumed: tuple[float, float],
-) -> Span:  # fmt: skip
+) -> Span:
     """The interval that is left of a central one where its ends are not known."""
     if bound is None:
         return Span(low=max(low, limits[0]), high=min(high, limits[1]), level=level, bound=None, estimated=True)

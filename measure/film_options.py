@@ -12,14 +12,17 @@ from flagdata.commands.durations import DURATION
 _Command = TypeVar("_Command", bound=Callable[..., object])
 _OPTIONS = (
     click.option("--crop", metavar="X,Y,W,H", help="Region in which the flag is [px]; by default the whole picture."),
-    click.option("--flag", type=click.IntRange(min=1), metavar="N",
-                 help="Which moving cloth, as numbered on the page of measure --report; by default the one that moves "
-                 "most."),
+    click.option(
+        "--flag",
+        type=click.IntRange(min=1),
+        metavar="N",
+        help="Which moving cloth, as numbered on the page of measure --report; by default the one that moves most.",
+    ),
     click.option("--start", "first", type=DURATION, metavar="TIME", help="Where to begin in the film, as in 12s."),
     click.option("--end", "last", type=DURATION, metavar="TIME", help="Where to end."),
     click.option("--true-fps", type=float, metavar="HZ", help="Rate at which a high-speed camera really ran."),
     click.option("--sequence-fps", type=float, metavar="HZ", help="Rate of a folder of images."),
-)  # fmt: skip
+)
 
 
 def film_options(command: _Command) -> _Command:

@@ -53,6 +53,10 @@ class Share:
     def as_dict(self) -> dict[str, float | int | None]:
         """JSON values."""
         return {
-            "value": self.value, "low": self.low, "high": self.high, "level": self.level, "hits": self.hits,
+            "value": self.value,
+            "low": self.low,
+            "high": self.high,
+            "level": self.level,
+            "hits": self.hits,
             "count": self.count,
-        }  # fmt: skip
+        }

@@ -81,9 +81,12 @@ class Cropping:
         count, height, width = self._checked(shape)
         side = round(float(rng.choice(self.scales)) * min(height, width))
         return Crop(
-            first=int(rng.integers(count - self.frames + 1)), top=int(rng.integers(height - side + 1)),
-            left=int(rng.integers(width - side + 1)), side=side, mirrored=bool(self.mirror and rng.integers(2)),
-        )  # fmt: skip
+            first=int(rng.integers(count - self.frames + 1)),
+            top=int(rng.integers(height - side + 1)),
+            left=int(rng.integers(width - side + 1)),
+            side=side,
+            mirrored=bool(self.mirror and rng.integers(2)),
+        )
 
     def whole(self, shape: tuple[int, int, int], *, first: int = 0) -> Crop:
         """The largest square about the middle of a film of (frames, height, width), from frame `first` on.

@@ -128,16 +128,15 @@ class Estimator:
             raise InputError(
                 f"clips of {clips.shape[1]} frames, the model was trained on {self.front_end.frames} at "
                 f"{self.front_end.rate:g} Hz",
-                where=f"model {self.name!r}", fix="cut or resample the clips to that",
-            )  # fmt: skip
+                where=f"model {self.name!r}",
+                fix="cut or resample the clips to that",
+            )
         shape = (clips.shape[1], clips.shape[2], clips.shape[3])
         cut = [self.cropping.cut(clip, self.cropping.whole(shape)) for clip in clips]
         return torch.cat([self.front_end(clip[None].to(self.device)) for clip in cut])
 
     @torch.no_grad()
-    def estimate(
-        self, inputs: Tensor, *, seed: int = 0, draws: int = DRAWS, known: Sequence[Known] = ()
-    ) -> Estimates:  # fmt: skip
+    def estimate(self, inputs: Tensor, *, seed: int = 0, draws: int = DRAWS, known: Sequence[Known] = ()) -> Estimates:
         """Estimates for inputs (n, *shape), see `inputs`.
 
         Args:
@@ -153,9 +152,11 @@ class Estimator:
         values = self.learners[0].scaling.values(logits)
         summary = embeddings[0].cpu().numpy().astype(np.float32)
         return Estimates(
-            targets=self.targets, draws=values.cpu().numpy().astype(np.float32), summary=summary,
+            targets=self.targets,
+            draws=values.cpu().numpy().astype(np.float32),
+            summary=summary,
             unlike=None if self.cloud is None else self.cloud.p_value(summary),
-        )  # fmt: skip
+        )
 
     @torch.no_grad()
     def embeddings(self, inputs: Tensor) -> list[Tensor]:
@@ -220,9 +221,10 @@ class Estimator:
         size = len(self.targets)
         centre, spread = learner.centre.double(), learner.spread.double()
         return Mixture(
-            log_weight=torch.zeros((count, 1)).to(centre), location=centre.expand(count, 1, size),
+            log_weight=torch.zeros((count, 1)).to(centre),
+            location=centre.expand(count, 1, size),
             factor=torch.diag(spread).expand(count, 1, size, size),
-        )  # fmt: skip
+        )
 
 
 def load(folder: Path) -> Estimator:
@@ -248,9 +250,13 @@ def load(folder: Path) -> Estimator:
             prefix = f"{place}." if "members" in card else ""
             own = {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
             learner = build(
-                network["name"], network["options"], loss=Loss(loss["name"]), targets=tuple(loss["targets"]),
-                components=loss["components"], margin=loss["margin"],
-            )  # fmt: skip
+                network["name"],
+                network["options"],
+                loss=Loss(loss["name"]),
+                targets=tuple(loss["targets"]),
+                components=loss["components"],
+                margin=loss["margin"],
+            )
             learner.load_state_dict(
                 {name: value.float() if value.is_floating_point() else value for name, value in own.items()}
             )
@@ -263,9 +269,14 @@ def load(folder: Path) -> Estimator:
         if path.exists():
             cloud = Familiarity.of_arrays({name: value.double().numpy() for name, value in read_tensors(path).items()})
         return Estimator(
-            name=str(card["name"]), learners=tuple(learners), front_end=front_end, cropping=cropping,
-            widening=widening, cloud=cloud, card=card,
-        )  # fmt: skip
+            name=str(card["name"]),
+            learners=tuple(learners),
+            front_end=front_end,
+            cropping=cropping,
+            widening=widening,
+            cloud=cloud,
+            card=card,
+        )
     except (KeyError, TypeError, ValueError, RuntimeError, ArithmeticError, AttributeError, FlagdataError) as error:
         raise CorruptError(f"the model does not fit this version: {error}", where=str(folder), fix=_FIX) from None
 

@@ -18,11 +18,26 @@ from models.course import at_rest, band_powers, centre_and_width, fourier_rows, 
 BANDS = ((0.0, 0.1), (0.1, 0.2), (0.2, 0.32), (0.32, 0.52), (0.52, 1.0))
 """Parts of the flow's spectrum up to the Nyquist frequency, each of which takes the bins in (low, high]."""
 _OF_SCALE = (
-    "mean x", "mean y", "log power x", "log power y", "log variance x", "log variance y", "log power of change x",
-    "log power of change y", "correlation of x and y", "centre x", "centre y", "width x", "width y",
+    "mean x",
+    "mean y",
+    "log power x",
+    "log power y",
+    "log variance x",
+    "log variance y",
+    "log power of change x",
+    "log power of change y",
+    "correlation of x and y",
+    "centre x",
+    "centre y",
+    "width x",
+    "width y",
     *(f"band {low:g}-{high:g} log power {axis}" for low, high in BANDS for axis in "xy"),
-    "phase gradient along x", "coherence along x", "phase gradient along y", "coherence along y", "log slope",
-)  # fmt: skip
+    "phase gradient along x",
+    "coherence along x",
+    "phase gradient along y",
+    "coherence along y",
+    "log slope",
+)
 _SCALES = ("finest", "fine", "coarse")
 
 

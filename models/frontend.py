@@ -41,14 +41,25 @@ _FLOW_SCALES = {"flow-maps": 2, "flow-maps-3": 3}
 BANDS = ((0.0, 0.08), (0.08, 0.16), (0.16, 0.32), (0.32, 0.52), (0.52, 1.0))
 """Parts of the spectrum up to the Nyquist frequency whose power is a wave map; each takes the bins in (low, high]."""
 _OF_EACH = (
-    "peak 1 log power", "peak 2 log power", "peak 1 frequency", "peak 2 frequency", "log power", "centre", "width",
+    "peak 1 log power",
+    "peak 2 log power",
+    "peak 1 frequency",
+    "peak 2 frequency",
+    "log power",
+    "centre",
+    "width",
     *(f"band {low:g}-{high:g} log power" for low, high in BANDS),
-    "phase gradient x", "phase gradient y", "coherence x", "coherence y",
-)  # fmt: skip
+    "phase gradient x",
+    "phase gradient y",
+    "coherence x",
+    "coherence y",
+)
 WAVE_CHANNELS = (
     *(f"d/d{axis}: {name}" for axis in "xy" for name in _OF_EACH),
-    "mean picture", "log of its slope", "log standard deviation in time",
-)  # fmt: skip
+    "mean picture",
+    "log of its slope",
+    "log standard deviation in time",
+)
 """Names of the wave maps, in order. Frequencies are shares of the Nyquist frequency, phase gradients shares of π a
 pixel of the pooled picture; powers are log(1 + I/10⁻³), I as in `periodogram`
 of standardised frames: logarithmic where something moves, near 0 where there is but noise."""

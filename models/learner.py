@@ -80,9 +80,10 @@ class Learner(nn.Module):
         spread, centre = torch.std_mean(learned, dim=0, correction=0)
         if not bool((spread > 0).all()):
             raise InputError(
-                "a target has one value in the whole training set", where=", ".join(self.scaling.names),
+                "a target has one value in the whole training set",
+                where=", ".join(self.scaling.names),
                 fix="leave it out, or widen its range in the data set",
-            )  # fmt: skip
+            )
         self.centre.copy_(centre)
         self.spread.copy_(spread)
 
@@ -158,14 +159,16 @@ def build(
             weights = sum(values.numel() for values in made().state_dict().values())
     except (TypeError, ValueError, RuntimeError, ArithmeticError) as error:
         raise InputError(
-            f"the network {network} does not take that: {error}", where="[network]",
+            f"the network {network} does not take that: {error}",
+            where="[network]",
             fix="see its docstring for what it takes",
-        ) from None  # fmt: skip
+        ) from None
     if weights > WEIGHTS_LIMIT:
         raise LimitError(
-            f"the network {network} would have {weights:.3g} weights", where="[network]",
+            f"the network {network} would have {weights:.3g} weights",
+            where="[network]",
             fix=f"at most {WEIGHTS_LIMIT} are trained or read; give smaller widths",
-        )  # fmt: skip
+        )
     return made()
 
 

@@ -70,9 +70,10 @@ class Mixture:
         chosen = list(columns)
         factor = self.factor[..., chosen, :]
         return Mixture(
-            log_weight=self.log_weight, location=self.location[..., chosen],
+            log_weight=self.log_weight,
+            location=self.location[..., chosen],
             factor=torch.linalg.cholesky(factor @ factor.mT),
-        )  # fmt: skip
+        )
 
     def sample_given(self, columns: Sequence[int], values: Tensor, generator: torch.Generator) -> Tensor:
         """Draw from the distribution of all targets given some of them: (n, p, t).
@@ -149,9 +150,7 @@ class Mixture:
     def rows(self, places: Sequence[int]) -> Mixture:
         """The mixtures of some of the clips."""
         chosen = list(places)
-        return Mixture(
-            log_weight=self.log_weight[chosen], location=self.location[chosen], factor=self.factor[chosen]
-        )  # fmt: skip
+        return Mixture(log_weight=self.log_weight[chosen], location=self.location[chosen], factor=self.factor[chosen])
 
     def double(self) -> Mixture:
         """The same in float64."""

@@ -133,7 +133,7 @@ class Restricted:
 
 def restricted(
     mixture: Mixture, scaling: Scaling, known: Sequence[Known], *, draws: int, generator: torch.Generator
-) -> Restricted:  # fmt: skip
+) -> Restricted:
     """Draw from mixtures given statements about some of their quantities.
 
     Args:
@@ -172,9 +172,14 @@ def restricted(
 
 
 def _drawn(
-    own: Mixture, ends: _Ends, soft: Sequence[Known], exact: Sequence[Tensor], *, draws: int,
+    own: Mixture,
+    ends: _Ends,
+    soft: Sequence[Known],
+    exact: Sequence[Tensor],
+    *,
+    draws: int,
     generator: torch.Generator,
-) -> tuple[Tensor, Tensor]:  # fmt: skip
+) -> tuple[Tensor, Tensor]:
     """(n, draw, s) values of what is stated, the inexact first, from p(κ | x) L(κ), and (n, m) log Z."""
     cells = CELLS[len(soft)]
     at = torch.cartesian_prod(*[torch.arange(cells)] * len(soft)).reshape(-1, len(soft)).to(own.location.device)

@@ -93,19 +93,24 @@ def write(folder: Path, members: Sequence[Path], *, train: Prepared, validation:
             or first.card["data"] != other.card["data"]
         ):
             raise UsageError(
-                f"{other.card['name']} was trained otherwise than {first.card['name']}", where=str(members),
+                f"{other.card['name']} was trained otherwise than {first.card['name']}",
+                where=str(members),
                 fix="ship seeds of one recipe, trained on the same data",
-            )  # fmt: skip
+            )
     learners = tuple(one.learners[0].float() for one in loaded)
     joint = replace(first, learners=learners, name=name)
     found = widening(joint, validation)
     cloud = familiar(joint, train, validation)
     card: dict[str, Any] = {key: first.card[key] for key in _KEPT}
     card |= {
-        "name": name, "members": len(learners), "seeds": [one.card["seed"] for one in loaded], "widening": list(found),
-        "seed": first.card["seed"], "parameters": sum(w.numel() for one in learners for w in one.network.parameters()),
+        "name": name,
+        "members": len(learners),
+        "seeds": [one.card["seed"] for one in loaded],
+        "widening": list(found),
+        "seed": first.card["seed"],
+        "parameters": sum(w.numel() for one in learners for w in one.network.parameters()),
         "trained": {"films": len(train), "sequences": len(np.unique(train.sequence))},
-    }  # fmt: skip
+    }
     tensors = {
         f"{place}.{key}": value.half() if value.is_floating_point() else value
         for place, learner in enumerate(learners)
@@ -126,8 +131,7 @@ def _seedless(recipe: object) -> dict[str, Any]:
 
 @click.command()
 @click.argument("name")
-@click.option("--lake", "lake_path", type=LocalPath(exists=True), required=True,
-              help="Where the networks are.")  # fmt: skip
+@click.option("--lake", "lake_path", type=LocalPath(exists=True), required=True, help="Where the networks are.")
 @click.option("--at", help="Version of the lake that they were trained at.")
 @click.option("--cache", type=LocalPath(), help="Folder of prepared inputs; by default LAKE.inputs.")
 @click.option("--out", type=LocalPath(), default=SHIPPED, help="Folder of the models that are shipped.")
@@ -156,9 +160,17 @@ def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Pa
     train, validation = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))
     with progress(len(train), label="prepare", unit="clip") as advance:
         inputs = prepare_films(
-            train, recipe.front_end, recipe.cropping, variants=recipe.variants, folder=folder, workers=workers,
-            advance=advance, augment=recipe.augment, sequences=recipe.data.sequences, seed=recipe.seed,
-        )  # fmt: skip
+            train,
+            recipe.front_end,
+            recipe.cropping,
+            variants=recipe.variants,
+            folder=folder,
+            workers=workers,
+            advance=advance,
+            augment=recipe.augment,
+            sequences=recipe.data.sequences,
+            seed=recipe.seed,
+        )
     with progress(len(validation), label="prepare", unit="clip") as advance:
         judged = prepare_clips(
             validation, recipe.front_end, recipe.cropping, folder=folder, workers=workers, advance=advance

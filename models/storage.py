@@ -48,9 +48,10 @@ def check_model(folder: Path) -> None:
             raise CorruptError("the model's files have changed since it was stored", where=str(folder), fix=_AGAIN)
     elif not (whole / SUMS).is_file():
         raise CorruptError(
-            f"the model has no {SUMS}, so that damage to it cannot be found", where=str(folder),
+            f"the model has no {SUMS}, so that damage to it cannot be found",
+            where=str(folder),
             fix=f"name it by its lake, or state that its files are whole: (cd FOLDER && sha256sum * > {SUMS})",
-        )  # fmt: skip
+        )
     else:
         check_sums(whole, fix=_AGAIN)
 

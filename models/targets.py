@@ -64,28 +64,35 @@ _OF_FLAGS = {
         Target(name="wind_speed", unit="m/s", low=0.0, high=10.0, about="wind speed"),
         Target(name="density", unit="kg/m²", low=0.10, high=0.17, about="area weight", digits=3),
         Target(
-            name="bending_scale", unit="log10(N·m)", low=-4.6, high=-3.25,
+            name="bending_scale",
+            unit="log10(N·m)",
+            low=-4.6,
+            high=-3.25,
             about="mean of the logarithms of the 15 bending coefficients",
         ),
         Target(
-            name="anisotropy", unit="1", low=-1.8, high=1.8,
+            name="anisotropy",
+            unit="1",
+            low=-1.8,
+            high=1.8,
             about="mean logarithm (base 10) of the 5 coefficients along the warp less that of the 5 along the weft",
         ),
     )
-}  # fmt: skip
+}
 """The ranges of wind and density are the paper's. With each of 15 factors drawn uniformly from 0.1 to 10 about Camel
 Ponte Roma's entries, the bending scale has mean -3.93 and standard deviation 0.10, the anisotropy 0.15 and 0.25; the
 ranges reach at least 6 of them either way."""
 
 _OF_FLAGS_OF_ANY_FABRIC = {
-    "fabric_density": Target(
-        name="density", unit="kg/m²", low=0.05, high=0.40, about="area weight", digits=3
-    ),
+    "fabric_density": Target(name="density", unit="kg/m²", low=0.05, high=0.40, about="area weight", digits=3),
     "fabric_bending": Target(
-        name="bending_scale", unit="log10(N·m)", low=-5.2, high=-2.9,
+        name="bending_scale",
+        unit="log10(N·m)",
+        low=-5.2,
+        high=-2.9,
         about="mean of the logarithms of the 15 bending coefficients",
     ),
-}  # fmt: skip
+}
 """Flags of the scene `flag-fabrics`: area weights from spinnaker cloth to denim, and a factor of 0.125 to 4 of all
 bending coefficients together, which moves the bending scale's mean from -4.8 to -3.3; the ranges reach 4 of its
 standard deviations beyond either."""
@@ -98,7 +105,7 @@ _OF_FLAGS_OUTDOORS = {
     ASPECT: Target(
         name=ASPECT, unit="1", low=-0.05, high=0.75, about="natural logarithm of the length over the height"
     ),
-}  # fmt: skip
+}
 """Flags of the scenes `flag-outdoor` and `flag-outdoor-damped`: winds of up to 16 m/s, and lengths of 1 to 2 heights,
 with a margin on either side so that a flag of 1:1 or 2:1 lies well within. Who knows a flag's size conditions on it."""
 
@@ -113,10 +120,14 @@ _OF_HANGING_CLOTH = {
         name="density", unit="kg/m²", low=0.079, high=0.454, about="area weight", digits=3, cloth=Cloth.HANGING
     ),
     "cloth_bending": Target(
-        name="bending_scale", unit="log10(N·m)", low=-5.1, high=-3.4, cloth=Cloth.HANGING,
+        name="bending_scale",
+        unit="log10(N·m)",
+        low=-5.1,
+        high=-3.4,
+        cloth=Cloth.HANGING,
         about="mean of the logarithms of the 15 bending coefficients",
     ),
-}  # fmt: skip
+}
 """Those of the ten materials of Wang et al. 2011 with the factors of the scene `hanging-cloth-wide`: area weights of
 0.113 to 0.324 kg/m² times 0.7 to 1.4, bending scales of -4.76 to -3.78 and 0.30 either way. Its anisotropy is the
 material's own, one of ten values, and no target."""
@@ -148,9 +159,10 @@ def _one(parameters: Mapping[str, NDArray[np.float64]], name: str) -> NDArray[np
     missing = [key for key in needed if key not in parameters or not np.isfinite(parameters[key]).any()]
     if missing:
         raise InputError(
-            f"no clip states its {missing[0]}, which the target {name} is made of", where="the clips' parameters",
+            f"no clip states its {missing[0]}, which the target {name} is made of",
+            where="the clips' parameters",
             fix="train on simulated recordings, or leave the target out",
-        )  # fmt: skip
+        )
     if len(needed) == 1:
         return np.asarray(parameters[quantity], dtype=np.float64)
     if quantity == ASPECT:
@@ -181,11 +193,13 @@ class Scaling:
                 raise UnknownNameError.of("target", name, TARGETS)
         if len({target.cloth for target in self.targets}) > 1 or len(set(self.quantities)) < len(self.names):
             raise InputError(
-                f"the targets are {', '.join(self.names)}", where="[loss] targets",
-                fix="name targets of one kind of cloth, each quantity once: " + "; or ".join(
+                f"the targets are {', '.join(self.names)}",
+                where="[loss] targets",
+                fix="name targets of one kind of cloth, each quantity once: "
+                + "; or ".join(
                     ", ".join(key for key, target in TARGETS.items() if target.cloth is cloth) for cloth in Cloth
                 ),
-            )  # fmt: skip
+            )
 
     @property
     def targets(self) -> tuple[Target, ...]:
@@ -242,9 +256,10 @@ class Scaling:
         values."""
         other = TARGETS[name]
         columns = [
-            column for column, own in enumerate(self.targets)
+            column
+            for column, own in enumerate(self.targets)
             if (own.name, own.cloth) == (other.name, other.cloth) and name not in self.names
-        ]  # fmt: skip
+        ]
         ranges = Scaling(names=(name,))
         return any(not ranges.beyond(values[:, [column]]) for column in columns)
 

@@ -31,9 +31,10 @@ class AnchorTracks:
         shape = tuple(self.samples.shape)
         if len(shape) != 4 or shape[0] < 2 or shape[2] != 3 or not torch.isfinite(self.samples).all():
             raise InputError(
-                f"tracks of anchors of shape {shape}, or not finite", where="anchors",
+                f"tracks of anchors of shape {shape}, or not finite",
+                where="anchors",
                 fix="give two or more samples, (n, held, 3, batch), in metres",
-            )  # fmt: skip
+            )
         if not self.period > 0:
             raise InputError(f"a period of {self.period!r} s", where="anchors", fix="give seconds between samples")
 

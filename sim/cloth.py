@@ -138,9 +138,11 @@ class Cloth:
                 [z if p.stiffening is None else p.stiffening for p, z in zip(parts, bare, strict=True)], -1
             )
         return replace(
-            first, materials=tuple(m for part in parts for m in part.materials), stiffening=stiffening,
+            first,
+            materials=tuple(m for part in parts for m in part.materials),
+            stiffening=stiffening,
             **{name: torch.cat([getattr(part, name) for part in parts], dim=-1) for name in _OF_MEMBERS},
-        )  # fmt: skip
+        )
 
     def at_corners(self, field: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """A vertex field (vertex, …) at the three corners of the faces: (face, …) each."""

@@ -22,8 +22,11 @@ if TYPE_CHECKING:
 @click.option("--batch", type=click.IntRange(min=1), metavar="N", help="How many at a time, instead of the recipe's.")
 @click.option("--device", default="cpu", show_default=True, help="Where to compute: cpu, cuda, cuda:1.")
 @click.option(
-    "--workers", type=click.IntRange(min=1), metavar="N", help="Batches at a time; by default one for each core.",
-)  # fmt: skip
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Batches at a time; by default one for each core.",
+)
 @click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")
 @json_option
 @lake_option

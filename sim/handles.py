@@ -46,8 +46,9 @@ class Handles:
         if shape != (len(self.times), 3) or not self.times or not np.isfinite(self.offsets).all():
             raise InputError(
                 f"{len(self.times)} key times with offsets of shape {shape}",
-                where="handles", fix="give one finite (x, y, z) offset for each key time",
-            )  # fmt: skip
+                where="handles",
+                fix="give one finite (x, y, z) offset for each key time",
+            )
         if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
             raise InputError("key times do not increase", where="handles", fix="sort them, each once")
 

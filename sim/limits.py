@@ -48,8 +48,9 @@ class StrainLimits:
         if not (0 <= self.low < 1 < self.high) or math.isnan(self.high):
             raise InputError(
                 f"strain limits {self.low!r} to {self.high!r} exclude the rest state",
-                where="strain limits", fix="give a low one in [0, 1) and a high one above 1",
-            )  # fmt: skip
+                where="strain limits",
+                fix="give a low one in [0, 1) and a high one above 1",
+            )
         if self.sweeps < 1:
             raise InputError(f"{self.sweeps} sweeps", where="strain limits", fix="give at least one")
 

@@ -101,9 +101,12 @@ class Material:
         if wrong:
             raise InputError(f"{', '.join(wrong)} must be a number", where=where, fix="write it without quotes")
         return cls(
-            name=name, source=str(content["source"]), stretching=content["stretching"], bending=content["bending"],
+            name=name,
+            source=str(content["source"]),
+            stretching=content["stretching"],
+            bending=content["bending"],
             **{key: float(value) for key, value in numbers.items()},
-        )  # fmt: skip
+        )
 
     @functools.cached_property
     def fingerprint(self) -> str:
@@ -139,9 +142,13 @@ def isotropic(
     """
     row = [stretching / 2, 0.0, stretching / 2, shear / 2]
     return Material(
-        name=name, source="constant stiffness", density=density, damping=damping,
-        stretching=np.tile(row, (6, 1)), bending=np.full(BENDING_SHAPE, bending),
-    )  # fmt: skip
+        name=name,
+        source="constant stiffness",
+        density=density,
+        damping=damping,
+        stretching=np.tile(row, (6, 1)),
+        bending=np.full(BENDING_SHAPE, bending),
+    )
 
 
 @functools.cache

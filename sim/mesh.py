@@ -72,8 +72,9 @@ class Mesh:
             face = int(np.flatnonzero(doubled < 0)[0])
             raise InputError(
                 f"{int((doubled < 0).sum())} triangles are inverted in the rest plane",
-                where=f"face {face}", fix="order their vertices counter-clockwise in (u, v)",
-            )  # fmt: skip
+                where=f"face {face}",
+                fix="order their vertices counter-clockwise in (u, v)",
+            )
         used = np.zeros(len(self.rest), dtype=bool)
         used[self.faces] = True
         if not used.all():
@@ -87,8 +88,9 @@ class Mesh:
             edge = unique[counts > 1][0]
             raise InputError(
                 "an edge is used twice in one direction: three faces on it, or two of opposed orientation",
-                where=f"edge {int(edge[0])}–{int(edge[1])}", fix="make the surface manifold and consistently oriented",
-            )  # fmt: skip
+                where=f"edge {int(edge[0])}–{int(edge[1])}",
+                fix="make the surface manifold and consistently oriented",
+            )
 
     @cached_property
     def _doubled_areas(self) -> NDArray[np.float64]:

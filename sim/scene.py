@@ -87,8 +87,9 @@ class Scene:
             vertex = int(np.flatnonzero(pieces == min(loose))[0])
             raise InputError(
                 f"{len(loose)} connected piece(s) of the cloth are not held anywhere",
-                where=f"piece with vertex {vertex}", fix="add a handle, or drop the piece",
-            )  # fmt: skip
+                where=f"piece with vertex {vertex}",
+                fix="add a handle, or drop the piece",
+            )
 
 
 def upright(mesh: Mesh) -> NDArray[np.float64]:
@@ -117,9 +118,13 @@ def flag(
     """
     mesh = grid(width=width, height=height, columns=columns, rows=max(1, round(columns * height / width)))
     return Scene(
-        mesh=mesh, position=upright(mesh), material=material, handles=Handles(vertices=held.corners(mesh.rest)),
-        wind=(wind_speed, 0.0, 0.0), evaluation=evaluation,
-    )  # fmt: skip
+        mesh=mesh,
+        position=upright(mesh),
+        material=material,
+        handles=Handles(vertices=held.corners(mesh.rest)),
+        wind=(wind_speed, 0.0, 0.0),
+        evaluation=evaluation,
+    )
 
 
 def hanging_cloth(
@@ -137,9 +142,13 @@ def hanging_cloth(
     """
     mesh = grid(width=side, height=side, columns=columns, rows=columns)
     return Scene(
-        mesh=mesh, position=upright(mesh), material=material, handles=Handles(vertices=held.top_corners(mesh.rest)),
-        wind=(*wind, 0.0), evaluation=evaluation,
-    )  # fmt: skip
+        mesh=mesh,
+        position=upright(mesh),
+        material=material,
+        handles=Handles(vertices=held.top_corners(mesh.rest)),
+        wind=(*wind, 0.0),
+        evaluation=evaluation,
+    )
 
 
 def assemble(
@@ -161,8 +170,9 @@ def assemble(
         if not same or any(getattr(scene, name) != getattr(first, name) for name in shared):
             raise UsageError(
                 f"scene {index} differs from scene 0 in mesh or one of: {', '.join(shared)}",
-                where="batch", fix="simulate such scenes in batches of their own",
-            )  # fmt: skip
+                where="batch",
+                fix="simulate such scenes in batches of their own",
+            )
 
     def real(values: NDArray[np.float64]) -> torch.Tensor:
         return torch.tensor(values, dtype=dtype, device=device)

@@ -198,9 +198,10 @@ class System:
     def __post_init__(self) -> None:
         if self.motion is not None and self.ties:
             raise InapplicableError(
-                "ties beside handles whose anchors move one by one", where="system",
+                "ties beside handles whose anchors move one by one",
+                where="system",
                 fix="leave out the effects that loosen or add attachments, or move all handles together",
-            )  # fmt: skip
+            )
 
     @cached_property
     def free(self) -> Tensor:
@@ -271,8 +272,9 @@ class System:
         if len(memory) != len(self.remembering):
             raise UsageError(
                 f"a state with {len(memory)} memories for {len(self.remembering)} forces that remember",
-                where="system", fix="start from the state that `sim.effects.apply` returns with the system",
-            )  # fmt: skip
+                where="system",
+                fix="start from the state that `sim.effects.apply` returns with the system",
+            )
         return memory
 
     def local(self, wind: Tensor, time: float, position: Tensor) -> Tensor:
@@ -357,12 +359,14 @@ class System:
         targets = [self._targets(time, offset) for time, offset in zip(times, offsets, strict=True)]
         return [
             Drive(
-                wind=(winds[k], winds[k + 1]), targets=(targets[k], targets[k + 1]),
-                rate=(targets[k + 1] - targets[k]) / (end - start), offset=(offsets[k], offsets[k + 1]),
+                wind=(winds[k], winds[k + 1]),
+                targets=(targets[k], targets[k + 1]),
+                rate=(targets[k + 1] - targets[k]) / (end - start),
+                offset=(offsets[k], offsets[k + 1]),
                 drift=(offsets[k + 1] - offsets[k]) / (end - start),
             )
             for k, (start, end) in enumerate(pairwise(times))
-        ]  # fmt: skip
+        ]
 
     @property
     def sprung(self) -> bool:
@@ -466,9 +470,15 @@ class System:
         cloth = self.cloth
         own = (cloth.mass, cloth.samples, cloth.segments, cloth.damping, self.gravity, self.anchors)
         parts = (
-            cloth.stiffening, self.wind, self.air, *self.effects, *self.flows, *self.loads, *self.ties,
+            cloth.stiffening,
+            self.wind,
+            self.air,
+            *self.effects,
+            *self.flows,
+            *self.loads,
+            *self.ties,
             *self.remembering,
-        )  # fmt: skip
+        )
         return (*own, *(tensor for part in parts for tensor in _tensors_of(part)))
 
     def energies(self, state: State) -> dict[str, Tensor]:

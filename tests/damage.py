@@ -11,9 +11,11 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 QUICK = settings(
-    max_examples=40, deadline=None, derandomize=True,
+    max_examples=40,
+    deadline=None,
+    derandomize=True,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
-)  # fmt: skip
+)
 
 places = st.floats(0, 1, exclude_max=True)
 damages = st.lists(
@@ -55,12 +57,48 @@ for _ in range(150):
     _nested = [_nested]
 wild = st.sampled_from(
     [
-        0, -1, 1, 3, 10**9, 10**12, 2**63, 10**29, 10**400, -(10**18), 0.0, -0.0, -0.5, 1e-300, 1e308, float("nan"),
-        float("inf"), -float("inf"), True, None, "", "x", "1e9", "\u0000", "\u202e\u2028\ud800", "'; drop \"\"\"\n[x]",
-        "../..", "/dev/zero", "a" * 5000, [], [1.0], [None], ["x", "x"], [[1, 2], [3]], [{}], {}, {"x": 1},
-        {"low": 1.0, "high": 1e30}, {"low": 1e-300, "high": 1e300, "scale": "log"}, _nested,
+        0,
+        -1,
+        1,
+        3,
+        10**9,
+        10**12,
+        2**63,
+        10**29,
+        10**400,
+        -(10**18),
+        0.0,
+        -0.0,
+        -0.5,
+        1e-300,
+        1e308,
+        float("nan"),
+        float("inf"),
+        -float("inf"),
+        True,
+        None,
+        "",
+        "x",
+        "1e9",
+        "\u0000",
+        "\u202e\u2028\ud800",
+        '\'; drop """\n[x]',
+        "../..",
+        "/dev/zero",
+        "a" * 5000,
+        [],
+        [1.0],
+        [None],
+        ["x", "x"],
+        [[1, 2], [3]],
+        [{}],
+        {},
+        {"x": 1},
+        {"low": 1.0, "high": 1e30},
+        {"low": 1e-300, "high": 1e300, "scale": "log"},
+        _nested,
     ]
-)  # fmt: skip
+)
 """Values that no recipe should hold, or not at most of its places."""
 
 

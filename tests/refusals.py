@@ -8,9 +8,13 @@ from typing import Any
 
 
 def unrefused(
-    use: Callable[..., object], cases: Iterable[tuple[Any, ...]], error: type[Exception] | None = None, match: str = "",
-    *, where: str = "",
-) -> list[str]:  # fmt: skip
+    use: Callable[..., object],
+    cases: Iterable[tuple[Any, ...]],
+    error: type[Exception] | None = None,
+    match: str = "",
+    *,
+    where: str = "",
+) -> list[str]:
     """What is wrong with the cases, a line each; none where all are refused as they state.
 
     A case is the arguments of `use`, then the class of the error unless it is given for all, then, unless `match` is

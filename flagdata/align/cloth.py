@@ -45,20 +45,31 @@ def cloth_recording(
     """
     if camera.kind is not Kind.CAMERA or camera.object is None:
         raise UsageError(
-            f"{camera.name!r} is a {camera.kind}, not a camera", where=camera.id,
+            f"{camera.name!r} is a {camera.kind}, not a camera",
+            where=camera.id,
             fix="name a camera artifact; see flagdata ls",
-        )  # fmt: skip
+        )
     stated = Finding(
-        kind="cloth-declared", severity=Severity.NOTE, value=cloth.density,
+        kind="cloth-declared",
+        severity=Severity.NOTE,
+        value=cloth.density,
         what=f"the cloth is {cloth.fabric}, of {cloth.density:g} kg/m²: measured by itself, as the table says",
-    )  # fmt: skip
+    )
     if cloth.wind is None:
         return _without_wind(lake, camera, cloth, stated, branch=branch, progress=progress)
     wind = ConstantWind(speed=cloth.wind[0], sigma=cloth.wind[1])
     _, made = declared_recording(
-        lake, camera, wind, recipe=_recipe(cloth), findings=(stated,), parameters=cloth.parameters, name=camera.name,
-        session=cloth.fabric, branch=branch, progress=progress,
-    )  # fmt: skip
+        lake,
+        camera,
+        wind,
+        recipe=_recipe(cloth),
+        findings=(stated,),
+        parameters=cloth.parameters,
+        name=camera.name,
+        session=cloth.fabric,
+        branch=branch,
+        progress=progress,
+    )
     return made
 
 
@@ -83,20 +94,33 @@ def _without_wind(
     if CAMERA in source.metadata:
         metadata[CAMERA] = dict(source.metadata[CAMERA])
     report = {
-        "schema": REPORT_SCHEMA, "kind": Kind.RECORDING.value, "frames": len(times), "start": iso(start),
-        "end": iso(end), "findings": [stated.as_dict()],
-    }  # fmt: skip
+        "schema": REPORT_SCHEMA,
+        "kind": Kind.RECORDING.value,
+        "frames": len(times),
+        "start": iso(start),
+        "end": iso(end),
+        "findings": [stated.as_dict()],
+    }
     with lake.transaction(f"declare the cloth of {camera.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
         with RecordWriter(staged, metadata=metadata) as record:
             copy_frames(record, source, None, progress=progress)
         recording = Artifact(
-            kind=Kind.RECORDING, name=camera.name, object=transaction.put(staged), parents=(camera.id,), recipe=recipe,
-            session=cloth.fabric, day=iso(start)[:10], start=start, end=end, frame_count=len(times),
+            kind=Kind.RECORDING,
+            name=camera.name,
+            object=transaction.put(staged),
+            parents=(camera.id,),
+            recipe=recipe,
+            session=cloth.fabric,
+            day=iso(start)[:10],
+            start=start,
+            end=end,
+            frame_count=len(times),
             rate=(len(times) - 1) * NANOSECONDS / (end - start) if end > start else None,
-            parameters=canonical(cloth.parameters), quality=sorted({*camera.quality, *quality_flags((stated,))}),
+            parameters=canonical(cloth.parameters),
+            quality=sorted({*camera.quality, *quality_flags((stated,))}),
             report=json.dumps(report, allow_nan=False, ensure_ascii=False),
-        )  # fmt: skip
+        )
         transaction.add(recording)
         for clip in clip_rows(Record.open(lake.record_place(str(recording.object))), recording, window=TRUTH_WINDOW):
             transaction.add(clip)

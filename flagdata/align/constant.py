@@ -60,9 +60,10 @@ class ConstantWind:
             raise UsageError(f"a wind of {self.speed} m/s", where="--speed", fix="give a speed of 0 or more in m/s")
         if not (math.isfinite(self.sigma) and self.sigma > 0):
             raise UsageError(
-                f"an uncertainty of the wind of {self.sigma} m/s", where="--sigma",
+                f"an uncertainty of the wind of {self.sigma} m/s",
+                where="--sigma",
                 fix="state how well the speed is known, in m/s (one standard deviation)",
-            )  # fmt: skip
+            )
 
     def recipe(self) -> dict[str, Any]:
         """What the artifact's identity depends on, beside the film."""
@@ -107,34 +108,42 @@ def declared_recording(
     """
     if camera.kind is not Kind.CAMERA or camera.start is None or camera.end is None:
         raise UsageError(
-            f"{camera.name!r} is a {camera.kind}, not a camera", where=camera.id,
+            f"{camera.name!r} is a {camera.kind}, not a camera",
+            where=camera.id,
             fix="flagdata declare CAMERA takes a camera artifact; see flagdata ls",
-        )  # fmt: skip
+        )
 
     def alignment(pair: Pair) -> Alignment:
         start, end = pair.span
         clock = by_stamps(camera.name, pair.wind.name, start=start, end=end, sigma=SAME_CLOCK)
         return Alignment(
-            clock=clock, recipe={**wind.recipe(), **(recipe or {})}, findings=findings, parameters=parameters or {},
+            clock=clock,
+            recipe={**wind.recipe(), **(recipe or {})},
+            findings=findings,
+            parameters=parameters or {},
             details={"method": clock.method, "offset": 0.0, "sigma": SAME_CLOCK, "confidence": 1.0},
-        )  # fmt: skip
+        )
 
     there = find_made(
         lake, Kind.WIND, {"camera": camera}, wind.recipe(), what="declared wind", name=None, session=None, branch=branch
     )
     if there.whole is not None:
         pair = Pair.opened(lake, camera, there.whole)
-        made = make_recording(
-            lake, pair, alignment(pair), name=name, session=session, branch=branch, progress=progress
-        )  # fmt: skip
+        made = make_recording(lake, pair, alignment(pair), name=name, session=session, branch=branch, progress=progress)
         return there.whole, made
     with lake.transaction(f"declare the wind of {camera.name}", branch=branch) as transaction:
         stated = _add_wind(transaction, camera, wind, session=session or camera.session, code=there.code)
         pair = Pair.opened(lake, camera, stated)
         recording = add_recording(
-            lake, transaction, pair, alignment(pair), name=name, session=session_of(pair, named=session),
-            code=there.code, progress=progress,
-        )  # fmt: skip
+            lake,
+            transaction,
+            pair,
+            alignment(pair),
+            name=name,
+            session=session_of(pair, named=session),
+            code=there.code,
+            progress=progress,
+        )
     return transaction.result.artifacts[stated.id], recorded(transaction, recording)
 
 
@@ -146,22 +155,37 @@ def _add_wind(
     before, after = round(MARGIN_BEFORE * NANOSECONDS), round(MARGIN_AFTER * NANOSECONDS)
     series = wind.series(cast(int, camera.start) - before, cast(int, camera.end) + after)
     stated = Finding(
-        kind=DECLARED, severity=Severity.WARNING, value=wind.speed,
+        kind=DECLARED,
+        severity=Severity.WARNING,
+        value=wind.speed,
         what=f"the wind was not measured, but declared to be {wind.speed:g} ± {wind.sigma:g} m/s all along",
-    )  # fmt: skip
+    )
     start, end = int(series.time[0]), int(series.time[-1])
     report = {
-        "schema": REPORT_SCHEMA, "kind": Kind.WIND.value, "speed": wind.speed, "sigma": wind.sigma,
-        "start": iso(start), "end": iso(end), "findings": [stated.as_dict()],
-    }  # fmt: skip
+        "schema": REPORT_SCHEMA,
+        "kind": Kind.WIND.value,
+        "speed": wind.speed,
+        "sigma": wind.sigma,
+        "start": iso(start),
+        "end": iso(end),
+        "findings": [stated.as_dict()],
+    }
     staged = transaction.staging(".mcap")
     with RecordWriter(staged, metadata={PROVENANCE: provenance({"camera": camera}, recipe, code=code)}) as record:
         record.wind(series)
     artifact = Artifact(
-        kind=Kind.WIND, name=f"{camera.name} declared wind", object=transaction.put(staged),
-        parents=(camera.id,), recipe=recipe, session=session, day=iso(start)[:10], start=start,
-        end=end, rate=1.0, quality=quality_flags((stated,)),
+        kind=Kind.WIND,
+        name=f"{camera.name} declared wind",
+        object=transaction.put(staged),
+        parents=(camera.id,),
+        recipe=recipe,
+        session=session,
+        day=iso(start)[:10],
+        start=start,
+        end=end,
+        rate=1.0,
+        quality=quality_flags((stated,)),
         report=json.dumps(report, allow_nan=False, ensure_ascii=False),
-    )  # fmt: skip
+    )
     transaction.add(artifact)
     return artifact

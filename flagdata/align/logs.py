@@ -127,9 +127,12 @@ def clock_between(
     motion, motion_sigma = _as_motion(fast)
     stamps = math.hypot(bins.sigma, motion_sigma, stamp_sigma(slow.time), stamp_sigma(fast.time))
     looked = replace(
-        search, centre=sign * search.centre, response=0.0, response_sigma=0.0,
+        search,
+        centre=sign * search.centre,
+        response=0.0,
+        response_sigma=0.0,
         stamp_sigma=math.hypot(search.stamp_sigma, stamps),
-    )  # fmt: skip
+    )
     whole = _whole(motion, bins.average, search=looked, generator=generator, names=names)
     line = _line(motion, bins.average, whole, search=looked, generator=generator, progress=progress)
     crooked = [finding.what for finding in line.findings]
@@ -173,9 +176,10 @@ def half_full(means: WindAverage) -> np.ndarray:
 def _usable(series: WindSeries) -> tuple[Instants, Series]:
     if "wind_speed" not in series.channels:
         raise InputError(
-            f"the log of {series.sensor.name} has no channel wind_speed", where=", ".join(sorted(series.channels)),
+            f"the log of {series.sensor.name} has no channel wind_speed",
+            where=", ".join(sorted(series.channels)),
             fix="give a log of the wind's speed",
-        )  # fmt: skip
+        )
     speed = series.channels["wind_speed"]
     good = ((series.flags & UNUSABLE) == 0) & np.isfinite(speed)
     if np.count_nonzero(good) < 2:
@@ -247,9 +251,13 @@ def _near(wind: WindAverage, low: int, high: int) -> WindAverage | None:
     if len(wind.time[rows]) < 2:
         return None
     return replace(
-        wind, time=wind.time[rows], speed=wind.speed[rows], sigma=wind.sigma[rows], direction=wind.direction[rows],
+        wind,
+        time=wind.time[rows],
+        speed=wind.speed[rows],
+        sigma=wind.sigma[rows],
+        direction=wind.direction[rows],
         count=wind.count[rows],
-    )  # fmt: skip
+    )
 
 
 def _part(
@@ -336,9 +344,14 @@ def _model(
     if turned:
         origin, offset, drift = origin + round(offset * NANOSECONDS), -offset, -drift / (1 + drift)
     segment = Segment(
-        start=int(sensor.time[0]), end=int(sensor.time[-1]) + 1, origin=origin, offset=offset, drift=drift,
-        sigma_offset=line.sigma_offset, sigma_drift=line.sigma_drift,
-    )  # fmt: skip
+        start=int(sensor.time[0]),
+        end=int(sensor.time[-1]) + 1,
+        origin=origin,
+        offset=offset,
+        drift=drift,
+        sigma_offset=line.sigma_offset,
+        sigma_drift=line.sigma_drift,
+    )
     return ClockModel(
         device=names[1], reference=names[0], method="estimated", confidence=confidence, segments=(segment,)
     )
@@ -346,7 +359,8 @@ def _model(
 
 def _refused(names: tuple[str, str], reasons: list[str]) -> RefusedError:
     return RefusedError(
-        f"no offset can be estimated: {'; '.join(reasons)}", where=f"{names[0]} and {names[1]}",
+        f"no offset can be estimated: {'; '.join(reasons)}",
+        where=f"{names[0]} and {names[1]}",
         fix="check that both logs are of one wind, and their zones; search around another offset: --centre, --search;"
         " or compare logs that last longer",
-    )  # fmt: skip
+    )

@@ -193,9 +193,11 @@ def evidence(pair: Pair, options: ClockOptions, *, progress: Progress | None = N
     if options.response is not None:
         response, sigma = options.response, search.response_sigma
     search = replace(
-        search, stamp_sigma=math.hypot(search.stamp_sigma, bins.sigma), response=response,
+        search,
+        stamp_sigma=math.hypot(search.stamp_sigma, bins.sigma),
+        response=response,
         response_sigma=sigma if options.response_sigma is None else options.response_sigma,
-    )  # fmt: skip
+    )
     _check_lengths(pair, bins.average, search)
     motion = pair.motion(progress=progress)
     generator = stream(0, "align", pair.camera.id, pair.wind.id)
@@ -216,7 +218,7 @@ def _check_lengths(pair: Pair, wind: WindAverage, search: LagSearch) -> None:
             "that both cover",
             where=f"{pair.camera.name} and {pair.wind.name}",
             fix=f"give a longer film and log, or state the offset: {_GIVEN}",
-        )  # fmt: skip
+        )
 
 
 def estimated(pair: Pair, found: Evidence, *, recipe: Mapping[str, Any]) -> Outcome:

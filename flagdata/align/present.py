@@ -42,9 +42,10 @@ def find_made(
         for label, asked, kept in (("name", name, artifact.name), ("session", session, artifact.session)):
             if asked is not None and asked != kept:
                 raise ConflictError(
-                    f"the {what} is there already with the {label} {kept!r}", where=artifact.id,
+                    f"the {what} is there already with the {label} {kept!r}",
+                    where=artifact.id,
                     fix=f"leave out --{label}, or take the old one off with flagdata withdraw first",
-                )  # fmt: skip
+                )
         return present(lake, artifact)
     return ABSENT
 

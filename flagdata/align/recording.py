@@ -159,9 +159,11 @@ class RecordingResult:
 
     def as_dict(self) -> dict[str, Any]:
         return {
-            "recording": self.recording.id, "clips": list(self.clips), "created": self.created,
+            "recording": self.recording.id,
+            "clips": list(self.clips),
+            "created": self.created,
             "healed": None if self.healed is None else asdict(self.healed),
-        }  # fmt: skip
+        }
 
     @property
     def line(self) -> str:
@@ -178,9 +180,10 @@ def truth_recipe(window: float) -> dict[str, Any]:
     """
     if not (math.isfinite(window) and 0 < window <= LONGEST_WINDOW):
         raise UsageError(
-            f"a ground truth over {window:g} s", where="--window",
+            f"a ground truth over {window:g} s",
+            where="--window",
             fix=f"give a length of time above zero, {LONGEST_WINDOW:g} s at most",
-        )  # fmt: skip
+        )
     return {} if window == TRUTH_WINDOW else {"truth": {"window": window}}
 
 
@@ -256,10 +259,15 @@ def make_recording(
         return present
     with lake.transaction(f"align {pair.camera.name} with {pair.wind.name}", branch=branch) as transaction:
         recording = add_recording(
-            lake, transaction, pair, alignment, name=name, session=session_of(pair, named=session),
+            lake,
+            transaction,
+            pair,
+            alignment,
+            name=name,
+            session=session_of(pair, named=session),
             code=_present(lake, pair, alignment.recipe, name=name, session=session, branch=branch).code,
             progress=progress,
-        )  # fmt: skip
+        )
     return recorded(transaction, recording)
 
 
@@ -297,10 +305,11 @@ def recorded(transaction: Transaction, recording: Artifact) -> RecordingResult:
     """What a transaction did that has ended and made `recording` and its clips."""
     result = transaction.result
     return RecordingResult(
-        recording=result.artifacts[recording.id], created=recording.id in result.added,
+        recording=result.artifacts[recording.id],
+        created=recording.id in result.added,
         healed=result.healed.get(recording.id),
         clips=tuple(made.id for made in result.artifacts.values() if made.recording == recording.id),
-    )  # fmt: skip
+    )
 
 
 def _near(series: WindSeries, start: int, end: int, *, before: float, where: str) -> WindSeries:

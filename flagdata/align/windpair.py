@@ -48,9 +48,10 @@ class WindPair:
         for artifact in found:
             if artifact.kind is not Kind.WIND or artifact.object is None:
                 raise UsageError(
-                    f"{artifact.name!r} is a {artifact.kind}, not a wind", where=artifact.id,
+                    f"{artifact.name!r} is a {artifact.kind}, not a wind",
+                    where=artifact.id,
                     fix="flagdata align REFERENCE SENSOR takes two wind artifacts; see flagdata ls",
-                )  # fmt: skip
+                )
         if found[0].id == found[1].id:
             raise UsageError("a log and itself", where=found[0].id, fix="name two wind artifacts")
         series = []
@@ -123,13 +124,24 @@ def make_aligned(
             **summary(found),
         }
         artifact = Artifact(
-            kind=Kind.WIND, name=name or pair.sensor.name, object=transaction.put(staged),
-            parents=(pair.reference.id, pair.sensor.id), recipe=recipe, session=session or pair.sensor.session,
-            day=iso(start)[:10], start=start, end=end, rate=pair.sensor.rate, clock_method=clock.method,
-            clock_offset=float(clock.to_common(middle) - middle) * 1e-9, clock_drift=clock.segments[0].drift,
-            clock_sigma=float(clock.sigma(middle)), clock_model=clock.to_json(), quality=pair.sensor.quality,
+            kind=Kind.WIND,
+            name=name or pair.sensor.name,
+            object=transaction.put(staged),
+            parents=(pair.reference.id, pair.sensor.id),
+            recipe=recipe,
+            session=session or pair.sensor.session,
+            day=iso(start)[:10],
+            start=start,
+            end=end,
+            rate=pair.sensor.rate,
+            clock_method=clock.method,
+            clock_offset=float(clock.to_common(middle) - middle) * 1e-9,
+            clock_drift=clock.segments[0].drift,
+            clock_sigma=float(clock.sigma(middle)),
+            clock_model=clock.to_json(),
+            quality=pair.sensor.quality,
             report=json.dumps(report, allow_nan=False, ensure_ascii=False),
-        )  # fmt: skip
+        )
         transaction.add(artifact)
     return transaction.result.artifacts[artifact.id], transaction.result.healed.get(artifact.id)
 

@@ -121,9 +121,15 @@ def render(
     own = {"width": width, "height": height, **(parameters or {})}
     return call(
         "sim.render.film:rendered",
-        sequence, look=look, parameters=own, cloth=cloth, heading=heading, renderer=renderer,
-        photos=None if photos is None else Path(photos), seed=seed,
-    )  # fmt: skip
+        sequence,
+        look=look,
+        parameters=own,
+        cloth=cloth,
+        heading=heading,
+        renderer=renderer,
+        photos=None if photos is None else Path(photos),
+        seed=seed,
+    )
 
 
 @checked
@@ -189,10 +195,25 @@ def measure(
     """
     return call(
         "measure.estimate.run:measured",
-        source, flag_size=flag_size, area_weight=area_weight, material=material, step=step, crop=crop, flag=flag,
-        start=start, end=end, true_fps=true_fps, sequence_fps=sequence_fps, level=level, seed=seed, model=model,
-        false_alarm=false_alarm, lake=None if lake is None else opened(lake).lake, at=at, anyway=anyway,
-    )  # fmt: skip
+        source,
+        flag_size=flag_size,
+        area_weight=area_weight,
+        material=material,
+        step=step,
+        crop=crop,
+        flag=flag,
+        start=start,
+        end=end,
+        true_fps=true_fps,
+        sequence_fps=sequence_fps,
+        level=level,
+        seed=seed,
+        model=model,
+        false_alarm=false_alarm,
+        lake=None if lake is None else opened(lake).lake,
+        at=at,
+        anyway=anyway,
+    )
 
 
 @checked
@@ -259,11 +280,26 @@ def calibrate(
     several = [recordings] if isinstance(recordings, Mapping | Path | str) else list(recordings)
     return call(
         "measure.calibrate.arrays:calibrated",
-        several, flag_size=flag_size, attachment=attachment, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg,
-        distance=distance, start=start, end=end, crop=crop, flag=flag, log=log, offset=offset,
-        simulations=simulations, level=level, seed=seed, workers=workers,
-        lake=None if lake is None else opened(lake).lake, at=at, cache=None if cache is None else Path(cache),
-    )  # fmt: skip
+        several,
+        flag_size=flag_size,
+        attachment=attachment,
+        azimuth_deg=azimuth_deg,
+        elevation_deg=elevation_deg,
+        distance=distance,
+        start=start,
+        end=end,
+        crop=crop,
+        flag=flag,
+        log=log,
+        offset=offset,
+        simulations=simulations,
+        level=level,
+        seed=seed,
+        workers=workers,
+        lake=None if lake is None else opened(lake).lake,
+        at=at,
+        cache=None if cache is None else Path(cache),
+    )
 
 
 @checked
@@ -319,6 +355,17 @@ def close_loop(
         raise UsageError("rest= without rate=, or the other way round", where="recordings", fix="give both")
     return call(
         "measure.closing.arrays:closed",
-        recordings, wind=wind, rest=rest, rate=rate, material=material, pins=pins, size=size,
-        density_uncertainty=density_uncertainty, noise=noise, level=level, nulls=nulls, seed=seed, workers=workers,
-    )  # fmt: skip
+        recordings,
+        wind=wind,
+        rest=rest,
+        rate=rate,
+        material=material,
+        pins=pins,
+        size=size,
+        density_uncertainty=density_uncertainty,
+        noise=noise,
+        level=level,
+        nulls=nulls,
+        seed=seed,
+        workers=workers,
+    )

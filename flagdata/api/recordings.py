@@ -188,9 +188,13 @@ def meshes(
 
 
 def _film(
-    source: Path | str, *, lake: AnyLake | None, at: str | None, true_fps: float | None = None,
+    source: Path | str,
+    *,
+    lake: AnyLake | None,
+    at: str | None,
+    true_fps: float | None = None,
     sequence_fps: float | None = None,
-) -> Film:  # fmt: skip
+) -> Film:
     held = None if lake is None else opened(lake).lake
     film, _ = film_at(source, lake=held, at=at, true_fps=true_fps, sequence_fps=sequence_fps)
     return film
@@ -210,13 +214,19 @@ def _wind(series: WindSeries, *, name: str, findings: tuple[Finding, ...] = ()) 
     speed = over_ground(series)
     if speed is None:
         raise InputError(
-            "the log has no wind over ground", where=name,
+            "the log has no wind over ground",
+            where=name,
             fix=f"it has {', '.join(series.channels)}; look at them with flagdata ingest --sniff",
-        )  # fmt: skip
+        )
     start = int(series.time[0])
     nothing = np.full(len(series), np.nan)
     return Wind(
-        name=name, time=(series.time - start) / NANOSECONDS, start=start, speed=speed,
-        direction=series.channels.get("wind_direction", nothing), channels=series.channels, sensor=series.sensor,
+        name=name,
+        time=(series.time - start) / NANOSECONDS,
+        start=start,
+        speed=speed,
+        direction=series.channels.get("wind_direction", nothing),
+        channels=series.channels,
+        sensor=series.sensor,
         findings=findings,
-    )  # fmt: skip
+    )

@@ -28,12 +28,17 @@ def _clock_options(command: F) -> F:
     for option in reversed(
         (
             click.option(
-                "--by", type=click.Choice(["stamps", "given", "estimate"]), default="estimate", show_default=True,
+                "--by",
+                type=click.Choice(["stamps", "given", "estimate"]),
+                default="estimate",
+                show_default=True,
                 help="Trust the stamps, take --offset, or estimate it from the flag's motion.",
             ),
             click.option("--offset", type=float, metavar="S", help="Seconds added to the camera's clock (--by given)."),
             click.option(
-                "--offset-sigma", type=float, metavar="S",
+                "--offset-sigma",
+                type=float,
+                metavar="S",
                 help="Its standard uncertainty; by stamps: how well the clocks are known to agree.",
             ),
             click.option(
@@ -43,21 +48,29 @@ def _clock_options(command: F) -> F:
                 "--search", type=float, metavar="S", help="Search this far either side of it; 120 by default."
             ),
             click.option(
-                "--window", type=DURATION, metavar="TIME",
+                "--window",
+                type=DURATION,
+                metavar="TIME",
                 help="Average the wind over this long before a clip's end for its ground truth, e.g. 10s or 2min; "
                 "60s by default.",
             ),
             click.option(
-                "--response", type=float, metavar="S",
+                "--response",
+                type=float,
+                metavar="S",
                 help="By how much the flag's motion follows the wind at the anemometer; by default 3 m over the mean "
                 "wind, 0.3 to 1 s.",
             ),
             click.option(
-                "--response-sigma", type=float, metavar="S",
+                "--response-sigma",
+                type=float,
+                metavar="S",
                 help="Its uncertainty; by default half of it, 0.3 at most, or 0.15 beside --response.",
             ),
             click.option(
-                "--max-sigma", type=float, metavar="S",
+                "--max-sigma",
+                type=float,
+                metavar="S",
                 help="Refuse an offset with a larger standard uncertainty [s]; 0.5 by default.",
             ),
             click.option("--name", help="What to call the recording; the camera's name by default."),
@@ -65,13 +78,15 @@ def _clock_options(command: F) -> F:
             click.option("--branch", default="main", show_default=True, help="Branch to commit on."),
             click.option("--dry-run", is_flag=True, help="Find the clock model, commit nothing."),
             click.option(
-                "--plot", metavar="FILE", type=LocalPath(dir_okay=False),
+                "--plot",
+                metavar="FILE",
+                type=LocalPath(dir_okay=False),
                 help="Picture of motion, wind and the search (--by estimate), drawn even when it is refused.",
             ),
             json_option,
             lake_option,
         )
-    ):  # fmt: skip
+    ):
         command = option(command)
     return command
 
@@ -81,11 +96,25 @@ def _clock_options(command: F) -> F:
 @click.argument("second", metavar="WIND|SENSOR")
 @_clock_options
 def align(
-    first: str, second: str, by: str, offset: float | None, offset_sigma: float | None, centre: float | None,
-    search: float | None, window: float | None, response: float | None, response_sigma: float | None,
-    max_sigma: float | None, name: str | None, session: str | None, branch: str, dry_run: bool, plot: Path | None,
-    as_json: bool, lake_path: str,
-) -> None:  # fmt: skip
+    first: str,
+    second: str,
+    by: str,
+    offset: float | None,
+    offset_sigma: float | None,
+    centre: float | None,
+    search: float | None,
+    window: float | None,
+    response: float | None,
+    response_sigma: float | None,
+    max_sigma: float | None,
+    name: str | None,
+    session: str | None,
+    branch: str,
+    dry_run: bool,
+    plot: Path | None,
+    as_json: bool,
+    lake_path: str,
+) -> None:
     """Put the artifacts CAMERA and WIND on one clock: a recording and its clips, in one commit.
 
     Of two wind artifacts, REFERENCE and SENSOR, the second is written anew on the first one's clock; offset, drift and
@@ -106,27 +135,56 @@ def align(
 
         unused = {"--window": window, "--response": response, "--response-sigma": response_sigma, "--plot": plot}
         align_logs(
-            lake, first, second, options, unused=tuple(o for o, value in unused.items() if value is not None),
-            name=name, session=session, branch=branch, dry_run=dry_run, as_json=as_json,
-        )  # fmt: skip
+            lake,
+            first,
+            second,
+            options,
+            unused=tuple(o for o, value in unused.items() if value is not None),
+            name=name,
+            session=session,
+            branch=branch,
+            dry_run=dry_run,
+            as_json=as_json,
+        )
         return
     pair = Pair.of(lake, first, second, at=branch)
     recipe = {**options.recipe(), **truth_recipe(TRUTH_WINDOW if window is None else window)}
     _run(
-        lake, pair, options, recipe=recipe, name=name, session=session, branch=branch, dry_run=dry_run,
-        plot=plot, as_json=as_json,
-    )  # fmt: skip
+        lake,
+        pair,
+        options,
+        recipe=recipe,
+        name=name,
+        session=session,
+        branch=branch,
+        dry_run=dry_run,
+        plot=plot,
+        as_json=as_json,
+    )
 
 
 @click.command(cls=LongCommand)
 @click.argument("recording")
 @_clock_options
 def realign(
-    recording: str, by: str, offset: float | None, offset_sigma: float | None, centre: float | None,
-    search: float | None, window: float | None, response: float | None, response_sigma: float | None,
-    max_sigma: float | None, name: str | None, session: str | None, branch: str, dry_run: bool, plot: Path | None,
-    as_json: bool, lake_path: str,
-) -> None:  # fmt: skip
+    recording: str,
+    by: str,
+    offset: float | None,
+    offset_sigma: float | None,
+    centre: float | None,
+    search: float | None,
+    window: float | None,
+    response: float | None,
+    response_sigma: float | None,
+    max_sigma: float | None,
+    name: str | None,
+    session: str | None,
+    branch: str,
+    dry_run: bool,
+    plot: Path | None,
+    as_json: bool,
+    lake_path: str,
+) -> None:
     """Write RECORDING anew with another clock model, from the same camera and wind artifacts.
 
     The window of the ground truth stays what it was unless --window says otherwise. The old recording and its clips
@@ -145,9 +203,17 @@ def realign(
     kept = truth_window(old.recipe) if window is None else window
     recipe = {**options.recipe(), **truth_recipe(kept), "supersedes": old.id}
     _run(
-        lake, pair, options, recipe=recipe, name=name or old.name, session=session or old.session, branch=branch,
-        dry_run=dry_run, plot=plot, as_json=as_json,
-    )  # fmt: skip
+        lake,
+        pair,
+        options,
+        recipe=recipe,
+        name=name or old.name,
+        session=session or old.session,
+        branch=branch,
+        dry_run=dry_run,
+        plot=plot,
+        as_json=as_json,
+    )
     if not dry_run:
         say(f"the recording {old.id[:SHORT]} it supersedes is still on {branch}; flagdata withdraw takes it off")
 
@@ -167,9 +233,15 @@ def _check_plot(plot: Path | None, options: ClockOptions) -> None:
 
 
 def _options(
-    by: str, offset: float | None, offset_sigma: float | None, centre: float | None, window: float | None,
-    response: float | None, response_sigma: float | None, max_sigma: float | None,
-) -> ClockOptions:  # fmt: skip
+    by: str,
+    offset: float | None,
+    offset_sigma: float | None,
+    centre: float | None,
+    window: float | None,
+    response: float | None,
+    response_sigma: float | None,
+    max_sigma: float | None,
+) -> ClockOptions:
     from flagdata.align.lag import LagSearch
     from flagdata.align.methods import ClockOptions, Method
 
@@ -180,15 +252,28 @@ def _options(
         sigma=usual.sigma if max_sigma is None else max_sigma,
     )
     return ClockOptions(
-        by=Method(by), offset=offset, offset_sigma=offset_sigma, search=None if search == usual else search,
-        response=response, response_sigma=response_sigma,
-    )  # fmt: skip
+        by=Method(by),
+        offset=offset,
+        offset_sigma=offset_sigma,
+        search=None if search == usual else search,
+        response=response,
+        response_sigma=response_sigma,
+    )
 
 
 def _run(
-    lake: Lake, pair: Pair, options: ClockOptions, *, recipe: dict[str, Any], name: str | None, session: str | None,
-    branch: str, dry_run: bool, plot: Path | None, as_json: bool,
-) -> None:  # fmt: skip
+    lake: Lake,
+    pair: Pair,
+    options: ClockOptions,
+    *,
+    recipe: dict[str, Any],
+    name: str | None,
+    session: str | None,
+    branch: str,
+    dry_run: bool,
+    plot: Path | None,
+    as_json: bool,
+) -> None:
     from flagdata.align.recording import find_recording, make_recording, session_of
 
     session_of(pair, named=session)  # refused before the long part

@@ -15,9 +15,18 @@ if TYPE_CHECKING:
 
 
 def align_logs(
-    lake: Lake, reference: str, sensor: str, options: ClockOptions, *, unused: tuple[str, ...], name: str | None,
-    session: str | None, branch: str, dry_run: bool, as_json: bool,
-) -> None:  # fmt: skip
+    lake: Lake,
+    reference: str,
+    sensor: str,
+    options: ClockOptions,
+    *,
+    unused: tuple[str, ...],
+    name: str | None,
+    session: str | None,
+    branch: str,
+    dry_run: bool,
+    as_json: bool,
+) -> None:
     """Estimate the sensor's clock and gain, and write its log on the reference's clock.
 
     Args:
@@ -54,16 +63,21 @@ def align_logs(
     shift = round(search.centre * NANOSECONDS)
     own, other = pair.sensor_series.time, pair.reference_series.time
     apart = by_spans(
-        (int(own[0]) + shift, int(own[-1]) + shift), (int(other[0]), int(other[-1])),
+        (int(own[0]) + shift, int(own[-1]) + shift),
+        (int(other[0]), int(other[-1])),
         names=(pair.sensor.name, pair.reference.name),
-    )  # fmt: skip
+    )
     if apart is not None:
         say_finding(apart)
     with progress(None, label="comparing", unit="part") as advance:
         found = log_clock(
-            pair.reference_series, pair.sensor_series, names=pair.names, search=search,
-            generator=stream(0, "align", pair.reference.id, pair.sensor.id), progress=advance,
-        )  # fmt: skip
+            pair.reference_series,
+            pair.sensor_series,
+            names=pair.names,
+            search=search,
+            generator=stream(0, "align", pair.reference.id, pair.sensor.id),
+            progress=advance,
+        )
     if dry_run:
         _report(None, found, created=False, healed=None, as_json=as_json)
         return

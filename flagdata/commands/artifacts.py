@@ -47,11 +47,12 @@ def ls(kind: str | None, at: str | None, as_json: bool, lake_path: str) -> None:
     if as_json:
         listed = [
             {
-                **_plain(row), "data": "lost" if row["object"] in gone else "there",
+                **_plain(row),
+                "data": "lost" if row["object"] in gone else "there",
                 "superseded": row["artifact"] in older,
             }
             for row in rows
-        ]  # fmt: skip
+        ]
         document("ls", {"at": at, "artifacts": listed, "clips_not_listed": clips})
         return
     header = ("artifact", "kind", "name", "start", "frames", "wind [m/s]", "size", "quality")
@@ -103,11 +104,15 @@ def show(artifact: str, whole: bool, at: str | None, as_json: bool, lake_path: s
         document(
             "show",
             {
-                "artifact": row, "labels": labels, "path": str(path) if path else None, "parents": parents,
-                "children": children, "versions": stated,
+                "artifact": row,
+                "labels": labels,
+                "path": str(path) if path else None,
+                "parents": parents,
+                "children": children,
+                "versions": stated,
                 "findings": [finding.as_dict() for finding in doubts],
             },
-        )  # fmt: skip
+        )
         return
     for name, text in _gist(lake, row):
         echo(f"{name:<15} {text}")

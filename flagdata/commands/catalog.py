@@ -49,8 +49,11 @@ def catalog(kind: str | None, as_json: bool) -> None:
     else:
         for name, names in found.items():
             echo(f"{name} ({kinds[name][1]})")
-            echo_lines(textwrap.fill(", ".join(names), initial_indent="  ", subsequent_indent="  ",
-                                     break_on_hyphens=False, width=80))  # fmt: skip
+            echo_lines(
+                textwrap.fill(
+                    ", ".join(names), initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False, width=80
+                )
+            )
 
 
 def titles(target: str) -> Mapping[str, str]:

@@ -17,9 +17,15 @@ from flagdata.console import document, echo, json_option, lake_option, progress
 @json_option
 @lake_option
 def declare(
-    camera: str, speed: float, sigma: float, name: str | None, session: str | None, branch: str,
-    as_json: bool, lake_path: str,
-) -> None:  # fmt: skip
+    camera: str,
+    speed: float,
+    sigma: float,
+    name: str | None,
+    session: str | None,
+    branch: str,
+    as_json: bool,
+    lake_path: str,
+) -> None:
     """State that the wind of the artifact CAMERA was constant, as in a wind tunnel: a recording and its clips.
 
     When it was filmed does not matter then: ingest a film whose start nobody knows by --start unknown. The declared

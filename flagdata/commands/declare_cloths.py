@@ -11,8 +11,13 @@ from flagdata.console import LocalPath, document, echo, in_steps, json_option, l
 
 @click.command("declare-cloths")
 @click.argument("table", type=LocalPath())
-@click.option("--crop", default="square", show_default=True, metavar="BOX",
-              help="Region of all films: x,y,width,height [px] of upright images; whole, square, or auto.")  # fmt: skip
+@click.option(
+    "--crop",
+    default="square",
+    show_default=True,
+    metavar="BOX",
+    help="Region of all films: x,y,width,height [px] of upright images; whole, square, or auto.",
+)
 @click.option("--branch", default="main", show_default=True, help="Branch to commit on.")
 @json_option
 @lake_option
@@ -53,12 +58,14 @@ def declare_cloths(table: Path, crop: str, branch: str, as_json: bool, lake_path
             {
                 "recordings": [
                     {
-                        **one.as_dict(), "parameters": cloth.parameters, "wind": cloth.wind,
+                        **one.as_dict(),
+                        "parameters": cloth.parameters,
+                        "wind": cloth.wind,
                     }
                     for cloth, one in made
                 ]
             },
-        )  # fmt: skip
+        )
         return
     for cloth, one in made:
         healed = "" if one.healed is None else f"; {one.healed.sentence}"

@@ -45,37 +45,54 @@ from flagdata.errors import UsageError
     help="MCAP of other programs: the topic of pictures or numbers to read. LeRobot: the camera.",
 )
 @click.option("--episode", type=click.IntRange(min=0), metavar="N", help="LeRobot: the episode to read.")
-@click.option("--join", is_flag=True,
-              help="Camera: the SOURCEs are the chapters of one recording, which become one artifact.")  # fmt: skip
-@click.option("--stream", type=click.IntRange(min=0), metavar="N",
-              help="Camera: number of the video stream in its file; the first by default.")  # fmt: skip
+@click.option(
+    "--join", is_flag=True, help="Camera: the SOURCEs are the chapters of one recording, which become one artifact."
+)
+@click.option(
+    "--stream",
+    type=click.IntRange(min=0),
+    metavar="N",
+    help="Camera: number of the video stream in its file; the first by default.",
+)
 @click.option("--zone", metavar="ZONE", help="Zone of a clock that does not say: Europe/Amsterdam, +02:00, UTC.")
 @click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")
 @click.option(
-    "--start", metavar="TIME",
+    "--start",
+    metavar="TIME",
     help="Camera: instant of the first frame, ISO 8601. Wind: of the first row, where stamps count from a start.",
-)  # fmt: skip
+)
 @click.option("--true-fps", type=float, metavar="HZ", help="Camera: rate at which a high-speed camera really ran.")
 @click.option("--sequence-fps", type=float, metavar="HZ", help="Camera: rate of pictures that carry no time stamps.")
 @click.option(
-    "--rate", default="25", show_default=True, metavar="HZ|STEP|native",
+    "--rate",
+    default="25",
+    show_default=True,
+    metavar="HZ|STEP|native",
     help="Camera: frames per second to keep; native keeps all. Meshes, markers: frames per second of a source that "
     "does not state them. Wind: readings per second of a log without timestamps, counted from --start. Also the time "
     "from one to the next, as in 10min.",
-)  # fmt: skip
+)
 @click.option(
-    "--crop", default="whole", show_default=True, metavar="BOX",
+    "--crop",
+    default="whole",
+    show_default=True,
+    metavar="BOX",
     help="Camera: x,y,width,height in px of the upright image; whole, square, or auto (where the motion is).",
-)  # fmt: skip
+)
 @click.option(
-    "--crop-picture", type=LocalPath(dir_okay=False), metavar="PATH",
+    "--crop-picture",
+    type=LocalPath(dir_okay=False),
+    metavar="PATH",
     help="Camera: write the picture that shows --crop auto.",
-)  # fmt: skip
+)
 @click.option("--exposure", type=float, metavar="S", help="Camera: exposure time, to stamp mid-exposure.")
 @click.option(
-    "--archive", type=click.Choice(["jpeg", "h264"]), default="jpeg", show_default=True,
+    "--archive",
+    type=click.Choice(["jpeg", "h264"]),
+    default="jpeg",
+    show_default=True,
     help="Camera: how frames are stored; h264 is smaller and slower to reach.",
-)  # fmt: skip
+)
 @click.option(
     "--sensor", "--recipe", "sensor", metavar="RECIPE", help="Wind: a recipe of catalogs/sensors, or a TOML file."
 )
@@ -84,47 +101,55 @@ from flagdata.errors import UsageError
 )
 @click.option("--date-order", type=click.Choice(["dmy", "mdy", "ymd"]), help="Wind: order in dates of numbers only.")
 @click.option(
-    "--platform", type=click.Choice(["fixed", "moving", "corrected"]),
+    "--platform",
+    type=click.Choice(["fixed", "moving", "corrected"]),
     help="Wind: fixed, as on a mast; moving, as on a boat; corrected, if a moving one logs the wind over ground.",
-)  # fmt: skip
+)
 @click.option("--talker", metavar="ID", help="Wind: NMEA 0183 talker to read, where several share a stream.")
 @click.option(
     "--azimuth", type=float, metavar="DEG", help="Wind: bearing of the sensor's north or bow, clockwise from north."
 )
 @click.option(
-    "--clock", type=click.Choice(["first", "last", "sort"]),
+    "--clock",
+    type=click.Choice(["first", "last", "sort"]),
     help="Wind: the clock was changed during the log: first = the time before the change is right, last = the time "
     "after it; sort = the clock is right, only sort the rows.",
-)  # fmt: skip
+)
 @click.option("--zero-offset", metavar="M/S", help="Wind: speed to subtract; report, or estimate from idle stretches.")
 @click.option("--encoding", metavar="CODEC", help="Wind: encoding of the text, where the file does not show it.")
 @click.option(
-    "--unit", metavar="UNIT",
+    "--unit",
+    metavar="UNIT",
     help="Wind: unit of a speed whose heading has none (m/s, km/h, mph, kn). Meshes, markers: of positions, else m.",
-)  # fmt: skip
+)
 @click.option(
-    "--wind", metavar="LABEL",
+    "--wind",
+    metavar="LABEL",
     help="Wind: the one anemometer to read of a table that holds several, or the column of its speed.",
-)  # fmt: skip
+)
 @click.option(
-    "--columns", metavar="LIST",
+    "--columns",
+    metavar="LIST",
     help="Wind: what the columns of a table are, in their order or by heading or number, such as "
     "'date,time,wind_speed[km/h],,wind_direction[deg]' or '1=time,7=wind_speed[kn]'. Names: time, date, year, month, "
     "day, day_of_year, hour, minute, second, wind_speed, wind_direction, wind_direction_to, wind_x, wind_y, wind_z, "
     "apparent_wind_speed, apparent_wind_direction, air_temperature, relative_humidity, air_pressure, site. What is "
     "measured has its unit in brackets. A name that is not known is refused with the list of all.",
-)  # fmt: skip
+)
 @click.option(
     "--missing", multiple=True, metavar="TEXT", help="Wind: a cell that means no value, such as -99.9; repeatable."
 )
 @click.option(
-    "--expect", multiple=True, metavar="KEY",
+    "--expect",
+    multiple=True,
+    metavar="KEY",
     help="Wind: a check of a draft that you have answered with yes, by the key that the refusal names; repeatable.",
-)  # fmt: skip
+)
 @click.option(
-    "--accept", metavar="HASH",
+    "--accept",
+    metavar="HASH",
     help="Wind: confirms what was drafted from a table that no recipe describes, by the hash that the refusal shows.",
-)  # fmt: skip
+)
 @json_option
 @lake_option
 @click.pass_context
@@ -189,9 +214,10 @@ def ingest(
     from flagdata.timebase import names_zone
 
     given = frozenset(
-        parameter for parameter in context.params
+        parameter
+        for parameter in context.params
         if context.get_parameter_source(parameter) is ParameterSource.COMMANDLINE
-    )  # fmt: skip
+    )
     if crop_picture is not None and crop.strip().lower() != "auto":
         raise UsageError("--crop-picture without --crop auto", where=str(crop_picture), fix="add --crop auto")
     if crop_picture is not None:
@@ -204,15 +230,39 @@ def ingest(
         sources, chapters = (first,), tuple(later)
     options = Given(
         camera=camera_options(
-            start=start, zone_name=zone, true_fps=true_fps, sequence_fps=sequence_fps, rate=rate, crop=crop,
-            exposure=exposure, archive=archive, topic=topic,
-            episode=episode, stream=stream, chapters=chapters,
+            start=start,
+            zone_name=zone,
+            true_fps=true_fps,
+            sequence_fps=sequence_fps,
+            rate=rate,
+            crop=crop,
+            exposure=exposure,
+            archive=archive,
+            topic=topic,
+            episode=episode,
+            stream=stream,
+            chapters=chapters,
         ),
         wind=wind_options(
-            format_name=None if format_name in ("camera", "meshes", "markers") else format_name, sensor=sensor,
-            zone_name=zone, date=date, date_order=date_order, platform=platform, talker=talker, azimuth=azimuth,
-            clock=clock, zero_offset=zero_offset, encoding=encoding, unit=unit, start=start, wind=wind, columns=columns,
-            rate=rate if "rate" in given else None, missing=missing, expect=expect, topic=topic,
+            format_name=None if format_name in ("camera", "meshes", "markers") else format_name,
+            sensor=sensor,
+            zone_name=zone,
+            date=date,
+            date_order=date_order,
+            platform=platform,
+            talker=talker,
+            azimuth=azimuth,
+            clock=clock,
+            zero_offset=zero_offset,
+            encoding=encoding,
+            unit=unit,
+            start=start,
+            wind=wind,
+            columns=columns,
+            rate=rate if "rate" in given else None,
+            missing=missing,
+            expect=expect,
+            topic=topic,
         ),
         meshes=mesh_options(rate=rate if "rate" in given else None, length=length_unit(unit)),
         markers=marker_options(rate=rate if "rate" in given else None, length=length_unit(unit)),
@@ -222,7 +272,7 @@ def ingest(
         zoned_start=start is not None and names_zone(start),
         unit=unit,
         confirm=on_command_line(accept, as_json=as_json),
-    )  # fmt: skip
+    )
     if sniff:
         for parameter in sorted(given - {*SNIFF, "as_json", "lake_path"}):
             raise UsageError(f"{option(parameter)} means nothing to --sniff", fix="leave it out")

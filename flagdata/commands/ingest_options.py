@@ -22,9 +22,21 @@ if TYPE_CHECKING:
 # Parameters that mean something for one kind of source only, those of --sniff, and those that name or time one source.
 CAMERA_ONLY = ("episode", "join", "stream", "true_fps", "sequence_fps", "crop", "crop_picture", "exposure", "archive")
 WIND_ONLY = (
-    "sensor", "date", "date_order", "platform", "talker", "azimuth", "clock", "zero_offset", "encoding", "wind",
-    "columns", "missing", "expect", "accept",
-)  # fmt: skip
+    "sensor",
+    "date",
+    "date_order",
+    "platform",
+    "talker",
+    "azimuth",
+    "clock",
+    "zero_offset",
+    "encoding",
+    "wind",
+    "columns",
+    "missing",
+    "expect",
+    "accept",
+)
 LENGTHS = ("unit",)
 """Options that meshes and markers share with the wind's speed."""
 FOREIGN = {
@@ -36,9 +48,24 @@ FOREIGN = {
 }
 """What each kind of source is called, and the options that mean nothing for it."""
 SNIFF = (
-    "sources", "sniff", "start", "zone", "true_fps", "sequence_fps", "crop", "crop_picture", "unit", "wind",
-    "date_order", "columns", "topic", "episode", "join", "stream", "encoding",
-)  # fmt: skip
+    "sources",
+    "sniff",
+    "start",
+    "zone",
+    "true_fps",
+    "sequence_fps",
+    "crop",
+    "crop_picture",
+    "unit",
+    "wind",
+    "date_order",
+    "columns",
+    "topic",
+    "episode",
+    "join",
+    "stream",
+    "encoding",
+)
 ONE_SOURCE = ("start", "date", "name", "crop_picture", "accept")
 
 

@@ -237,9 +237,15 @@ def _one(lake: Lake, source: Path, kind: Guess, options: Given) -> tuple[IngestR
         return options.confirm.answered(lambda answers: _winds(lake, source, _with(options, answers)))
     with progress(None, label=source.name, unit="frame") as advance, _CropPicture(options.crop_picture) as picture:
         result = ingest_camera(
-            lake, source, options.camera, labels=options.labels, branch=options.branch, reasons=kind.reasons,
-            progress=advance, crop_picture=picture.write if options.crop_picture else None,
-        )  # fmt: skip
+            lake,
+            source,
+            options.camera,
+            labels=options.labels,
+            branch=options.branch,
+            reasons=kind.reasons,
+            progress=advance,
+            crop_picture=picture.write if options.crop_picture else None,
+        )
     return (result,)
 
 
@@ -280,11 +286,14 @@ def _winds(lake: Lake, source: Path, options: Given) -> tuple[IngestResult, ...]
         raise dead[0][1]
     left_out = [
         Finding(
-            kind="anemometer-left-out", severity=Severity.WARNING, what=f"the anemometer {label!r}: {error.what}",
-            where=error.where, fix=error.fix,
+            kind="anemometer-left-out",
+            severity=Severity.WARNING,
+            what=f"the anemometer {label!r}: {error.what}",
+            where=error.where,
+            fix=error.fix,
         ).as_dict()
         for label, error in dead
-    ]  # fmt: skip
+    ]
     first = results[0]
     report = {**first.report, "findings": [*first.report["findings"], *left_out]}
     return (replace(first, report=report), *results[1:])
@@ -295,9 +304,14 @@ def _meshes(lake: Lake, source: Path, kind: Guess, options: Given) -> IngestResu
 
     with progress(None, label=source.name, unit="mesh") as advance:
         return ingest_meshes(
-            lake, source, options.meshes, labels=options.labels, branch=options.branch, reasons=kind.reasons,
+            lake,
+            source,
+            options.meshes,
+            labels=options.labels,
+            branch=options.branch,
+            reasons=kind.reasons,
             progress=advance,
-        )  # fmt: skip
+        )
 
 
 class _CropPicture:

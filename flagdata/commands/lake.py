@@ -206,9 +206,10 @@ def diff(before: str, after: str | None, as_json: bool, lake_path: str) -> None:
 @click.option("--branch", "branch_name", default="main", show_default=True, help="The branch to take them off.")
 @click.option("--with-descendants", is_flag=True, help="Hide all that was made from them as well, directly or not.")
 @click.option(
-    "--everywhere", is_flag=True,
+    "--everywhere",
+    is_flag=True,
     help="Off every branch, and delete their data at once, also where tags and older versions show them.",
-)  # fmt: skip
+)
 @json_option
 @lake_option
 @click.pass_context

@@ -121,12 +121,17 @@ def du(grace: timedelta, at: str | None, as_json: bool, lake_path: str) -> None:
         ("shown by", "", "artifacts", "size", "own", "shared", "lost"),
         [
             (
-                version.name, version.noun, version.share.artifacts, size_text(version.share.size),
-                size_text(version.own), size_text(version.share.size - version.own), version.lost or "",
+                version.name,
+                version.noun,
+                version.share.artifacts,
+                size_text(version.share.size),
+                size_text(version.own),
+                size_text(version.share.size - version.own),
+                version.lost or "",
             )
             for version in found.versions
         ],
-    )  # fmt: skip
+    )
     say(f"{size_text(found.total)} in all; gc would free {size_text(found.freed)} (flagdata gc --dry-run lists it)")
 
 

@@ -30,12 +30,27 @@ VIEWS: dict[str | None, tuple[str, ...]] = {
     "camera": ("artifact", "name", "start_time", "duration", "frame_count", "rate", "quality"),
     "wind": ("artifact", "name", "start_time", "duration", "rate", "quality"),
     "recording": (
-        "artifact", "name", "start_time", "duration", "frame_count",
-        "clock_method", "clock_offset", "clock_sigma", "quality",
+        "artifact",
+        "name",
+        "start_time",
+        "duration",
+        "frame_count",
+        "clock_method",
+        "clock_offset",
+        "clock_sigma",
+        "quality",
     ),
     "clip": (
-        "artifact", "recording", "start_time", "frame_first", "frame_count",
-        "wind", "wind_sigma", "wind_coverage", "wind_staleness", "quality",
+        "artifact",
+        "recording",
+        "start_time",
+        "frame_first",
+        "frame_count",
+        "wind",
+        "wind_sigma",
+        "wind_coverage",
+        "wind_staleness",
+        "quality",
     ),
     "meshes": ("artifact", "name", "frame_count", "rate", "seed", "wind", "quality"),
     "markers": ("artifact", "name", "frame_count", "rate", "quality"),
@@ -43,7 +58,7 @@ VIEWS: dict[str | None, tuple[str, ...]] = {
     "network": ("artifact", "name", "seed", "created", "code_version", "quality"),
     "measurement": ("artifact", "name", "created", "wind", "wind_sigma", "quality"),
     None: ("artifact", "kind", "name", "start_time", "duration", "wind", "wind_sigma", "quality"),
-}  # fmt: skip
+}
 
 
 @click.command()
@@ -56,9 +71,13 @@ VIEWS: dict[str | None, tuple[str, ...]] = {
     "--limit", type=click.IntRange(min=0), help=f"Rows at most; {PEOPLE_LIMIT} in the table for people, else all."
 )
 @click.option(
-    "--time-limit", type=click.FloatRange(min=0, min_open=True), default=_TIME_LIMIT, show_default=True,
-    metavar="SECONDS", help="What the query may take, before it is stopped.",
-)  # fmt: skip
+    "--time-limit",
+    type=click.FloatRange(min=0, min_open=True),
+    default=_TIME_LIMIT,
+    show_default=True,
+    metavar="SECONDS",
+    help="What the query may take, before it is stopped.",
+)
 @click.option("--arrow", metavar="FILE", type=LocalPath(), help="Write an Arrow IPC file.")
 @click.option("--csv", "as_csv", is_flag=True, help="Comma-separated values on stdout.")
 @click.option("--describe", is_flag=True, help="List the columns with their units.")
@@ -161,9 +180,16 @@ def as_document(selection: Selection, *, at: str | None, version: int) -> dict[s
                 not_finite[name] = not_finite.get(name, 0) + 1
         rows.append(row)
     return {
-        "at": at, "version": version, "where": selection.request.where, "sql": selection.request.sql,
-        "count": len(rows), "total": selection.total(), "columns": fields, "not_finite": not_finite, "rows": rows,
-    }  # fmt: skip
+        "at": at,
+        "version": version,
+        "where": selection.request.where,
+        "sql": selection.request.sql,
+        "count": len(rows),
+        "total": selection.total(),
+        "columns": fields,
+        "not_finite": not_finite,
+        "rows": rows,
+    }
 
 
 def plain(value: Any) -> Any:

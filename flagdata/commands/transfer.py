@@ -64,11 +64,15 @@ def _report(tag: str, place: str, done: Transfer, *, as_json: bool) -> None:
         document(
             tag,
             {
-                "lake": place, "head": done.head, "versions": done.versions, "objects": list(done.objects),
-                "bytes": done.size, "refs": list(done.refs),
+                "lake": place,
+                "head": done.head,
+                "versions": done.versions,
+                "objects": list(done.objects),
+                "bytes": done.size,
+                "refs": list(done.refs),
                 "findings": [finding.as_dict() for finding in done.findings],
             },
-        )  # fmt: skip
+        )
         return
     for finding in done.findings:
         say_finding(finding)

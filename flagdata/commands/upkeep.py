@@ -41,9 +41,14 @@ class Duration(click.ParamType):
 
 
 grace_option = click.option(
-    "--older-than", "grace", type=Duration(), default="24h", show_default=True, metavar="AGE",
+    "--older-than",
+    "grace",
+    type=Duration(),
+    default="24h",
+    show_default=True,
+    metavar="AGE",
     help="How old something must be, with nothing referring to it, to be garbage.",
-)  # fmt: skip
+)
 
 
 @click.command()
@@ -121,11 +126,15 @@ def _examine(source: Path, *, as_json: bool) -> None:
     header = ("stream", "holds", "messages", "rate [Hz]", "from", "to")
     rows = [
         (
-            one.name, one.holds, one.count, "" if one.rate is None else f"{one.rate:.4g}",
-            iso(one.start), iso(one.end),
+            one.name,
+            one.holds,
+            one.count,
+            "" if one.rate is None else f"{one.rate:.4g}",
+            iso(one.start),
+            iso(one.end),
         )
         for one in found.streams
-    ]  # fmt: skip
+    ]
     table(header, rows)
     _conclude("doctor", found.findings, f"{found.format}: {counted(len(rows), 'stream')} examined", as_json=False)
 

@@ -82,11 +82,17 @@ def clip_rows(
         start = int(times[first])
         rows.append(
             _row(
-                recording, truth,
-                first=first, frames=frames, window=window, start=start, end=end, clock_sigma=sigma,
+                recording,
+                truth,
+                first=first,
+                frames=frames,
+                window=window,
+                start=start,
+                end=end,
+                clock_sigma=sigma,
                 parameters=parameters,
             )
-        )  # fmt: skip
+        )
     return rows
 
 

@@ -181,8 +181,9 @@ def _common(windows: NDArray[np.float64]) -> float:
     if len(found) > 1:
         raise UsageError(
             f"the clips have ground truths over {', '.join(f'{window:g}' for window in found)} s",
-            where="window", fix="name one: window=SECONDS; the others are then computed anew from the records' wind",
-        )  # fmt: skip
+            where="window",
+            fix="name one: window=SECONDS; the others are then computed anew from the records' wind",
+        )
     return float(found[0]) if len(found) else TRUTH_WINDOW
 
 

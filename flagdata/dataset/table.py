@@ -17,9 +17,24 @@ from flagdata.errors import CorruptError
 
 # Columns of the catalog that a pair is made of.
 COLUMNS = (
-    "artifact", "recording", "session", "day", "seed", "object", "frame_first", "frame_count", "start", "end",
-    "wind", "wind_sigma", "wind_coverage", "wind_staleness", "clock_sigma", "parameters", "recipe",
-)  # fmt: skip
+    "artifact",
+    "recording",
+    "session",
+    "day",
+    "seed",
+    "object",
+    "frame_first",
+    "frame_count",
+    "start",
+    "end",
+    "wind",
+    "wind_sigma",
+    "wind_coverage",
+    "wind_staleness",
+    "clock_sigma",
+    "parameters",
+    "recipe",
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

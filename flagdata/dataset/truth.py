@@ -63,18 +63,31 @@ class WindTruth:
     def exact(cls, wind: float) -> WindTruth:
         """A wind that a simulation states [m/s]."""
         return cls(
-            wind=wind, sigma=0.0, sigma_mean=0.0, sigma_sensor=0.0, sigma_clock=0.0,
-            coverage=1.0, staleness=0.0, count=0,
-        )  # fmt: skip
+            wind=wind,
+            sigma=0.0,
+            sigma_mean=0.0,
+            sigma_sensor=0.0,
+            sigma_clock=0.0,
+            coverage=1.0,
+            staleness=0.0,
+            count=0,
+        )
 
     @classmethod
     def missing(cls, *, staleness: float) -> WindTruth:
         """No usable sample in the window; the newest before its end is `staleness` old [s]."""
         nan = math.nan
         return cls(
-            wind=nan, sigma=nan, sigma_mean=nan, sigma_sensor=nan, sigma_clock=nan,
-            coverage=0.0, staleness=staleness, count=0, flags=("wind-missing",),
-        )  # fmt: skip
+            wind=nan,
+            sigma=nan,
+            sigma_mean=nan,
+            sigma_sensor=nan,
+            sigma_clock=nan,
+            coverage=0.0,
+            staleness=staleness,
+            count=0,
+            flags=("wind-missing",),
+        )
 
 
 def over_ground(series: WindSeries) -> Series | None:

@@ -52,10 +52,12 @@ class Example:
     def _rows(self) -> dict[str, str]:
         length, height = self.flag_size
         return {
-            "film": self.film.name, "log": self.log.name, "flag": f"{length:g} m × {height:g} m",
+            "film": self.film.name,
+            "log": self.log.name,
+            "flag": f"{length:g} m × {height:g} m",
             "true wind": f"{self.truth['wind_speed']:.2f} m/s, the mean over the film",
             "true area weight": f"{self.truth['density']:.3f} kg/m²",
-        }  # fmt: skip
+        }
 
     def __repr__(self) -> str:
         return f"Example({self.title}; " + "; ".join(f"{name} {value}" for name, value in self._rows().items()) + ")"
@@ -91,9 +93,14 @@ def example(name: str = "flag") -> Example:
     about = tomllib.loads((folder / _ABOUT).read_text(encoding="utf-8"))
     length, height = about["flag-size"]
     return Example(
-        name=name, title=about["title"], film=folder / about["film"], log=folder / about["log"],
-        flag_size=(length, height), clock_offset=about["clock-offset"], truth=about["truth"],
-    )  # fmt: skip
+        name=name,
+        title=about["title"],
+        film=folder / about["film"],
+        log=folder / about["log"],
+        flag_size=(length, height),
+        clock_offset=about["clock-offset"],
+        truth=about["truth"],
+    )
 
 
 def example_of(source: Path | str) -> Example | None:

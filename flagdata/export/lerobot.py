@@ -40,14 +40,17 @@ _CHUNK = 1000  # files a folder
 _NEAR_WHOLE = 1e-3  # relative; a rate this near to a whole number is that number
 _NUMBERS: dict[str, tuple[str, str]] = {
     "timestamp": ("float32", "s from the episode's start, frame_index / fps"),
-    "frame_index": ("int64", ""), "episode_index": ("int64", ""), "index": ("int64", ""), "task_index": ("int64", ""),
+    "frame_index": ("int64", ""),
+    "episode_index": ("int64", ""),
+    "index": ("int64", ""),
+    "task_index": ("int64", ""),
     "flagdata.time": ("int64", "instant of the frame on the common clock, UTC ns"),
     "flagdata.device_time": ("int64", "instant of the frame on the camera's own clock, UTC ns"),
     "observation.wind_speed": ("float32", "newest mean over 1 s of the wind speed, m/s; NaN where there is none"),
     "observation.wind_sigma": ("float32", "standard uncertainty of that mean, m/s"),
     "observation.wind_direction": ("float32", "its direction, rad, from, clockwise from true north"),
     "observation.wind_age": ("float32", "age of that mean at the frame, s"),
-}  # fmt: skip
+}
 """Feature → type and meaning."""
 
 
@@ -82,9 +85,13 @@ class LeRobot:
                 advance(1)
         made.write(folder, self.frames)
         return {
-            "episodes": len(made.episodes), "frames": made.total, "fps": float(rate), "units": label_units(),
-            "worst_timing": made.worst, "video": "AV1, lossy" if self.frames == "av1" else "PNG, exact",
-        }  # fmt: skip
+            "episodes": len(made.episodes),
+            "frames": made.total,
+            "fps": float(rate),
+            "units": label_units(),
+            "worst_timing": made.worst,
+            "video": "AV1, lossy" if self.frames == "av1" else "PNG, exact",
+        }
 
 
 def common_rate(rates: Sequence[float]) -> Fraction:
@@ -119,10 +126,14 @@ class _Made:
         self.worst = max(self.worst, self._apart(entry))
         columns: dict[str, NDArray[Any]] = {
             "timestamp": (np.arange(count) / float(self.rate)).astype(np.float32),
-            "frame_index": np.arange(count), "episode_index": np.full(count, number),
-            "index": np.arange(self.total, self.total + count), "task_index": np.zeros(count, np.int64),
-            "flagdata.time": times, "flagdata.device_time": entry.device_frame_times, **_wind(entry),
-        }  # fmt: skip
+            "frame_index": np.arange(count),
+            "episode_index": np.full(count, number),
+            "index": np.arange(self.total, self.total + count),
+            "task_index": np.zeros(count, np.int64),
+            "flagdata.time": times,
+            "flagdata.device_time": entry.device_frame_times,
+            **_wind(entry),
+        }
         place: dict[str, Any] = {}
         pictures = _Tally.empty()
         if film is not None:
@@ -136,15 +147,23 @@ class _Made:
         label = entry.label()
         self.episodes.append(
             {
-                "episode_index": number, "tasks": [TASK], "length": count, **where,
-                "dataset_from_index": self.total, "dataset_to_index": self.total + count, **place,
-                "meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0,
-                "flagdata/artifact": entry.key, "flagdata/wind": label["wind"],
-                "flagdata/wind_sigma": label["wind_sigma"], "flagdata/clock_sigma": label["clock_sigma"],
+                "episode_index": number,
+                "tasks": [TASK],
+                "length": count,
+                **where,
+                "dataset_from_index": self.total,
+                "dataset_to_index": self.total + count,
+                **place,
+                "meta/episodes/chunk_index": 0,
+                "meta/episodes/file_index": 0,
+                "flagdata/artifact": entry.key,
+                "flagdata/wind": label["wind"],
+                "flagdata/wind_sigma": label["wind_sigma"],
+                "flagdata/clock_sigma": label["clock_sigma"],
                 "flagdata/label": json.dumps(label, sort_keys=True, allow_nan=False, ensure_ascii=False),
                 **{f"stats/{n}/{k}": v for n, tally in tallies.items() for k, v in tally.stats(n == CAMERA).items()},
             }
-        )  # fmt: skip
+        )
         self.total += count
 
     def _apart(self, entry: Entry) -> float:
@@ -158,9 +177,10 @@ class _Made:
         if apart >= 0.5 / float(self.rate):
             raise InputError(
                 f"frames lie up to {apart:.3f} s from a steady {float(self.rate):g} Hz, which LeRobot takes them to "
-                "have", where=entry.key,
+                "have",
+                where=entry.key,
                 fix="export films of one rate without gaps (clips have none), or to mcap, which keeps each instant",
-            )  # fmt: skip
+            )
         return apart
 
     def _sized(self, entry: Entry, tally: _Tally) -> Iterator[NDArray[np.uint8]]:
@@ -174,8 +194,9 @@ class _Made:
             if images.shape[1:] != self.size:
                 raise InputError(
                     f"frames of {images.shape[2]} × {images.shape[1]} px beside {self.size[1]} × {self.size[0]}",
-                    where=entry.key, fix="a data set of LeRobot has one size: select films of one by --where",
-                )  # fmt: skip
+                    where=entry.key,
+                    fix="a data set of LeRobot has one size: select films of one by --where",
+                )
             tally.take(images / 255.0)
             yield from images
 
@@ -191,30 +212,45 @@ class _Made:
         height, width = self.size or (0, 0)
         features: dict[str, Any] = {
             CAMERA: {
-                "dtype": "video" if frames == "av1" else "image", "shape": [height, width, 3],
+                "dtype": "video" if frames == "av1" else "image",
+                "shape": [height, width, 3],
                 "names": ["height", "width", "channels"],
             },
             **{
                 name: {"dtype": kind, "shape": [1], "names": None, **({"info": {"about": about}} if about else {})}
                 for name, (kind, about) in _NUMBERS.items()
             },
-        }  # fmt: skip
+        }
         if frames == "av1":
             features[CAMERA]["info"] = {
-                "video.height": height, "video.width": width, "video.codec": "av1", "video.pix_fmt": "yuv420p",
-                "video.is_depth_map": False, "video.fps": int(self.rate), "video.channels": 3, "has_audio": False,
-            }  # fmt: skip
+                "video.height": height,
+                "video.width": width,
+                "video.codec": "av1",
+                "video.pix_fmt": "yuv420p",
+                "video.is_depth_map": False,
+                "video.fps": int(self.rate),
+                "video.channels": 3,
+                "has_audio": False,
+            }
         fps = int(self.rate) if self.rate.denominator == 1 else float(self.rate)
         _json(
             meta / "info.json",
             {
-                "codebase_version": VERSION, "robot_type": None, "total_episodes": len(self.episodes),
-                "total_frames": self.total, "total_tasks": 1, "chunks_size": _CHUNK, "fps": fps,
-                "data_files_size_in_mb": _DATA_BYTES >> 20, "video_files_size_in_mb": _VIDEO_BYTES >> 20,
-                "splits": {"train": f"0:{len(self.episodes)}"}, "data_path": f"data/{FILE}.parquet",
-                "video_path": f"videos/{{video_key}}/{FILE}.mp4" if frames == "av1" else None, "features": features,
+                "codebase_version": VERSION,
+                "robot_type": None,
+                "total_episodes": len(self.episodes),
+                "total_frames": self.total,
+                "total_tasks": 1,
+                "chunks_size": _CHUNK,
+                "fps": fps,
+                "data_files_size_in_mb": _DATA_BYTES >> 20,
+                "video_files_size_in_mb": _VIDEO_BYTES >> 20,
+                "splits": {"train": f"0:{len(self.episodes)}"},
+                "data_path": f"data/{FILE}.parquet",
+                "video_path": f"videos/{{video_key}}/{FILE}.mp4" if frames == "av1" else None,
+                "features": features,
             },
-        )  # fmt: skip
+        )
 
 
 @dataclass(kw_only=True)
@@ -240,10 +276,12 @@ class _Tally:
     @classmethod
     def joined(cls, parts: Sequence[_Tally]) -> _Tally:
         return cls(
-            count=sum(part.count for part in parts), low=min(part.low for part in parts),
-            high=max(part.high for part in parts), total=sum(part.total for part in parts),
+            count=sum(part.count for part in parts),
+            low=min(part.low for part in parts),
+            high=max(part.high for part in parts),
+            total=sum(part.total for part in parts),
             squares=sum(part.squares for part in parts),
-        )  # fmt: skip
+        )
 
     def take(self, values: NDArray[np.float64]) -> None:
         if values.size:
@@ -294,9 +332,7 @@ class _Data:
         values: dict[str, Any] = {name: columns[name] for name in _NUMBERS}
         if pictures is not None:
             values[CAMERA] = [{"bytes": picture, "path": None} for picture in pictures]
-        table = pa.table(
-            [pa.array(values[one.name], one.type) for one in self._schema], schema=self._schema
-        )  # fmt: skip
+        table = pa.table([pa.array(values[one.name], one.type) for one in self._schema], schema=self._schema)
         self._writer.write_table(table, row_group_size=table.num_rows)
         self._written += table.nbytes
         return {"data/chunk_index": self._number // _CHUNK, "data/file_index": self._number % _CHUNK}
@@ -337,9 +373,11 @@ class _Films:
             self._frames += 1
         chunk, file = divmod(self._number, _CHUNK)
         place = {
-            "chunk_index": chunk, "file_index": file, "from_timestamp": float((begin or 0) / self._rate),
+            "chunk_index": chunk,
+            "file_index": file,
+            "from_timestamp": float((begin or 0) / self._rate),
             "to_timestamp": float(self._frames / self._rate),
-        }  # fmt: skip
+        }
         if self._size >= _VIDEO_BYTES:
             self._finish()
         return {f"videos/{CAMERA}/{name}": value for name, value in place.items()}

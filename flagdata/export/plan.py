@@ -128,10 +128,13 @@ class Prepared:
         """
         request, rows = self.request, self.source.rows
         recipe = {
-            "format": request.format, "options": dataclasses.asdict(self.exporter),  # pyright: ignore[reportArgumentType]
-            "version": self.version, "where": request.where,
-            "split": request.split, "salt": request.salt if request.split else None,
-        }  # fmt: skip
+            "format": request.format,
+            "options": dataclasses.asdict(self.exporter),  # pyright: ignore[reportArgumentType]
+            "version": self.version,
+            "where": request.where,
+            "split": request.split,
+            "salt": request.salt if request.split else None,
+        }
         with fresh_folder(target) as folder:
             content = self.exporter.write(self.source, folder, advance)
             manifest = write_manifest(

@@ -24,13 +24,34 @@ FILMED = frozenset({Kind.CLIP, Kind.RECORDING, Kind.CAMERA})
 """Kinds of rows that have frames."""
 # Columns that say what a sample is and where it comes from; written beside the data by every format.
 IDENTITY = (
-    "artifact", "kind", "name", "object", "parents", "recipe_hash", "code_version", "seed",
-    "recording", "session", "dataset", "side", "day", "frame_first", "frame_count", "rate",
-)  # fmt: skip
+    "artifact",
+    "kind",
+    "name",
+    "object",
+    "parents",
+    "recipe_hash",
+    "code_version",
+    "seed",
+    "recording",
+    "session",
+    "dataset",
+    "side",
+    "day",
+    "frame_first",
+    "frame_count",
+    "rate",
+)
 TRUTH = (
-    "wind", "wind_sigma", "wind_coverage", "wind_staleness",
-    "clock_method", "clock_offset", "clock_drift", "clock_sigma", "quality",
-)  # fmt: skip
+    "wind",
+    "wind_sigma",
+    "wind_coverage",
+    "wind_staleness",
+    "clock_method",
+    "clock_offset",
+    "clock_drift",
+    "clock_sigma",
+    "quality",
+)
 
 
 @dataclass(frozen=True, kw_only=True)

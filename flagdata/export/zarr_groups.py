@@ -20,9 +20,13 @@ from flagdata.export.source import IDENTITY, TRUTH, Entry, Source, label_units
 from flagdata.schema import CHANNELS, Kind
 
 _STANDARD = {
-    "wind_speed": "wind_speed", "wind_direction": "wind_from_direction", "wind_z": "upward_air_velocity",
-    "air_temperature": "air_temperature", "air_pressure": "air_pressure", "relative_humidity": "relative_humidity",
-}  # fmt: skip
+    "wind_speed": "wind_speed",
+    "wind_direction": "wind_from_direction",
+    "wind_z": "upward_air_velocity",
+    "air_temperature": "air_temperature",
+    "air_pressure": "air_pressure",
+    "relative_humidity": "relative_humidity",
+}
 _AT_ONCE = 64
 _TIME = {"units": "nanoseconds since 1970-01-01", "dtype": "int64", "calendar": "proleptic_gregorian"}
 

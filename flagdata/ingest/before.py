@@ -81,13 +81,15 @@ def unconfirmed(artifacts: Iterable[Artifact]) -> tuple[Finding, ...]:
     """A warning for each artifact of a log that an older version read by a draft of its own, which nobody confirmed."""
     return tuple(
         Finding(
-            kind="draft-unconfirmed", severity=Severity.WARNING, where=f"artifact {artifact.id} {artifact.name!r}",
+            kind="draft-unconfirmed",
+            severity=Severity.WARNING,
+            where=f"artifact {artifact.id} {artifact.name!r}",
             what="an older version drafted how to read this log, and nobody confirmed it",
             fix="ingest the file again, confirm what is shown, and withdraw this artifact",
         )
         for artifact in artifacts
         if _was_drafted(artifact)
-    )  # fmt: skip
+    )
 
 
 def _was_drafted(artifact: Artifact) -> bool:

@@ -109,20 +109,25 @@ def _film(row: Mapping[str, str], folder: Path, where: str) -> ClothFilm:
     density = _number(row, "area_weight", where, unit="kg/m²")
     if density is None or not _WEIGHTS[0] <= density <= _WEIGHTS[1]:
         raise InputError(
-            f"an area weight of {row['area_weight']} kg/m²", where=where,
+            f"an area weight of {row['area_weight']} kg/m²",
+            where=where,
             fix=f"give kg/m², {_WEIGHTS[0]:g} to {_WEIGHTS[1]:g}; 1 oz/yd² is 0.0339 kg/m², 100 g/m² is 0.1",
-        )  # fmt: skip
+        )
     speed, sigma = (_number(row, name, where, unit="m/s") for name in ("wind_speed", "wind_sigma"))
     if (speed is None) != (sigma is None) or sigma == 0:
         raise InputError(
-            "a wind without its uncertainty, or the other way round", where=where,
+            "a wind without its uncertainty, or the other way round",
+            where=where,
             fix="give wind_speed and wind_sigma (above 0), in m/s, or neither",
-        )  # fmt: skip
+        )
     return ClothFilm(
-        film=film, fabric=row["fabric"], density=density, wind_level=row.get("wind_level", ""),
+        film=film,
+        fabric=row["fabric"],
+        density=density,
+        wind_level=row.get("wind_level", ""),
         bending_stiffness=_number(row, "bending_stiffness", where, unit="N·m"),
         wind=None if speed is None or sigma is None else (speed, sigma),
-    )  # fmt: skip
+    )
 
 
 def _number(row: Mapping[str, str], name: str, where: str, *, unit: str) -> float | None:
@@ -148,6 +153,7 @@ def _check_alike(found: list[ClothFilm], where: str) -> None:
         same = (other.density, other.bending_stiffness) == (newest.density, newest.bending_stiffness)
         if other.fabric == newest.fabric and not same:
             raise InputError(
-                f"{newest.fabric} has another area weight or stiffness than before", where=where,
+                f"{newest.fabric} has another area weight or stiffness than before",
+                where=where,
                 fix="give each fabric one name and its own values in all rows",
-            )  # fmt: skip
+            )

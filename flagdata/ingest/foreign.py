@@ -56,10 +56,16 @@ class Stream:
         median = float(np.median(forward)) if len(forward) else 0.0
         gaps = forward[forward > _GAP * median]
         return cls(
-            name=name, holds=holds, count=len(stamps), start=int(stamps.min()), end=int(stamps.max()),
-            rate=NANOSECONDS / median if median else None, gaps=len(gaps),
-            longest=float(gaps.max()) / NANOSECONDS if len(gaps) else 0.0, backward=int((steps <= 0).sum()),
-        )  # fmt: skip
+            name=name,
+            holds=holds,
+            count=len(stamps),
+            start=int(stamps.min()),
+            end=int(stamps.max()),
+            rate=NANOSECONDS / median if median else None,
+            gaps=len(gaps),
+            longest=float(gaps.max()) / NANOSECONDS if len(gaps) else 0.0,
+            backward=int((steps <= 0).sum()),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,11 +146,14 @@ def _lerobot(folder: Path) -> Examination:
             if steady > _STEADY:
                 findings.append(
                     Finding(
-                        kind="timing-uneven", severity=Severity.WARNING, where=stream.name, value=float(steady),
+                        kind="timing-uneven",
+                        severity=Severity.WARNING,
+                        where=stream.name,
+                        value=float(steady),
                         what=f"its stamps lie up to {steady:.3f} s from frame / fps, where LeRobot looks for its films",
                         fix="check it with LeRobot's own reader",
                     )
-                )  # fmt: skip
+                )
     findings += _lost_pictures(streams if found else [])
     if not timed:
         what = "no instants: LeRobot counts frame / fps, so gaps, jitter and the date of the camera are not in it"
@@ -166,22 +175,31 @@ def _lerobot(folder: Path) -> Examination:
 def _judged(stream: Stream) -> Iterator[Finding]:
     if stream.backward:
         yield Finding(
-            kind="stamps-disordered", severity=Severity.ERROR, where=stream.name, count=stream.backward,
+            kind="stamps-disordered",
+            severity=Severity.ERROR,
+            where=stream.name,
+            count=stream.backward,
             what=f"{stream.backward} of {stream.count} stamps are not after the one before",
             fix="an ingest leaves such frames out, and sorts or asks about rows; mend the recorder's clock",
-        )  # fmt: skip
+        )
     if stream.gaps:
         yield Finding(
-            kind="gaps", severity=Severity.WARNING, where=stream.name, count=stream.gaps, value=stream.longest,
+            kind="gaps",
+            severity=Severity.WARNING,
+            where=stream.name,
+            count=stream.gaps,
+            value=stream.longest,
             what=f"{stream.gaps} gaps, the longest of {stream.longest:.3f} s, at a usual {stream.rate or 0:.4g} Hz",
             fix="none needed: gaps are kept as such, and clips never span one",
-        )  # fmt: skip
+        )
     if stream.start < _EARLIEST:
         yield Finding(
-            kind="not-a-date", severity=Severity.WARNING, where=stream.name,
+            kind="not-a-date",
+            severity=Severity.WARNING,
+            where=stream.name,
             what=f"its stamps begin at {iso(stream.start)}: they count from a start, or the clock was not set",
             fix="give --start when you ingest a film",
-        )  # fmt: skip
+        )
 
 
 def _lost_pictures(streams: Sequence[Stream]) -> Iterator[Finding]:

@@ -38,9 +38,19 @@ from flagdata.timebase import NANOSECONDS, iso
 
 _AT_ONCE = 64
 _OF_A_SAMPLE = (
-    "name", "seed", "session", "dataset", "side", "day", "rate", "clock_method", "clock_offset", "clock_drift",
-    "clock_sigma", "quality",
-)  # fmt: skip
+    "name",
+    "seed",
+    "session",
+    "dataset",
+    "side",
+    "day",
+    "rate",
+    "clock_method",
+    "clock_offset",
+    "clock_drift",
+    "clock_sigma",
+    "quality",
+)
 """Columns that the recording of an exported clip takes from its label."""
 
 
@@ -72,9 +82,11 @@ def ingest_record(lake: Lake, path: Path, *, labels: Labels | None = None, branc
         artifact = _alone(artifact, source)
         findings = (*findings, _without(absent))
     artifact = replace(
-        artifact, name=labels.name or artifact.name, session=labels.session or artifact.session,
+        artifact,
+        name=labels.name or artifact.name,
+        session=labels.session or artifact.session,
         quality=sorted({*artifact.quality, *quality_flags(findings)}),
-    )  # fmt: skip
+    )
     report = _report(artifact, record, findings)
     if artifact.report is None:
         artifact = replace(artifact, report=json.dumps(report, allow_nan=False, ensure_ascii=False))
@@ -113,9 +125,10 @@ def _row_beside(path: Path, sha256: str) -> dict[str, Any] | None:
         found = table.filter(pc.field("artifact") == path.stem).to_pylist()
     except (pa.ArrowException, OSError) as error:
         raise CorruptError(
-            f"the table of rows beside the record cannot be read: {error}", where=str(rows),
+            f"the table of rows beside the record cannot be read: {error}",
+            where=str(rows),
             fix="export again, or move the record to a folder of its own to ingest it without its row",
-        ) from None  # fmt: skip
+        ) from None
     whole = found and found[0]["frame_first"] is None
     if not found or (whole and found[0]["object"] != f"mcap/{sha256}"):
         return None
@@ -146,11 +159,17 @@ def _of_sample(record: Record, row: Mapping[str, Any] | None, source: Source) ->
     window = {"truth": {"window": recipe["window"]}} if "window" in recipe else {}
     times = record.frame_times
     return Artifact(
-        kind=Kind.RECORDING, source_hash=source.hash, source_name=source.name, parameters=parameters,
-        recipe={"ingest": "record", "artifact": original, **window}, start=int(times[0]), end=int(times[-1]),
-        frame_count=len(times), clock_model=_clock(record)[0],
+        kind=Kind.RECORDING,
+        source_hash=source.hash,
+        source_name=source.name,
+        parameters=parameters,
+        recipe={"ingest": "record", "artifact": original, **window},
+        start=int(times[0]),
+        end=int(times[-1]),
+        frame_count=len(times),
+        clock_model=_clock(record)[0],
         **{**known, "session": known["session"] or f"recording {str(recording)[:SHORT]}"},
-    )  # fmt: skip
+    )
 
 
 def _of_metadata(record: Record, source: Source) -> Artifact:
@@ -173,15 +192,23 @@ def _of_metadata(record: Record, source: Source) -> Artifact:
     model = ClockModel.from_json(clock) if clock is not None else None
     span = int(times[-1] - times[0])
     return Artifact(
-        kind=kind, name=Path(stated.get("source_name", source.name)).stem, recipe=recipe, parents=parents,
-        source_hash=stated.get("source_hash"), source_name=stated.get("source_name"), start=int(times[0]),
-        end=int(times[-1]), day=iso(int(times[0]))[:10], frame_count=record.frame_count if filmed else None,
-        rate=(len(times) - 1) * NANOSECONDS / span if span else None, clock_model=clock,
+        kind=kind,
+        name=Path(stated.get("source_name", source.name)).stem,
+        recipe=recipe,
+        parents=parents,
+        source_hash=stated.get("source_hash"),
+        source_name=stated.get("source_name"),
+        start=int(times[0]),
+        end=int(times[-1]),
+        day=iso(int(times[0]))[:10],
+        frame_count=record.frame_count if filmed else None,
+        rate=(len(times) - 1) * NANOSECONDS / span if span else None,
+        clock_model=clock,
         clock_method=model.method if model is not None else None,
         clock_offset=float(model.to_common(middle) - middle) / NANOSECONDS if model is not None else None,
         clock_drift=model.segments[0].drift if model is not None else None,
         clock_sigma=float(model.sigma(middle)) if model is not None else None,
-    )  # fmt: skip
+    )
 
 
 def _clock(record: Record) -> tuple[str | None, int]:
@@ -204,30 +231,40 @@ def _alone(artifact: Artifact, source: Source) -> Artifact:
 
 def _without(absent: list[str]) -> Finding:
     return Finding(
-        kind="parents-absent", severity=Severity.NOTE, count=len(absent),
+        kind="parents-absent",
+        severity=Severity.NOTE,
+        count=len(absent),
         what=f"what it was made from is not on the branch ({', '.join(one[:SHORT] for one in absent)}): it came in as "
         "a recording without parents",
         fix="to restore it whole, export and ingest the camera and the wind first, then withdraw this one",
-    )  # fmt: skip
+    )
 
 
 def _unreported(labels: Labels) -> Finding:
     unknown = [label for label, given in (("name", labels.name), ("session", labels.session)) if given is None]
     fix = "take it off (flagdata withdraw), then ingest the file in the folder that flagdata export wrote"
     return Finding(
-        kind="report-absent", severity=Severity.WARNING,
+        kind="report-absent",
+        severity=Severity.WARNING,
         what=f"there is no {ROWS} with its row beside the record: unknown are its {', '.join(unknown)}"
         f"{' and ' if unknown else ''}quality flags",
         fix=fix + (f", or give {' and '.join(f'--{label}' for label in unknown)}" if unknown else ""),
-    )  # fmt: skip
+    )
 
 
 def _report(artifact: Artifact, record: Record, findings: tuple[Finding, ...]) -> dict[str, Any]:
     """What came in, for people and for --json."""
     start, end = artifact.start or 0, artifact.end or 0
     return {
-        "schema": REPORT_SCHEMA, "kind": "record", "format": f"a record of flagdata ({artifact.kind})", "reasons": [],
-        "start": iso(start), "end": iso(end), "span": (end - start) / NANOSECONDS,
-        "frames": record.frame_count if TOPIC_IMAGE in record.topics else 0, "rate": artifact.rate,
-        "wind": TOPIC_WIND in record.topics, "findings": [finding.as_dict() for finding in findings],
-    }  # fmt: skip
+        "schema": REPORT_SCHEMA,
+        "kind": "record",
+        "format": f"a record of flagdata ({artifact.kind})",
+        "reasons": [],
+        "start": iso(start),
+        "end": iso(end),
+        "span": (end - start) / NANOSECONDS,
+        "frames": record.frame_count if TOPIC_IMAGE in record.topics else 0,
+        "rate": artifact.rate,
+        "wind": TOPIC_WIND in record.topics,
+        "findings": [finding.as_dict() for finding in findings],
+    }

@@ -181,9 +181,18 @@ def ingest_camera(
         source.check_unchanged()
         report = camera_report(info, times, findings, reasons)
         artifact = _artifact(
-            Kind.CAMERA, source, recipe, labels, findings=findings, report=report, start=times.first, end=times.last,
-            rate=times.rate, frame_count=times.count, stored=transaction.put(staged),
-        )  # fmt: skip
+            Kind.CAMERA,
+            source,
+            recipe,
+            labels,
+            findings=findings,
+            report=report,
+            start=times.first,
+            end=times.last,
+            rate=times.rate,
+            frame_count=times.count,
+            stored=transaction.put(staged),
+        )
         transaction.add(artifact)
     return result_of(transaction, artifact, report, labels)
 
@@ -353,22 +362,32 @@ def _staged(
     if one.paired is not None:
         report["host_clock"] = json.loads(one.paired.model.to_json())
     artifact = _artifact(
-        Kind.WIND, source, recipe, one.labels, findings=findings, report=report, start=int(time[0]), end=int(time[-1]),
-        rate=report["rate"], frame_count=None, stored=transaction.put(staged),
-    )  # fmt: skip
+        Kind.WIND,
+        source,
+        recipe,
+        one.labels,
+        findings=findings,
+        report=report,
+        start=int(time[0]),
+        end=int(time[-1]),
+        rate=report["rate"],
+        frame_count=None,
+        stored=transaction.put(staged),
+    )
     return artifact, report
 
 
-def _beside(
-    lake: Lake, series: WindSeries, session: str | None, others: Sequence[Artifact]
-) -> tuple[Finding, ...]:  # fmt: skip
+def _beside(lake: Lake, series: WindSeries, session: str | None, others: Sequence[Artifact]) -> tuple[Finding, ...]:
     """Those of other logs, of the same session or of none, whose wind this one is, hours apart."""
     start, end = int(series.time[0]), int(series.time[-1])
     near = [
-        artifact for artifact in others
-        if artifact.session == session and artifact.start is not None and artifact.end is not None
+        artifact
+        for artifact in others
+        if artifact.session == session
+        and artifact.start is not None
+        and artifact.end is not None
         and min(end, artifact.end) - max(start, artifact.start) > 0
-    ]  # fmt: skip
+    ]
     near.sort(key=lambda artifact: max(start, artifact.start or 0) - min(end, artifact.end or 0))
     found: list[Finding] = []
     for artifact in near[:NEIGHBOURS]:
@@ -481,10 +500,11 @@ def result_of(transaction: Transaction, artifact: Artifact, report: Mapping[str,
 
 def _left_whole(path: Path) -> Finding:
     return Finding(
-        kind="log-not-attached", severity=Severity.NOTE,
+        kind="log-not-attached",
+        severity=Severity.NOTE,
         what=f"{path.name} was not attached: an MCAP file holds other topics as well",
         fix="keep the original: the catalog has its hash",
-    )  # fmt: skip
+    )
 
 
 def _not_attached(path: Path) -> Finding:

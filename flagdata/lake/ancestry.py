@@ -71,11 +71,12 @@ def ancestry(shown: pa.Table, artifact: str) -> Ancestry:
     known = {row["artifact"]: row for row in rows.filter(_among(rows["artifact"], generations)).to_pylist()}
     relatives = {
         one: Relative(
-            artifact=one, generation=generation,
+            artifact=one,
+            generation=generation,
             **{name: known[one][name] for name in _COLUMNS[1:-1]} if one in known else {},
         )
         for one, generation in sorted(generations.items(), key=lambda item: item[1])
-    }  # fmt: skip
+    }
     edges = dict.fromkeys([*((parent, child) for child, parent in above), *below])
     return Ancestry(artifact=artifact, relatives=relatives, edges=tuple(edges))
 

@@ -391,14 +391,22 @@ class Catalog:
         write_durably(path, content)
         now = time.time_ns() // 1_000_000
         written = {
-            "timestamp": now, "operation": "WRITE", "operationParameters": {"mode": "Append", "partitionBy": "[]"},
-            "engineInfo": "flagdata", **{f"{_INFO_PREFIX}{key}": value for key, value in info.items()},
-            FILE_HASH: hashlib.sha256(content).hexdigest(), PREVIOUS_HASH: self._entries.hash(version - 1),
-        }  # fmt: skip
+            "timestamp": now,
+            "operation": "WRITE",
+            "operationParameters": {"mode": "Append", "partitionBy": "[]"},
+            "engineInfo": "flagdata",
+            **{f"{_INFO_PREFIX}{key}": value for key, value in info.items()},
+            FILE_HASH: hashlib.sha256(content).hexdigest(),
+            PREVIOUS_HASH: self._entries.hash(version - 1),
+        }
         added = {
-            "path": path.name, "partitionValues": {}, "size": len(content), "modificationTime": now,
-            "dataChange": rows_change, "stats": json.dumps({"numRecords": rows.num_rows}),
-        }  # fmt: skip
+            "path": path.name,
+            "partitionValues": {},
+            "size": len(content),
+            "modificationTime": now,
+            "dataChange": rows_change,
+            "stats": json.dumps({"numRecords": rows.num_rows}),
+        }
         dropped = [{"path": name, "dataChange": rows_change, "deletionTimestamp": now} for name in removed]
         # Not by the Delta library, which reads the log again after it has put the entry, and may fail then.
         actions = [{"commitInfo": written}, {"add": added}, *({"remove": action} for action in dropped)]
@@ -422,16 +430,14 @@ class Catalog:
         newest = max((number for number in self._entries.checkpoints() if number <= version), default=-1)
         for place in (self._log / _HINT, self._log / f"{newest:020d}{CHECKPOINT}"):
             if isinstance(place, Path) and place.exists() and not place.is_file():  # of a pipe it would wait for ever
-                raise CorruptError(
-                    f"{place.name} of the catalog's log is no regular file", where=str(place), fix=_DELETE
-                )
+                what = f"{place.name} of the catalog's log is no regular file"
+                raise CorruptError(what, where=str(place), fix=_DELETE)
         noted = self._summaries.checkpoints.get(newest)
         if noted is not None:
             path = self._log / f"{newest:020d}{CHECKPOINT}"
             if file_hash(path) != noted:
-                raise CorruptError(
-                    "a checkpoint of the catalog's log has changed since it was written", where=str(path), fix=_DELETE
-                )
+                what = "a checkpoint of the catalog's log has changed since it was written"
+                raise CorruptError(what, where=str(path), fix=_DELETE)
         if newest + 1 < self._summaries.covered:
             history = self.history()
             *_, last = self._entries.entries(range(newest + 1, version + 1), head=history[0]["version"]) or [None]
@@ -443,9 +449,10 @@ class Catalog:
         newest = self.history(1)[0]["version"] if self._history is None else self._history[0]
         if version > newest and version > self.head():
             raise CorruptError(
-                f"version {version} is named, but the newest is {self.head()}", where=str(self.path),
+                f"version {version} is named, but the newest is {self.head()}",
+                where=str(self.path),
                 fix="run flagdata doctor: it lists the refs that cannot be read",
-            )  # fmt: skip
+            )
         with self._log_errors(version):
             table = self._table = self._repeated(lambda: self._at(version))
         unknown = [f.name for f in table.schema().fields if f.name not in CATALOG]

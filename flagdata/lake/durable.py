@@ -89,9 +89,11 @@ def confirming(what: str, where: Place) -> Iterator[None]:
         said = (error.strerror or str(error)) if refused else error.what
         _LOG.warning(
             "flagdata: warning: %s is published, but the disk did not confirm it (%s)\n  where: %s\n  fix:   %s",
-            what, " ".join(said.split()), (error.filename if refused else error.where) or where,
+            what,
+            " ".join(said.split()),
+            (error.filename if refused else error.where) or where,
             "check the disk, then run flagdata doctor: until it confirms, a power cut may lose it",
-        )  # fmt: skip
+        )
 
 
 @contextmanager

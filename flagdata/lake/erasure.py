@@ -86,9 +86,13 @@ def erase(lake: Store, artifacts: Collection[str], message: str, *, with_descend
         names = {*erased.values(), *before.objects.values()} - {None}
         removed, kept = _delete(lake, names, check)  # type: ignore[arg-type]
     return Erasure(
-        version=version, artifacts=tuple(sorted(erased)), branches=tuple(branches),
-        tags=tuple(ref for ref in concerned if ref in tags), objects=removed, kept=kept,
-    )  # fmt: skip
+        version=version,
+        artifacts=tuple(sorted(erased)),
+        branches=tuple(branches),
+        tags=tuple(ref for ref in concerned if ref in tags),
+        objects=removed,
+        kept=kept,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,9 +113,15 @@ class _Before:
         if not entries:
             return cls(version=0, objects={})
         needed = mark(lake, grace=_GRACE).objects
-        return cls(version=entries[0]["version"], objects={
-            artifact: name for entry in entries for artifact, name in noted_erased(entry).items() if name not in needed
-        })  # fmt: skip
+        return cls(
+            version=entries[0]["version"],
+            objects={
+                artifact: name
+                for entry in entries
+                for artifact, name in noted_erased(entry).items()
+                if name not in needed
+            },
+        )
 
 
 def unfinished(lake: Store, needed: Collection[str]) -> dict[str, tuple[int, str]]:
@@ -189,9 +199,10 @@ def _delete(lake: Store, names: Collection[str], check: Check) -> tuple[tuple[st
     damage = [finding for finding in marked.findings if finding.severity is Severity.ERROR]
     if damage:
         raise CorruptError(
-            f"which objects are needed is unknown, so none was deleted: {damage[0].what}", where=damage[0].where,
+            f"which objects are needed is unknown, so none was deleted: {damage[0].what}",
+            where=damage[0].where,
             fix="mend what flagdata doctor reports, and run the command again",
-        )  # fmt: skip
+        )
     held = {name for state in leases(lake.staging) if state.alive for name in state.objects}
     kept = dict.fromkeys(sorted(set(names) & marked.objects), "another artifact has the same content")
     kept |= dict.fromkeys(sorted(set(names) & held - marked.objects), "a running transaction holds it")

@@ -99,9 +99,10 @@ def _found(lake: Store, up_to: int) -> Expiry:
     damage = [found for found in (*marked.findings, *catalog_files(lake)) if found.severity is Severity.ERROR]
     if damage:
         raise CorruptError(
-            f"which objects are needed is unknown: {damage[0].what}", where=damage[0].where,
+            f"which objects are needed is unknown: {damage[0].what}",
+            where=damage[0].where,
             fix=damage[0].fix or "run flagdata doctor",
-        )  # fmt: skip
+        )
     committed = lake.catalog.objects() - marked.objects - held
     going = [stored for stored in lake.objects if stored.name in committed]
     return Expiry(up_to=up_to, objects=tuple(sorted(one.name for one in going)), size=sum(one.size for one in going))

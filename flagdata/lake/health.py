@@ -259,36 +259,44 @@ def _erased(lake: Lake, marked: Marked) -> list[Finding]:
             version, message = max(gone[name] for name in names)
             findings.append(
                 Finding(
-                    kind="erased", severity=Severity.NOTE, count=len(names), where=f"ref {ref}",
+                    kind="erased",
+                    severity=Severity.NOTE,
+                    count=len(names),
+                    where=f"ref {ref}",
                     what=f"{len(names)} rows have no data any more: they were erased, the last by version {version} "
                     f"({message})",
                     fix="none needed; exports of this ref leave them out by --where, or fail",
                 )
-            )  # fmt: skip
+            )
     return findings
 
 
 def _unfinished(lake: Lake, name: str, version: int, message: str) -> Finding:
     return Finding(
-        kind="erasure-unfinished", severity=Severity.ERROR, where=str(lake.objects.path(name)),
+        kind="erasure-unfinished",
+        severity=Severity.ERROR,
+        where=str(lake.objects.path(name)),
         what=f"version {version} erased what {name} holds ({message}), and its bytes are still there: the erasure was "
         "interrupted, or the disk refused it",
         fix="run flagdata gc, which deletes it at once; or the same flagdata withdraw --everywhere again",
-    )  # fmt: skip
+    )
 
 
 def _expired(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
     """A note for each commit that let versions expire, of which data went."""
     return [
         Finding(
-            kind="expired", severity=Severity.NOTE, count=len(gone), where=f"versions up to {one.up_to}",
+            kind="expired",
+            severity=Severity.NOTE,
+            count=len(gone),
+            where=f"versions up to {one.up_to}",
             what=f"{len(gone)} of the objects that these versions show went when they expired, by version "
             f"{one.version} ({one.message})",
             fix=f"none needed; all branches and tags, and versions from {one.version} on, are whole without them",
         )
         for one in expirations(lake)
         if (gone := one.objects - _needed(marked) - frozenset(stored))
-    ]  # fmt: skip
+    ]
 
 
 def _collected(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
@@ -390,9 +398,11 @@ def _beside(lake: Lake) -> list[Finding]:
     """A note on files of an operating system in the lake's folders; what lies in objects is passed over."""
     own = {COLLECT, TURN}
     found = sorted(
-        str(path) for folder in ("", *FOLDERS) for path in (lake.path / folder).glob("*")
+        str(path)
+        for folder in ("", *FOLDERS)
+        for path in (lake.path / folder).glob("*")
         if is_beside(path.name) and path.name not in own and not SCRATCH.fullmatch(path.name)
-    )  # fmt: skip
+    )
     if not found:
         return []
     what = f"{counted(len(found), 'file')} of an operating system, as .DS_Store: passed over"

@@ -80,9 +80,10 @@ def put(
         known = set(shown["artifact"].to_pylist())
         if absent := sorted(set(artifacts) - known):
             raise NotFoundError(
-                f"{', '.join(absent)} is not on branch {branch!r}", where=str(lake.path),
+                f"{', '.join(absent)} is not on branch {branch!r}",
+                where=str(lake.path),
                 fix=f"give ids of rows that flagdata ls --at {branch} shows",
-            )  # fmt: skip
+            )
         labelled = frozenset(artifacts) | clips_of(shown, artifacts)
         present = labels_of(shown)
         others = {artifact: present[artifact] for artifact in sorted(present.keys() & known)}
@@ -115,8 +116,9 @@ def _check_types(
             if kind(labels[name]) != kind(value):
                 raise ConflictError(
                     f"{name} is a {kind(labels[name])} on other artifacts, as {labels[name]!r}, not a {kind(value)}",
-                    where=artifact, fix="give a value of that type, or take the label off the others: name=",
-                )  # fmt: skip
+                    where=artifact,
+                    fix="give a value of that type, or take the label off the others: name=",
+                )
 
 
 def _check_case(fresh: Collection[str], present: Mapping[str, Mapping[str, Value]]) -> None:
@@ -131,8 +133,9 @@ def _check_case(fresh: Collection[str], present: Mapping[str, Mapping[str, Value
         if other != name:
             raise ConflictError(
                 f"the labels {name} and {other} are one column in SQL, which takes capitals for small letters",
-                where=other, fix="keep one of the two names" + _taking_off(name, present),
-            )  # fmt: skip
+                where=other,
+                fix="keep one of the two names" + _taking_off(name, present),
+            )
 
 
 def _taking_off(name: str, present: Mapping[str, Mapping[str, Value]]) -> str:

@@ -86,9 +86,10 @@ class Lake(Store):
         inside = {path.name for path in self._entries()} if self.path.is_dir() else set()
         if STAGING in inside and inside <= {*FOLDERS, _MARKER}:
             return ConflictError(
-                "a lake is being made there, or its making was stopped", where=where,
+                "a lake is being made there, or its making was stopped",
+                where=where,
                 fix="wait for it; where no process is making it, delete what is there and give the command again",
-            )  # fmt: skip
+            )
         return ConflictError("there is something else already", where=where, fix="choose an empty or new folder")
 
     def _is_occupied(self) -> bool:

@@ -216,8 +216,10 @@ class Log:
         fix += f"delete {noting}" if noting.parent == self.marks else f"that of {noting.name}"
         return CorruptError(
             f"the log entry {path.name} is not what {noting.name} says: one of the two has changed since it was "
-            "written", where=str(path), fix=fix,
-        )  # fmt: skip
+            "written",
+            where=str(path),
+            fix=fix,
+        )
 
     def noted_of(self, version: int, entry: bytes) -> str | None:
         """The SHA-256 that an entry, which may be of another lake, notes of its file.
@@ -320,12 +322,14 @@ def is_stated(version: object, number: int) -> bool:
     when, files = version.get("timestamp"), version.get("files", [])
     texts = [value for key, value in version.items() if key not in ("version", "timestamp", "files")]
     return (
-        isinstance(when, int) and 0 <= when < _LATEST
-        and isinstance(files, list) and all(isinstance(text, str) for text in (*texts, *files))
+        isinstance(when, int)
+        and 0 <= when < _LATEST
+        and isinstance(files, list)
+        and all(isinstance(text, str) for text in (*texts, *files))
         and isinstance(version.get("operation"), str)
         and all(_COUNT(version.get(key, "0")) for key in ("rows", "withdrawn"))
         and ("commit" not in version or "branch" in version)
-    )  # fmt: skip
+    )
 
 
 def names_in(folder: Place) -> list[str]:

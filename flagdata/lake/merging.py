@@ -84,17 +84,26 @@ def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:
 
     commit = f"c{secrets.token_hex(8)}"
     info = {
-        "commit": commit, "message": message, "branch": into, "rows": str(len(added)), "merged": branch,
-        "merged_version": str(head), "code_version": code_version(),
-    }  # fmt: skip
+        "commit": commit,
+        "message": message,
+        "branch": into,
+        "rows": str(len(added)),
+        "merged": branch,
+        "merged_version": str(head),
+        "code_version": code_version(),
+    }
     if withdrawn:
         info["withdrawn"] = str(len(withdrawn))
     version = take_off(lake, withdrawn, branch=into, base=head, info=info, fresh=_published(fresh, into))
     return MergeResult(
-        version=version, commit=commit, added=tuple(sorted(added)), existing=tuple(sorted(new & here)),
-        withdrawn=tuple(sorted(withdrawn)), left_out=left_out,
+        version=version,
+        commit=commit,
+        added=tuple(sorted(added)),
+        existing=tuple(sorted(new & here)),
+        withdrawn=tuple(sorted(withdrawn)),
+        left_out=left_out,
         brought_back={artifact: found for artifact, found in brought_back.items() if artifact in added},
-    )  # fmt: skip
+    )
 
 
 def _ids(table: pa.Table) -> frozenset[str]:

@@ -413,7 +413,11 @@ def write_plain(group: zarr.Group, name: str, values: NDArray[Any], dims: tuple[
     from zarr.codecs import BloscCodec
 
     array = group.create_array(
-        name, shape=values.shape, dtype=values.dtype, chunks=tuple(max(1, n) for n in values.shape),
-        dimension_names=dims, compressors=BloscCodec(cname="zstd", clevel=5, typesize=values.dtype.itemsize),
-    )  # fmt: skip
+        name,
+        shape=values.shape,
+        dtype=values.dtype,
+        chunks=tuple(max(1, n) for n in values.shape),
+        dimension_names=dims,
+        compressors=BloscCodec(cname="zstd", clevel=5, typesize=values.dtype.itemsize),
+    )
     array[...] = values

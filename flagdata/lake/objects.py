@@ -259,9 +259,10 @@ def path_in_lake(name: str) -> Path:
     """
     if not OBJECT_NAME.fullmatch(name):
         raise InputError(
-            f"{name!r} is not an object name", where="lake",
+            f"{name!r} is not an object name",
+            where="lake",
             fix="give mcap/<sha256>, zarr/<treehash> or model/<treehash>",
-        )  # fmt: skip
+        )
     store, _, digest = name.partition("/")
     return Path(store) / f"{digest}{STORES[store]}"
 

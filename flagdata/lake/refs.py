@@ -221,9 +221,10 @@ class Refs:
             raise unreadable("the ref", path, error) from None
         except (ValueError, KeyError, TypeError, AttributeError):
             raise CorruptError(
-                "the ref cannot be read, or has changed since it was written", where=str(path),
+                "the ref cannot be read, or has changed since it was written",
+                where=str(path),
                 fix=_PULL,
-            ) from None  # fmt: skip
+            ) from None
 
 
 def resolve(

@@ -56,9 +56,13 @@ _ENDED = ("Z", "X")  # states of a process whose parent has not asked for its re
 def owner() -> dict[str, Any]:
     """Who writes: for people, and for other processes of this machine."""
     return {
-        "pid": os.getpid(), "host": socket.gethostname(), "since": datetime.now(UTC).isoformat(), "life": LIFE,
-        "machine": _machine(), "started": _started(os.getpid()),
-    }  # fmt: skip
+        "pid": os.getpid(),
+        "host": socket.gethostname(),
+        "since": datetime.now(UTC).isoformat(),
+        "life": LIFE,
+        "machine": _machine(),
+        "started": _started(os.getpid()),
+    }
 
 
 class Held:
@@ -94,8 +98,9 @@ class Held:
         if self._lost or _now() - self._written > LIFE / 2:
             raise ConflictError(
                 "the store could not be reached for so long that others may take this process for dead",
-                where=str(self.place), fix="check the network, then do it again",
-            )  # fmt: skip
+                where=str(self.place),
+                fix="check the network, then do it again",
+            )
 
     def close(self) -> None:
         """Take the object away, unless another has replaced it."""
@@ -221,8 +226,9 @@ def _pauses(staging: RemotePath) -> Iterator[None]:
             _LOG.warning(
                 "flagdata: waiting for another process that uses the lake: it collects, names a version or commits\n"
                 "  where: %s\n  fix:   none needed; if it was killed on another machine, its lock is void after %.0f s",
-                staging, LIFE,
-            )  # fmt: skip
+                staging,
+                LIFE,
+            )
 
 
 def lease_lines(folder: RemotePath) -> tuple[list[str], bool]:

@@ -102,9 +102,10 @@ def explained(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
         if name in (known := erased(lake)):
             version, message = known[name]
             return NotFoundError(
-                f"{name} was erased from all versions by version {version} ({message})", where=missing.where,
+                f"{name} was erased from all versions by version {version} ({message})",
+                where=missing.where,
                 fix="leave its artifact out by --where; no version has its data any more",
-            )  # fmt: skip
+            )
         for one in expirations(lake):
             if name in one.objects:
                 return NotFoundError(

@@ -88,9 +88,14 @@ def placed(lake: Store, result: Artifact, *, branch: str = MAIN) -> Placed:
 
 
 def keep(
-    lake: Lake, result: Artifact, write: Callable[[Path], object], message: str, *, branch: str = MAIN,
+    lake: Lake,
+    result: Artifact,
+    write: Callable[[Path], object],
+    message: str,
+    *,
+    branch: str = MAIN,
     left: Callable[[Artifact], Iterable[Artifact]] = lambda kept: (),
-) -> Placed:  # fmt: skip
+) -> Placed:
     """Commit a result where it is new (see `placed`), or its object damaged or missing, with what it left.
 
     Args:

@@ -94,9 +94,12 @@ class Summaries:
     def _put(self, history: Sequence[Mapping[str, Any]], first: int, checkpoints: Mapping[int, str]) -> None:
         last = len(history) - 1
         content = {
-            "schema": _SCHEMA, "before": self._log.hash(first - 1) if first else "", "end": self._log.hash(last),
-            "checkpoints": checkpoints, "versions": list(history[first:]),
-        }  # fmt: skip
+            "schema": _SCHEMA,
+            "before": self._log.hash(first - 1) if first else "",
+            "end": self._log.hash(last),
+            "checkpoints": checkpoints,
+            "versions": list(history[first:]),
+        }
         text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
         self._folder.mkdir(exist_ok=True)
         put_if_absent(self._folder / f"{first:020d}-{last:020d}-{digest(text)}.json", text.encode())

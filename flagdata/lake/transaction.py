@@ -258,9 +258,10 @@ class Transaction:
             existing = (*self._existing, *(identity for identity in self._pending if identity in known))
             if gone := [identity for identity in self._existing if identity not in known]:
                 raise ConflictError(
-                    f"{gone[0]} was withdrawn from branch {self.branch!r} meanwhile", where=str(self._lake.path),
+                    f"{gone[0]} was withdrawn from branch {self.branch!r} meanwhile",
+                    where=str(self._lake.path),
                     fix="do it again",
-                )  # fmt: skip
+                )
             moved = {i: replace(row, created=created) for i, (_, row) in self._moved.items()}
             artifacts = self._there(version, existing) | fresh | moved
             if not fresh and not moved:

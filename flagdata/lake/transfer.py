@@ -77,9 +77,10 @@ def _with_push(error: ConflictError, source: Lake, target: Place | str) -> Confl
     if not same:
         return error
     return ConflictError(
-        "there is a clone of this lake already", where=str(lake.path),
+        "there is a clone of this lake already",
+        where=str(lake.path),
         fix=f"flagdata push {lake.path} --lake {source.path} brings it up to date, also where a clone was stopped",
-    )  # fmt: skip
+    )
 
 
 def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
@@ -123,9 +124,7 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
             target.refs.adopt(kind, name, stored)
     names = tuple(sorted(name for _, name in refs))
     findings = tuple(_unprintable(source, marked, versions=head - there))
-    return Transfer(
-        versions=head - there, head=head, objects=tuple(missing), size=size, refs=names, findings=findings
-    )  # fmt: skip
+    return Transfer(versions=head - there, head=head, objects=tuple(missing), size=size, refs=names, findings=findings)
 
 
 def _unprintable(source: Lake, marked: Marked, *, versions: int) -> Iterator[Finding]:
@@ -141,11 +140,14 @@ def _unprintable(source: Lake, marked: Marked, *, versions: int) -> Iterator[Fin
     columns = [name for name, count in found.items() if count]
     if columns:
         yield Finding(
-            kind="control-characters", severity=Severity.WARNING, count=found.total(),
+            kind="control-characters",
+            severity=Severity.WARNING,
+            count=found.total(),
             what=f"{counted(found.total(), 'text')} of {', '.join(columns)} hold control characters or marks of "
-            "direction: they came as they are, and are shown escaped", where=str(source.path),
+            "direction: they came as they are, and are shown escaped",
+            where=str(source.path),
             fix="none needed for flagdata; give other programs what flagdata prints, not the files of the catalog",
-        )  # fmt: skip
+        )
 
 
 def _sizes(marked: Marked) -> dict[str, int]:
@@ -172,8 +174,9 @@ def _delete_refs(source: Lake, target: Lake) -> None:
     """Delete the target's refs that the source lacks and that the log says were deleted since they were made: also
     where an earlier transfer brought that entry, and was stopped."""
     for kind, noun, known in (
-        ("tags", "tag", source.refs.tags()), ("branches", "branch", source.refs.branches()),
-    ):  # fmt: skip
+        ("tags", "tag", source.refs.tags()),
+        ("branches", "branch", source.refs.branches()),
+    ):
         there = target.refs.tags() if kind == "tags" else target.refs.branches()
         for entry in source.catalog.history():
             name = entry.get("deleted", "").removeprefix(f"{noun} ")
@@ -201,8 +204,9 @@ def _check_history(source: Lake, target: Lake, *, head: int, there: int) -> None
     if there > head:
         raise ConflictError(
             f"{target.path} is ahead: it has versions up to {there}, {source.path} up to {head}",
-            where=str(target.path), fix="move them the other way: flagdata pull for push, or flagdata push for pull",
-        )  # fmt: skip
+            where=str(target.path),
+            fix="move them the other way: flagdata pull for push, or flagdata push for pull",
+        )
 
 
 def _missing_refs(source: Lake, target: Lake) -> dict[tuple[str, str], bytes]:
@@ -216,6 +220,7 @@ def _missing_refs(source: Lake, target: Lake) -> dict[tuple[str, str], bytes]:
         if there.get(key, content) != content:
             raise ConflictError(
                 f"both lakes have a {_NOUNS[key[0]]} {key[1]!r}, and not the same",
-                where=str(target.path), fix="delete one of the two",
-            )  # fmt: skip
+                where=str(target.path),
+                fix="delete one of the two",
+            )
     return {key: content for key, content in stored.items() if key not in there}

@@ -98,9 +98,10 @@ def usage(lake: Lake, *, at: str | None = None, grace: timedelta) -> Usage:
     marked = mark(lake, grace=grace)
     if damage := [finding for finding in marked.findings if finding.severity is Severity.ERROR]:
         raise CorruptError(
-            f"which objects are needed is unknown: {damage[0].what}", where=damage[0].where,
+            f"which objects are needed is unknown: {damage[0].what}",
+            where=damage[0].where,
             fix=damage[0].fix or "run flagdata doctor",
-        )  # fmt: skip
+        )
     garbage = unneeded(lake, marked, states, grace=grace)
     sizes: Counter[str] = Counter()
     for key, size in files_of(lake.path):
@@ -114,12 +115,14 @@ def usage(lake: Lake, *, at: str | None = None, grace: timedelta) -> Usage:
     counts = Counter(name for ref, objects in shown.items() if ref in marked.refs for name in objects)
     versions = tuple(
         Shown(
-            name=ref, noun=nouns[ref], lost=len(objects - sizes.keys()),
+            name=ref,
+            noun=nouns[ref],
+            lost=len(objects - sizes.keys()),
             share=_share(objects & sizes.keys(), sizes, artifacts=tables[ref].num_rows),
             own=sum(sizes[name] for name in objects if counts[name] <= int(ref in marked.refs)),
         )
         for ref, objects in shown.items()
-    )  # fmt: skip
+    )
     concerned = marked.refs if at is None else {at: tables[at]}
     kinds = _kinds(concerned, sizes, others=at is None)
     return Usage(kinds=kinds, versions=versions, total=sizes.total(), freed=garbage.size, grace=grace)

@@ -24,9 +24,16 @@ _SWEEPS = 4
 TITLE_CELLS, LINE_CELLS = 19, 27  # of a monospaced guess at a proportional font: what fits a box
 INK, QUIET, RULE, PAPER, MARKED = "#1c2326", "#56646b", "#9aa7ad", "#ffffff", "#1f6286"
 COLOURS = {
-    "camera": "#b5541c", "wind": "#1f6fa8", "recording": "#3b7d6b", "clip": "#7aa69a", "meshes": "#7b5ea7",
-    "markers": "#a0568c", "model": "#8a7a2d", "network": "#555fb0", "measurement": "#a8402c",
-}  # fmt: skip
+    "camera": "#b5541c",
+    "wind": "#1f6fa8",
+    "recording": "#3b7d6b",
+    "clip": "#7aa69a",
+    "meshes": "#7b5ea7",
+    "markers": "#a0568c",
+    "model": "#8a7a2d",
+    "network": "#555fb0",
+    "measurement": "#a8402c",
+}
 """Colour of a box's edge, by kind."""
 
 
@@ -92,8 +99,9 @@ def layout(boxes: Sequence[Box], edges: Collection[tuple[str, str]]) -> Layout:
     at = {place.key: (number, place) for number, column in enumerate(columns) for place in column}
     return Layout(
         size=(2 * _MARGIN + len(columns) * WIDTH + (len(columns) - 1) * _GAP_X, 2 * _MARGIN + height),
-        at=at, ways=[[at[key] for key in way] for way in ways],
-    )  # fmt: skip
+        at=at,
+        ways=[[at[key] for key in way] for way in ways],
+    )
 
 
 def svg(boxes: Sequence[Box], edges: Collection[tuple[str, str]], *, title: str) -> str:

@@ -67,12 +67,15 @@ def _single(relative: Relative, *, details: bool, link: Callable[[str], str] | N
     known = relative.kind is not None
     what = detail_lines(relative)
     return Box(
-        key=relative.artifact, column=relative.generation, kind=relative.kind, marked=marked,
+        key=relative.artifact,
+        column=relative.generation,
+        kind=relative.kind,
+        marked=marked,
         title=relative.name or "not at this version",
         lines=[f"{relative.kind or 'artifact'} {relative.artifact[:SHORT]}", *(what if details else ())],
         about="\n".join([relative.name or "", relative.artifact, *what]),
         link=link(relative.artifact) if link is not None and known else None,
-    )  # fmt: skip
+    )
 
 
 def _several(group: Sequence[Relative], generation: int) -> Box:
@@ -80,6 +83,10 @@ def _several(group: Sequence[Relative], generation: int) -> Box:
     names = sorted({one.name for one in group if one.name is not None})
     shown = names[0] if len(names) == 1 else f"{names[0]} … {names[-1]}" if names else ""
     return Box(
-        key=group[0].artifact, column=generation, kind=kind, title=f"{len(group):,} × {kind or 'artifact'}",
-        lines=[shown], about=f"{len(group)} artifacts of one kind in one generation",
-    )  # fmt: skip
+        key=group[0].artifact,
+        column=generation,
+        kind=kind,
+        title=f"{len(group):,} × {kind or 'artifact'}",
+        lines=[shown],
+        about=f"{len(group)} artifacts of one kind in one generation",
+    )

@@ -291,9 +291,7 @@ def in_order(file: Bytes, summary: Summary, topic: str, *, where: str) -> bool:
     shared = [i for i in sorted(overlaps) if len(chunks[i].message_index_offsets) > 1]
     file.prepare([_index_span(chunks[i], channel) for i in shared])
     for i in shared:
-        time, _ = _message_index(
-            file, chunks[i].message_index_offsets[channel], channel, summary.data_end, where=where
-        )  # fmt: skip
+        time, _ = _message_index(file, chunks[i].message_index_offsets[channel], channel, summary.data_end, where=where)
         bounds[i] = (int(time.min(initial=0)), int(time.max(initial=0)))
     return all(one[1] < other[0] for one, other in pairwise(bounds))
 
@@ -325,9 +323,10 @@ def _places(
         if channel in chunk.message_index_offsets:
             if chunk.compression:
                 raise InputError(
-                    f"the record's chunks are compressed ({chunk.compression})", where=where,
+                    f"the record's chunks are compressed ({chunk.compression})",
+                    where=where,
                     fix=_RECOVER + " to rewrite it",
-                )  # fmt: skip
+                )
             count = message_count(chunk, channel)
             first, last = (0, count) if span is None else (span[0] - before, span[0] + span[1] - before)
             if span is None or (first < count and last > 0):
@@ -385,8 +384,9 @@ def check_parts(parts: Sequence[bytes | memoryview], table: Messages, topic: str
             if zlib.crc32(part) != table.checksums[index]:
                 raise CorruptError(
                     f"message {table.first + index} of {topic} has changed since it was written: its checksum is wrong",
-                    where=f"{where}, byte {table.offset[index]}", fix=FIX,
-                )  # fmt: skip
+                    where=f"{where}, byte {table.offset[index]}",
+                    fix=FIX,
+                )
     elif table.checksum is not None:
         total = 0
         for index in np.argsort(table.offset, kind="stable").tolist():
@@ -394,8 +394,9 @@ def check_parts(parts: Sequence[bytes | memoryview], table: Messages, topic: str
         if total != table.checksum:
             raise CorruptError(
                 f"{topic} has changed since it was written: its checksum is wrong",
-                where=f"{where}, bytes {table.offset.min()} to {(table.offset + table.length).max()}", fix=FIX,
-            )  # fmt: skip
+                where=f"{where}, bytes {table.offset.min()} to {(table.offset + table.length).max()}",
+                fix=FIX,
+            )
 
 
 def check_chunk(file: Bytes, chunk: ChunkIndex, *, where: str) -> None:
@@ -410,8 +411,9 @@ def check_chunk(file: Bytes, chunk: ChunkIndex, *, where: str) -> None:
     if checksum and zlib.crc32(read_exact(file, chunk.compressed_size, start, where=where)) != checksum:
         raise CorruptError(
             "a chunk has changed since it was written: its checksum is wrong",
-            where=f"{where}, bytes {start} to {start + chunk.compressed_size}", fix=FIX,
-        )  # fmt: skip
+            where=f"{where}, bytes {start} to {start + chunk.compressed_size}",
+            fix=FIX,
+        )
 
 
 def _empty() -> NDArray[np.int64]:
@@ -449,8 +451,9 @@ def read_metadata(file: Bytes, summary: Summary, *, where: str) -> dict[str, dic
         ):
             raise CorruptError(
                 f"the metadata {entry.name!r} has changed since it was written: its checksum is wrong",
-                where=f"{where}, byte {entry.offset}", fix=FIX,
-            )  # fmt: skip
+                where=f"{where}, byte {entry.offset}",
+                fix=FIX,
+            )
         found[entry.name] = content.metadata
     return found
 

@@ -173,10 +173,15 @@ class McapFile:
         self._write(struct.pack("<I", crc))
         self._attachments.append(
             AttachmentIndex(
-                offset=offset, length=_HEADER + length, create_time=0, log_time=log_time, data_size=size, name=name,
+                offset=offset,
+                length=_HEADER + length,
+                create_time=0,
+                log_time=log_time,
+                data_size=size,
+                name=name,
                 media_type=media_type,
             )
-        )  # fmt: skip
+        )
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Add a metadata record."""
@@ -217,11 +222,16 @@ class McapFile:
 
     def _statistics(self) -> Statistics:
         return Statistics(
-            attachment_count=len(self._attachments), channel_count=len(self._channels),
-            channel_message_counts=self._counts, chunk_count=len(self._chunks),
-            message_count=sum(self._counts.values()), metadata_count=len(self._metadata),
-            message_start_time=self._start or 0, message_end_time=self._end, schema_count=len(self._schemas),
-        )  # fmt: skip
+            attachment_count=len(self._attachments),
+            channel_count=len(self._channels),
+            channel_message_counts=self._counts,
+            chunk_count=len(self._chunks),
+            message_count=sum(self._counts.values()),
+            metadata_count=len(self._metadata),
+            message_start_time=self._start or 0,
+            message_end_time=self._end,
+            schema_count=len(self._schemas),
+        )
 
     def _count(self, channel_id: int, count: int, low: int, high: int) -> None:
         self._counts[channel_id] = self._counts.get(channel_id, 0) + count
@@ -238,9 +248,13 @@ class McapFile:
         done, self._chunk = self._chunk, _OpenChunk()
         data = bytes(done.data)
         chunk = Chunk(
-            compression="", data=data, message_start_time=done.start, message_end_time=done.end,
-            uncompressed_crc=zlib.crc32(data), uncompressed_size=len(data),
-        )  # fmt: skip
+            compression="",
+            data=data,
+            message_start_time=done.start,
+            message_end_time=done.end,
+            uncompressed_crc=zlib.crc32(data),
+            uncompressed_size=len(data),
+        )
         offset = self._at
         self._write(_bytes(chunk))
         length = self._at - offset
@@ -251,11 +265,17 @@ class McapFile:
             self._write(struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + len(notes), channel, len(notes)) + notes)
         self._chunks.append(
             ChunkIndex(
-                message_start_time=done.start, message_end_time=done.end, chunk_start_offset=offset,
-                chunk_length=length, message_index_offsets=places, message_index_length=self._at - first,
-                compression="", compressed_size=len(data), uncompressed_size=len(data),
+                message_start_time=done.start,
+                message_end_time=done.end,
+                chunk_start_offset=offset,
+                chunk_length=length,
+                message_index_offsets=places,
+                message_index_length=self._at - first,
+                compression="",
+                compressed_size=len(data),
+                uncompressed_size=len(data),
             )
-        )  # fmt: skip
+        )
 
     def _write(self, data: bytes) -> None:
         self._crc = zlib.crc32(data, self._crc)

@@ -122,9 +122,11 @@ def _build() -> descriptor_pb2.FileDescriptorProto:
     mean.field("speed", 2, _FIELD.TYPE_DOUBLE, "Mean wind speed [m/s].")
     mean.field("sigma", 3, _FIELD.TYPE_DOUBLE, "Standard uncertainty of that mean [m/s].")
     mean.field(
-        "direction", 4, _FIELD.TYPE_DOUBLE,
+        "direction",
+        4,
+        _FIELD.TYPE_DOUBLE,
         "Vector-mean direction [rad; from, clockwise from true north]; NaN where the sensor has none.",
-    )  # fmt: skip
+    )
     mean.field("count", 5, _FIELD.TYPE_INT32, "Usable samples in the period.")
     mean.field("period", 6, _FIELD.TYPE_DOUBLE, "Length of the period [s].")
 

@@ -308,9 +308,10 @@ class Record:
             raise UsageError(f"{count} frames from {first} were asked for", fix="ask for at least one, from 0 or later")
         if first + count > self.frame_count:
             raise NotFoundError(
-                f"frames {first} to {first + count - 1} of {self.frame_count}", where=str(self.path),
+                f"frames {first} to {first + count - 1} of {self.frame_count}",
+                where=str(self.path),
                 fix="ask for fewer",
-            )  # fmt: skip
+            )
         if not self._in_spans:
             return self._frames
         where, span = str(self.path), (first, count)

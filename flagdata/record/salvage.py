@@ -41,8 +41,12 @@ CHUNK_LIMIT = 1 << 30
 """No record is taken to be longer than this in the file [B]; a longer one is a damaged length."""
 _IN_CHUNK = frozenset({Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE})
 _DATA_OPCODES = _IN_CHUNK | {
-    Opcode.HEADER, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA,
-}  # fmt: skip
+    Opcode.HEADER,
+    Opcode.CHUNK,
+    Opcode.MESSAGE_INDEX,
+    Opcode.ATTACHMENT,
+    Opcode.METADATA,
+}
 _FIRST_PRIVATE = 0x80
 _DATA_END_BYTES = 4
 _CHUNK_START = re.compile(rb"\x06.{3}[\x00-\x40]\x00{4}", re.DOTALL)  # the opcode, and a length within CHUNK_LIMIT
@@ -53,10 +57,13 @@ _LONGEST_NAME = 8  # bytes of the name of a compression
 _KNOWN: dict[str, Any] = {
     kind.DESCRIPTOR.full_name: kind
     for kind in (
-        messages.CompressedImage, messages.CompressedVideo, messages.WindSample, messages.WindMean,
+        messages.CompressedImage,
+        messages.CompressedVideo,
+        messages.WindSample,
+        messages.WindMean,
         messages.TruthParameters,
     )
-}  # fmt: skip
+}
 
 
 def salvage(source: Path, target: Path) -> tuple[Finding, ...]:
@@ -191,15 +198,19 @@ class _Copy:
     def finish(self) -> None:
         if self._unknown:
             self.find(
-                "unknown-channel", Severity.ERROR,
-                f"{self._unknown} messages left out: the definition of their channel is lost", count=self._unknown,
-            )  # fmt: skip
+                "unknown-channel",
+                Severity.ERROR,
+                f"{self._unknown} messages left out: the definition of their channel is lost",
+                count=self._unknown,
+            )
         total = self.counts.total()
         parts = ", ".join(f"{count} on {topic}" for topic, count in sorted(self.counts.items()))
         self.find(
-            "recovered", Severity.NOTE,
-            f"{total} messages from {iso(self._times[0])} to {iso(self._times[1])}: {parts}", count=total,
-        )  # fmt: skip
+            "recovered",
+            Severity.NOTE,
+            f"{total} messages from {iso(self._times[0])} to {iso(self._times[1])}: {parts}",
+            count=total,
+        )
         losses = [finding.what for finding in self.findings if finding.severity is not Severity.NOTE]
         if losses:
             name = f"{SALVAGE}/{self._salvaged + 1}"
@@ -315,9 +326,11 @@ class _Pass:
     def _attachment(self, content: bytes, start: int) -> None:
         if zlib.crc32(content[:-4]) != int.from_bytes(content[-4:], "little"):
             self._copy.find(
-                "damaged-attachment", Severity.ERROR, "an attachment left out: its checksum is wrong",
+                "damaged-attachment",
+                Severity.ERROR,
+                "an attachment left out: its checksum is wrong",
                 where=f"byte {start}",
-            )  # fmt: skip
+            )
             return
         self._copy.attachment(parse(Attachment.read, content, where=self._where))
 
@@ -346,10 +359,12 @@ class _Pass:
                 break
         if kept:
             self._copy.find(
-                "unchecked-messages", Severity.WARNING,
+                "unchecked-messages",
+                Severity.WARNING,
                 f"{kept} messages kept from a chunk whose end, and so its checksum, is missing",
-                where=f"byte {start}", count=kept,
-            )  # fmt: skip
+                where=f"byte {start}",
+                count=kept,
+            )
 
     def _plausible(self, message: Message) -> bool:
         """Whether a message without a checksum decodes as what its channel says (a crash may leave zeros behind)."""
@@ -381,9 +396,11 @@ class _Pass:
         self._stream.seek(self._size - len(MAGIC))
         if self._stream.read() != MAGIC:
             self._copy.find(
-                "cut-off", Severity.NOTE, "all data is there; the summary at the end was cut off and is written anew",
+                "cut-off",
+                Severity.NOTE,
+                "all data is there; the summary at the end was cut off and is written anew",
                 where=f"byte {self._size}",
-            )  # fmt: skip
+            )
 
     def _cut_off(self, start: int, place: str) -> None:
         self._copy.find(
@@ -411,9 +428,12 @@ class _Pass:
             self._copy.find(kind, Severity.WARNING, f"{what}; no message was there", where=f"byte {start}")
             return
         self._copy.find(
-            kind, Severity.ERROR, f"{what}; {there - kept} of its {there} messages are lost", where=f"byte {start}",
+            kind,
+            Severity.ERROR,
+            f"{what}; {there - kept} of its {there} messages are lost",
+            where=f"byte {start}",
             count=there - kept,
-        )  # fmt: skip
+        )
 
 
 def _is_chunk(view: mmap.mmap, at: int, length: int) -> bool:

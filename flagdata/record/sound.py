@@ -55,9 +55,12 @@ class SoundMessages:
         if not right:
             return None
         return Message(
-            channel_id=channel, log_time=int(table.log_time[row]), publish_time=int(table.publish_time[row]),
-            sequence=int.from_bytes(head[11:15], "little"), data=data,
-        )  # fmt: skip
+            channel_id=channel,
+            log_time=int(table.log_time[row]),
+            publish_time=int(table.publish_time[row]),
+            sequence=int.from_bytes(head[11:15], "little"),
+            data=data,
+        )
 
     def _read(self, offset: int, length: int) -> bytes:
         with self._path.open("rb") as stream:

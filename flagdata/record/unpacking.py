@@ -64,9 +64,10 @@ def check_stated(size: int, *, where: str | None = None) -> None:
     """
     if size > UNPACKED_LIMIT:
         raise LimitError(
-            f"the chunk claims to unpack to {size} bytes", where=where,
+            f"the chunk claims to unpack to {size} bytes",
+            where=where,
             fix=f"at most {UNPACKED_LIMIT} are unpacked at once: write smaller chunks",
-        )  # fmt: skip
+        )
 
 
 def _joined(pieces: Iterator[bytes], stated: int, *, where: str | None) -> bytearray:
@@ -91,9 +92,10 @@ def _pieces(compression: str, data: bytes, *, where: str | None) -> Iterator[byt
     if compression == "zstd":
         return _of_zstd(data)
     raise CorruptError(
-        f"the chunk's compression is {compression[:40]!r}", where=where,
+        f"the chunk's compression is {compression[:40]!r}",
+        where=where,
         fix="MCAP has lz4, zstd and none: convert it with the program that wrote it",
-    )  # fmt: skip
+    )
 
 
 def _of_lz4(data: bytes) -> Iterator[bytes]:

@@ -311,9 +311,11 @@ class RecordWriter:
                 last = max(first + 1, int(np.searchsorted(log_time, until)))
             rows = slice(first, last)
             block = MessageBlock(
-                log_time=log_time[rows], publish_time=publish_time[rows], payload=payloads.data[rows],
+                log_time=log_time[rows],
+                publish_time=publish_time[rows],
+                payload=payloads.data[rows],
                 used=payloads.used[rows],
-            )  # fmt: skip
+            )
             self._writer.add_messages(block, channel_id=channel, sequence=self._sequences[topic])
             self._sequences[topic] += last - first
             first = last
@@ -322,9 +324,10 @@ class RecordWriter:
         """The number of a topic's channel, for messages from `earliest` on [UTC ns]."""
         if earliest < 0:
             raise TimeError(
-                "an instant before 1970, which MCAP cannot hold", where=f"{self.path}, {topic}",
+                "an instant before 1970, which MCAP cannot hold",
+                where=f"{self.path}, {topic}",
                 fix="set the device's start time",
-            )  # fmt: skip
+            )
         if topic not in self._channels:
             schema = self._writer.register_schema(
                 name=kind.DESCRIPTOR.full_name, encoding=SchemaEncoding.Protobuf, data=messages.descriptor_set(kind)

@@ -65,9 +65,10 @@ def fetched(name: str, suffix: str, *, size: int, fetch: Callable[[Path], None],
         fetch(part)
         if content_hash(part) != name.partition("/")[2]:
             raise CorruptError(
-                f"the bytes of {name} have changed since they were written", where=where,
+                f"the bytes of {name} have changed since they were written",
+                where=where,
                 fix="run flagdata verify: it names what replaces the object; or restore it from a copy",
-            )  # fmt: skip
+            )
         try:
             part.rename(path)
         except OSError:  # a folder that another process has fetched meanwhile

@@ -57,9 +57,10 @@ def settings() -> dict[str, str]:
         found |= {name: stated[name] for name in _ENVIRONMENT if name in stated}
         if profile is not None and "aws_access_key_id" not in stated:
             raise UsageError(
-                f"the profile {profile!r} has no access key of its own", where="AWS_PROFILE",
+                f"the profile {profile!r} has no access key of its own",
+                where="AWS_PROFILE",
                 fix="put its keys into the environment: eval $(aws configure export-credentials --format env)",
-            )  # fmt: skip
+            )
     region = os.environ.get("AWS_REGION") or os.environ.get("AWS_DEFAULT_REGION") or stated.get("region")
     endpoint = os.environ.get("AWS_ENDPOINT_URL_S3") or os.environ.get("AWS_ENDPOINT_URL") or stated.get("endpoint_url")
     found["aws_region"] = region or "us-east-1"
@@ -101,9 +102,10 @@ def client(bucket: str) -> S3Store:
 def _client(bucket: str) -> S3Store:
     if importlib.util.find_spec("obstore") is None:
         raise UsageError(
-            "a lake in object storage needs the package obstore", where=f"s3://{bucket}",
+            "a lake in object storage needs the package obstore",
+            where=f"s3://{bucket}",
             fix="pip install 'flagdata[s3]'",
-        )  # fmt: skip
+        )
     from datetime import timedelta
 
     from obstore.store import S3Store

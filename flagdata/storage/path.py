@@ -78,16 +78,18 @@ class RemotePath:
         if found is None:
             shown = "s3://…" if _SECRET.search(address) else address
             raise UsageError(
-                "not the address of a bucket", where=shown, fix="write s3://bucket/prefix; credentials are read from"
-                " the environment or a profile"
-            )  # fmt: skip
+                "not the address of a bucket",
+                where=shown,
+                fix="write s3://bucket/prefix; credentials are read from the environment or a profile",
+            )
         key = (found[2] or "").rstrip("/")
         if key and (not _KEY.fullmatch(key) or {".", ".."} & set(key.split("/"))):
             shown = f"{SCHEME}{found[1]}/…" if _SECRET.search(address) else address
             raise UsageError(
-                "the prefix of a lake has letters, digits and . _ = + - only, between single slashes", where=shown,
+                "the prefix of a lake has letters, digits and . _ = + - only, between single slashes",
+                where=shown,
                 fix="choose another prefix",
-            )  # fmt: skip
+            )
         return cls(found[1], key)
 
     def __reduce__(self) -> tuple[type[RemotePath], tuple[str, str]]:

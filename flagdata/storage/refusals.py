@@ -15,9 +15,12 @@ from flagdata.storage.connection import COLOUR, plain, settings
 from flagdata.storage.requests import SHORTLY, Answer, Unreachable, asked
 
 _NEEDS = {
-    "GET": "s3:GetObject", "HEAD": "s3:GetObject (and s3:ListBucket)", "PUT": "s3:PutObject",
-    "POST": "s3:PutObject", "DELETE": "s3:DeleteObject",
-}  # fmt: skip
+    "GET": "s3:GetObject",
+    "HEAD": "s3:GetObject (and s3:ListBucket)",
+    "PUT": "s3:PutObject",
+    "POST": "s3:PutObject",
+    "DELETE": "s3:DeleteObject",
+}
 """Actions that requests need permission for, by Amazon's names; those of an upload's parts are a put's."""
 _LISTING, _DELETING = re.compile(r"list-type=2|list request"), re.compile(r"DeleteObjects|\?delete\b")
 _METHOD = re.compile(r"Error performing ([A-Z]+)")
@@ -98,12 +101,14 @@ _CAUSES = {
     ),
     ("InvalidToken", "InvalidSecurity", "UnrecognizedClientException"): Cause(
         what="the session token is not of these credentials",
-        fix="set AWS_SESSION_TOKEN together with the keys that it was given with, or unset it", kind=CredentialsError,
+        fix="set AWS_SESSION_TOKEN together with the keys that it was given with, or unset it",
+        kind=CredentialsError,
     ),
     ("InvalidAccessKeyId", "InvalidClientTokenId", "NotSignedUp"): Cause(
         what="the store does not know the access key",
         fix="check the credentials: AWS_ACCESS_KEY_ID, or AWS_PROFILE, and that they are of the store at"
-        " AWS_ENDPOINT_URL", kind=CredentialsError,
+        " AWS_ENDPOINT_URL",
+        kind=CredentialsError,
     ),
     ("SignatureDoesNotMatch",): Cause(
         what="the secret key is not that of the access key",
@@ -111,8 +116,16 @@ _CAUSES = {
         kind=CredentialsError,
     ),
     ("MissingSecurityHeader", "MissingAuthenticationToken", "CredentialsNotSupported"): _MISSING,
-    ("SlowDown", "TooManyRequests", "TooManyRequestsException", "Throttling", "ThrottlingException",
-     "RequestThrottled", "RequestLimitExceeded", "BandwidthLimitExceeded"): _SLOW,
+    (
+        "SlowDown",
+        "TooManyRequests",
+        "TooManyRequestsException",
+        "Throttling",
+        "ThrottlingException",
+        "RequestThrottled",
+        "RequestLimitExceeded",
+        "BandwidthLimitExceeded",
+    ): _SLOW,
     ("ServiceUnavailable", "InternalError", "InternalServerError", "RequestTimeout"): _FAILED,
     ("NotImplemented", "MethodNotAllowed"): _LACKING,
     ("TemporaryRedirect", "Redirect"): _REDIRECTED,
@@ -129,12 +142,16 @@ _CAUSES = {
     ("AllAccessDisabled", "AccountProblem"): Cause(
         what="the account is closed or suspended", fix="ask the store's operator", kind=CredentialsError
     ),
-    ("KMS.DisabledException", "KMS.NotFoundException", "KMS.InvalidStateException",
-     "KMS.KMSInvalidStateException"): Cause(
+    (
+        "KMS.DisabledException",
+        "KMS.NotFoundException",
+        "KMS.InvalidStateException",
+        "KMS.KMSInvalidStateException",
+    ): Cause(
         what="the key of the key service that encrypts the bucket cannot be used",
         fix="have that key enabled, or the bucket given another one",
     ),
-}  # fmt: skip
+}
 _BY_CODE = {code: cause for codes, cause in _CAUSES.items() for code in codes}
 _BY_STATUS = {429: _SLOW, 501: _LACKING, 405: _LACKING, 307: _REDIRECTED, 302: _REDIRECTED, 308: _REDIRECTED}
 

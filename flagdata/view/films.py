@@ -71,9 +71,11 @@ def film_of(lake: Lake, row: Mapping[str, Any], opened: Callable[[str], Record])
             return None
         first = entry.first
         return Film(
-            times=entry.frame_times, jpegs=lambda at, count: entry.record.jpegs(first + at, count),
-            record=entry.record, wind_span=entry.wind_span,
-        )  # fmt: skip
+            times=entry.frame_times,
+            jpegs=lambda at, count: entry.record.jpegs(first + at, count),
+            record=entry.record,
+            wind_span=entry.wind_span,
+        )
     if kind not in DRAWN:
         return None
     if (size := lake.objects.size(name)) > _DRAWN_BYTES:

@@ -57,9 +57,12 @@ _FILMED = frozenset({Kind.CAMERA, Kind.RECORDING, Kind.CLIP, *DRAWN})
 _ASIDE = frozenset({"artifact", "name", "kind", "parents", "report", "recipe", "parameters", "clock_model", "quality"})
 _CLOCK = (("clock_offset", "offset", "s"), ("clock_sigma", "σ of the offset", "s"), ("clock_drift", "drift", "s/s"))
 _EVIDENCE = (
-    ("interval", "interval of the offset", "s"), ("drift_sigma", "σ of the drift", "s/s"),
-    ("confidence", "confidence", ""), ("chance", "probability by chance", ""), ("correlation", "correlation", ""),
-)  # fmt: skip
+    ("interval", "interval of the offset", "s"),
+    ("drift_sigma", "σ of the drift", "s/s"),
+    ("confidence", "confidence", ""),
+    ("chance", "probability by chance", ""),
+    ("correlation", "correlation", ""),
+)
 
 
 class Tables:
@@ -158,9 +161,17 @@ def overview(site: Site, *, kind: str | None, name: str | None, page: int) -> st
     page = min(page, last)
     cards = [_card(site, row) for row in rows.take(found.slice(page * CARDS, CARDS)).to_pylist()]
     return _page(
-        site, "overview.html.j2", cards=cards, counts=counts, kind=kind, name=name or "", page=page, last=last,
-        total=len(found), everything=rows.num_rows - counts.get(Kind.CLIP.value, 0),
-    )  # fmt: skip
+        site,
+        "overview.html.j2",
+        cards=cards,
+        counts=counts,
+        kind=kind,
+        name=name or "",
+        page=page,
+        last=last,
+        total=len(found),
+        everything=rows.num_rows - counts.get(Kind.CLIP.value, 0),
+    )
 
 
 def artifact(site: Site, identity: str) -> str:
@@ -180,13 +191,22 @@ def artifact(site: Site, identity: str) -> str:
     drawn = picture(ancestry(shown, identity), link=lambda one: site.link(f"artifact/{one}"))
     stated = {name: _stated(row, name) for name in ("recipe", "parameters", "clock_model")}
     return _page(
-        site, "artifact.html.j2", card=_card(site, row), row=row, facts=facts, lost=lost,
-        findings=_findings(report), words=report.get("words"), evidence=_evidence(row, report),
+        site,
+        "artifact.html.j2",
+        card=_card(site, row),
+        row=row,
+        facts=facts,
+        lost=lost,
+        findings=_findings(report),
+        words=report.get("words"),
+        evidence=_evidence(row, report),
         stated={name: json.dumps(value, indent=2, ensure_ascii=False) for name, value in stated.items() if value},
-        films=row["kind"] in _FILMED and row["object"] is not None, blows=row["kind"] == Kind.WIND,
+        films=row["kind"] in _FILMED and row["object"] is not None,
+        blows=row["kind"] == Kind.WIND,
         lineage=Markup(drawn),  # its texts are escaped
-        clips=clips, clip_count=count,
-    )  # fmt: skip
+        clips=clips,
+        clip_count=count,
+    )
 
 
 def sql(site: Site, text: str | None) -> tuple[str, FlagdataError | None]:
@@ -242,12 +262,18 @@ def _card(site: Site, row: Mapping[str, Any]) -> dict[str, Any]:
         wind = (_stated(row, "report") or {}).get("mean_speed")
     sigma = "" if row["wind_sigma"] is None else f" ± {row['wind_sigma']:.2f}"
     return {
-        "artifact": row["artifact"], "kind": row["kind"], "name": printable(row["name"]), "quality": row["quality"],
+        "artifact": row["artifact"],
+        "kind": row["kind"],
+        "name": printable(row["name"]),
+        "quality": row["quality"],
         "start": None if row["start"] is None else iso(row["start"] // 10**9 * 10**9).replace("T", " "),
-        "length": _together(length), "size": _together(size), "drawn": row["kind"] in DRAWN,
+        "length": _together(length),
+        "size": _together(size),
+        "drawn": row["kind"] in DRAWN,
         "wind": None if wind is None else f"{wind:.2f}{sigma} m/s",
-        "lost": site.media.is_lost(row), "pictured": row["kind"] in _FILMED and row["object"] is not None,
-    }  # fmt: skip
+        "lost": site.media.is_lost(row),
+        "pictured": row["kind"] in _FILMED and row["object"] is not None,
+    }
 
 
 def _together(text: str | None) -> str | None:
@@ -317,9 +343,10 @@ def _answer(site: Site, text: str) -> Table:
     known = set(ids.filter(pc.is_in(ids, value_set=pa.array(sorted(named), pa.string()))).to_pylist())  # type: ignore[attr-defined]
     columns = [[_cell(site, value, known) for value in column] for column in values]
     return Table(
-        header=[printable(name) for name in answer.column_names], rows=list(zip(*columns, strict=True)),
+        header=[printable(name) for name in answer.column_names],
+        rows=list(zip(*columns, strict=True)),
         total=selection.total(),
-    )  # fmt: skip
+    )
 
 
 def _cell(site: Site, value: Any, known: set[str]) -> tuple[str, str | None]:

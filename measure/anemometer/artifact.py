@@ -28,15 +28,22 @@ def artifact(found: Calibrated, name: str, reading: Reading) -> Artifact:
     model = found.model
     spans = [[float(one.features.starts[0]), len(one.features.starts) * model.step] for one in found.recordings]
     return Artifact(
-        kind=Kind.MEASUREMENT, name=name, parents=[one.identity for one in found.recordings],
+        kind=Kind.MEASUREMENT,
+        name=name,
+        parents=[one.identity for one in found.recordings],
         recipe={
-            CALIBRATED: ANSWER, "features": VERSION, "conditioned": CONDITIONED, "network": model.identity,
-            "flag_size": [model.size.length, model.size.height], "spans": spans, "level": found.level,
+            CALIBRATED: ANSWER,
+            "features": VERSION,
+            "conditioned": CONDITIONED,
+            "network": model.identity,
+            "flag_size": [model.size.length, model.size.height],
+            "spans": spans,
+            "level": found.level,
             **reading.recipe(),
         },
         quality=quality_flags(found.findings),
         report=canonical({"schema": "flagdata.anemometer-report/1", **found.as_dict()}),
-    )  # fmt: skip
+    )
 
 
 def keep(lake: Lake, found: Calibrated, name: str, reading: Reading, *, branch: str) -> Placed:
@@ -46,6 +53,9 @@ def keep(lake: Lake, found: Calibrated, name: str, reading: Reading, *, branch: 
         FlagdataError: as `Lake.transaction`.
     """
     return results.keep(
-        lake, artifact(found, name, reading), lambda staged: write(staged, found.model, found.as_dict()),
-        f"calibrate {name}", branch=branch,
-    )  # fmt: skip
+        lake,
+        artifact(found, name, reading),
+        lambda staged: write(staged, found.model, found.as_dict()),
+        f"calibrate {name}",
+        branch=branch,
+    )

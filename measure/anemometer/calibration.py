@@ -109,27 +109,44 @@ class Calibrated:
         """JSON values."""
         model, (low, high) = self.model, self.model.range
         return {
-            "sentence": self.sentence, "network": model.network, "flag_size": [model.size.length, model.size.height],
-            "window": model.step, "windows": len(model.winds), "range": [low, high], "rmse": model.rmse,
-            "uncalibrated_rmse": self.uncalibrated, "level": self.level, "half_width": _plain(self.half_width),
-            "clock_offset": self.offset, "clock_sigma": self.clock, "penalty": model.ridge.penalty,
+            "sentence": self.sentence,
+            "network": model.network,
+            "flag_size": [model.size.length, model.size.height],
+            "window": model.step,
+            "windows": len(model.winds),
+            "range": [low, high],
+            "rmse": model.rmse,
+            "uncalibrated_rmse": self.uncalibrated,
+            "level": self.level,
+            "half_width": _plain(self.half_width),
+            "clock_offset": self.offset,
+            "clock_sigma": self.clock,
+            "penalty": model.ridge.penalty,
             "features": list(model.names),
             "recordings": [
                 {
-                    "name": one.name, "artifact": one.identity, "windows": int(one.usable.sum()),
-                    "anemometer": one.sensor.name, "accuracy": one.sensor.accuracy,
+                    "name": one.name,
+                    "artifact": one.identity,
+                    "windows": int(one.usable.sum()),
+                    "anemometer": one.sensor.name,
+                    "accuracy": one.sensor.accuracy,
                     "distance_constant": one.sensor.distance_constant,
                 }
                 for one in self.recordings
             ],
             "findings": [finding.as_dict() for finding in self.findings],
-        }  # fmt: skip
+        }
 
 
 def recorded(
-    subject: Subject, network: Network, size: FlagSize, *, first: float, last: float | None,
+    subject: Subject,
+    network: Network,
+    size: FlagSize,
+    *,
+    first: float,
+    last: float | None,
     advance: Callable[[int, int], None] | None = None,
-) -> Recording:  # fmt: skip
+) -> Recording:
     """Look at a recording of a lake.
 
     Args:
@@ -143,28 +160,32 @@ def recorded(
     film, wind = subject.film, None if subject.record is None else subject.record.wind()
     if wind is None or film.start is None or subject.artifact is None:
         raise InputError(
-            "no log of the wind is beside the film", where=film.name,
+            "no log of the wind is beside the film",
+            where=film.name,
             fix="align a film and a log (flagdata align), and name the recording that comes out",
-        )  # fmt: skip
+        )
     log = Log.of(wind, start=film.start, clock=subject.artifact.clock_sigma or 0.0)
     if log.times[0] > min(film.duration, math.inf if last is None else last) or log.times[-1] < first:
         raise InputError(
             f"the log runs from {log.times[0]:.1f} to {log.times[-1]:.1f} s of the film's time and covers none of it",
-            where=film.name, fix="align the film with the log of its own time (flagdata align)",
-        )  # fmt: skip
+            where=film.name,
+            fix="align the film with the log of its own time (flagdata align)",
+        )
     features = features_of(film, network.estimator, size, first=first, last=last, advance=advance)
     findings = film.findings()
     if faults := [one for one in findings if one.kind in REASONS]:
         raise RefusedError(faults[0].what, where=film.name, fix=faults[0].fix or "give another film")
     return Recording(
-        name=film.name, identity=subject.artifact.id, features=features, log=log.unlagged(),
-        sensor=wind.sensor, findings=findings,
-    )  # fmt: skip
+        name=film.name,
+        identity=subject.artifact.id,
+        features=features,
+        log=log.unlagged(),
+        sensor=wind.sensor,
+        findings=findings,
+    )
 
 
-def calibrated(
-    recordings: Sequence[Recording], *, network: Network, size: FlagSize, level: float
-) -> Calibrated:  # fmt: skip
+def calibrated(recordings: Sequence[Recording], *, network: Network, size: FlagSize, level: float) -> Calibrated:
     """Fit a reading model.
 
     Raises:
@@ -176,9 +197,10 @@ def calibrated(
     count = sum(int(one.sum()) for one in usable)
     if count * step < LEAST / 2:
         raise InputError(
-            f"only {count * step:.0f} s of film have all their frames and a log beside them", where=recordings[0].name,
+            f"only {count * step:.0f} s of film have all their frames and a log beside them",
+            where=recordings[0].name,
             fix=f"give {LEAST:.0f} s or more that the log covers; {ENOUGH / 60:.0f} minutes are better",
-        )  # fmt: skip
+        )
     _check_wind(recordings, usable)
     names = recordings[0].features.names
     rows, plain = _rows(recordings, usable)
@@ -199,20 +221,31 @@ def calibrated(
         raise RefusedError(
             f"the wind that is read of windows left out errs by {checked.rmse:.2f} m/s, as much as their mean would "
             f"({spread:.2f} m/s): what moves may not be the flag, or film and log may not be of one time",
-            where=recordings[0].name, fix="check the flag with --crop or --flag, and the clocks with flagdata align",
-        )  # fmt: skip
+            where=recordings[0].name,
+            fix="check the flag with --crop or --flag, and the clocks with flagdata align",
+        )
     model = ReadingModel(
-        network=network.estimator.name, identity=network.identity, size=size, step=step, names=names,
-        ridge=Ridge.fitted(rows, logged, checked.penalty, checked.weights), winds=logged,
-        errors=logged - checked.predicted, block=round(BLOCK / step),
+        network=network.estimator.name,
+        identity=network.identity,
+        size=size,
+        step=step,
+        names=names,
+        ridge=Ridge.fitted(rows, logged, checked.penalty, checked.weights),
+        winds=logged,
+        errors=logged - checked.predicted,
+        block=round(BLOCK / step),
         familiar=Familiar.of(plain, checked.predicted, blocks),
         places=tuple(one.features.place for one in recordings),
-    )  # fmt: skip
+    )
     return Calibrated(
-        model=model, recordings=tuple(recordings), offset=offset, clock=clock, level=level,
+        model=model,
+        recordings=tuple(recordings),
+        offset=offset,
+        clock=clock,
+        level=level,
         uncalibrated=_uncalibrated(recordings, usable, logged),
         findings=(*(f for one in recordings for f in one.findings), *_noticed(recordings, count * step, offset, clock)),
-    )  # fmt: skip
+    )
 
 
 def _check_wind(recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]]) -> None:
@@ -221,8 +254,9 @@ def _check_wind(recordings: Sequence[Recording], usable: Sequence[NDArray[np.boo
         raise RefusedError(
             f"the wind hardly changes ({every.mean():.1f} m/s, its windows within {every.std():.2f} m/s), so that "
             "nothing shows how the flag follows it",
-            where=recordings[0].name, fix="film for longer, or in gusts; several recordings are taken together",
-        )  # fmt: skip
+            where=recordings[0].name,
+            fix="film for longer, or in gusts; several recordings are taken together",
+        )
 
 
 def _rows(recordings: Sequence[Recording], usable: Sequence[NDArray[np.bool_]]) -> tuple[Floats, Floats]:
@@ -253,29 +287,35 @@ def _noticed(recordings: Sequence[Recording], seconds: float, offset: float, clo
     if seconds < ENOUGH:
         found.append(
             Finding(
-                kind="short-calibration", severity=Severity.WARNING, value=seconds,
+                kind="short-calibration",
+                severity=Severity.WARNING,
+                value=seconds,
                 what=f"{seconds:.0f} s of film beside a log are few: the intervals rest on {seconds / BLOCK:.0f} "
                 "blocks of time",
                 fix=f"give {ENOUGH / 60:.0f} minutes or more",
             )
-        )  # fmt: skip
+        )
     if abs(offset) > 1.5 * clock > 0:
         found.append(
             Finding(
-                kind="clock-at-limit", severity=Severity.WARNING, value=offset,
+                kind="clock-at-limit",
+                severity=Severity.WARNING,
+                value=offset,
                 what=f"the log fits best {offset:+.2f} s later than its stamps, whose uncertainty is {clock:.2f} s",
                 fix="check the clocks with flagdata align",
             )
-        )  # fmt: skip
+        )
     accuracy = max((one.sensor.accuracy or 0.0 for one in recordings), default=0.0)
     if accuracy:
         found.append(
             Finding(
-                kind="anemometer-accuracy", severity=Severity.NOTE, value=accuracy,
+                kind="anemometer-accuracy",
+                severity=Severity.NOTE,
+                value=accuracy,
                 what=f"the anemometer states ±{accuracy:g} m/s, which the reading model takes over and no interval "
                 "contains",
             )
-        )  # fmt: skip
+        )
     return found
 
 

@@ -80,9 +80,14 @@ class Features:
 
 @torch.no_grad()
 def features_of(
-    film: ConditionedFilm, model: Estimator, size: FlagSize, *, first: float | None = None, last: float | None = None,
+    film: ConditionedFilm,
+    model: Estimator,
+    size: FlagSize,
+    *,
+    first: float | None = None,
+    last: float | None = None,
     advance: Callable[[int, int], None] | None = None,
-) -> Features:  # fmt: skip
+) -> Features:
     """Look at a film.
 
     Args:
@@ -96,9 +101,14 @@ def features_of(
     """
     scale = size.scale(trained_on(model.targets))
     layout = lay_out(
-        frames=model.front_end.frames, spacings=(spacing(scale, rate=model.front_end.rate),), rate=film.rate,
-        duration=film.duration, step=None, first=first, last=last,
-    )  # fmt: skip
+        frames=model.front_end.frames,
+        spacings=(spacing(scale, rate=model.front_end.rate),),
+        rate=film.rate,
+        duration=film.duration,
+        step=None,
+        first=first,
+        last=last,
+    )
     summaries: NDArray[np.float32] | None = None
     rows: dict[int, NDArray[np.float32]] = {}
     winds = np.full(layout.count, np.nan)
@@ -132,11 +142,16 @@ def features_of(
     every = np.full((layout.count, len(next(iter(rows.values())))), np.nan)
     every[list(rows)] = list(rows.values())
     return Features(
-        film=film.name, starts=layout.first + layout.step * np.arange(layout.count, dtype=np.float64), layout=layout,
+        film=film.name,
+        starts=layout.first + layout.step * np.arange(layout.count, dtype=np.float64),
+        layout=layout,
         values=np.concatenate([every, winds[:, None]], axis=1),
         names=(*(f"{SUMMARY}{k}" for k in range(every.shape[1])), "network-wind"),
-        summaries=summaries, winds=winds, clip=clip, place=_place(film, *hoist.found()),
-    )  # fmt: skip
+        summaries=summaries,
+        winds=winds,
+        clip=clip,
+        place=_place(film, *hoist.found()),
+    )
 
 
 class _Hoist:
@@ -180,6 +195,8 @@ def _place(film: ConditionedFilm, hoist: NDArray[np.float64], side: float) -> Pl
     square = found.square
     corner = np.array([square.x, square.y], dtype=np.float64)
     return Place(
-        hoist=(corner + hoist * square.side) / longer, side=side, background=np.asarray(background, np.float32),
+        hoist=(corner + hoist * square.side) / longer,
+        side=side,
+        background=np.asarray(background, np.float32),
         bare=bare,
-    )  # fmt: skip
+    )

@@ -42,10 +42,20 @@ class Made:
 
 
 def made(
-    sources: Sequence[str], size: FlagSize, reading: Reading, *, name: str | None, model: str | None, lake: Lake | None,
-    branch: str, commit: bool, first: float, last: float | None, level: float,
+    sources: Sequence[str],
+    size: FlagSize,
+    reading: Reading,
+    *,
+    name: str | None,
+    model: str | None,
+    lake: Lake | None,
+    branch: str,
+    commit: bool,
+    first: float,
+    last: float | None,
+    level: float,
     advance: Callable[[int], object] | None = None,
-) -> Made:  # fmt: skip
+) -> Made:
     """Make a reading model of recordings of one flag from one place.
 
     Args:
@@ -68,9 +78,10 @@ def made(
     seconds = sum(min(one.film.duration, math.inf if last is None else last) - first for one in found)
     if seconds < LEAST:
         raise InputError(
-            f"{max(seconds, 0.0):.0f} s of film beside a log", where=found[0].film.name,
+            f"{max(seconds, 0.0):.0f} s of film beside a log",
+            where=found[0].film.name,
             fix=f"give {LEAST:.0f} s or more; {ENOUGH / 60:.0f} minutes are better",
-        )  # fmt: skip
+        )
 
     def step(_: int, count: int) -> None:
         if advance is not None:

@@ -53,9 +53,14 @@ class Familiarity(Verdict):
 
 
 def measure_by(
-    film: ConditionedFilm, model: ReadingModel, estimator: Estimator, options: Options, *, name: str,
+    film: ConditionedFilm,
+    model: ReadingModel,
+    estimator: Estimator,
+    options: Options,
+    *,
+    name: str,
     advance: Callable[[int, int], None] | None = None,
-) -> Measurement:  # fmt: skip
+) -> Measurement:
     """Measure a film by a reading model.
 
     Args:
@@ -89,32 +94,49 @@ def measured_from(
     draws = np.maximum(winds[shown].mean() + errors, 0.0)
     low, high = (float(end) for end in np.quantile(draws, [(1 - options.level) / 2, (1 + options.level) / 2]))
     own = Quantity(
-        name=WIND, unit="m/s", value=float(draws.mean()), sigma=float(draws.std()),
-        span=Span(low=low, high=high, level=options.level, bound=None, estimated=True), assumed=model.range,
+        name=WIND,
+        unit="m/s",
+        value=float(draws.mean()),
+        sigma=float(draws.std()),
+        span=Span(low=low, high=high, level=options.level, bound=None, estimated=True),
+        assumed=model.range,
         information=information(draws, model.winds),
-    )  # fmt: skip
+    )
     middle = shown[len(shown) // 2]
     scale = model.size.scale(trained_on(estimator.targets))
     return Measurement(
-        film=film.name, rate=film.rate, duration=film.duration, model=name, options=replace(options, size=model.size),
-        names=(WIND,), draws=draws[:, None], quantities=(own,), windows=windows, combined=len(shown),
-        dependence=_dependence(errors, model, len(shown)), verdict=judged,
+        film=film.name,
+        rate=film.rate,
+        duration=film.duration,
+        model=name,
+        options=replace(options, size=model.size),
+        names=(WIND,),
+        draws=draws[:, None],
+        quantities=(own,),
+        windows=windows,
+        combined=len(shown),
+        dependence=_dependence(errors, model, len(shown)),
+        verdict=judged,
         sizes=Sizes(given=model.size, scale=np.array([scale]), draws=np.full((1, DRAWS), scale), findings=()),
-        summary=features.summaries[middle], clip=features.clip,
-        findings=(*findings, *_about(winds[shown], features, model)), bounds=(),
-    )  # fmt: skip
+        summary=features.summaries[middle],
+        clip=features.clip,
+        findings=(*findings, *_about(winds[shown], features, model)),
+        bounds=(),
+    )
 
 
 def _check(options: Options, model: ReadingModel) -> None:
     for where, given in (
-        ("--area-weight", options.area_weight is not None), ("--refine", options.refine is not None),
+        ("--area-weight", options.area_weight is not None),
+        ("--refine", options.refine is not None),
         ("--windows", options.step is not None and abs(options.step - model.step) > 1e-6),
-    ):  # fmt: skip
+    ):
         if given:
             raise UsageError(
-                f"a reading model knows its flag, and its windows are {model.step:.4g} s long", where=where,
+                f"a reading model knows its flag, and its windows are {model.step:.4g} s long",
+                where=where,
                 fix=f"leave {where} out, or choose a network by --model",
-            )  # fmt: skip
+            )
 
 
 def _size_reason(given: FlagSize | None, model: ReadingModel) -> list[Finding]:
@@ -123,32 +145,46 @@ def _size_reason(given: FlagSize | None, model: ReadingModel) -> list[Finding]:
         return []
     return [
         Finding(
-            kind="another-size", severity=Severity.WARNING, value=given.length / own.length,
+            kind="another-size",
+            severity=Severity.WARNING,
+            value=given.length / own.length,
             what=f"the flag is stated as {given.length:g} m × {given.height:g} m, that of the calibration as "
             f"{own.length:g} m × {own.height:g} m",
             fix="check --flag-size, or calibrate this flag",
         )
-    ]  # fmt: skip
+    ]
 
 
 def _verdict(
-    film: ConditionedFilm, features: Features, used: Floats, winds: Floats, model: ReadingModel, options: Options,
+    film: ConditionedFilm,
+    features: Features,
+    used: Floats,
+    winds: Floats,
+    model: ReadingModel,
+    options: Options,
     findings: Sequence[Finding],
-) -> Familiarity:  # fmt: skip
+) -> Familiarity:
     shown = np.isfinite(winds)
     compared = Compared.of(model.familiar.shift(used[shown], winds[shown]), features.place, model.places)
     faults = [one for one in findings if one.kind in REASONS]
     faults += [*_size_reason(options.size, model), *compared.reasons()]
     p = model.familiar.p_value(used[shown], winds[shown])
     return Familiarity(
-        false_alarm=options.false_alarm, level=0.0, refusing=len(p), sizes=(0,), considered=1, size=0,
+        false_alarm=options.false_alarm,
+        level=0.0,
+        refusing=len(p),
+        sizes=(0,),
+        considered=1,
+        size=0,
         p=float(np.median(p)),
-        window_p=tuple(p.tolist()), blank=(False,) * len(p), faults=tuple(Reason.counted(one) for one in faults),
+        window_p=tuple(p.tolist()),
+        blank=(False,) * len(p),
+        faults=tuple(Reason.counted(one) for one in faults),
         window_reasons=(
             Reason(kind="familiar", what=f"the median p of its windows is {np.median(p):.2f}", p=float(np.median(p))),
         ),
         figures=compared.figures,
-    )  # fmt: skip
+    )
 
 
 def _window(
@@ -158,10 +194,14 @@ def _window(
     value = max(wind, least)
     place = int(np.count_nonzero(features.whole[:k]))
     own = Quantity(
-        name=WIND, unit="m/s", value=value, sigma=model.rmse,
+        name=WIND,
+        unit="m/s",
+        value=value,
+        sigma=model.rmse,
         span=Span(low=max(wind - half, least), high=wind + half, level=options.level, bound=None, estimated=True),
-        assumed=model.range, information=information(wind + model.errors, model.winds),
-    )  # fmt: skip
+        assumed=model.range,
+        information=information(wind + model.errors, model.winds),
+    )
     start = float(features.starts[k])
     return WindowAnswer(start=start, end=start + features.layout.length, quantities=(own,), p=judged.window_p[place])
 
@@ -180,18 +220,23 @@ def _about(winds: Floats, features: Features, model: ReadingModel) -> list[Findi
     if beyond:
         found.append(
             Finding(
-                kind="beyond-calibration", severity=Severity.WARNING, count=beyond, value=beyond / len(winds),
+                kind="beyond-calibration",
+                severity=Severity.WARNING,
+                count=beyond,
+                value=beyond / len(winds),
                 what=f"{beyond} of {len(winds)} windows read winds beyond those of the calibration ({low:.1f} to "
                 f"{high:.1f} m/s), where nothing checked the intervals",
                 fix="calibrate in stronger and weaker winds as well",
             )
-        )  # fmt: skip
+        )
     missing = len(features.starts) - len(winds)
     if missing:
         found.append(
             Finding(
-                kind="windows-left-out", severity=Severity.WARNING, count=missing,
+                kind="windows-left-out",
+                severity=Severity.WARNING,
+                count=missing,
                 what=f"{missing} of {len(features.starts)} windows lack frames and were left out",
             )
-        )  # fmt: skip
+        )
     return found

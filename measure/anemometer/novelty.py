@@ -79,9 +79,15 @@ class Familiar:
             distances[inside] = np.sqrt(np.square(white).mean(axis=1))
             noises.append(len(white) * float(np.square(white.mean(axis=0)).mean()))
         return cls(
-            centre=whole.centre, spread=whole.spread, coefficients=whole.coefficients, whitening=whole.whitening,
-            distances=np.sort(distances), low=whole.low, high=whole.high, noise=float(np.mean(noises)),
-        )  # fmt: skip
+            centre=whole.centre,
+            spread=whole.spread,
+            coefficients=whole.coefficients,
+            whitening=whole.whitening,
+            distances=np.sort(distances),
+            low=whole.low,
+            high=whole.high,
+            noise=float(np.mean(noises)),
+        )
 
     @classmethod
     def _fitted(cls, values: Floats, winds: Floats) -> Familiar:
@@ -94,10 +100,15 @@ class Familiar:
         own, vectors = np.linalg.eigh(covariance)
         low, high = np.quantile(winds, [0.02, 0.98])
         return cls(
-            centre=centre, spread=spread, coefficients=coefficients, distances=np.zeros(0), low=float(low),
-            high=float(high), noise=0.0,
+            centre=centre,
+            spread=spread,
+            coefficients=coefficients,
+            distances=np.zeros(0),
+            low=float(low),
+            high=float(high),
+            noise=0.0,
             whitening=(vectors / np.sqrt(np.maximum(own, 1e-12))).T,
-        )  # fmt: skip
+        )
 
     def _white(self, values: Floats, winds: Floats) -> Floats:
         powers = np.vander(winds, _DEGREE + 1, increasing=True)
@@ -151,9 +162,11 @@ class Compared:
         alike = [one for one in places if one.background.shape == here.background.shape]
         known = [value for one in alike if not math.isnan(value := _correlation(here, one))]
         return cls(
-            shift=shift, framing=min(_away(here, one) for one in places),
-            likeness=max(known) if known else math.nan, same_shape=bool(alike),
-        )  # fmt: skip
+            shift=shift,
+            framing=min(_away(here, one) for one in places),
+            likeness=max(known) if known else math.nan,
+            same_shape=bool(alike),
+        )
 
     @property
     def figures(self) -> str:
@@ -165,9 +178,10 @@ class Compared:
             "the hoist was not found" if math.isnan(self.framing) else f"the hoist by {self.framing:.2f} of its height"
         )
         found.append(
-            "no background shows the place" if math.isnan(self.likeness)
+            "no background shows the place"
+            if math.isnan(self.likeness)
             else f"the backgrounds correlate by {self.likeness:.2f}"
-        )  # fmt: skip
+        )
         return ", ".join(found)
 
     def reasons(self) -> list[Finding]:

@@ -19,17 +19,22 @@ _BLUE, _RUST = "#2b6f8f", "#c4622d"
 def section(found: Calibrated) -> Section:
     """The section, with the windows beside the log."""
     values = {
-        "sentence": found.sentence, "series": _picture(found), "level": f"{found.level * 100:.3g} %",
+        "sentence": found.sentence,
+        "series": _picture(found),
+        "level": f"{found.level * 100:.3g} %",
         "clock": _clock(found),
         "recordings": [
             {
-                "name": one.name, "windows": int(one.usable.sum()), "anemometer": one.sensor.name,
-                "accuracy": _stated(one.sensor.accuracy, "m/s"), "distance": _stated(one.sensor.distance_constant, "m"),
+                "name": one.name,
+                "windows": int(one.usable.sum()),
+                "anemometer": one.sensor.name,
+                "accuracy": _stated(one.sensor.accuracy, "m/s"),
+                "distance": _stated(one.sensor.distance_constant, "m"),
             }
             for one in found.recordings
         ],
         "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in found.findings],
-    }  # fmt: skip
+    }
     body = Markup(render("measure.anemometer", "section.html.j2", values))
     return Section(anchor="anemometer", title="The flag as an anemometer", body=body)
 

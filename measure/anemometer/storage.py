@@ -20,9 +20,12 @@ FORMAT = 1
 HEAD = "flagdata_anemometer"
 _RIDGE = ("centre", "spread", "coefficients")
 _FAMILIAR: Mapping[str, tuple[str, ...]] = {
-    "centre": ("feature",), "spread": ("feature",), "coefficients": ("power", "feature"),
-    "whitening": ("white", "feature"), "distances": ("rank",),
-}  # fmt: skip
+    "centre": ("feature",),
+    "spread": ("feature",),
+    "coefficients": ("power", "feature"),
+    "whitening": ("white", "feature"),
+    "distances": ("rank",),
+}
 
 
 def write(path: Path, model: ReadingModel, about: Mapping[str, Any]) -> None:
@@ -36,13 +39,22 @@ def write(path: Path, model: ReadingModel, about: Mapping[str, Any]) -> None:
 
     ridge, familiar = model.ridge, model.familiar
     group = zarr.open_group(path, mode="w-", zarr_format=3)
-    group.update_attributes({
-        HEAD: {"format": FORMAT}, "network": model.network, "identity": model.identity,
-        "flag_size": [model.size.length, model.size.height], "step": model.step, "features": list(model.names),
-        "ridge": {"offset": ridge.offset, "penalty": ridge.penalty}, "block": model.block, "noise": familiar.noise,
-        "compared": [familiar.low, familiar.high], "sides": [place.side for place in model.places],
-        "answer": dict(about),
-    })  # fmt: skip
+    group.update_attributes(
+        {
+            HEAD: {"format": FORMAT},
+            "network": model.network,
+            "identity": model.identity,
+            "flag_size": [model.size.length, model.size.height],
+            "step": model.step,
+            "features": list(model.names),
+            "ridge": {"offset": ridge.offset, "penalty": ridge.penalty},
+            "block": model.block,
+            "noise": familiar.noise,
+            "compared": [familiar.low, familiar.high],
+            "sides": [place.side for place in model.places],
+            "answer": dict(about),
+        }
+    )
     for name in _RIDGE:
         write_plain(group, f"ridge_{name}", getattr(ridge, name), ("column",))
     write_plain(group, "winds", model.winds, ("window",))
@@ -73,20 +85,28 @@ def read(path: Path) -> ReadingModel:
             return read_part(group, name, None, None, where=str(path))
 
         return ReadingModel(
-            network=about["network"], identity=about["identity"],
-            size=FlagSize(length=about["flag_size"][0], height=about["flag_size"][1]), step=about["step"],
+            network=about["network"],
+            identity=about["identity"],
+            size=FlagSize(length=about["flag_size"][0], height=about["flag_size"][1]),
+            step=about["step"],
             names=tuple(about["features"]),
             ridge=Ridge(**{part: array(f"ridge_{part}") for part in _RIDGE}, **about["ridge"]),
-            winds=array("winds"), errors=array("errors"), block=about["block"],
+            winds=array("winds"),
+            errors=array("errors"),
+            block=about["block"],
             familiar=Familiar(
-                noise=about["noise"], low=about["compared"][0], high=about["compared"][1],
+                noise=about["noise"],
+                low=about["compared"][0],
+                high=about["compared"][1],
                 **{name: array(f"familiar_{name}") for name in _FAMILIAR},
             ),
             places=tuple(
                 Place(
-                    hoist=array(f"hoist_{number}"), side=side, background=array(f"background_{number}"),
+                    hoist=array(f"hoist_{number}"),
+                    side=side,
+                    background=array(f"background_{number}"),
                     bare=array(f"bare_{number}"),
                 )
                 for number, side in enumerate(about["sides"])
             ),
-        )  # fmt: skip
+        )

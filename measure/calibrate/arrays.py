@@ -32,11 +32,27 @@ Number = float | tuple[float, float] | str | Stated
 
 
 def calibrated(
-    recordings: Sequence[Arrays | Path | str], *, flag_size: tuple[float, float], attachment: str,
-    azimuth_deg: Number | None, elevation_deg: Number | None, distance: float | None, start: float, end: float | None,
-    crop: tuple[int, int, int, int] | None, flag: int | None, log: str | None, offset: Number | None,
-    simulations: int, level: float, seed: int, workers: int, lake: Lake | None, at: str | None, cache: Path | None,
-) -> Calibrated:  # fmt: skip
+    recordings: Sequence[Arrays | Path | str],
+    *,
+    flag_size: tuple[float, float],
+    attachment: str,
+    azimuth_deg: Number | None,
+    elevation_deg: Number | None,
+    distance: float | None,
+    start: float,
+    end: float | None,
+    crop: tuple[int, int, int, int] | None,
+    flag: int | None,
+    log: str | None,
+    offset: Number | None,
+    simulations: int,
+    level: float,
+    seed: int,
+    workers: int,
+    lake: Lake | None,
+    at: str | None,
+    cache: Path | None,
+) -> Calibrated:
     """What `flagdata.calibrate` does; see there for what it takes.
 
     Raises:
@@ -53,8 +69,11 @@ def calibrated(
         elevation=(
             ELEVATION if elevation_deg is None else known(ELEVATION, Stated.of(elevation_deg), where="elevation_deg")
         ),
-        distance=FAR if distance is None else distance, simulations=simulations, level=level, seed=seed,
-    )  # fmt: skip
+        distance=FAR if distance is None else distance,
+        simulations=simulations,
+        level=level,
+        seed=seed,
+    )
 
     def name(numbered: tuple[int, Arrays | Path | str]) -> str:
         number, one = numbered
@@ -67,15 +86,25 @@ def calibrated(
             cuts = tuple(cut(each, start, end) if each.place is None else each for each in rows)
             return Opened(name=name(numbered), parent=None, rows=cuts)
         return opened(
-            str(one), size, reading, lake=lake, at=at or "main", first=start, last=end, log=log,
+            str(one),
+            size,
+            reading,
+            lake=lake,
+            at=at or "main",
+            first=start,
+            last=end,
+            log=log,
             offset=None if offset is None else Stated.of(offset),
-        )  # fmt: skip
+        )
 
     gathered = Sources.of(list(enumerate(recordings, start=1)), opening, name=name).read(size)
     found = calibrate(
-        gathered.recordings, options, folder=cache or user_cache() / "calibrate", workers=workers,
+        gathered.recordings,
+        options,
+        folder=cache or user_cache() / "calibrate",
+        workers=workers,
         left_out=gathered.left_out,
-    )  # fmt: skip
+    )
     return _answer(found)
 
 
@@ -102,14 +131,23 @@ def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
 def _answer(found: Calibration) -> Calibrated:
     quantities = {
         one.name: Weighed(
-            unit=one.unit, value=one.value, sigma=one.sigma, interval=one.interval, assumed=one.assumed,
+            unit=one.unit,
+            value=one.value,
+            sigma=one.sigma,
+            interval=one.interval,
+            assumed=one.assumed,
             bound=one.span.worded(lambda value: f"{value:.4g}", f" {one.unit}") if one.bounded else None,
             level=one.span.level,
         )
         for one in found.cloth
-    }  # fmt: skip
+    }
     return Calibrated(
-        sentence=found.sentence, level=found.options.level, quantities=quantities,
-        draws={name: found.draws.cloth[name] for name in quantities}, withheld=found.withheld, stated=found.stated,
-        findings=found.findings, document=found.as_dict(),
-    )  # fmt: skip
+        sentence=found.sentence,
+        level=found.options.level,
+        quantities=quantities,
+        draws={name: found.draws.cloth[name] for name in quantities},
+        withheld=found.withheld,
+        stated=found.stated,
+        findings=found.findings,
+        document=found.as_dict(),
+    )

@@ -36,15 +36,24 @@ def artifact(found: Calibration, reading: Reading, parents: tuple[str, ...]) -> 
     sources = [one.observed.source for one in found.recordings]
     spans = [[one.observed.first, one.observed.duration] for one in found.recordings]
     return Artifact(
-        kind=Kind.MEASUREMENT, name=", ".join(one.observed.name for one in found.recordings),
-        parents=parents, seed=found.options.seed, parameters=canonical(values),
+        kind=Kind.MEASUREMENT,
+        name=", ".join(one.observed.name for one in found.recordings),
+        parents=parents,
+        seed=found.options.seed,
+        parameters=canonical(values),
         recipe={
-            "calibrate": ANSWER, "simulations": VERSION, "observe": READINGS, "conditioned": CONDITIONED,
-            "sources": sources, "spans": spans, **reading.recipe(), **found.options.recipe(),
+            "calibrate": ANSWER,
+            "simulations": VERSION,
+            "observe": READINGS,
+            "conditioned": CONDITIONED,
+            "sources": sources,
+            "spans": spans,
+            **reading.recipe(),
+            **found.options.recipe(),
         },
         quality=quality_flags(found.findings),
         report=canonical({"schema": "flagdata.calibrate-report/1", **found.as_dict()}),
-    )  # fmt: skip
+    )
 
 
 def keep(lake: Lake, found: Calibration, reading: Reading, parents: tuple[str, ...], *, branch: str) -> Placed:

@@ -30,15 +30,27 @@ from measure.calibrate.tables import Beside, instants, rows_of
 from measure.estimate.similarity import FlagSize
 
 _FOLLOWS = (
-    "outline-speed", "middle-speed", "extension", "amplitude-across", "amplitude-up", "droop", "frequency",
-)  # fmt: skip
+    "outline-speed",
+    "middle-speed",
+    "extension",
+    "amplitude-across",
+    "amplitude-up",
+    "droop",
+    "frequency",
+)
 """Observables that follow the wind, those that do so most closely first; the droop falls with it."""
 
 
 def joined(
-    path: Path, size: FlagSize, *, lake: Lake, log: str, at: str, offset: Stated | None = None,
+    path: Path,
+    size: FlagSize,
+    *,
+    lake: Lake,
+    log: str,
+    at: str,
+    offset: Stated | None = None,
     progress: Callable[[int], object] | None = None,
-) -> tuple[Beside, str]:  # fmt: skip
+) -> tuple[Beside, str]:
     """The log of a lake beside a table, and its artifact's id.
 
     Args:
@@ -89,9 +101,14 @@ def declared(table: Columns, offset: Stated, *, names: tuple[str, str]) -> Clock
 
 
 def estimated(
-    table: Columns, series: WindSeries, *, names: tuple[str, str], seed: str, search: LagSearch | None = None,
+    table: Columns,
+    series: WindSeries,
+    *,
+    names: tuple[str, str],
+    seed: str,
+    search: LagSearch | None = None,
     progress: Callable[[int], object] | None = None,
-) -> ClockModel:  # fmt: skip
+) -> ClockModel:
     """The table's clock on the log's, by what follows the wind in it.
 
     Args:
@@ -107,22 +124,28 @@ def estimated(
     values = follows(table)
     there = np.isfinite(values)
     motion = WindSeries(
-        time=instants(table)[there], channels={"wind_speed": values[there]},
+        time=instants(table)[there],
+        channels={"wind_speed": values[there]},
         flags=np.zeros(int(there.sum()), dtype=np.uint16),
         # A row's time is the middle of its span: nothing precedes it.
         sensor=Sensor(name=names[1], averaging=0.0, distance_constant=0.0),
-    )  # fmt: skip
+    )
     try:
         model, _, _ = clock_between(
-            series, motion, names=names, search=search, generator=stream(0, "calibrate", "beside", seed),
+            series,
+            motion,
+            names=names,
+            search=search,
+            generator=stream(0, "calibrate", "beside", seed),
             progress=progress,
-        )  # fmt: skip
+        )
     except RefusedError as error:
         raise RefusedError(
-            error.what, where=error.where,
+            error.what,
+            where=error.where,
             fix="check that the table and the log are of one wind, or state what is added to the table's clock to "
             "reach the log's: --offset 0.3±0.1",
-        ) from error  # fmt: skip
+        ) from error
     segments = tuple(
         replace(
             one, offset=one.offset + search.response, sigma_offset=math.hypot(one.sigma_offset, search.response_sigma)
@@ -143,6 +166,7 @@ def follows(table: Columns) -> Floats:
             own = math.pi / 2 - table[name] if name == "droop" else table[name]
             return np.asarray(own - min(0.0, float(np.nanmin(own))), dtype=np.float64)
     raise InputError(
-        f"no observable that follows the wind: {', '.join(_FOLLOWS)}", where=table.where,
+        f"no observable that follows the wind: {', '.join(_FOLLOWS)}",
+        where=table.where,
         fix="state the offset of the clocks: --offset 0.3±0.1",
-    )  # fmt: skip
+    )

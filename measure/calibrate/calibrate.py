@@ -64,10 +64,15 @@ class Options:
     def recipe(self) -> dict[str, Any]:
         """JSON values."""
         return {
-            "flag_size": [self.flag.length, self.flag.height], "attachment": self.flag.attachment,
-            "azimuth": self.azimuth.prior.as_dict(), "elevation": self.elevation.prior.as_dict(),
-            "distance": self.distance, "simulations": self.simulations, "level": self.level, "seed": self.seed,
-        }  # fmt: skip
+            "flag_size": [self.flag.length, self.flag.height],
+            "attachment": self.flag.attachment,
+            "azimuth": self.azimuth.prior.as_dict(),
+            "elevation": self.elevation.prior.as_dict(),
+            "distance": self.distance,
+            "simulations": self.simulations,
+            "level": self.level,
+            "seed": self.seed,
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,10 +109,15 @@ class Quantity:
     def as_dict(self) -> dict[str, Any]:
         """JSON values; an end of the interval that nothing bounds is null."""
         return {
-            "unit": self.unit, "value": self.value, "sigma": self.sigma, "interval": self.span.ends(),
-            "level": self.span.level, "bound": None if self.span.bound is None else self.span.bound.value,
-            "assumed": list(self.assumed), "determined": self.value is not None,
-        }  # fmt: skip
+            "unit": self.unit,
+            "value": self.value,
+            "sigma": self.sigma,
+            "interval": self.span.ends(),
+            "level": self.span.level,
+            "bound": None if self.span.bound is None else self.span.bound.value,
+            "assumed": list(self.assumed),
+            "determined": self.value is not None,
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,23 +241,31 @@ class Calibration:
         """JSON values."""
         weight = self.weight
         return {
-            "sentence": self.sentence, "cloth": {q.name: q.as_dict() for q in self.cloth},
+            "sentence": self.sentence,
+            "cloth": {q.name: q.as_dict() for q in self.cloth},
             "recordings": [
                 {
-                    "name": one.observed.name, "source": one.observed.source, "windows": len(one.observed.readings),
-                    "wind_speed": float(one.observed.speed.mean()), "misfit": one.misfit, "failed": one.failed,
+                    "name": one.observed.name,
+                    "source": one.observed.source,
+                    "windows": len(one.observed.readings),
+                    "wind_speed": float(one.observed.speed.mean()),
+                    "misfit": one.misfit,
+                    "failed": one.failed,
                     "observables": [name for name, there in zip(OBSERVED, one.used, strict=True) if there],
                     "place": {q.name: q.as_dict() for q in place},
                 }
                 for one, place in zip(self.recordings, self.places, strict=True)
             ],
-            "area_weight_stated": self.stated, "withheld": self.withheld,
-            "close_loop": None if weight.value is None or weight.sigma is None else {
-                "density": weight.value, "density-uncertainty": weight.sigma / weight.value
-            },
-            "check": self.check.as_dict(), "options": self.options.recipe(), "level": self.options.level,
+            "area_weight_stated": self.stated,
+            "withheld": self.withheld,
+            "close_loop": None
+            if weight.value is None or weight.sigma is None
+            else {"density": weight.value, "density-uncertainty": weight.sigma / weight.value},
+            "check": self.check.as_dict(),
+            "options": self.options.recipe(),
+            "level": self.options.level,
             "findings": [finding.as_dict() for finding in self.findings],
-        }  # fmt: skip
+        }
 
 
 def calibrate(
@@ -292,12 +310,19 @@ def designs_of(recordings: Sequence[Observed], options: Options) -> list[Design]
         raise InputError(f"{twice[0]} is given twice", where="recordings", fix="give each recording of the flag once")
     return [
         Design(
-            flag=options.flag, log=one.log, duration=one.duration, azimuth=options.azimuth,
-            elevation=options.elevation, count=options.simulations, seed=options.seed, distance=options.distance,
-            recording=name, place=name if one.place is None else one.place,
+            flag=options.flag,
+            log=one.log,
+            duration=one.duration,
+            azimuth=options.azimuth,
+            elevation=options.elevation,
+            count=options.simulations,
+            seed=options.seed,
+            distance=options.distance,
+            recording=name,
+            place=name if one.place is None else one.place,
         )
         for one, name in zip(recordings, names, strict=True)
-    ]  # fmt: skip
+    ]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -328,15 +353,19 @@ class _Simulated:
         """
         one = self.observed
         return Sight(
-            emulator=Emulator.fit(self.values, self.summaries, self.used, name=one.name), azimuth=options.azimuth,
-            elevation=options.elevation, place=one.place,
-        )  # fmt: skip
+            emulator=Emulator.fit(self.values, self.summaries, self.used, name=one.name),
+            azimuth=options.azimuth,
+            elevation=options.elevation,
+            place=one.place,
+        )
 
 
 def answered(
-    simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats]], options: Options, *,
+    simulations: Sequence[tuple[Observed, Mapping[str, Floats], Floats]],
+    options: Options,
+    *,
     left_out: Sequence[Finding] = (),
-) -> Calibration:  # fmt: skip
+) -> Calibration:
     """The answer from recordings, each with its simulations' values, name → (simulation,), and their readings
     (simulation, window, observable). Those whose simulations do not show what they show are left out.
 
@@ -360,20 +389,24 @@ def answered(
     left_out = (*left_out, *unlike)
     made, sights = [own for own, _ in both], [own for _, own in both]
     check_in_all(
-        sum(one.observed.duration for one in made), where=", ".join(one.observed.name for one in made),
+        sum(one.observed.duration for one in made),
+        where=", ".join(one.observed.name for one in made),
         left_out=left_out,
-    )  # fmt: skip
+    )
     found = posterior(sights, [one.observed.summary for one in made], seed=options.seed)
     fitted = tuple(
         _fitted(one, sight, found, place, options) for place, (one, sight) in enumerate(zip(made, sights, strict=True))
     )
     calibration = Calibration(
-        options=options, draws=found, recordings=fitted, check=checked(made, options),
+        options=options,
+        draws=found,
+        recordings=fitted,
+        check=checked(made, options),
         cloth=tuple(quantity(q, found.cloth[q.name], options.level) for q in CLOTH),
         places=tuple(
             tuple(quantity(q, place[q.name], options.level) for q in _placed(options)) for place in found.places
         ),
-    )  # fmt: skip
+    )
     findings = (*left_out, *_findings(calibration))
     if calibration.withheld is not None:
         calibration = replace(calibration, cloth=tuple(_assumed(q, options.level) for q in CLOTH))
@@ -399,10 +432,14 @@ def quantity(about: Uncertain, draws: Floats, level: float) -> Quantity:
     places = ranks if determined and about.ends is not None else None
     own = span(draws, places, level=level, limits=about.limits, assumed=about.ends or about.limits)
     return Quantity(
-        name=about.name, unit=about.unit, value=float(np.median(draws)) if determined and own.estimated else None,
-        sigma=float(draws.std()) if own.estimated else None, span=own, assumed=(assumed[0], assumed[1]),
+        name=about.name,
+        unit=about.unit,
+        value=float(np.median(draws)) if determined and own.estimated else None,
+        sigma=float(draws.std()) if own.estimated else None,
+        span=own,
+        assumed=(assumed[0], assumed[1]),
         range=about.ends,
-    )  # fmt: skip
+    )
 
 
 def _assumed(about: Uncertain, level: float) -> Quantity:
@@ -460,10 +497,15 @@ def _fitted(made: _Simulated, sight: Sight, found: Posterior, place: int, option
         looked & (spread > 0), (one.summary - whole.mean(axis=0)) / np.where(spread > 0, spread, 1.0), np.nan
     )
     return Fitted(
-        observed=one, low=low, middle=middle, high=high, used=np.asarray(used.reshape(-1, count).any(axis=0)),
-        misfit=float((1 + (distance >= own).sum()) / (1 + len(distance))), apart=apart,
+        observed=one,
+        low=low,
+        middle=middle,
+        high=high,
+        used=np.asarray(used.reshape(-1, count).any(axis=0)),
+        misfit=float((1 + (distance >= own).sum()) / (1 + len(distance))),
+        apart=apart,
         failed=int((~np.isfinite(summaries[:, used]).all(axis=1)).sum()),
-    )  # fmt: skip
+    )
 
 
 def _findings(calibration: Calibration) -> tuple[Finding, ...]:

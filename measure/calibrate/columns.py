@@ -106,9 +106,10 @@ def known_columns(names: Sequence[str], *, where: str) -> None:
     known = [*_UNITS, *OBSERVABLES, *(f"{name}{SIGMA}" for name in OBSERVABLES)]
     if unknown := [name for name in names if name not in known]:
         raise InputError(
-            f"columns {', '.join(unknown)} are not known", where=where,
+            f"columns {', '.join(unknown)} are not known",
+            where=where,
             fix=f"keep, and name, these: {', '.join(known)}; a unit stands behind a name, as in droop [deg]",
-        )  # fmt: skip
+        )
 
 
 def names(path: Path) -> set[str]:

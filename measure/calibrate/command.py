@@ -31,44 +31,99 @@ if TYPE_CHECKING:
 
 @click.command(cls=LongCommand)
 @click.argument("sources", nargs=-1, required=True, metavar="RECORDING...")
-@click.option("--only", type=click.Choice(["weight", "anemometer"]), help="Do only one: weigh the cloth, in minutes "
-              "of simulation, or calibrate the flag as an anemometer, as fast as its film is read.")  # fmt: skip
-@click.option("--name", metavar="NAME", help="Of the reading model, by which flagdata measure --model finds it; by "
-              "default the first recording's with -anemometer.")  # fmt: skip
-@click.option("--model", metavar="NAME|FOLDER|ID", help="Network whose summary the reading model uses; by default "
-              "flow-outdoor.")  # fmt: skip
+@click.option(
+    "--only",
+    type=click.Choice(["weight", "anemometer"]),
+    help="Do only one: weigh the cloth, in minutes "
+    "of simulation, or calibrate the flag as an anemometer, as fast as its film is read.",
+)
+@click.option(
+    "--name",
+    metavar="NAME",
+    help="Of the reading model, by which flagdata measure --model finds it; by "
+    "default the first recording's with -anemometer.",
+)
+@click.option(
+    "--model", metavar="NAME|FOLDER|ID", help="Network whose summary the reading model uses; by default flow-outdoor."
+)
 @click.option("--flag-size", metavar="LxH", help="Length along the wind and height along the pole [m], as in 1.5x1.0.")
-@click.option("--attachment", type=click.Choice(["corners", "hoist"]), default="corners", show_default=True,
-              help="How the flag is held: at both ends of its hoist, or along all of it.")  # fmt: skip
-@click.option("--azimuth", type=STATED, metavar="DEGREES",
-              help="Of the camera's axis to the wind, 90 from the side, as in 70±7; by default 30:150.")  # fmt: skip
+@click.option(
+    "--attachment",
+    type=click.Choice(["corners", "hoist"]),
+    default="corners",
+    show_default=True,
+    help="How the flag is held: at both ends of its hoist, or along all of it.",
+)
+@click.option(
+    "--azimuth",
+    type=STATED,
+    metavar="DEGREES",
+    help="Of the camera's axis to the wind, 90 from the side, as in 70±7; by default 30:150.",
+)
 @click.option("--elevation", type=STATED, metavar="DEGREES", help="Of the camera's axis, upwards; by default 0±5.")
-@click.option("--distance", type=click.FloatRange(min=1.0), default=15.0, show_default=True, metavar="M",
-              help="From the camera to the flag [m].")  # fmt: skip
+@click.option(
+    "--distance",
+    type=click.FloatRange(min=1.0),
+    default=15.0,
+    show_default=True,
+    metavar="M",
+    help="From the camera to the flag [m].",
+)
 @click.option(
     "--crop", metavar="X,Y,W,H", help="Region of films in which the flag is [px]; by default the whole picture."
 )
-@click.option("--flag", type=click.IntRange(min=1), metavar="N",
-              help="Which moving cloth; by default the one that moves most.")  # fmt: skip
-@click.option("--log", metavar="ARTIFACT", help="Log of the wind beside tables that have no wind column: a wind of "
-              "--lake, by its id.")  # fmt: skip
-@click.option("--offset", type=STATED, metavar="S±SIGMA", help="Seconds added to the tables' clock to reach the log's, "
-              "as in 0.3±0.1; by default estimated.")  # fmt: skip
+@click.option(
+    "--flag", type=click.IntRange(min=1), metavar="N", help="Which moving cloth; by default the one that moves most."
+)
+@click.option(
+    "--log",
+    metavar="ARTIFACT",
+    help="Log of the wind beside tables that have no wind column: a wind of --lake, by its id.",
+)
+@click.option(
+    "--offset",
+    type=STATED,
+    metavar="S±SIGMA",
+    help="Seconds added to the tables' clock to reach the log's, as in 0.3±0.1; by default estimated.",
+)
 @click.option("--start", "first", type=DURATION, default="0s", metavar="TIME", help="Where to begin, as in 12s.")
 @click.option("--end", "last", type=DURATION, metavar="TIME", help="Where to end; weighing uses two minutes at most.")
-@click.option("--simulations", type=click.IntRange(min=64), default=128, show_default=True,
-              help="Simulated flags for each recording.")  # fmt: skip
-@click.option("--workers", type=click.IntRange(min=1), default=lambda: os.cpu_count() or 1, show_default="all cores",
-              help="Number of processes that simulate.")  # fmt: skip
-@click.option("--cache", type=LocalPath(), metavar="FOLDER",
-              help="Where simulations are kept, so that an interrupted calibration goes on; by default the user's "
-              "cache folder.")  # fmt: skip
-@click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.9, show_default=True,
-              help="Level of the intervals.")  # fmt: skip
+@click.option(
+    "--simulations",
+    type=click.IntRange(min=64),
+    default=128,
+    show_default=True,
+    help="Simulated flags for each recording.",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    default=lambda: os.cpu_count() or 1,
+    show_default="all cores",
+    help="Number of processes that simulate.",
+)
+@click.option(
+    "--cache",
+    type=LocalPath(),
+    metavar="FOLDER",
+    help="Where simulations are kept, so that an interrupted calibration goes on; by default the user's cache folder.",
+)
+@click.option(
+    "--level",
+    type=click.FloatRange(0, 1, min_open=True, max_open=True),
+    default=0.9,
+    show_default=True,
+    help="Level of the intervals.",
+)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of all draws.")
 @click.option("--report", type=LocalPath(), metavar="FILE.html", help="Write a page that needs no other.")
-@click.option("--lake", "lake_path", type=LakePlace(), envvar="FLAGDATA_LAKE",
-              help="Where recordings are, and where calibrations go; also FLAGDATA_LAKE.")  # fmt: skip
+@click.option(
+    "--lake",
+    "lake_path",
+    type=LakePlace(),
+    envvar="FLAGDATA_LAKE",
+    help="Where recordings are, and where calibrations go; also FLAGDATA_LAKE.",
+)
 @click.option("--branch", default="main", show_default=True, help="Branch of the lake to read and commit on.")
 @click.option("--read-only", is_flag=True, help="Read the lake, commit nothing.")
 @json_option
@@ -120,9 +175,10 @@ def calibrate(
     _check_only(only)
     if flag_size is None:
         raise UsageError(
-            "the flag's size is missing: windows are as long as its size requires", where="--flag-size",
+            "the flag's size is missing: windows are as long as its size requires",
+            where="--flag-size",
             fix="give length x height in metres, as in 1.5x1.0",
-        )  # fmt: skip
+        )
     from flagdata.caches import user_cache
     from flagdata.lake import Lake
     from flagdata.lake.results import placed
@@ -154,9 +210,19 @@ def calibrate(
     anemometer = None
     if only != "weight":
         anemometer = _anemometer(
-            sources, size, reading, only=only, name=name, model=model, lake=lake, branch=branch, commit=not read_only,
-            first=first, last=last, level=level,
-        )  # fmt: skip
+            sources,
+            size,
+            reading,
+            only=only,
+            name=name,
+            model=model,
+            lake=lake,
+            branch=branch,
+            commit=not read_only,
+            first=first,
+            last=last,
+            level=level,
+        )
     if weighable is None:
         if anemometer is not None:
             _report(anemometer, report, as_json=as_json)
@@ -165,17 +231,24 @@ def calibrate(
         flag=Flag(length=size.length, height=size.height, attachment=attachment),
         azimuth=AZIMUTH if azimuth is None else known(AZIMUTH, azimuth, where="--azimuth"),
         elevation=ELEVATION if elevation is None else known(ELEVATION, elevation, where="--elevation"),
-        distance=distance, simulations=simulations, level=level, seed=seed,
-    )  # fmt: skip
+        distance=distance,
+        simulations=simulations,
+        level=level,
+        seed=seed,
+    )
     with progress(None, label="observe", unit="window") as advance:
         gathered = weighable.read(size, advance=advance)
     observed, parents = gathered.recordings, gathered.parents
     say(announced(simulations * sum(one.duration for one in observed), workers=workers))
     with progress(simulations * len(observed), label="calibrate", unit="flag") as advance:
         found = calibrated(
-            observed, options, folder=(cache or user_cache() / "calibrate"), workers=workers,
-            left_out=gathered.left_out, advance=advance,
-        )  # fmt: skip
+            observed,
+            options,
+            folder=(cache or user_cache() / "calibrate"),
+            workers=workers,
+            left_out=gathered.left_out,
+            advance=advance,
+        )
     wanted = None
     if lake is not None and not read_only:
         wanted = placed(lake, artifact(found, reading, parents), branch=branch).artifact.id
@@ -199,8 +272,17 @@ def calibrate(
 
 
 _OF_WEIGHT = (
-    "attachment", "azimuth", "elevation", "distance", "log", "offset", "simulations", "workers", "cache", "seed",
-)  # fmt: skip
+    "attachment",
+    "azimuth",
+    "elevation",
+    "distance",
+    "log",
+    "offset",
+    "simulations",
+    "workers",
+    "cache",
+    "seed",
+)
 _OF_ANEMOMETER = ("name", "model")
 
 
@@ -215,9 +297,20 @@ def _check_only(only: str | None) -> None:
 
 
 def _anemometer(
-    sources: tuple[str, ...], size: FlagSize, reading: Reading, *, only: str | None, name: str | None,
-    model: str | None, lake: Lake | None, branch: str, commit: bool, first: float, last: float | None, level: float,
-) -> Made | None:  # fmt: skip
+    sources: tuple[str, ...],
+    size: FlagSize,
+    reading: Reading,
+    *,
+    only: str | None,
+    name: str | None,
+    model: str | None,
+    lake: Lake | None,
+    branch: str,
+    commit: bool,
+    first: float,
+    last: float | None,
+    level: float,
+) -> Made | None:
     """The reading model; None with the reason on stderr where none can be made and the weight was asked for as well."""
     from measure.anemometer.making import made
     from measure.calibrate.filmed import is_table
@@ -226,15 +319,26 @@ def _anemometer(
         if only is None and name is None and model is None:
             return None
         raise UsageError(
-            "a table of observables has no pictures, which a reading model takes", where="RECORDING",
+            "a table of observables has no pictures, which a reading model takes",
+            where="RECORDING",
             fix="name recordings of a lake, or give --only weight",
-        )  # fmt: skip
+        )
     try:
         with progress(None, label="read", unit="window") as advance:
             done = made(
-                sources, size, reading, name=name, model=model, lake=lake, branch=branch, commit=commit, first=first,
-                last=last, level=level, advance=advance,
-            )  # fmt: skip
+                sources,
+                size,
+                reading,
+                name=name,
+                model=model,
+                lake=lake,
+                branch=branch,
+                commit=commit,
+                first=first,
+                last=last,
+                level=level,
+                advance=advance,
+            )
     except (InputError, RefusedError) as error:
         if only is not None:
             raise
@@ -303,8 +407,10 @@ def _print(found: Calibration) -> None:
         fitted = ", ".join(f"{row['name']} {row['interval']} {row['unit']}".strip() for row in map(shown, place))
         say(f"  {recording.observed.name}: {fitted}")
     check = found.check
-    say(f"  intervals of {check.held} of {check.count} simulations left out contain their weight, median error "
-        f"{check.error:.1%}")  # fmt: skip
+    say(
+        f"  intervals of {check.held} of {check.count} simulations left out contain their weight, median error "
+        f"{check.error:.1%}"
+    )
     for finding in found.findings:
         say_finding(finding)
     if found.stated is not None:

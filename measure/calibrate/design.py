@@ -71,9 +71,14 @@ class Design:
         """What differs among the simulations."""
         known = self.log.distance is not None
         return (
-            *CLOTH, *FABRIC, *NUISANCES, self.azimuth, self.elevation, *(() if known else (DISTANCE,)),
+            *CLOTH,
+            *FABRIC,
+            *NUISANCES,
+            self.azimuth,
+            self.elevation,
+            *(() if known else (DISTANCE,)),
             *((clock_error(self.log.clock),) if self.log.clock else ()),
-        )  # fmt: skip
+        )
 
     def values(self) -> Mapping[str, Floats]:
         """Name → (count,), by ascending damping, so that batches can be simulated in long steps."""
@@ -95,7 +100,9 @@ class Design:
         shared = {name: own for name, own in values.items() if name not in ("azimuth", "elevation")}
         return [
             Batch(
-                flag=self.flag, log=self.log, duration=self.duration,
+                flag=self.flag,
+                log=self.log,
+                duration=self.duration,
                 values={name: own[first : first + BATCH] for name, own in shared.items()},
                 places=places[first : first + BATCH, None],
                 seeds=tuple(
@@ -104,7 +111,7 @@ class Design:
                 ),
             )
             for first in range(0, self.count, BATCH)
-        ]  # fmt: skip
+        ]
 
 
 def simulated(

@@ -49,19 +49,23 @@ class Discretisation:
         """
         low, high = FINER
         return cls(
-            finer=float(rng.uniform(low, high)), diagonals=int(rng.integers(2)),
+            finer=float(rng.uniform(low, high)),
+            diagonals=int(rng.integers(2)),
             uneven=int(rng.integers(2**31)) if rng.random() < 0.5 else None,
             step=None if rng.random() < explicit else float(STEPS[rng.integers(len(STEPS))]),
-        )  # fmt: skip
+        )
 
     def mesh(self, fit: Mesh) -> Mesh:
         """This kind's mesh of the cloth of the fit's one."""
         low, (width, height) = fit.rest.min(axis=0), np.ptp(fit.rest, axis=0).tolist()
         spacing = math.sqrt(width * height / fit.vertex_count) / self.finer
         flat = grid(
-            width=width, height=height, columns=max(2, round(width / spacing)), rows=max(2, round(height / spacing)),
+            width=width,
+            height=height,
+            columns=max(2, round(width / spacing)),
+            rows=max(2, round(height / spacing)),
             diagonals=list(Diagonals)[self.diagonals],
-        )  # fmt: skip
+        )
         if self.uneven is not None:
             flat = irregular(flat, spacing, stream(self.uneven, "discretisation", "mesh"))
         return replace(flat, rest=flat.rest + low)

@@ -78,7 +78,7 @@ class Emulator:
                 where=name,
                 fix="check --flag-size, --attachment and --azimuth: flags that were simulated so look otherwise; or "
                 "give more simulations with --simulations",
-            )  # fmt: skip
+            )
         model = Metamodel.fit(x, y, np.arange(len(x)))
         residuals = np.full((len(summaries), y.shape[1]), np.nan)
         own = cls(model=model, used=used, residuals=residuals, weights=values[CLOTH[0].name])
@@ -122,9 +122,10 @@ def informative(
     useful = _left_out(x, y) / y.std(axis=0) < INFORMATIVE
     if not useful.any():
         raise RefusedError(
-            "what the film shows does not depend on the cloth in these simulations", where=name,
+            "what the film shows does not depend on the cloth in these simulations",
+            where=name,
             fix="give more simulations with --simulations, or windows with more wind",
-        )  # fmt: skip
+        )
     used[np.flatnonzero(used)[~useful]] = False
     return used
 

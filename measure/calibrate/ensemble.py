@@ -23,9 +23,14 @@ _STRETCH = 2.0
 
 
 def ensemble(
-    likelihood: Callable[[Floats], Floats], *, groups: int, dimension: int, walkers: int, steps: int,
+    likelihood: Callable[[Floats], Floats],
+    *,
+    groups: int,
+    dimension: int,
+    walkers: int,
+    steps: int,
     rng: np.random.Generator,
-) -> Floats:  # fmt: skip
+) -> Floats:
     """(group, draw, dimension) normal scores; of the steps the first half is not kept, and one in `_THIN` of the rest.
 
     Args:

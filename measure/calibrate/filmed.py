@@ -92,20 +92,25 @@ class Part:
         findings = (*self.findings, *film.findings())
         if lost := [one for one in findings if one.kind == "camera-lost" and (one.value or 0.0) > _LOST]:
             raise RefusedError(
-                f"the camera may move, and cannot be followed: {lost[0].what}", where=film.name,
+                f"the camera may move, and cannot be followed: {lost[0].what}",
+                where=film.name,
                 fix="film from a tripod, or choose a part with --start and --end",
-            )  # fmt: skip
+            )
         nothing = [math.nan] * len(OBSERVED)
         readings = [
             nothing if window is None else [OBSERVABLES[name].of_film(window).value for name in OBSERVED]
             for window in seen.windows
         ]
         return Observed(
-            name=film.name, source=self.source, first=first, readings=np.array(readings),
+            name=film.name,
+            source=self.source,
+            first=first,
+            readings=np.array(readings),
             log=self.log.cut(first, first + len(readings) * seen.seconds),
-            sigma=np.array([OBSERVABLES[name].sigma for name in OBSERVED]), findings=findings,
+            sigma=np.array([OBSERVABLES[name].sigma for name in OBSERVED]),
+            findings=findings,
             excerpt=Excerpt.of(seen.windows),
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -163,9 +168,18 @@ class Sources:
 
     @classmethod
     def open(
-        cls, sources: Sequence[str], size: FlagSize, reading: Reading, *, lake: Lake | None, at: str, first: float,
-        last: float | None, log: str | None = None, offset: Stated | None = None,
-    ) -> Sources:  # fmt: skip
+        cls,
+        sources: Sequence[str],
+        size: FlagSize,
+        reading: Reading,
+        *,
+        lake: Lake | None,
+        at: str,
+        first: float,
+        last: float | None,
+        log: str | None = None,
+        offset: Stated | None = None,
+    ) -> Sources:
         """Open sources by their names; as `opened` and `of`."""
 
         def one(source: str) -> Opened:
@@ -201,9 +215,17 @@ class Sources:
 
 
 def opened(
-    source: str, size: FlagSize, reading: Reading, *, lake: Lake | None, at: str, first: float, last: float | None,
-    log: str | None = None, offset: Stated | None = None,
-) -> Opened:  # fmt: skip
+    source: str,
+    size: FlagSize,
+    reading: Reading,
+    *,
+    lake: Lake | None,
+    at: str,
+    first: float,
+    last: float | None,
+    log: str | None = None,
+    offset: Stated | None = None,
+) -> Opened:
     """A table or a recording of a lake from `first` to `last` [s], before pictures are read.
 
     Args:
@@ -235,9 +257,16 @@ def opened(
 
 
 def _of_table(
-    path: Path, size: FlagSize, *, lake: Lake | None, at: str, first: float, last: float | None, log: str | None,
+    path: Path,
+    size: FlagSize,
+    *,
+    lake: Lake | None,
+    at: str,
+    first: float,
+    last: float | None,
+    log: str | None,
     offset: Stated | None,
-) -> tuple[tuple[Observed, ...], str | None]:  # fmt: skip
+) -> tuple[tuple[Observed, ...], str | None]:
     beside, parent = None, None
     if log is not None:
         if lake is None:
@@ -262,9 +291,10 @@ def part_of(subject: Subject, *, first: float, last: float | None) -> Part:
     film, wind = subject.film, None if subject.record is None else subject.record.wind()
     if wind is None or film.start is None:
         raise InputError(
-            "no log of the wind is beside the film", where=film.name,
+            "no log of the wind is beside the film",
+            where=film.name,
             fix="align a film and a log (flagdata align), and name the recording that comes out",
-        )  # fmt: skip
+        )
     clock = None if subject.artifact is None else subject.artifact.clock_sigma
     log = Log.of(wind, start=film.start, clock=clock or 0.0)
     return Part.of(film, log, source=subject.identity, first=first, last=last)

@@ -43,7 +43,7 @@ def usable(
             f"none of {len(failed)} recordings can be used: {reasons}",
             where=", ".join(who for who, _ in failed),
             fix="; ".join(dict.fromkeys(error.fix for _, error in failed)),
-        )  # fmt: skip
+        )
     return found, tuple(
         Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=f"{who} is left out: {error.what}", fix=error.fix)
         for who, error in failed

@@ -86,7 +86,7 @@ class Observed:
                 f"no observable could be read in {SHOWN:.0%} of the windows: what is followed may not be the flag",
                 where=self.name,
                 fix="look at the film with flagdata observe --picture, and choose the flag with --crop or --flag",
-            )  # fmt: skip
+            )
 
     @property
     def duration(self) -> float:
@@ -159,9 +159,10 @@ def check_duration(seconds: float, *, where: str) -> None:
     """
     if seconds < LEAST_WINDOWS * WINDOW:
         raise InputError(
-            f"{max(seconds, 0.0):.3g} s of film with a log beside them", where=where,
+            f"{max(seconds, 0.0):.3g} s of film with a log beside them",
+            where=where,
             fix=f"give {LEAST_WINDOWS * WINDOW:g} s or more; two minutes are better",
-        )  # fmt: skip
+        )
 
 
 def check_in_all(seconds: float, *, where: str, left_out: Sequence[Finding] = ()) -> None:
@@ -177,9 +178,10 @@ def check_in_all(seconds: float, *, where: str, left_out: Sequence[Finding] = ()
     if seconds < LEAST_IN_ALL * WINDOW - 1e-9:
         without = "".join(f"; {one.what}" for one in left_out)
         raise InputError(
-            f"{seconds:.3g} s of film with a log beside them{without}", where=where,
+            f"{seconds:.3g} s of film with a log beside them{without}",
+            where=where,
             fix=f"give {LEAST_IN_ALL * WINDOW:g} s or more in all; two minutes are better",
-        )  # fmt: skip
+        )
 
 
 def first_part(duration: float) -> Finding:

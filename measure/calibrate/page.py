@@ -30,22 +30,29 @@ def page(found: Calibration, provenance: Mapping[str, str], *, sections: Sequenc
     """
     check = found.check
     values = {
-        "name": ", ".join(one.observed.name for one in found.recordings), "sentence": found.sentence,
+        "name": ", ".join(one.observed.name for one in found.recordings),
+        "sentence": found.sentence,
         "tone": "settled" if found.weight.value is not None else "open" if found.weighs else "missed",
         "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in found.findings],
-        "level": f"{found.options.level * 100:.3g} %", "cloth": [shown(q) for q in found.cloth],
-        "stated": found.stated, "posterior": None if found.withheld else _posterior(found),
+        "level": f"{found.options.level * 100:.3g} %",
+        "cloth": [shown(q) for q in found.cloth],
+        "stated": found.stated,
+        "posterior": None if found.withheld else _posterior(found),
         "recordings": [
             {
-                "name": one.observed.name, "windows": len(one.observed.readings),
-                "wind": f"{one.observed.speed.mean():.1f}", "misfit": f"{one.misfit:.2g}",
-                "place": [shown(q) for q in place], "picture": _windows(one),
+                "name": one.observed.name,
+                "windows": len(one.observed.readings),
+                "wind": f"{one.observed.speed.mean():.1f}",
+                "misfit": f"{one.misfit:.2g}",
+                "place": [shown(q) for q in place],
+                "picture": _windows(one),
             }
             for one, place in zip(found.recordings, found.places, strict=True)
         ],
         "check": {"count": check.count, "held": check.held, "error": f"{check.error:.1%}"},
-        "sections": list(sections), "provenance": {**provenance, "code": code_version()},
-    }  # fmt: skip
+        "sections": list(sections),
+        "provenance": {**provenance, "code": code_version()},
+    }
     return render("measure.calibrate", "page.html.j2", values)
 
 
@@ -57,11 +64,14 @@ def shown(one: Quantity) -> dict[str, str]:
     unit = "" if one.unit == "1" else one.unit
     known = one.span.worded(lambda value: f"{value * turn:.3g}")
     return {
-        "name": one.name.replace("_", " "), "unit": "°" if one.name in _DEGREES else unit,
-        "value": "" if one.value is None else f"{one.value * turn:.3g}", "bounded": "yes" if one.bounded else "",
-        "interval": known, "level": f"{one.span.level * 100:.3g} %",
+        "name": one.name.replace("_", " "),
+        "unit": "°" if one.name in _DEGREES else unit,
+        "value": "" if one.value is None else f"{one.value * turn:.3g}",
+        "bounded": "yes" if one.bounded else "",
+        "interval": known,
+        "level": f"{one.span.level * 100:.3g} %",
         "assumed": f"{least * turn:.3g} to {most * turn:.3g}",
-    }  # fmt: skip
+    }
 
 
 def _posterior(found: Calibration) -> str:

@@ -60,9 +60,13 @@ def posterior(sights: Sequence[Sight], observed: Sequence[Floats], *, seed: int)
     """
     about = scatter([one.emulator for one in sights])
     scores = _drawn(
-        sights, about, [own[None] for own in observed], walkers=WALKERS, steps=STEPS,
+        sights,
+        about,
+        [own[None] for own in observed],
+        walkers=WALKERS,
+        steps=STEPS,
         rng=stream(seed, "calibrate", "posterior"),
-    )  # fmt: skip
+    )
     cloth, places = values(scores[0], sights)
     return Posterior(cloth=cloth, places=tuple(places), together=about.together)
 
@@ -75,21 +79,28 @@ def weighed(sights: Sequence[Sight], observed: Sequence[Floats], *, seed: int) -
     """
     walkers, steps = CHECK
     scores = _drawn(
-        sights, scatter([one.emulator for one in sights]), observed, walkers=walkers, steps=steps,
+        sights,
+        scatter([one.emulator for one in sights]),
+        observed,
+        walkers=walkers,
+        steps=steps,
         rng=stream(seed, "calibrate", "weighed"),
-    )  # fmt: skip
+    )
     cloth, _ = values(scores.reshape(-1, scores.shape[2]), sights)
     return {name: own.reshape(scores.shape[:2]) for name, own in cloth.items()}
 
 
 def _drawn(
-    sights: Sequence[Sight], about: Scatter, observed: Sequence[Floats], *, walkers: int, steps: int,
+    sights: Sequence[Sight],
+    about: Scatter,
+    observed: Sequence[Floats],
+    *,
+    walkers: int,
+    steps: int,
     rng: np.random.Generator,
-) -> Floats:  # fmt: skip
+) -> Floats:
     """(flag, draw, dimension) normal scores of flags whose summaries are (flag, summary) in each recording."""
-    whole = np.concatenate(
-        [own[:, one.emulator.used] for one, own in zip(sights, observed, strict=True)], axis=1
-    )  # fmt: skip
+    whole = np.concatenate([own[:, one.emulator.used] for one, own in zip(sights, observed, strict=True)], axis=1)
 
     def likelihood(scores: Floats) -> Floats:
         cloth, places = values(scores.reshape(-1, scores.shape[2]), sights)
@@ -99,6 +110,4 @@ def _drawn(
         offset = np.repeat(whole, scores.shape[1], axis=0) - mean
         return about.log_density(offset, stretch).reshape(scores.shape[:2])
 
-    return ensemble(
-        likelihood, groups=len(whole), dimension=dimension(sights), walkers=walkers, steps=steps, rng=rng
-    )  # fmt: skip
+    return ensemble(likelihood, groups=len(whole), dimension=dimension(sights), walkers=walkers, steps=steps, rng=rng)

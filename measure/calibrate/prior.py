@@ -98,48 +98,66 @@ def _log(low: float, high: float) -> Range:
 
 CLOTH = (
     Uncertain(
-        name="area_weight", unit="kg/m²", prior=_log(0.05, 0.45),
+        name="area_weight",
+        unit="kg/m²",
+        prior=_log(0.05, 0.45),
         source="flag cloths are sold from 50 g/m² (spun polyester) to 350 g/m² (denim, wool bunting: 150 to 240)",
         limits=_POSITIVE,
     ),
     Uncertain(
-        name="bending", unit="N·m", prior=_log(3e-6, 6e-4),
+        name="bending",
+        unit="N·m",
+        prior=_log(3e-6, 6e-4),
         source="mean coefficient of the fabrics of Wang et al. 2011, a tenth to ten times, as Runia et al. 2020 search",
         limits=_POSITIVE,
     ),
     Uncertain(
-        name="damping", unit="s", prior=_log(2.5e-4, 4e-2),
-        source="hardly ever measured; what the nulls of verdicts vary it by", limits=_POSITIVE,
+        name="damping",
+        unit="s",
+        prior=_log(2.5e-4, 4e-2),
+        source="hardly ever measured; what the nulls of verdicts vary it by",
+        limits=_POSITIVE,
     ),
-)  # fmt: skip
+)
 """What is sought."""
 FABRIC = (
     Uncertain(
-        name="stretching", unit="1", prior=_log(0.5, 2.0),
+        name="stretching",
+        unit="1",
+        prior=_log(0.5, 2.0),
         source="factor on the table of the fabric that a simulation draws, as nulls of verdicts vary it",
     ),
     Uncertain(
-        name="fabric", unit="1", prior=Range(low=0.0, high=1.0),
+        name="fabric",
+        unit="1",
+        prior=Range(low=0.0, high=1.0),
         source="place in the list of the fabrics that Wang et al. 2011 measured, none of which is a flag's",
     ),
-)  # fmt: skip
+)
 """What a cloth is beside, the same in all recordings of it: left to the scatter."""
 NUISANCES = (
     Uncertain(name="gain", unit="1", prior=Normal(mean=1.0, sigma=0.03), source="classes of cups, IEC 61400-12-1"),
     Uncertain(
-        name="scale", unit="1", prior=Normal(mean=1.0, sigma=0.01),
+        name="scale",
+        unit="1",
+        prior=Normal(mean=1.0, sigma=0.01),
         source="a flag's size as sold or taped, one per cent",
     ),
     Uncertain(
-        name="eddies", unit="m", prior=_log(20.0, 120.0),
+        name="eddies",
+        unit="m",
+        prior=_log(20.0, 120.0),
         source="integral length along the wind, 50 to 100 m at 10 m height and less near the ground (ESDU 85020)",
     ),
-)  # fmt: skip
+)
 """What a simulation needs beside, another one in each recording. Gain and scale are fitted, eddies are left to the
 scatter."""
 DISTANCE = Uncertain(
-    name="distance_constant", unit="m", prior=_log(1.5, 5.0), source="cups (ISO 17713-1; WMO-No. 8)",
-)  # fmt: skip
+    name="distance_constant",
+    unit="m",
+    prior=_log(1.5, 5.0),
+    source="cups (ISO 17713-1; WMO-No. 8)",
+)
 """Of an anemometer whose recipe states none."""
 
 
@@ -151,14 +169,18 @@ def clock_error(sigma: float) -> Uncertain:
 DIRECTION = math.radians(5.0)
 """Standard uncertainty of the logged wind's direction: north, or a tunnel's axis, lined up by eye and compass [rad]."""
 AZIMUTH = Uncertain(
-    name="azimuth", unit="rad", prior=Range(low=math.radians(30.0), high=math.radians(150.0)),
+    name="azimuth",
+    unit="rad",
+    prior=Range(low=math.radians(30.0), high=math.radians(150.0)),
     source="a camera that was not placed by a vane; within 30° of the wind's axis a flag shows no length",
-)  # fmt: skip
+)
 """Of the camera's axis to the wind where the user gives none."""
 ELEVATION = Uncertain(
-    name="elevation", unit="rad", prior=Normal(mean=0.0, sigma=math.radians(5.0)),
+    name="elevation",
+    unit="rad",
+    prior=Normal(mean=0.0, sigma=math.radians(5.0)),
     source="a camera held level at a flag a few metres up and ten or more away",
-)  # fmt: skip
+)
 
 
 def draws(quantities: tuple[Uncertain, ...], count: int, *, seed: int, name: str) -> Mapping[str, Floats]:

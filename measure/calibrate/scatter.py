@@ -26,11 +26,12 @@ FEWEST_FREEDOM = 20
 HEAVY = 10.0
 """Most degrees of freedom of the t distribution: residuals of simulations have a kurtosis of 4, 3 + 6/(ν − 4)."""
 TAKEN_APART = Finding(
-    kind="recordings-taken-apart", severity=Severity.WARNING,
+    kind="recordings-taken-apart",
+    severity=Severity.WARNING,
     what="too few simulations for so many recordings: the cloth was taken as a different one in each, so that "
     "intervals are too narrow and probabilities too sure",
     fix="give fewer recordings, or more simulations with --simulations",
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,9 +55,11 @@ class Scatter:
         k, freedom = offset.shape[1], self.freedom
         constant = gammaln((freedom + k) / 2) - gammaln(freedom / 2) - 0.5 * k * math.log(freedom * math.pi)
         return (
-            constant - self.determinant - 0.5 * k * np.log(stretch)
+            constant
+            - self.determinant
+            - 0.5 * k * np.log(stretch)
             - 0.5 * (freedom + k) * np.log1p(self.distance(offset, stretch) / freedom)
-        )  # fmt: skip
+        )
 
     def distance(self, offset: Floats, stretch: Floats) -> Floats:
         """(n,) squared standardised distance of offsets (n, k)."""
@@ -69,9 +72,11 @@ def scatter(emulators: Sequence[Emulator]) -> Scatter:
     freedom = min(freedom, HEAVY)
     factor = np.linalg.cholesky(covariance * (freedom - 2) / freedom)
     return Scatter(
-        white=np.asarray(np.linalg.inv(factor), dtype=np.float64), freedom=freedom, together=together,
+        white=np.asarray(np.linalg.inv(factor), dtype=np.float64),
+        freedom=freedom,
+        together=together,
         determinant=float(np.log(np.diag(factor)).sum()),
-    )  # fmt: skip
+    )
 
 
 def _covariance(emulators: Sequence[Emulator]) -> tuple[Floats, float, bool]:

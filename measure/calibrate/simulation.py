@@ -38,9 +38,17 @@ from sim.state import State
 from sim.system import System
 
 FABRICS = (
-    "11oz-black-denim", "camel-ponte-roma", "gray-interlock", "ivory-rib-knit", "navy-sparkle-sweat",
-    "pink-ribbon-brown", "royal-target", "tango-red-jet-set", "white-dots-on-blk", "white-swim-solid",
-)  # fmt: skip
+    "11oz-black-denim",
+    "camel-ponte-roma",
+    "gray-interlock",
+    "ivory-rib-knit",
+    "navy-sparkle-sweat",
+    "pink-ribbon-brown",
+    "royal-target",
+    "tango-red-jet-set",
+    "white-dots-on-blk",
+    "white-swim-solid",
+)
 """Whose tables are multiplied: the measured ones of Wang et al. 2011. Each simulation draws one, since a flag's fabric
 is not stated."""
 COLUMNS = 12
@@ -54,8 +62,15 @@ BATCH = 16
 VERSION = 5
 """Raised where the same batch gives other numbers."""
 OBSERVED = (
-    "droop", "extension", "middle-speed", "frequency", "bandwidth", "amplitude-up", "amplitude-across", "area",
-)  # fmt: skip
+    "droop",
+    "extension",
+    "middle-speed",
+    "frequency",
+    "bandwidth",
+    "amplitude-up",
+    "amplitude-across",
+    "area",
+)
 """Observables that are asked for: a coarse mesh shows no travelling waves, and few windows show them."""
 _STEPS = (1e-3, 2e-3, 4e-3)
 """Steps of backward Euler [s], which damps as much by itself; the least damping of a batch allows the step. Cloths that
@@ -136,13 +151,18 @@ class Batch:
         """All that shapes what it gives, as JSON values."""
         log = self.log
         return {
-            "version": VERSION, "flag": [self.flag.length, self.flag.height, self.flag.attachment],
+            "version": VERSION,
+            "flag": [self.flag.length, self.flag.height, self.flag.attachment],
             "log": [log.times.tolist(), log.speed.tolist(), None if log.turn is None else log.turn.tolist()],
             "averaging": log.averaging,
-            "duration": self.duration, "values": {name: own.tolist() for name, own in sorted(self.values.items())},
-            "places": self.places.tolist(), "seeds": list(self.seeds), "columns": self.columns,
-            "observables": list(self.observables), **self._beside(),
-        }  # fmt: skip
+            "duration": self.duration,
+            "values": {name: own.tolist() for name, own in sorted(self.values.items())},
+            "places": self.places.tolist(),
+            "seeds": list(self.seeds),
+            "columns": self.columns,
+            "observables": list(self.observables),
+            **self._beside(),
+        }
 
     def _beside(self) -> dict[str, object]:
         """What differs from a calibration's simulations, whose hash is older."""
@@ -207,18 +227,25 @@ class Batch:
     def _material(self, place: int, damped: float) -> Material:
         own = {name: float(values[place]) for name, values in self.values.items()}
         return cloth(
-            own["area_weight"], own["bending"], max(own["damping"] - damped, 0.0), stretching=own["stretching"],
+            own["area_weight"],
+            own["bending"],
+            max(own["damping"] - damped, 0.0),
+            stretching=own["stretching"],
             fabric=FABRICS[int(own["fabric"] * len(FABRICS))],
-        )  # fmt: skip
+        )
 
     def _wind(self, system: System) -> SegmentWind:
         made = []
         for place, seed in enumerate(self.seeds):
             own = {name: float(values[place]) for name, values in self.values.items()}
             velocity = blown(
-                self.log.moved(own.get("clock_error", 0.0)), before=SETTLE, duration=self.duration,
-                distance=own["distance_constant"], eddies=own["eddies"], seed=child_seed(seed, "calibrate", "wind"),
-            )  # fmt: skip
+                self.log.moved(own.get("clock_error", 0.0)),
+                before=SETTLE,
+                duration=self.duration,
+                distance=own["distance_constant"],
+                eddies=own["eddies"],
+                seed=child_seed(seed, "calibrate", "wind"),
+            )
             made.append(velocity * own["gain"])
         samples = torch.as_tensor(np.stack(made, axis=-1), dtype=system.cloth.dtype)
         return SegmentWind(period=1 / WIND_RATE, samples=samples)
@@ -243,9 +270,12 @@ def cloth(area_weight: float, bending: float, damping: float, *, stretching: flo
     """
     base = named(fabric)
     return replace(
-        base, density=area_weight, damping=damping, stretching=base.stretching * stretching,
+        base,
+        density=area_weight,
+        damping=damping,
+        stretching=base.stretching * stretching,
         bending=base.bending * (bending / mean_bending(base)),
-    )  # fmt: skip
+    )
 
 
 def mean_bending(material: Material) -> float:
@@ -269,8 +299,14 @@ def windows(
     rows = []
     for first in range(0, len(positions) - size + 1, size):
         window = seen_from(
-            view, positions[first : first + size], times=times, faces=mesh.faces, hoist=hoist, free=free,
-            length=flag.length, height=flag.height,
-        )  # fmt: skip
+            view,
+            positions[first : first + size],
+            times=times,
+            faces=mesh.faces,
+            hoist=hoist,
+            free=free,
+            length=flag.length,
+            height=flag.height,
+        )
         rows.append([one.of_cloth(window).value for one in own])
     return np.array(rows)

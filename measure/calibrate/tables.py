@@ -148,9 +148,13 @@ def _against_time(table: Columns, *, name: str, identity: str, beside: Beside | 
         [_windows(edges, low, high, table.of(one), quadratic=OBSERVABLES[one].quadratic) for one in OBSERVED], axis=1
     )
     return Observed(
-        name=name, source=identity, readings=readings, log=log, findings=_of_rows(table, step),
+        name=name,
+        source=identity,
+        readings=readings,
+        log=log,
+        findings=_of_rows(table, step),
         sigma=np.array([_mean(table.of(f"{one}{SIGMA}")) for one in OBSERVED]),
-    )  # fmt: skip
+    )
 
 
 def _windows(edges: Floats, low: Floats, high: Floats, values: Floats, *, quadratic: bool) -> Floats:
@@ -179,14 +183,15 @@ def _against_wind(table: Columns, *, name: str, identity: str) -> tuple[Observed
             where=table.where,
             fix=f"give how long each was observed: {DURATION} [s], or {COUNT}, of windows of {WINDOW:g} s; rows "
             f"against time have a column {TIME}",
-        )  # fmt: skip
+        )
     windows = table[lengths[0]] / (WINDOW if lengths[0] == DURATION else 1.0)
     for line, wind, own in zip(table.lines, table[WIND].tolist(), windows.tolist(), strict=True):
         if not (wind > 0 and own >= LEAST_WINDOWS - 1e-6):
             raise InputError(
-                f"a row of {own * WINDOW:g} s in a wind of {wind:g} m/s", where=f"{table.where}, line {line}",
+                f"a row of {own * WINDOW:g} s in a wind of {wind:g} m/s",
+                where=f"{table.where}, line {line}",
                 fix=f"leave out rows in still air or of less than {LEAST_WINDOWS * WINDOW:g} s",
-            )  # fmt: skip
+            )
     most = max(LEAST_WINDOWS, round(LONGEST / WINDOW) // len(windows))
     recordings = []
     for row, (line, wind) in enumerate(zip(table.lines, table[WIND].tolist(), strict=True)):

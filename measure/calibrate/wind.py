@@ -75,13 +75,15 @@ class Log:
         if len(self.times) < _FEWEST_SAMPLES:
             raise InputError(
                 f"{len(self.times)} usable samples of the wind, at least {_FEWEST_SAMPLES} are needed",
-                where="wind log", fix="give a log of more samples, or a longer part of the film",
-            )  # fmt: skip
+                where="wind log",
+                fix="give a log of more samples, or a longer part of the film",
+            )
         if not (np.diff(self.times) > 0).all() or not np.isfinite(self.speed).all() or not self.speed.mean() > 0:
             raise InputError(
-                "times that do not ascend, speeds that are not finite, or no wind", where="wind log",
+                "times that do not ascend, speeds that are not finite, or no wind",
+                where="wind log",
                 fix="choose a stretch with wind",
-            )  # fmt: skip
+            )
 
     @classmethod
     def of(cls, series: WindSeries, *, start: int, clock: float = 0.0) -> Log:
@@ -106,9 +108,13 @@ class Log:
             turn = np.angle(heading * np.exp(-1j * mean))
         averaging = series.sensor.averaging or 0.0
         return cls(
-            times=(series.time[usable] - start) / NANOSECONDS - averaging / 2, speed=speed[usable].copy(), turn=turn,
-            distance=series.sensor.distance_constant, averaging=averaging, clock=clock,
-        )  # fmt: skip
+            times=(series.time[usable] - start) / NANOSECONDS - averaging / 2,
+            speed=speed[usable].copy(),
+            turn=turn,
+            distance=series.sensor.distance_constant,
+            averaging=averaging,
+            clock=clock,
+        )
 
     def cut(self, start: float, end: float) -> Log:
         """The part of it that a film from `start` to `end` [s] needs, with its times since `start`.
@@ -121,20 +127,26 @@ class Log:
             raise InputError(
                 f"the log runs from {self.times[0]:.1f} to {self.times[-1]:.1f} s of the film's time and does not "
                 f"cover its part from {start:.1f} to {end:.1f} s",
-                where="wind log", fix="choose a part of the film that the log covers, with --start and --end",
-            )  # fmt: skip
+                where="wind log",
+                fix="choose a part of the film that the log covers, with --start and --end",
+            )
         near = (self.times >= start - 60.0) & (self.times <= end + 2 * period)
         inside = self.times[near]
         widest = float(np.diff(inside).max())
         if widest > max(_LONGEST_GAP, 1.5 * period):
             raise InputError(
-                f"the log has a gap of {widest:.1f} s beside the film", where="wind log",
+                f"the log has a gap of {widest:.1f} s beside the film",
+                where="wind log",
                 fix="choose a part without gaps, with --start and --end",
-            )  # fmt: skip
+            )
         return Log(
-            times=inside - start, speed=self.speed[near], turn=None if self.turn is None else self.turn[near],
-            distance=self.distance, averaging=self.averaging, clock=self.clock,
-        )  # fmt: skip
+            times=inside - start,
+            speed=self.speed[near],
+            turn=None if self.turn is None else self.turn[near],
+            distance=self.distance,
+            averaging=self.averaging,
+            clock=self.clock,
+        )
 
     def moved(self, late: float) -> Log:
         """The same samples that much later [s]."""

@@ -16,6 +16,8 @@ def announced(flag_seconds: float, *, workers: int) -> str:
         workers: processes that share them.
     """
     return workload.announced(
-        f"simulating flags for {flag_seconds / 60:.0f} minutes in all", flag_seconds / _PACE, workers=workers,
+        f"simulating flags for {flag_seconds / 60:.0f} minutes in all",
+        flag_seconds / _PACE,
+        workers=workers,
         kept="what was simulated before is kept and taken up",
-    )  # fmt: skip
+    )

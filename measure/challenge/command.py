@@ -65,18 +65,25 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
 @challenge.command()
 @_FOLDER
 @click.option(
-    "--recipe", default="standard", show_default=True,
+    "--recipe",
+    default="standard",
+    show_default=True,
     help="Recipe of a challenge: a name of the catalog, or a .toml file; or a recipe of close-loop, for nulls of its "
     "cloth, markers and winds.",
-)  # fmt: skip
+)
 @click.option(
     "--seed",
     type=click.IntRange(min=0),
     required=True,
     help="Seed of everything that is drawn; it must differ from that of the challenge.",
 )
-@click.option("--lake", "lake_path", type=LakePlace(), envvar="FLAGDATA_LAKE",
-              help="Lake that a recipe of close-loop reads artifacts from; also FLAGDATA_LAKE.")  # fmt: skip
+@click.option(
+    "--lake",
+    "lake_path",
+    type=LakePlace(),
+    envvar="FLAGDATA_LAKE",
+    help="Lake that a recipe of close-loop reads artifacts from; also FLAGDATA_LAKE.",
+)
 @click.option(
     "--kinds",
     type=click.IntRange(min=4),
@@ -121,9 +128,10 @@ def bank(
     help="Number of sets that are judged at a time; of films, processes that simulate.",
 )
 @click.option(
-    "--bank", type=LocalPath(),
+    "--bank",
+    type=LocalPath(),
     help="Folder of simulated nulls that the sets share; of films, where their simulations are kept.",
-)  # fmt: skip
+)
 @json_option
 def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path | None, as_json: bool) -> None:
     """Judge the sets that have no verdict yet, and file the verdicts with their hashes."""
@@ -151,9 +159,15 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
     elif waiting:
         first = target.experiment(waiting[0])
         options = Options(bank=bank)
-        say(of_recordings(
-            first.recordings, first.specimen.mesh.vertex_count, options, sets=len(waiting), workers=workers,
-        ))  # fmt: skip
+        say(
+            of_recordings(
+                first.recordings,
+                first.specimen.mesh.vertex_count,
+                options,
+                sets=len(waiting),
+                workers=workers,
+            )
+        )
     with progress(len(waiting), label="judging", unit="set") as advance:
 
         def report(filing: Filing) -> None:
@@ -177,20 +191,28 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
 @_ONLY
 @click.option("--out", type=LocalPath(), help="Folder to which the sheet is also written, as .json, .md and .png.")
 @click.option(
-    "--history", type=LocalPath(), metavar="FILE.csv",
+    "--history",
+    type=LocalPath(),
+    metavar="FILE.csv",
     help="File of all graded challenges, to which this one is added under its folder's name.",
-)  # fmt: skip
+)
 @click.option(
-    "--against", type=click.Choice(["true-model", "floor"]),
+    "--against",
+    type=click.Choice(["true-model", "floor"]),
     help="Error against which E_red is measured: that of the true model, which is computed, or the verdict's floor. By "
     "default the true model's, and of films the floor.",
-)  # fmt: skip
+)
 @json_option
 @click.pass_context
 def score(
-    context: click.Context, folder: Path, only: tuple[str, ...], out: Path | None, history: Path | None,
-    against: str | None, as_json: bool,
-) -> None:  # fmt: skip
+    context: click.Context,
+    folder: Path,
+    only: tuple[str, ...],
+    out: Path | None,
+    history: Path | None,
+    against: str | None,
+    as_json: bool,
+) -> None:
     """Open the keys and grade; ends with 3 where a gate is not met.
 
     From then on no verdict can be filed on these sets.

@@ -64,12 +64,19 @@ def draw(recipe: ChallengeRecipe, *, seed: int, count: int) -> tuple[AnswerKey, 
         numerics = next(nulls) if kind is Kind.NULL else _numerics(recipe, seed, kind, effects)
         keys.append(
             _key(
-                recipe, stream(seed, "set", index), name=f"set-{place + 1:03d}", kind=kind, effects=effects,
-                turn=None if kind is Kind.PAIR else turns[index], numerics=numerics, rate=rates[index],
-                noise=noises[index], varying=varying[index],
+                recipe,
+                stream(seed, "set", index),
+                name=f"set-{place + 1:03d}",
+                kind=kind,
+                effects=effects,
+                turn=None if kind is Kind.PAIR else turns[index],
+                numerics=numerics,
+                rate=rates[index],
+                noise=noises[index],
+                varying=varying[index],
                 shared=None if recipe.films is None else stream(seed, "winds"),
             )
-        )  # fmt: skip
+        )
     return tuple(keys)
 
 
@@ -115,12 +122,22 @@ def _key(
     intensity = recipe.intensity.at(rng.random())
     table = recipe.outside if kind is Kind.OUTSIDE else recipe.effects
     key = AnswerKey(
-        name=name, kind=kind, effects=tuple(_acting(effect, table[effect], turn, rng.random) for effect in effects),
-        impact=0.0, material=material, density=density, bending=bending, damping=damping,
-        speeds=_speeds(recipe, rng), toward=float(rng.uniform(-math.pi, math.pi)),
-        heading=float(rng.uniform(-_HEADING, _HEADING)), intensity=intensity if varying else 0.0,
-        rate=rate, noise=noise, numerics=numerics,
-    )  # fmt: skip
+        name=name,
+        kind=kind,
+        effects=tuple(_acting(effect, table[effect], turn, rng.random) for effect in effects),
+        impact=0.0,
+        material=material,
+        density=density,
+        bending=bending,
+        damping=damping,
+        speeds=_speeds(recipe, rng),
+        toward=float(rng.uniform(-math.pi, math.pi)),
+        heading=float(rng.uniform(-_HEADING, _HEADING)),
+        intensity=intensity if varying else 0.0,
+        rate=rate,
+        noise=noise,
+        numerics=numerics,
+    )
     if shared is None:
         return key
     intensity = recipe.intensity.at(shared.random()) if recipe.varying else 0.0

@@ -59,9 +59,10 @@ def file(folder: ChallengeFolder, filing: Filing) -> None:
     """
     if filed(folder, filing.name) or filing.name in opened(folder):
         raise ConflictError(
-            "a verdict is filed already, or the key was opened", where=f"{folder.path}, {filing.name}",
+            "a verdict is filed already, or the key was opened",
+            where=f"{folder.path}, {filing.name}",
             fix="make a new challenge: a verdict is given once",
-        )  # fmt: skip
+        )
     digest = write_json(folder.verdict(filing.name), filing.as_dict())
     rewrite(folder.verdict_hash(filing.name), digest + "\n")
 

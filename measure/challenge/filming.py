@@ -52,38 +52,52 @@ def films_of(
         called = "abcdefghijklmnopqrstuvwxyz"[index]
         sequence = MeshSequence(
             time=np.round(np.arange(len(positions)) / filming.rate * NANOSECONDS).astype(np.int64),
-            positions=positions.astype(np.float32), faces=mesh.faces.astype(np.int32),
-            rest=mesh.rest.astype(np.float32), attributes={},
-        )  # fmt: skip
+            positions=positions.astype(np.float32),
+            faces=mesh.faces.astype(np.int32),
+            rest=mesh.rest.astype(np.float32),
+            attributes={},
+        )
         quantities = {
-            "camera_angle": math.radians(azimuth), "camera_radius": distance * math.cos(math.radians(elevation)),
+            "camera_angle": math.radians(azimuth),
+            "camera_radius": distance * math.cos(math.radians(elevation)),
             "camera_height": filming.height - distance * math.sin(math.radians(elevation)),
-            "mesh_height": filming.height + recipe.height / 2, "view_angle": math.radians(filming.view),
-            "raster_samples": filming.samples, "width": filming.width, "height": filming.pixels_high,
+            "mesh_height": filming.height + recipe.height / 2,
+            "view_angle": math.radians(filming.view),
+            "raster_samples": filming.samples,
+            "width": filming.width,
+            "height": filming.pixels_high,
             "exposure_bias": -0.3,
-        }  # fmt: skip
+        }
         look = replace(
             prior.named("outdoor").with_quantities(quantities, source="the challenge"), backgrounds=filming.backgrounds
         )
         zeta = look.draw(child_seed(seed, name, "look", index), Assets())
         write_film(
-            folder / f"{called}.mp4", sequence, zeta, rate=filming.rate, start=_START,
-            seed=child_seed(seed, name, "noise", index), workers=1, advance=lambda frames: None,
-        )  # fmt: skip
+            folder / f"{called}.mp4",
+            sequence,
+            zeta,
+            rate=filming.rate,
+            start=_START,
+            seed=child_seed(seed, name, "noise", index),
+            workers=1,
+            advance=lambda frames: None,
+        )
         times, speed = logged(recipe, wind)
         recordings.append({"name": called, "times": times.tolist(), "speed": speed.tolist()})
     return {
-        "schema": SCHEMA, "flag": {"length": recipe.width, "height": recipe.height},
+        "schema": SCHEMA,
+        "flag": {"length": recipe.width, "height": recipe.height},
         "camera": {
             "azimuth": [filming.azimuth, filming.azimuth_sigma],
-            "elevation": [filming.elevation, filming.elevation_sigma], "distance": filming.distance,
+            "elevation": [filming.elevation, filming.elevation_sigma],
+            "distance": filming.distance,
         },
-        "area_weight": None if not filming.weight_sigma else [
-            material_of(key).density * math.exp(filming.weight_sigma * rng.standard_normal()), filming.weight_sigma
-        ],
+        "area_weight": None
+        if not filming.weight_sigma
+        else [material_of(key).density * math.exp(filming.weight_sigma * rng.standard_normal()), filming.weight_sigma],
         "anemometer": {"distance_constant": _CUP, "averaging": 1.0},
         "recordings": recordings,
-    }  # fmt: skip
+    }
 
 
 def logged(recipe: ChallengeRecipe, wind: Floats) -> tuple[Floats, Floats]:

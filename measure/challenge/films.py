@@ -85,7 +85,8 @@ def read_films(folder: Path) -> Filmed:
 
         return Filmed(
             flag=Flag(length=float(flag["length"]), height=float(flag["height"])),
-            azimuth=angle(AZIMUTH, camera["azimuth"]), elevation=angle(ELEVATION, camera["elevation"]),
+            azimuth=angle(AZIMUTH, camera["azimuth"]),
+            elevation=angle(ELEVATION, camera["elevation"]),
             distance=float(camera["distance"]),
             area_weight=None if weighed is None else (float(weighed[0]), float(weighed[0]) * float(weighed[1])),
             recordings={
@@ -94,11 +95,12 @@ def read_films(folder: Path) -> Filmed:
                     Log(
                         times=np.array(entry["times"], dtype=np.float64),
                         speed=np.array(entry["speed"], dtype=np.float64),
-                        distance=float(cup["distance_constant"]), averaging=float(cup["averaging"]),
+                        distance=float(cup["distance_constant"]),
+                        averaging=float(cup["averaging"]),
                     ),
                 )
                 for entry in about["recordings"]
             },
-        )  # fmt: skip
+        )
     except (KeyError, IndexError, TypeError, ValueError, OverflowError, AttributeError, OSError) as error:
         raise InputError(f"not a set of films: {error!r}", where=str(folder), fix="restore the folder") from error

@@ -70,7 +70,10 @@ class ClosingTheLoopOnFilms:
         from measure.films.run import Options
 
         calibration = Calibrating(
-            flag=given.flag, azimuth=given.azimuth, elevation=given.elevation, distance=given.distance,
+            flag=given.flag,
+            azimuth=given.azimuth,
+            elevation=given.elevation,
+            distance=given.distance,
             simulations=self.simulations,
-        )  # fmt: skip
+        )
         return Options(calibration=calibration, kinds=self.kinds, area_weight=given.area_weight)

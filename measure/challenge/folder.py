@@ -90,16 +90,23 @@ class ChallengeFolder:
             )
         content = read_json(self.public, noun="challenge")
         sets, hashes = content.get("sets"), ("data", "commitment")
-        stated = isinstance(content.get("title"), str) and isinstance(sets, dict) and all(
-            isinstance(entry, dict) and all(isinstance(entry.get(key), str) for key in hashes)
-            and is_name(name) and Path(name).name == name
-            for name, entry in sets.items()
-        )  # fmt: skip
+        stated = (
+            isinstance(content.get("title"), str)
+            and isinstance(sets, dict)
+            and all(
+                isinstance(entry, dict)
+                and all(isinstance(entry.get(key), str) for key in hashes)
+                and is_name(name)
+                and Path(name).name == name
+                for name, entry in sets.items()
+            )
+        )
         if not stated:
             raise CorruptError(
-                "the challenge does not state its title and its sets", where=str(self.public),
+                "the challenge does not state its title and its sets",
+                where=str(self.public),
                 fix="restore the file as it was made",
-            )  # fmt: skip
+            )
         return content
 
     def names(self) -> list[str]:
@@ -140,14 +147,16 @@ class ChallengeFolder:
             found = data_hash(self.data(name))
         except OSError as error:
             raise CorruptError(
-                f"the data cannot be read: {error.strerror}", where=str(self.data(name)),
+                f"the data cannot be read: {error.strerror}",
+                where=str(self.data(name)),
                 fix="restore the folder as it was made",
-            ) from None  # fmt: skip
+            ) from None
         if found != self.manifest()["sets"][name]["data"]:
             raise CorruptError(
-                "the data are not those that were published", where=str(self.data(name)),
+                "the data are not those that were published",
+                where=str(self.data(name)),
                 fix="restore the folder as it was made",
-            )  # fmt: skip
+            )
 
     @property
     def filmed(self) -> bool:
@@ -216,18 +225,25 @@ def read_set(folder: Path) -> Experiment:
         beside = {path.name: path for path in folder.iterdir()}
         markers = _array(beside["markers.npy"])
         specimen = Specimen(
-            mesh=mesh, material=named(flag["material"]), held=corners(mesh.rest), anchors=np.array(flag["pins"]),
-            stiffness=flag["pin_stiffness"], gravity=tuple(flag["gravity"]), anchors_given=False,
-        )  # fmt: skip
+            mesh=mesh,
+            material=named(flag["material"]),
+            held=corners(mesh.rest),
+            anchors=np.array(flag["pins"]),
+            stiffness=flag["pin_stiffness"],
+            gravity=tuple(flag["gravity"]),
+            anchors_given=False,
+        )
         recordings = tuple(
             Trajectory(
-                name=entry["name"], markers=markers,
+                name=entry["name"],
+                markers=markers,
                 positions=_array(beside[f"{entry['name']}.npy"]),
-                rate=about["rate"], noise=about["noise"],
+                rate=about["rate"],
+                noise=about["noise"],
                 wind=WindTrack(times=np.array(entry["wind"]["times"]), velocity=np.array(entry["wind"]["velocity"])),
             )
             for entry in about["recordings"]
-        )  # fmt: skip
+        )
     except (KeyError, IndexError, TypeError, ValueError, OverflowError, AttributeError, EOFError, OSError) as error:
         raise InputError(f"not a set: {error!r}", where=str(folder), fix="restore the folder as it was made") from error
     return Experiment(specimen=as_seen(specimen, recordings), recordings=recordings)

@@ -23,9 +23,13 @@ def row(name: str, sheet: Mapping[str, Any]) -> dict[str, str]:
     """The row of a sheet as `measure.challenge.sheet.as_dict` gives it; shares are "hits/count [low, high]"."""
     shares = {what: _share_text(share) for what, share in sheet["shares"].items()}
     return {
-        "challenge": name, "title": str(sheet["title"]), "code_version": str(sheet["code_version"]),
-        "criteria": " ".join(sheet.get("criteria", [])), "sets": str(sum(sheet["sets"].values())), **shares,
-    }  # fmt: skip
+        "challenge": name,
+        "title": str(sheet["title"]),
+        "code_version": str(sheet["code_version"]),
+        "criteria": " ".join(sheet.get("criteria", [])),
+        "sets": str(sum(sheet["sets"].values())),
+        **shares,
+    }
 
 
 def rows(path: Path) -> list[dict[str, str]]:

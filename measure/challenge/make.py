@@ -98,11 +98,13 @@ def _make(
     files.write_json(
         target.public,
         {
-            "schema": "flagdata.challenge/1", "title": recipe.title, "code_version": code_version(),
+            "schema": "flagdata.challenge/1",
+            "title": recipe.title,
+            "code_version": code_version(),
             "filmed": recipe.films is not None,
             "sets": {name: entries[name] for name in sorted(entries)},
         },
-    )  # fmt: skip
+    )
 
 
 def _write(
@@ -140,15 +142,19 @@ def _write_markers(
     about = {
         "schema": "flagdata.challenge-set/1",
         "flag": {
-            "material": key.material, "width": recipe.width, "height": recipe.height, "pins": pins.tolist(),
-            "pin_stiffness": ARCSIM_STIFFNESS, "gravity": list(GRAVITY),
+            "material": key.material,
+            "width": recipe.width,
+            "height": recipe.height,
+            "pins": pins.tolist(),
+            "pin_stiffness": ARCSIM_STIFFNESS,
+            "gravity": list(GRAVITY),
         },
         "rate": key.rate,
         "noise": key.noise,
         "recordings": [
             {"name": name, "wind": _log(recipe, wind)} for name, wind in zip(names, made.winds, strict=True)
         ],
-    }  # fmt: skip
+    }
     return files.write_set(target.data(key.name), about=about, markers=markers, positions=positions)
 
 

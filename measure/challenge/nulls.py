@@ -58,15 +58,24 @@ def null_batches(recipe: ChallengeRecipe, *, seed: int, kinds: int) -> list[Null
                 f"recordings of {recipe.duration:g} s are too short", where=recipe.title, fix="let them last for 10 s"
             )
         specimen = Specimen(
-            mesh=mesh, material=named(recipe.materials[index % len(recipe.materials)]), held=held, anchors=along_pole,
-            stiffness=handles.ARCSIM_STIFFNESS, anchors_given=False,
-        )  # fmt: skip
+            mesh=mesh,
+            material=named(recipe.materials[index % len(recipe.materials)]),
+            held=held,
+            anchors=along_pole,
+            stiffness=handles.ARCSIM_STIFFNESS,
+            anchors_given=False,
+        )
         made.append(
             banks.prior_batch(
-                specimen, markers=layout(recipe, stream(own, "layout")), rate=rate, noise=noise, speeds=speeds,
-                duration=cut.lasting(banks.each(recipe.count * cut.segments(frames))), seed=own,
+                specimen,
+                markers=layout(recipe, stream(own, "layout")),
+                rate=rate,
+                noise=noise,
+                speeds=speeds,
+                duration=cut.lasting(banks.each(recipe.count * cut.segments(frames))),
+                seed=own,
             )
-        )  # fmt: skip
+        )
     return made
 
 
@@ -93,9 +102,10 @@ def nulls_of(recipe: str, *, seed: int, kinds: int, lake: Lake | None) -> tuple[
         loaded = load(recipe)
         if loaded.films is not None:
             raise UsageError(
-                "films need no bank: their simulations are kept as the first set is judged", where=f"--recipe {recipe}",
+                "films need no bank: their simulations are kept as the first set is judged",
+                where=f"--recipe {recipe}",
                 fix="run `flagdata challenge run` with --bank, the folder to keep them in",
-            )  # fmt: skip
+            )
         made = null_batches(loaded, seed=seed, kinds=kinds)
         return Origin(title=loaded.title, recipe=recipe_hash(_content(loaded))), made
     experiment = recipes.load(path)
@@ -133,6 +143,7 @@ def claim(folder: Path, origin: Origin, *, seed: int) -> None:
     for key in ("title", "recipe", "seed"):
         if noted.get(key) != made[key]:
             raise ConflictError(
-                f"its nulls are of {key} {noted.get(key)!r}, not {made[key]!r}", where=str(folder),
+                f"its nulls are of {key} {noted.get(key)!r}, not {made[key]!r}",
+                where=str(folder),
                 fix="name a folder that is not there yet",
-            )  # fmt: skip
+            )

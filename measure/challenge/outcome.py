@@ -51,10 +51,14 @@ class Outcome:
         named = [name for name in verdict["named"] if name != FIELD]
         named.sort(key=lambda name: rank.index(name) if name in rank else len(rank))
         return cls(
-            key=key, conclusion=Conclusion(verdict["conclusion"]), named=tuple(named),
-            ranking=tuple(verdict["ranking"]), comparisons=tuple(verdict["comparisons"]), seconds=filing.seconds,
+            key=key,
+            conclusion=Conclusion(verdict["conclusion"]),
+            named=tuple(named),
+            ranking=tuple(verdict["ranking"]),
+            comparisons=tuple(verdict["comparisons"]),
+            seconds=filing.seconds,
             apart=verdict.get("apart"),
-        )  # fmt: skip
+        )
 
     @property
     def refused(self) -> bool:

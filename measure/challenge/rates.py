@@ -51,9 +51,10 @@ class Power:
         """
         if not strength or not len(strength) == len(group) == len(detected) or min(strength) <= 0:
             raise InputError(
-                f"{len(strength)} strengths, {len(group)} groups, {len(detected)} outcomes", where="power curve",
+                f"{len(strength)} strengths, {len(group)} groups, {len(detected)} outcomes",
+                where="power curve",
                 fix="give one of each for every case, strengths above 0",
-            )  # fmt: skip
+            )
         x, hit = np.log(np.asarray(strength)), np.asarray(detected, dtype=np.float64)
         names = sorted(set(group))
         index = np.array([names.index(name) for name in group])

@@ -173,8 +173,9 @@ class ChallengeRecipe:
             raise InputError(
                 f"{self.count} speeds {self.apart:g} m/s apart do not fit between {self.speed.low:g} and "
                 f"{self.speed.high:g} m/s",
-                where=self.title, fix="widen the range, or bring them nearer",
-            )  # fmt: skip
+                where=self.title,
+                fix="widen the range, or bring them nearer",
+            )
         needed = {Kind.ONE: (self.effects, 1), Kind.PAIR: (self.effects, 2), Kind.OUTSIDE: (self.outside, 1)}
         for kind, (table, least) in needed.items():
             if self.composition[kind] > 0 and len(table) < least:
@@ -184,9 +185,10 @@ class ChallengeRecipe:
         cells = max(numerics.columns * numerics.rows for numerics in self.numerics.values())
         ticks = (self.settle + self.duration) * self.ticks
         for what, number, most in (
-            ("markers", self.marker_columns * self.marker_rows, CELLS_LIMIT), ("cells of a mesh", cells, CELLS_LIMIT),
+            ("markers", self.marker_columns * self.marker_rows, CELLS_LIMIT),
+            ("cells of a mesh", cells, CELLS_LIMIT),
             ("instants of a recording, at the rate that all rates divide", ticks, TICKS_LIMIT),
-        ):  # fmt: skip
+        ):
             if number > most:
                 raise LimitError(f"{number:.3g} {what}", where=self.title, fix=f"have at most {most}")
 
@@ -227,29 +229,48 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
     films = None
     if "films" in top.names():
         films = top.table("films").record(
-            Filming, rate=POSITIVE, width=Bounds(least=64), pixels_high=Bounds(least=64), view=POSITIVE,
-            samples=POSITIVE, distance=POSITIVE, azimuth_sigma=NOT_NEGATIVE, elevation_sigma=NOT_NEGATIVE,
-            distance_sigma=NOT_NEGATIVE, height=POSITIVE, weight_sigma=NOT_NEGATIVE,
-        )  # fmt: skip
+            Filming,
+            rate=POSITIVE,
+            width=Bounds(least=64),
+            pixels_high=Bounds(least=64),
+            view=POSITIVE,
+            samples=POSITIVE,
+            distance=POSITIVE,
+            azimuth_sigma=NOT_NEGATIVE,
+            elevation_sigma=NOT_NEGATIVE,
+            distance_sigma=NOT_NEGATIVE,
+            height=POSITIVE,
+            weight_sigma=NOT_NEGATIVE,
+        )
     top.done()
     rates = tuple(_whole(run, "rates", rate) for rate in run.numbers("rates")) if films is None else (films.rate,)
     recipe = ChallengeRecipe(
-        title=title, films=films,
+        title=title,
+        films=films,
         composition={kind: shares.number(kind.value, 0.0, least=0) for kind in Kind},
-        width=flag.number("width", 1.5, above=0), height=flag.number("height", 1.0, above=0),
+        width=flag.number("width", 1.5, above=0),
+        height=flag.number("height", 1.0, above=0),
         materials=materials,
-        density=flag.range("density", 1.0, above=0), bending=flag.range("bending", 1.0, above=0),
-        count=run.whole("count", 3, least=1), duration=run.number("duration", 10.0, above=0),
+        density=flag.range("density", 1.0, above=0),
+        bending=flag.range("bending", 1.0, above=0),
+        count=run.whole("count", 3, least=1),
+        duration=run.number("duration", 10.0, above=0),
         settle=run.number("settle", 4.0, above=0),
-        rates=rates, noises=run.numbers("noises") if films is None else (0.0,),
-        speed=run.range("speed", 5.0, above=0), apart=run.number("apart", 0.0, least=0),
-        varying=log.number("share", 0.0, least=0), log_rate=log.whole("rate", 10, least=1),
-        intensity=log.range("intensity", 0.1, above=0), length=log.number("length", 40.0, above=0),
-        marker_columns=markers.whole("columns", 17, least=4), marker_rows=markers.whole("rows", 11, least=4),
+        rates=rates,
+        noises=run.numbers("noises") if films is None else (0.0,),
+        speed=run.range("speed", 5.0, above=0),
+        apart=run.number("apart", 0.0, least=0),
+        varying=log.number("share", 0.0, least=0),
+        log_rate=log.whole("rate", 10, least=1),
+        intensity=log.range("intensity", 0.1, above=0),
+        length=log.number("length", 40.0, above=0),
+        marker_columns=markers.whole("columns", 17, least=4),
+        marker_rows=markers.whole("rows", 11, least=4),
         jitter=markers.number("jitter", 0.0, least=0),
         numerics={name: _numerics(numerics.table(name)) for name in numerics.names()},
-        effects=_strengths(effects, EFFECTS), outside=_strengths(outside, OUTSIDE),
-    )  # fmt: skip
+        effects=_strengths(effects, EFFECTS),
+        outside=_strengths(outside, OUTSIDE),
+    )
     for table in (shares, flag, run, log, markers, numerics):
         table.done()
     return recipe

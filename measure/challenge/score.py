@@ -60,8 +60,13 @@ class Gate:
 
     def as_dict(self) -> dict[str, Any]:
         """JSON values."""
-        return {"name": self.name, "value": self.value, "wanted": self.wanted,
-                "bound": "at most" if self.at_most else "at least", "met": self.met}  # fmt: skip
+        return {
+            "name": self.name,
+            "value": self.value,
+            "wanted": self.wanted,
+            "bound": "at most" if self.at_most else "at least",
+            "met": self.met,
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,14 +203,24 @@ class Sheet:
         reductions = self.reductions
         return (
             Gate(name="false positives on nulls", value=self.false_positives.value, wanted=0.05, at_most=True),
-            Gate(name="class among those named, of one effect", wanted=0.6,
-                 value=self.share(self.of_kind(Kind.ONE), lambda o: o.class_among_named).value),
-            Gate(name="wrong name given alone, of all sets", wanted=0.05, at_most=True,
-                 value=self.share(self.outcomes, lambda o: o.wrong_alone).value),
-            Gate(name="none of the library or partly, of what was detected from outside", wanted=0.5,
-                 value=self.share(seen, lambda o: o.outside_said).value),
+            Gate(
+                name="class among those named, of one effect",
+                wanted=0.6,
+                value=self.share(self.of_kind(Kind.ONE), lambda o: o.class_among_named).value,
+            ),
+            Gate(
+                name="wrong name given alone, of all sets",
+                wanted=0.05,
+                at_most=True,
+                value=self.share(self.outcomes, lambda o: o.wrong_alone).value,
+            ),
+            Gate(
+                name="none of the library or partly, of what was detected from outside",
+                wanted=0.5,
+                value=self.share(seen, lambda o: o.outside_said).value,
+            ),
             Gate(name="median E_red", value=float(np.median(reductions)) if reductions else None, wanted=0.5),
-        )  # fmt: skip
+        )
 
     @property
     def gates(self) -> tuple[Gate, ...]:
@@ -215,14 +230,20 @@ class Sheet:
             return self._gates_of_films()
         return (
             Gate(name="false positives on nulls", value=self.false_positives.value, wanted=0.05, at_most=True),
-            Gate(name="class-level identification of strong effects", wanted=0.9,
-                 value=self.share(self.strong, lambda o: o.class_right).value),
-            Gate(name="top-1 identification of strong effects", wanted=0.8,
-                 value=self.share(self.strong, lambda o: o.first_right).value),
+            Gate(
+                name="class-level identification of strong effects",
+                wanted=0.9,
+                value=self.share(self.strong, lambda o: o.class_right).value,
+            ),
+            Gate(
+                name="top-1 identification of strong effects",
+                wanted=0.8,
+                value=self.share(self.strong, lambda o: o.first_right).value,
+            ),
             Gate(name="recall of none of the library", value=self.outside_recall.value, wanted=0.7),
             Gate(name="median E_red", value=float(np.median(reductions)) if reductions else None, wanted=0.7),
             Gate(name="control separated", value=self.separated.value, wanted=0.9),
-        )  # fmt: skip
+        )
 
     @property
     def shares(self) -> dict[str, Share]:
@@ -284,8 +305,9 @@ def score(
         raise RefusedError(
             f"{len(missing)} of {len(names)} sets have no filed verdict: {', '.join(missing[:5])}"
             f"{' …' if len(missing) > 5 else ''}",
-            where=str(folder.path), fix="run `flagdata challenge run` first; keys stay sealed until then",
-        )  # fmt: skip
+            where=str(folder.path),
+            fix="run `flagdata challenge run` first; keys stay sealed until then",
+        )
     filed = {name: filing.read(folder, name) for name in names}
     for name in names:
         folder.checked(name)
@@ -302,9 +324,10 @@ def score(
             progress(1)
     found = graded(manifest["title"], outcomes)
     return replace(
-        found, criteria=tuple(sorted({h for one in filed.values() if (h := one.criteria) is not None})),
+        found,
+        criteria=tuple(sorted({h for one in filed.values() if (h := one.criteria) is not None})),
         filmed=folder.filmed,
-    )  # fmt: skip
+    )
 
 
 def graded(title: str, outcomes: Sequence[Outcome]) -> Sheet:
@@ -312,10 +335,12 @@ def graded(title: str, outcomes: Sequence[Outcome]) -> Sheet:
     one = [o for o in outcomes if o.key.kind is Kind.ONE and o.key.impact > 0]
     acted = [o for o in outcomes if o.key.impact > 0]
     return Sheet(
-        title=title, outcomes=tuple(outcomes), power=_power(one, _class),
+        title=title,
+        outcomes=tuple(outcomes),
+        power=_power(one, _class),
         by_noise=_power(acted, lambda o: f"{1e3 * o.key.noise:g}"),
         by_rate=_power(acted, lambda o: str(o.key.rate)),
-    )  # fmt: skip
+    )
 
 
 def _class(outcome: Outcome) -> str:

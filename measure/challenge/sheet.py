@@ -92,10 +92,20 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
         for effect, one in sheet.half_strengths.items()
     ]
     sets = [
-        (o.key.name, _truth(o, strengths=True), f"{_MILLI * o.key.impact:.2g}", f"{_MILLI * o.key.noise:g}",
-         str(o.key.rate), o.key.numerics, _said(o), _number(o.reduction), _number(o.control_gap), f"{o.seconds:.0f}")
+        (
+            o.key.name,
+            _truth(o, strengths=True),
+            f"{_MILLI * o.key.impact:.2g}",
+            f"{_MILLI * o.key.noise:g}",
+            str(o.key.rate),
+            o.key.numerics,
+            _said(o),
+            _number(o.reduction),
+            _number(o.control_gap),
+            f"{o.seconds:.0f}",
+        )
         for o in sheet.outcomes
-    ]  # fmt: skip
+    ]
     said = [(true, name, str(n)) for true, row in confusion(sheet).items() for name, n in row.items()]
     spreads = (
         f"E_red: {_words(sheet.reductions, 0.1, 'worst decile')}.\n"
@@ -113,7 +123,8 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
         table(("gate", "value", "wanted", "met"), gates),
         table(("share", "of", "value", "Clopper–Pearson 90 %"), shares),
         f"The true strengths are to lie in intervals stated at {levels}." if levels else "",
-        spreads, strong,
+        spreads,
+        strong,
         table(("group", "half detected at", "sets"), half),
         table(("effect", "half detected at", "unit"), strengths),
         f"![Power curves]({picture})" if picture is not None else "",
@@ -121,7 +132,7 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
         table(
             ("set", "true", "impact, mm", "noise, mm", "rate", "numerics", "said", "E_red", "control gap", "s"), sets
         ),
-    ]  # fmt: skip
+    ]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
@@ -225,10 +236,16 @@ def _digits(value: float) -> str:
 
 def _row(o: Outcome) -> dict[str, Any]:
     return {
-        "key": o.key.as_dict(), "conclusion": o.conclusion.value if o.conclusion is not None else "refused",
-        "named": list(o.named), "detected": o.detected, "top_1": o.first_right, "class_level": o.class_right,
-        "reduction": o.reduction, "control_gap": o.control_gap, "seconds": o.seconds,
-    }  # fmt: skip
+        "key": o.key.as_dict(),
+        "conclusion": o.conclusion.value if o.conclusion is not None else "refused",
+        "named": list(o.named),
+        "detected": o.detected,
+        "top_1": o.first_right,
+        "class_level": o.class_right,
+        "reduction": o.reduction,
+        "control_gap": o.control_gap,
+        "seconds": o.seconds,
+    }
 
 
 def _class_name(outcome: Outcome) -> str:

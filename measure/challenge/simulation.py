@@ -123,9 +123,10 @@ def _tried(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey], halvin
     key = keys[place]
     if not halvings:
         raise FlagdataError(
-            f"the cloth diverged {seconds:.2f} s after the first frame", where=f"{key.name}, numerics {key.numerics!r}",
+            f"the cloth diverged {seconds:.2f} s after the first frame",
+            where=f"{key.name}, numerics {key.numerics!r}",
             fix="narrow the recipe's ranges of damping or of that effect",
-        )  # fmt: skip
+        )
     weaker = replace(key, effects=tuple(map(_halved, key.effects)))
     return _tried(recipe, seed, [*keys[:place], weaker, *keys[place + 1 :]], halvings - 1)
 
@@ -151,8 +152,9 @@ def _simulated(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) ->
         members = range(place * recipe.count, (place + 1) * recipe.count)
         ticks = recipe.ticks // key.rate * np.arange(_frames(recipe, key))
         positions = tuple(np.stack([frames[int(tick)][:, :, member] for tick in ticks]) for member in members)
-        settled = tuple(wind[round(recipe.settle * recipe.log_rate) :] if len(wind) > 1 else wind
-                        for wind in winds[key.name])  # fmt: skip
+        settled = tuple(
+            wind[round(recipe.settle * recipe.log_rate) :] if len(wind) > 1 else wind for wind in winds[key.name]
+        )
         square = float((impact[list(members)] ** 2).mean())
         result[key.name] = SimulatedSet(
             positions=positions, winds=settled, effects=key.effects, impact=math.sqrt(square)
@@ -189,14 +191,21 @@ def _winds(recipe: ChallengeRecipe, seed: int, key: AnswerKey) -> tuple[Floats, 
     return tuple(s[:, None] * direction for s in series)
 
 
-def _turbulent(
-    recipe: ChallengeRecipe, key: AnswerKey, count: int, rng: np.random.Generator, speed: float
-) -> Floats:  # fmt: skip
+def _turbulent(recipe: ChallengeRecipe, key: AnswerKey, count: int, rng: np.random.Generator, speed: float) -> Floats:
     """(sample, 3) of a wind along +x that is turbulent across and upwards as well, the same in all sets [m/s]."""
     gusts = Gusts(intensity=key.intensity)
-    series = gusts.with_series(
-        rng, batch=1, speed=speed, length=recipe.length, duration=(count - 1) / recipe.log_rate, rate=recipe.log_rate
-    ).samples[:, :count, 0].numpy()  # fmt: skip
+    series = (
+        gusts.with_series(
+            rng,
+            batch=1,
+            speed=speed,
+            length=recipe.length,
+            duration=(count - 1) / recipe.log_rate,
+            rate=recipe.log_rate,
+        )
+        .samples[:, :count, 0]
+        .numpy()
+    )
     parts = np.array([1.0, float(gusts.lateral), float(gusts.vertical)])[:, None] * key.intensity * speed * series
     return parts.T + np.array([speed, 0.0, 0.0])
 
@@ -213,13 +222,16 @@ def _base(
     contact = Contact(thickness=numerics.thickness) if numerics.thickness else None
     scenes = [
         Scene(
-            mesh=mesh, position=_start(mesh.rest, key, stream(seed, key.name, "start", index), handles),
-            material=material_of(key), handles=handles, wind=tuple(winds[key.name][index].mean(axis=0).tolist()),
+            mesh=mesh,
+            position=_start(mesh.rest, key, stream(seed, key.name, "start", index), handles),
+            material=material_of(key),
+            handles=handles,
+            wind=tuple(winds[key.name][index].mean(axis=0).tolist()),
             contact=contact,
         )
         for key in keys
         for index in range(recipe.count)
-    ]  # fmt: skip
+    ]
     system, state = assemble(scenes)
     if not any(key.intensity for key in keys):
         return system, state
@@ -255,12 +267,16 @@ def _effect(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey], name:
     duration = recipe.settle + recipe.duration + 2 * HORIZON + 1 / _GUST_RATE
     series = [
         effect.with_series(
-            stream(seed, key.name, "gusts", index), batch=1, speed=speed, length=recipe.length, duration=duration,
+            stream(seed, key.name, "gusts", index),
+            batch=1,
+            speed=speed,
+            length=recipe.length,
+            duration=duration,
             rate=_GUST_RATE,
         )
         for key in keys
         for index, speed in enumerate(key.speeds)
-    ]  # fmt: skip
+    ]
     return replace(effect, times=series[0].times, samples=torch.cat([s.samples for s in series], dim=-1))
 
 

@@ -33,19 +33,32 @@ Pins: TypeAlias = str | Sequence[tuple[float, float]]
 
 
 def closed(
-    recordings: Recordings, *, wind: Any, rest: ArrayLike | None, rate: float | None, material: str, pins: Pins,
-    size: tuple[float, float] | None, density_uncertainty: float | None, noise: float | None, level: float | None,
-    nulls: int | None, seed: int, workers: int,
-) -> Closed:  # fmt: skip
+    recordings: Recordings,
+    *,
+    wind: Any,
+    rest: ArrayLike | None,
+    rate: float | None,
+    material: str,
+    pins: Pins,
+    size: tuple[float, float] | None,
+    density_uncertainty: float | None,
+    noise: float | None,
+    level: float | None,
+    nulls: int | None,
+    seed: int,
+    workers: int,
+) -> Closed:
     """What `flagdata.close_loop` does.
 
     Raises:
         FlagdataError: see `flagdata.close_loop`.
     """
     options = Options(
-        seed=seed, workers=workers, level=CRITERIA.level if level is None else level,
+        seed=seed,
+        workers=workers,
+        level=CRITERIA.level if level is None else level,
         nulls=FEWEST_NULLS if nulls is None else nulls,
-    )  # fmt: skip
+    )
     tracked = _tracked(recordings, rest=rest, rate=rate, wind=wind, noise=noise)
     observed = observe(tracked, _setup(material, pins, size, density_uncertainty))
     return _answer(with_warnings(close_loop(observed.experiment, options), checked(observed.findings)))
@@ -59,9 +72,11 @@ def _setup(material: str, pins: Pins, size: tuple[float, float] | None, density_
         raise UnknownNameError.of("attachment", pins, names, where="pins")
     places = Hold(pins) if isinstance(pins, str) else tuple((float(u), float(v)) for u, v in pins)
     return Setup(
-        material=named(material), pins=places, outline=None if size is None else sheet(*size),
+        material=named(material),
+        pins=places,
+        outline=None if size is None else sheet(*size),
         density_uncertainty=DENSITY_UNCERTAINTY if density_uncertainty is None else density_uncertainty,
-    )  # fmt: skip
+    )
 
 
 def _tracked(
@@ -72,9 +87,10 @@ def _tracked(
     winds = wind if isinstance(wind, list) else [wind] * len(several)
     if len(winds) != len(several):
         raise UsageError(
-            f"{len(winds)} winds for {len(several)} recordings", where="wind",
+            f"{len(winds)} winds for {len(several)} recordings",
+            where="wind",
             fix="give one, or a list with one for each recording",
-        )  # fmt: skip
+        )
     return [
         _observation(one, name=f"recording {number}", rest=rest, rate=rate, wind=_track(own), noise=noise)
         for number, (one, own) in enumerate(zip(several, winds, strict=True), start=1)
@@ -88,9 +104,14 @@ def _several(recordings: Recordings) -> list[ArrayLike | MeshSequence]:
 
 
 def _observation(
-    one: ArrayLike | MeshSequence, *, name: str, rest: ArrayLike | None, rate: float | None, wind: WindTrack,
+    one: ArrayLike | MeshSequence,
+    *,
+    name: str,
+    rest: ArrayLike | None,
+    rate: float | None,
+    wind: WindTrack,
     noise: float | None,
-) -> Observation:  # fmt: skip
+) -> Observation:
     if isinstance(one, MeshSequence):
         return replace(from_sequence(one, name=name), wind=wind, noise=noise)
     if rest is None or rate is None:
@@ -109,22 +130,33 @@ def _track(wind: Any) -> WindTrack:
         velocity = np.array([velocity[0], 0.0, 0.0])
     if velocity.shape != (3,) or not math.isfinite(float(velocity.sum())):
         raise InputError(
-            f"a wind of shape {velocity.shape}", where="wind",
+            f"a wind of shape {velocity.shape}",
+            where="wind",
             fix="give a speed, a velocity (x, y, z), or times (n,) and velocities (n, 3)",
-        )  # fmt: skip
+        )
     return WindTrack(times=np.zeros(1), velocity=velocity[None])
 
 
 def _answer(verdict: Verdict) -> Closed:
     strengths = {
         one.effect: Strength(
-            parameter=one.parameter, value=one.strength.value, low=one.strength.low, high=one.strength.high,
-            unit=one.strength.unit, level=one.strength.level, bound=one.strength.bound,
+            parameter=one.parameter,
+            value=one.strength.value,
+            low=one.strength.low,
+            high=one.strength.high,
+            unit=one.strength.unit,
+            level=one.strength.level,
+            bound=one.strength.bound,
         )
         for one in sentences.named_candidates(verdict)
-    }  # fmt: skip
+    }
     return Closed(
-        conclusion=verdict.conclusion.value, named=verdict.named, sentence=sentences.heading(verdict),
-        words=words(verdict), p_value=verdict.test.p_value.value, strengths=strengths, document=as_document(verdict),
+        conclusion=verdict.conclusion.value,
+        named=verdict.named,
+        sentence=sentences.heading(verdict),
+        words=words(verdict),
+        p_value=verdict.test.p_value.value,
+        strengths=strengths,
+        document=as_document(verdict),
         page=page(verdict),
-    )  # fmt: skip
+    )

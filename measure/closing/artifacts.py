@@ -79,9 +79,14 @@ class Answer:
 
 
 def answer_of(
-    verdict: Verdict, experiment: Experiment, options: Options, *, name: str, models: tuple[NamedModel, ...],
+    verdict: Verdict,
+    experiment: Experiment,
+    options: Options,
+    *,
+    name: str,
+    models: tuple[NamedModel, ...],
     findings: tuple[Finding, ...],
-) -> Answer:  # fmt: skip
+) -> Answer:
     """That of recordings of markers.
 
     Args:
@@ -93,15 +98,24 @@ def answer_of(
     if options.bank is not None:
         bank = digest(" ".join(file_hash(path) for path in files(options.bank)))
     recipe = {
-        "close-loop": 1, "experiment": fingerprint(experiment), "level": options.level,
-        "nulls": None if options.bank is not None else [options.nulls, options.most_nulls], "bank": bank,
-    }  # fmt: skip
+        "close-loop": 1,
+        "experiment": fingerprint(experiment),
+        "level": options.level,
+        "nulls": None if options.bank is not None else [options.nulls, options.most_nulls],
+        "bank": bank,
+    }
     return Answer(
-        name=name, verdict=verdict, models=models, effects=acting(verdict), findings=findings, page=page(verdict),
-        words=words(verdict), recipe=recipe,
+        name=name,
+        verdict=verdict,
+        models=models,
+        effects=acting(verdict),
+        findings=findings,
+        page=page(verdict),
+        words=words(verdict),
+        recipe=recipe,
         parents=tuple(dict.fromkeys(r.source for r in experiment.recordings if r.source)),
         seed=options.seed,
-    )  # fmt: skip
+    )
 
 
 def keep(lake: Lake, answer: Answer, *, branch: str = "main") -> Kept:
@@ -111,10 +125,13 @@ def keep(lake: Lake, answer: Answer, *, branch: str = "main") -> Kept:
         FlagdataError: as `Lake.transaction`.
     """
     place = results.keep(
-        lake, _measurement(answer), lambda staged: write(staged, answer.verdict, page=answer.page),
-        f"close loop: {answer.name}", branch=branch,
+        lake,
+        _measurement(answer),
+        lambda staged: write(staged, answer.verdict, page=answer.page),
+        f"close loop: {answer.name}",
+        branch=branch,
         left=lambda verdict: [_model(answer, model, verdict) for model in answer.models],
-    )  # fmt: skip
+    )
     verdict = place.artifact
     made = tuple(_model(answer, model, verdict).id for model in answer.models)
     models = made if place.new else models_of(lake, verdict.id, branch)
@@ -132,10 +149,14 @@ def write(path: Path, verdict: Verdict, *, page: str) -> None:
     import zarr
 
     group = zarr.open_group(path, mode="w-", zarr_format=3)
-    group.update_attributes({
-        _HEAD: {"format": _FORMAT}, "conclusion": verdict.conclusion.value, "named": list(verdict.named),
-        "words": verdict.words,
-    })  # fmt: skip
+    group.update_attributes(
+        {
+            _HEAD: {"format": _FORMAT},
+            "conclusion": verdict.conclusion.value,
+            "named": list(verdict.named),
+            "words": verdict.words,
+        }
+    )
     texts = {"verdict": json.dumps(as_document(verdict), allow_nan=False), "report": page}
     for name, text in texts.items():
         write_plain(group, name, np.frombuffer(text.encode(), dtype=np.uint8))
@@ -176,22 +197,35 @@ def _measurement(answer: Answer) -> Artifact:
     fitted = {p.name: (p.after or p.before).value for p in verdict.parameters}
     fitted |= {f"{c.effect}.{c.parameter}": c.strength.value for c in answer.effects if c.strength.bound is None}
     report = {
-        "schema": "flagdata.close-loop-report/1", "conclusion": verdict.conclusion.value, "named": list(verdict.named),
-        "words": verdict.words, "p_value": verdict.test.p_value.value, "separating": verdict.separating,
+        "schema": "flagdata.close-loop-report/1",
+        "conclusion": verdict.conclusion.value,
+        "named": list(verdict.named),
+        "words": verdict.words,
+        "p_value": verdict.test.p_value.value,
+        "separating": verdict.separating,
         "findings": [finding.as_dict() for finding in answer.findings],
-    }  # fmt: skip
+    }
     return Artifact(
-        kind=Kind.MEASUREMENT, name=answer.name, parents=answer.parents, recipe=dict(answer.recipe),
-        seed=answer.seed, parameters=canonical(fitted), quality=quality_flags(answer.findings),
+        kind=Kind.MEASUREMENT,
+        name=answer.name,
+        parents=answer.parents,
+        recipe=dict(answer.recipe),
+        seed=answer.seed,
+        parameters=canonical(fitted),
+        quality=quality_flags(answer.findings),
         report=json.dumps(report, allow_nan=False, ensure_ascii=False),
-    )  # fmt: skip
+    )
 
 
 def _model(answer: Answer, model: NamedModel, measurement: Artifact) -> Artifact:
     effects: Sequence[str] = list(model.content.get("effects", {}))
     report = {"schema": "flagdata.model-report/1", "words": answer.verdict.words, "findings": []}
     return Artifact(
-        kind=Kind.MODEL, name=model.name, parents=(measurement.id, *answer.parents), seed=answer.seed,
-        recipe={**measurement.recipe, "effects": effects}, parameters=canonical(model.content),
+        kind=Kind.MODEL,
+        name=model.name,
+        parents=(measurement.id, *answer.parents),
+        seed=answer.seed,
+        recipe={**measurement.recipe, "effects": effects},
+        parameters=canonical(model.content),
         report=json.dumps(report, allow_nan=False, ensure_ascii=False),
-    )  # fmt: skip
+    )

@@ -32,8 +32,13 @@ _OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "accept", "
 
 @click.command("close-loop", cls=LongCommand)
 @click.argument("sources", metavar="SOURCE...", nargs=-1)
-@click.option("--recipe", "recipe_path", type=LocalPath(), metavar="FILE.toml",
-              help="Recipe of the cloth, pins, wind and test; it may name the recordings as well.")  # fmt: skip
+@click.option(
+    "--recipe",
+    "recipe_path",
+    type=LocalPath(),
+    metavar="FILE.toml",
+    help="Recipe of the cloth, pins, wind and test; it may name the recordings as well.",
+)
 @click.option(
     "--wind",
     "winds",
@@ -88,14 +93,29 @@ _OF_SOURCES = ("winds", "axis", "north", "offset", "sensor", "zone", "accept", "
 )
 @film_options
 @null_options(level="Significance level of the global test; 0.05 by default.")
-@click.option("--most-nulls", type=click.IntRange(min=1), default=320, show_default=True,
-              help="Number up to which more are simulated where p is within a factor of two of the level.")  # fmt: skip
-@click.option("--lake", "lake_path", type=LakePlace(), envvar="FLAGDATA_LAKE",
-              help="Lake that artifacts are read from and results are written to; also FLAGDATA_LAKE.")  # fmt: skip
+@click.option(
+    "--most-nulls",
+    type=click.IntRange(min=1),
+    default=320,
+    show_default=True,
+    help="Number up to which more are simulated where p is within a factor of two of the level.",
+)
+@click.option(
+    "--lake",
+    "lake_path",
+    type=LakePlace(),
+    envvar="FLAGDATA_LAKE",
+    help="Lake that artifacts are read from and results are written to; also FLAGDATA_LAKE.",
+)
 @click.option("--branch", default="main", show_default=True, help="Branch of the lake to commit on.")
 @click.option("--name", help="Name of the measurement and its models; by default that of the first source.")
-@click.option("--out", type=LocalPath(), default=Path("out/close-loop"), show_default=True,
-              help="Folder that report.html, verdict.json and the models are written to.")  # fmt: skip
+@click.option(
+    "--out",
+    type=LocalPath(),
+    default=Path("out/close-loop"),
+    show_default=True,
+    help="Folder that report.html, verdict.json and the models are written to.",
+)
 @json_option
 @click.pass_context
 def close_loop(
@@ -179,9 +199,10 @@ def close_loop(
             check_files(out / kind, *FILES, command="close-loop")
         if nulls is not None:
             raise UsageError(
-                "films count kinds of numerics, and markers recordings", where="--nulls",
+                "films count kinds of numerics, and markers recordings",
+                where="--nulls",
                 fix="leave it out: 40 kinds are simulated for markers and 20 for films",
-            )  # fmt: skip
+            )
     else:
         refuse_of_others(context, films=bool(films))
 
@@ -189,17 +210,28 @@ def close_loop(
         """The answer by markers, and the cloth's nominal material."""
         said = nulls_given(recipe, level=level, nulls=nulls, bank=bank)
         options = Options(
-            seed=seed, bank=bank, most_nulls=most_nulls, workers=workers or len(os.sched_getaffinity(0)), **said,
-        )  # fmt: skip
+            seed=seed,
+            bank=bank,
+            most_nulls=most_nulls,
+            workers=workers or len(os.sched_getaffinity(0)),
+            **said,
+        )
         setup = _setup(Setup() if recipe is None else recipe.setup, material, density_uncertainty, size, pins)
         if recipe is not None and in_recipe:
             observed = recipes.read(replace(recipe, setup=setup), lake)
         else:
             reading = Reading(
-                rate=rate, unit=unit, noise=noise, offset=offset, up=_up(context, up, recipe),
-                sensor=sensor, zone=zone, axis=_axis(context, axis, north),
-                confirm=on_command_line(accept, as_json=as_json), north=None if north is None else math.radians(north),
-            )  # fmt: skip
+                rate=rate,
+                unit=unit,
+                noise=noise,
+                offset=offset,
+                up=_up(context, up, recipe),
+                sensor=sensor,
+                zone=zone,
+                axis=_axis(context, axis, north),
+                confirm=on_command_line(accept, as_json=as_json),
+                north=None if north is None else math.radians(north),
+            )
             observed = observe(read(tracked, winds, reading, lake), setup)
         refuse(observed.findings)
         recordings, cloth = observed.experiment.recordings, observed.experiment.specimen
@@ -208,9 +240,13 @@ def close_loop(
         verdict = with_warnings(verdict, observed.findings)
         called = names["markers"] or _name(observed.experiment.recordings[0].name, tracked, recipe)
         answer = answer_of(
-            verdict, observed.experiment, options, name=called, findings=observed.findings,
+            verdict,
+            observed.experiment,
+            options,
+            name=called,
+            findings=observed.findings,
             models=models(verdict, observed.experiment, name=called, seed=seed),
-        )  # fmt: skip
+        )
         return answer, cloth.material
 
     def of_films(level: float | None) -> Answer:
@@ -240,9 +276,11 @@ def close_loop(
     by_films = of_films(whole / 2)
     by_markers, nominal = of_markers(whole / 2)
     joint = joined(
-        by_markers.verdict, by_films.verdict, level=whole,
+        by_markers.verdict,
+        by_films.verdict,
+        level=whole,
         nominal={"area_weight": nominal.density, "bending": mean_bending(nominal)},
-    )  # fmt: skip
+    )
     deliver_joint(joint, (by_markers, by_films), out=out, lake=lake, branch=branch, as_json=as_json)
 
 

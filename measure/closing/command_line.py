@@ -29,12 +29,14 @@ def null_options(*, level: str) -> Callable[[_Command], _Command]:
     """
     options = (
         click.option(
-            "--nulls", type=click.IntRange(min=1),
+            "--nulls",
+            type=click.IntRange(min=1),
             help="Number of recordings without any effect to simulate for comparison, 160 or more; on films the number "
             "of meshes and time-stepping methods, 20 by default.",
         ),
         click.option(
-            "--bank", type=LocalPath(exists=True),
+            "--bank",
+            type=LocalPath(exists=True),
             help="Folder of such simulations that were made before, by `flagdata challenge bank`.",
         ),
         click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), help=level),
@@ -44,7 +46,7 @@ def null_options(*, level: str) -> Callable[[_Command], _Command]:
         click.option(
             "--workers", type=click.IntRange(min=1), help="Number of processes; by default one for each core."
         ),
-    )  # fmt: skip
+    )
 
     def decorated(command: _Command) -> _Command:
         for option in reversed(options):

@@ -76,10 +76,14 @@ class Joint:
     def as_dict(self) -> dict[str, Any]:
         """JSON values, without the two verdicts."""
         return {
-            "conclusion": self.conclusion.value, "named": list(self.named), "words": self.words,
-            "p_value": self.p_value, "level": self.level, "strengths": [asdict(one) for one in self.strengths],
+            "conclusion": self.conclusion.value,
+            "named": list(self.named),
+            "words": self.words,
+            "p_value": self.p_value,
+            "level": self.level,
+            "strengths": [asdict(one) for one in self.strengths],
             "cloth": [asdict(one) for one in self.cloth],
-        }  # fmt: skip
+        }
 
 
 def joined(markers: Verdict, films: Verdict, *, level: float, nominal: Mapping[str, float]) -> Joint:
@@ -99,9 +103,15 @@ def joined(markers: Verdict, films: Verdict, *, level: float, nominal: Mapping[s
     p = min([1.0, *(len(both) * one.test.p_value.value for one in tested)])
     strengths = [_strength(name, markers, films) for name in named]
     return Joint(
-        conclusion=_conclusion(tested, rejecting, named), named=named, p_value=p, level=level,
-        strengths=tuple(strengths), cloth=_cloth(markers, films, nominal), markers=markers, films=films,
-    )  # fmt: skip
+        conclusion=_conclusion(tested, rejecting, named),
+        named=named,
+        p_value=p,
+        level=level,
+        strengths=tuple(strengths),
+        cloth=_cloth(markers, films, nominal),
+        markers=markers,
+        films=films,
+    )
 
 
 def _conclusion(tested: Sequence[Verdict], rejecting: Sequence[Verdict], named: Sequence[str]) -> Conclusion:
@@ -120,9 +130,11 @@ def _conclusion(tested: Sequence[Verdict], rejecting: Sequence[Verdict], named: 
 def _strength(effect: str, markers: Verdict, films: Verdict) -> Combined:
     found = [next((one for one in verdict.ranking if one.effect == effect), None) for verdict in (markers, films)]
     return _combined(
-        effect, *((None if one is None else one.strength) for one in found), shared=CRITERIA.strength_factor,
+        effect,
+        *((None if one is None else one.strength) for one in found),
+        shared=CRITERIA.strength_factor,
         null=next((one.null for one in found if one is not None), 0.0),
-    )  # fmt: skip
+    )
 
 
 def _cloth(markers: Verdict, films: Verdict, nominal: Mapping[str, float]) -> tuple[Combined, ...]:
@@ -173,9 +185,12 @@ def _combined(
     sign = 1 if first.value > null else -1
     low, value, high = sorted(null + sign * end for end in ends)
     return Combined(
-        name=name, markers=markers, films=films, apart=abs(means[0] - means[1]) / math.sqrt(sum(own)),
+        name=name,
+        markers=markers,
+        films=films,
+        apart=abs(means[0] - means[1]) / math.sqrt(sum(own)),
         together=Estimate(value=value, low=low, high=high, unit=second.unit, level=CRITERIA.interval),
-    )  # fmt: skip
+    )
 
 
 def _sided(one: Estimate, null: float) -> bool:

@@ -96,9 +96,10 @@ def _model(
     own = fitted(verdict, effects)
     material = _material(specimen.material)
     material |= {
-        "density": specimen.material.density * own["density"], "bending-factor": own["bending"],
+        "density": specimen.material.density * own["density"],
+        "bending-factor": own["bending"],
         "damping": own["damping"],
-    }  # fmt: skip
+    }
     return NamedModel(name=name, content={"title": name, **common, "material": material, **acted(effects)})
 
 
@@ -139,7 +140,7 @@ def _flag(specimen: Specimen) -> dict[str, Any] | None:
         or not np.allclose(flat.rest, rest)
         or not np.array_equal(flat.faces, specimen.mesh.faces)
     ):
-        return None  # fmt: skip
+        return None
     if not np.allclose(specimen.anchors, upright(flat)[list(specimen.held)], atol=1e-3 * width):
         return None
     for attachment, vertices in (("corners", handles.corners(flat.rest)), ("hoist", handles.full_hoist(flat.rest))):
@@ -150,9 +151,12 @@ def _flag(specimen: Specimen) -> dict[str, Any] | None:
 
 def _mesh(specimen: Specimen) -> dict[str, Any]:
     return {
-        "shape": "mesh", "rest": specimen.mesh.rest.tolist(), "faces": specimen.mesh.faces.tolist(),
-        "held": list(specimen.held), "anchors": specimen.anchors.tolist(),
-    }  # fmt: skip
+        "shape": "mesh",
+        "rest": specimen.mesh.rest.tolist(),
+        "faces": specimen.mesh.faces.tolist(),
+        "held": list(specimen.held),
+        "anchors": specimen.anchors.tolist(),
+    }
 
 
 def _material(nominal: Material) -> dict[str, Any]:
@@ -162,9 +166,13 @@ def _material(nominal: Material) -> dict[str, Any]:
         if np.array_equal(known.stretching, nominal.stretching) and np.array_equal(known.bending, nominal.bending):
             return {"name": nominal.name}
     table = {
-        "title": nominal.name, "source": nominal.source, "density": nominal.density,
-        "stretching": nominal.stretching.tolist(), "bending": nominal.bending.tolist(), "damping": nominal.damping,
-    }  # fmt: skip
+        "title": nominal.name,
+        "source": nominal.source,
+        "density": nominal.density,
+        "stretching": nominal.stretching.tolist(),
+        "bending": nominal.bending.tolist(),
+        "damping": nominal.damping,
+    }
     return {"table": table}
 
 

@@ -78,9 +78,11 @@ def _written(answer: Answer, *, out: Path, lake: Lake | None, branch: str) -> di
         kept = None if lake is None else keep(lake, answer, branch=branch)
     if kept is not None:
         as_written["artifacts"] = {
-            "measurement": kept.measurement, "models": list(kept.models), "existing": not kept.place.new,
+            "measurement": kept.measurement,
+            "models": list(kept.models),
+            "existing": not kept.place.new,
             "version": kept.place.version,
-        }  # fmt: skip
+        }
         say(f"measurement {kept.measurement}, {kept.place.sentence}")
     if kept is not None and kept.place.new:
         for model, identity in zip(answer.models, kept.models, strict=True):

@@ -75,8 +75,11 @@ def read(sources: Sequence[str], winds: Sequence[str], reading: Reading, lake: L
         )
     if not any(map(_is_log, winds)):
         given = {
-            "offset": reading.offset, "sensor": reading.sensor, "zone": reading.zone, "accept": reading.confirm.accept
-        }  # fmt: skip
+            "offset": reading.offset,
+            "sensor": reading.sensor,
+            "zone": reading.zone,
+            "accept": reading.confirm.accept,
+        }
         for name in given:
             if given[name] is not None:
                 raise UsageError("no wind is a log", where=f"--{name}", fix="leave it out, or name a log by --wind")

@@ -31,10 +31,13 @@ SCENE = "flag-outdoor-damped"
 RATE, SECONDS = 25, 12
 """Hz and s of the film: ten windows of the network."""
 GIVEN = {
-    "count": 1, "batch": 1, "material": {"density": 0.18}, "wind": {"speed": 5.0},
+    "count": 1,
+    "batch": 1,
+    "material": {"density": 0.18},
+    "wind": {"speed": 5.0},
     "effects": {"gusts": {"intensity": 0.15}},
     "time": {"settle": 3.0, "frames": RATE * SECONDS, "rate": float(RATE)},
-}  # fmt: skip
+}
 """In place of what the scene draws."""
 START = datetime(2026, 5, 14, 9, 30, tzinfo=UTC)
 """When the camera starts, by its own clock."""
@@ -69,9 +72,15 @@ def make(folder: Path, *, seed: int) -> None:
         .draw(child_seed(seed, "example", "look"), Assets())
     )
     write_film(
-        folder / "flag.mp4", outcome.sequence, zeta, rate=RATE, start=START, seed=child_seed(seed, "example", "film"),
-        workers=1, advance=lambda frames: None,
-    )  # fmt: skip
+        folder / "flag.mp4",
+        outcome.sequence,
+        zeta,
+        rate=RATE,
+        start=START,
+        seed=child_seed(seed, "example", "film"),
+        workers=1,
+        advance=lambda frames: None,
+    )
     settled = recipe.time.settling / RATE
     times = np.arange(round((settled + SECONDS) * _AIR_RATE) + 1) / _AIR_RATE
     velocity = velocities(crew.assemble([member])[0], times)
@@ -87,11 +96,16 @@ def make(folder: Path, *, seed: int) -> None:
     (folder / "anemometer.csv").write_text("\n".join([_HEADING, *lines]) + "\n", encoding="utf-8")
     (folder / "example.toml").write_text(
         _ABOUT.format(
-            seconds=SECONDS, length=recipe.scene.width, height=recipe.scene.height, offset=OFFSET, wind=wind,
-            density=member.parameters["density"], damping=member.parameters["damping"],
+            seconds=SECONDS,
+            length=recipe.scene.width,
+            height=recipe.scene.height,
+            offset=OFFSET,
+            wind=wind,
+            density=member.parameters["density"],
+            damping=member.parameters["damping"],
         ),
         encoding="utf-8",
-    )  # fmt: skip
+    )
 
 
 @click.command()

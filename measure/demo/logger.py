@@ -15,9 +15,12 @@ from sim.datasets.recipe import AnemometerSpec, Truth
 ZONE = "+02:00"
 """Of the logger's wall clock."""
 CUP = AnemometerSpec(
-    truth=Truth.MEASURED, noise=0.05, resolution=0.1, accuracy=0.1,
+    truth=Truth.MEASURED,
+    noise=0.05,
+    resolution=0.1,
+    accuracy=0.1,
     effects={"anemometer-lag": {"distance": 2.3}, "anemometer-dead-zone": {"threshold": 0.4}},
-)  # fmt: skip
+)
 """The instrument, as its data sheet has it."""
 SENSOR = """\
 name = "cup-logger"

@@ -54,9 +54,12 @@ CLOCK_SIGMA = 0.5
 SCALE_SIGMA = 3e-3
 """kg/m², standard error with which a kitchen scale and a tape give the cloth's area weight."""
 _SURVEYED = {
-    "azimuth": math.radians(3.0), "elevation": math.radians(1.0), "distance": 0.1, "clock": CLOCK_SIGMA,
+    "azimuth": math.radians(3.0),
+    "elevation": math.radians(1.0),
+    "distance": 0.1,
+    "clock": CLOCK_SIGMA,
     "area_weight": SCALE_SIGMA,
-}  # fmt: skip
+}
 """Standard errors with which a person notes down where the camera stood, by compass and tape, clocks and cloth."""
 
 
@@ -80,9 +83,7 @@ class Acting:
         return f"{self.effect}, {self.parameter} {self.strength:g}" + ("" if unit == "1" else f" {unit}")
 
 
-HIDDEN = (
-    Acting(effect="hem-mass", parameter="line_density", strength=0.06),
-)  # fmt: skip
+HIDDEN = (Acting(effect="hem-mass", parameter="line_density", strength=0.06),)
 """Of which the seed draws one: a rope in the hem weighs as much as the cloth. The flag moves more in stronger wind
 all the same, so that its motion shows how the clocks differ."""
 
@@ -125,9 +126,10 @@ class RecordingRecipe:
     def __post_init__(self) -> None:
         if self.duration < 10 or self.rate < 1:
             raise InputError(
-                f"a recording of {self.duration} s at {self.rate} Hz", where="demonstration",
+                f"a recording of {self.duration} s at {self.rate} Hz",
+                where="demonstration",
                 fix="make it at least 10 s long, at 1 Hz",
-            )  # fmt: skip
+            )
 
     def drawn(self, name: str, low: float, high: float) -> float:
         """A value between two from the stream of that name."""
@@ -213,26 +215,42 @@ def make_recording(
     sequence = _flown(recipe, system, state, advance)
     zeta = look(recipe)
     write_film(
-        video, sequence, zeta, rate=recipe.rate, start=START, seed=child_seed(recipe.seed, "demo", "film"),
-        workers=workers, advance=advance,
-    )  # fmt: skip
+        video,
+        sequence,
+        zeta,
+        rate=recipe.rate,
+        start=START,
+        seed=child_seed(recipe.seed, "demo", "film"),
+        workers=workers,
+        advance=advance,
+    )
     cloth = _cloth(recipe)
     return Recording(
-        video=video, log=log, sensor=sensor, noted=_noted(recipe, sequence, zeta, offset), clock_offset=offset,
-        wind=np.hypot(velocity[:, 0], velocity[:, 1]), area_weight=cloth[0], damping=cloth[2], acting=recipe.acting,
-    )  # fmt: skip
+        video=video,
+        log=log,
+        sensor=sensor,
+        noted=_noted(recipe, sequence, zeta, offset),
+        clock_offset=offset,
+        wind=np.hypot(velocity[:, 0], velocity[:, 1]),
+        area_weight=cloth[0],
+        damping=cloth[2],
+        acting=recipe.acting,
+    )
 
 
 def look(recipe: RecordingRecipe) -> RenderParameters:
     """How it is filmed: as in the data set `outdoor`, from 7 to 9 m away, in daylight, before the sky or hills, against
     which the outline of a flag is found."""
     quantities = {
-        "camera_radius": recipe.drawn("radius", 7.0, 9.0), "camera_height": recipe.drawn("camera", 1.4, 1.8),
+        "camera_radius": recipe.drawn("radius", 7.0, 9.0),
+        "camera_height": recipe.drawn("camera", 1.4, 1.8),
         "camera_angle": math.radians(recipe.drawn("azimuth", 70.0, 110.0)),
         "view_angle": math.radians(recipe.drawn("view", 20.0, 23.0)),
-        "exposure_bias": recipe.drawn("exposure", -0.5, 0.1), "raster_samples": recipe.samples,
-        "width": recipe.width, "height": recipe.rows,
-    }  # fmt: skip
+        "exposure_bias": recipe.drawn("exposure", -0.5, 0.1),
+        "raster_samples": recipe.samples,
+        "width": recipe.width,
+        "height": recipe.rows,
+    }
     outdoor = prior.named("outdoor").with_quantities(quantities, source="the demonstration")
     plain = replace(outdoor, textures=("flag", "stripes"), backgrounds=("sky", "hills"))
     return plain.draw(child_seed(recipe.seed, "demo", "look"), Assets())
@@ -241,9 +259,10 @@ def look(recipe: RecordingRecipe) -> RenderParameters:
 def _cloth(recipe: RecordingRecipe) -> tuple[float, float, float]:
     """Area weight [kg/m²], factor on the bending table, damping [s]."""
     return (
-        recipe.drawn("area-weight", 0.16, 0.20), math.exp(recipe.drawn("bending", -0.5, 0.5)),
+        recipe.drawn("area-weight", 0.16, 0.20),
+        math.exp(recipe.drawn("bending", -0.5, 0.5)),
         recipe.drawn("damping", 3e-3, 8e-3),
-    )  # fmt: skip
+    )
 
 
 def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
@@ -259,9 +278,13 @@ def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
     speed = recipe.wind
     scene = Scene(mesh=flat, position=start + rough, material=material, handles=held, wind=(speed, 0.0, 0.0))
     gusts = Gusts(intensity=recipe.intensity).with_series(
-        stream(recipe.seed, "demo", "gusts"), batch=1, speed=speed, length=recipe.eddies,
-        duration=BEFORE + recipe.duration + AFTER, rate=AIR_RATE,
-    )  # fmt: skip
+        stream(recipe.seed, "demo", "gusts"),
+        batch=1,
+        speed=speed,
+        length=recipe.eddies,
+        duration=BEFORE + recipe.duration + AFTER,
+        rate=AIR_RATE,
+    )
     acting = recipe.acting
     beside = [] if acting is None else [EFFECTS[acting.effect](**{acting.parameter: acting.strength})]
     system, state = apply([gusts, *beside], *assemble([scene], dtype=torch.float32))
@@ -281,9 +304,12 @@ def _flown(recipe: RecordingRecipe, system: System, state: State, advance: Calla
                 advance(1)
     mesh = recipe.mesh
     return MeshSequence(
-        time=np.round(np.arange(count) / recipe.rate * NANOSECONDS).astype(np.int64), positions=np.stack(frames),
-        faces=mesh.faces.astype(np.int32), rest=mesh.rest.astype(np.float32), attributes={},
-    )  # fmt: skip
+        time=np.round(np.arange(count) / recipe.rate * NANOSECONDS).astype(np.int64),
+        positions=np.stack(frames),
+        faces=mesh.faces.astype(np.int32),
+        rest=mesh.rest.astype(np.float32),
+        attributes={},
+    )
 
 
 def _log(recipe: RecordingRecipe, path: Path, times: NDArray[np.float64], velocity: NDArray[np.float64]) -> float:
@@ -295,19 +321,25 @@ def _log(recipe: RecordingRecipe, path: Path, times: NDArray[np.float64], veloci
     first = (int(series.time[0]) - begin) / NANOSECONDS - BEFORE  # by the camera's clock, from its start
     stamp = START + timedelta(seconds=first + offset)
     write_log(
-        path, series.channels["wind_speed"], series.channels["wind_direction"], first=stamp,
-        quiet=round(BEFORE - _LARGEST_OFFSET), seed=recipe.seed,
-    )  # fmt: skip
+        path,
+        series.channels["wind_speed"],
+        series.channels["wind_direction"],
+        first=stamp,
+        quiet=round(BEFORE - _LARGEST_OFFSET),
+        seed=recipe.seed,
+    )
     return offset
 
 
 def _noted(recipe: RecordingRecipe, sequence: MeshSequence, zeta: RenderParameters, offset: float) -> Noted:
     camera = stage(Meshes.flag(sequence, heading=0.0), zeta).camera
     true = {
-        "azimuth": zeta.camera_angle, "elevation": math.asin(camera.forward[2]),
-        "distance": zeta.camera_radius / math.cos(math.asin(camera.forward[2])), "clock": offset,
+        "azimuth": zeta.camera_angle,
+        "elevation": math.asin(camera.forward[2]),
+        "distance": zeta.camera_radius / math.cos(math.asin(camera.forward[2])),
+        "clock": offset,
         "area_weight": _cloth(recipe)[0],
-    }  # fmt: skip
+    }
     return Noted(
         **{
             name: value + float(stream(recipe.seed, "demo", "noted", name).normal(0.0, _SURVEYED[name]))

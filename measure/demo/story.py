@@ -128,11 +128,25 @@ def _filmed(made: Recording) -> tuple[str, ...]:
     """Options of the film that weighing and the loop have in common, so that they share simulations."""
     noted = made.noted
     return (
-        "--flag-size", SIZE, "--azimuth", f"{math.degrees(noted.azimuth):.0f}±3",
-        "--elevation", f"{math.degrees(noted.elevation):.0f}±2", "--distance", f"{noted.distance:.1f}",
-        "--end", f"{WEIGHED:g}s", "--simulations", str(SIMULATIONS), "--workers", str(_cores()),
-        "--cache", "simulations", "--lake", "lake",
-    )  # fmt: skip
+        "--flag-size",
+        SIZE,
+        "--azimuth",
+        f"{math.degrees(noted.azimuth):.0f}±3",
+        "--elevation",
+        f"{math.degrees(noted.elevation):.0f}±2",
+        "--distance",
+        f"{noted.distance:.1f}",
+        "--end",
+        f"{WEIGHED:g}s",
+        "--simulations",
+        str(SIMULATIONS),
+        "--workers",
+        str(_cores()),
+        "--cache",
+        "simulations",
+        "--lake",
+        "lake",
+    )
 
 
 def markers_step(shell: Transcript, seed: int) -> None:
@@ -191,11 +205,17 @@ class _Step:
             typed = tuple(command for command, _ in self._shell.entries[self._typed :])
             self._shell.cards.append(
                 Card(
-                    title=self._title, done=self._done, found=self.found.strip(), picture=self.picture, alt=self._alt,
-                    page=self._page, commands=typed, seconds=time.monotonic() - self._began,
+                    title=self._title,
+                    done=self._done,
+                    found=self.found.strip(),
+                    picture=self.picture,
+                    alt=self._alt,
+                    page=self._page,
+                    commands=typed,
+                    seconds=time.monotonic() - self._began,
                     truths=tuple(self._truths),
                 )
-            )  # fmt: skip
+            )
 
 
 def _film(shell: Transcript, recipe: RecordingRecipe) -> Recording:
@@ -245,9 +265,17 @@ def _measured(shell: Transcript, made: Recording) -> None:
     alt = "The wind read off the film, beside the log and the true wind"
     with _Step(shell, "Wind from the film", done, alt=alt, page="measured.html") as step:
         printed = shell.attempt(
-            "measure", "flag", "--flag-size", SIZE, "--windows", f"{_CLIPS:g}s", "--report", "measured.html",
-            "--lake", "lake",
-        )  # fmt: skip
+            "measure",
+            "flag",
+            "--flag-size",
+            SIZE,
+            "--windows",
+            f"{_CLIPS:g}s",
+            "--report",
+            "measured.html",
+            "--lake",
+            "lake",
+        )
         step.took(None if printed is None else _first(printed))
         if printed is not None:
             step.picture = _series(shell.folder / "lake", made)
@@ -273,9 +301,15 @@ def _series(place: Path, made: Recording) -> str:
     wind = _during(made)
     axes.plot(np.arange(len(wind)) / AIR_RATE, wind, color="0.75", linewidth=0.8, label="true wind at the flag")
     axes.errorbar(
-        time_, value, np.abs(np.stack([value - low, high - value])), fmt="o", markersize=3, linewidth=0.8,
-        color="#c4622d", label="read off the film, 90 %",
-    )  # fmt: skip
+        time_,
+        value,
+        np.abs(np.stack([value - low, high - value])),
+        fmt="o",
+        markersize=3,
+        linewidth=0.8,
+        color="#c4622d",
+        label="read off the film, 90 %",
+    )
     axes.set(xlabel="time since the first frame [s]", ylabel="wind speed [m/s]", ylim=(0, None))
     axes.legend(loc="lower right", fontsize=8, ncols=2)
     return figure_url(figure, dpi=110)

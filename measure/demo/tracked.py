@@ -88,9 +88,10 @@ class TrackedRecipe:
     def __post_init__(self) -> None:
         if self.duration < 5 or not self.speeds or min(self.speeds) <= 0:
             raise InputError(
-                f"recordings of {self.duration} s at {self.speeds} m/s", where="demonstration",
+                f"recordings of {self.duration} s at {self.speeds} m/s",
+                where="demonstration",
                 fix="make them at least 5 s long, in some wind",
-            )  # fmt: skip
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,11 +140,14 @@ def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int],
     )
     recipe_file.write_text(
         RECIPE.format(
-            width=recipe.width, height=recipe.height, vertices=recipe.vertices, material=MATERIAL,
+            width=recipe.width,
+            height=recipe.height,
+            vertices=recipe.vertices,
+            material=MATERIAL,
             recordings=recordings,
         ),
         encoding="utf-8",
-    )  # fmt: skip
+    )
     unit = EFFECTS[recipe.effect].parameters()[recipe.parameter].unit
     return Tracks(
         table=table,

@@ -20,9 +20,12 @@ LEAST_INFORMATION = 0.05
 """Information of a posterior over its prior, Kullback–Leibler of Gaussians of the same moments [nat]. Below it the film
 did not constrain it: a posterior of the same mean then has 78 % of the prior's standard deviation or more."""
 SHORT = {
-    "wind_speed": "wind", "density": "area weight", "bending_scale": "bending", "anisotropy": "anisotropy",
+    "wind_speed": "wind",
+    "density": "area weight",
+    "bending_scale": "bending",
+    "anisotropy": "anisotropy",
     ASPECT: "logarithm of length over height",
-}  # fmt: skip
+}
 """Names in the one-line answer."""
 HEADLINE = ("wind_speed", "density")
 """What the one-line answer is about."""
@@ -87,11 +90,12 @@ class Quantity:
             return None
         other = "more" if self.span.bound is Bound.LEAST else "less"
         return Finding(
-            kind=f"{self.name.replace('_', '-')}-at-end", severity=Severity.WARNING,
+            kind=f"{self.name.replace('_', '-')}-at-end",
+            severity=Severity.WARNING,
             what=f"{SHORT[self.name]}: {self._beyond}, and {PILED:.0%} of the draws or more lie within {WITHIN:.0%} of "
             f"that end; {other} would look the same, so that only a bound is given",
             fix="check --flag-size, with which the range grows",
-        )  # fmt: skip
+        )
 
     @property
     def _beyond(self) -> str:
@@ -113,17 +117,29 @@ class Quantity:
     def as_dict(self) -> dict[str, Any]:
         """JSON values; an end of the interval that nothing bounds is null."""
         return {
-            "unit": self.unit, "value": self.value, "sigma": self.sigma, "interval": self.span.ends(),
-            "level": self.span.level, "bound": None if self.span.bound is None else self.span.bound.value,
-            "assumed": list(self.assumed), "information": self.information, "constrained": self.constrained,
+            "unit": self.unit,
+            "value": self.value,
+            "sigma": self.sigma,
+            "interval": self.span.ends(),
+            "level": self.span.level,
+            "bound": None if self.span.bound is None else self.span.bound.value,
+            "assumed": list(self.assumed),
+            "information": self.information,
+            "constrained": self.constrained,
             "given": self.given,
-        }  # fmt: skip
+        }
 
 
 def quantities(
-    draws: NDArray[np.float64], prior: NDArray[np.float64], names: Sequence[str], *, level: float,
-    assumed: NDArray[np.float64], places: NDArray[np.float64], stated: Mapping[str, Stated],
-) -> tuple[Quantity, ...]:  # fmt: skip
+    draws: NDArray[np.float64],
+    prior: NDArray[np.float64],
+    names: Sequence[str],
+    *,
+    level: float,
+    assumed: NDArray[np.float64],
+    places: NDArray[np.float64],
+    stated: Mapping[str, Stated],
+) -> tuple[Quantity, ...]:
     """All quantities of a posterior.
 
     Args:
@@ -152,11 +168,16 @@ def quantities(
         own = span(draws[:, k], places[:, k], level=level, limits=limits, assumed=ends)
         found.append(
             Quantity(
-                name=name, unit=_UNITS[name], value=float(draws[:, k].mean()) if own.estimated else None,
-                sigma=float(draws[:, k].std()) if own.estimated else None, span=own, assumed=ends,
-                information=information(draws[:, k], prior[:, k]), given=given is not None,
+                name=name,
+                unit=_UNITS[name],
+                value=float(draws[:, k].mean()) if own.estimated else None,
+                sigma=float(draws[:, k].std()) if own.estimated else None,
+                span=own,
+                assumed=ends,
+                information=information(draws[:, k], prior[:, k]),
+                given=given is not None,
             )
-        )  # fmt: skip
+        )
     return tuple(found)
 
 
@@ -164,9 +185,15 @@ def _given(name: str, value: float, *, level: float) -> Quantity:
     """A quantity whose value was stated."""
     own = Span(low=value, high=value, level=level, bound=None, estimated=True)
     return Quantity(
-        name=name, unit=_UNITS[name], value=value, sigma=0.0, span=own, assumed=(value, value), information=0.0,
+        name=name,
+        unit=_UNITS[name],
+        value=value,
+        sigma=0.0,
+        span=own,
+        assumed=(value, value),
+        information=0.0,
         given=True,
-    )  # fmt: skip
+    )
 
 
 def information(posterior: NDArray[np.float64], prior: NDArray[np.float64]) -> float:

@@ -44,32 +44,52 @@ def artifact(measured: Measurement, subject: Subject, network: Network, reading:
     wind = estimates.get(WIND)
     flags = quality_flags(measured.noticed(anyway=True))
     return Artifact(
-        kind=Kind.MEASUREMENT, name=measured.film, parents=parents, seed=measured.options.seed,
-        source_hash=subject.content_hash(), source_name=None if subject.path is None else subject.path.name,
+        kind=Kind.MEASUREMENT,
+        name=measured.film,
+        parents=parents,
+        seed=measured.options.seed,
+        source_hash=subject.content_hash(),
+        source_name=None if subject.path is None else subject.path.name,
         recipe={
-            "measure": _ANSWER, "network": network.identity, **measured.options.recipe(), **reading.recipe(),
+            "measure": _ANSWER,
+            "network": network.identity,
+            **measured.options.recipe(),
+            **reading.recipe(),
         },
-        start=start, end=None if start is None else start + round(measured.duration * NANOSECONDS),
-        wind=None if wind is None else wind.value, wind_sigma=None if wind is None else wind.sigma,
+        start=start,
+        end=None if start is None else start + round(measured.duration * NANOSECONDS),
+        wind=None if wind is None else wind.value,
+        wind_sigma=None if wind is None else wind.sigma,
         parameters=canonical({name: q.value for name, q in estimates.items()}),
         quality=sorted({*flags, REFUSED}) if measured.verdict.refused else flags,
         report=canonical(report(measured)),
-    )  # fmt: skip
+    )
 
 
 def report(measured: Measurement) -> Mapping[str, Any]:
     """What the row says of it: JSON values."""
     return {
-        "schema": "flagdata.measure-report/2", "sentence": measured.sentence, "model": measured.model,
-        "quantities": {q.name: q.as_dict() for q in measured.quantities}, "gate": measured.verdict.as_dict(),
-        "combined": measured.combined, "findings": [finding.as_dict() for finding in measured.noticed(anyway=True)],
-    }  # fmt: skip
+        "schema": "flagdata.measure-report/2",
+        "sentence": measured.sentence,
+        "model": measured.model,
+        "quantities": {q.name: q.as_dict() for q in measured.quantities},
+        "gate": measured.verdict.as_dict(),
+        "combined": measured.combined,
+        "findings": [finding.as_dict() for finding in measured.noticed(anyway=True)],
+    }
 
 
 def keep(
-    lake: Lake, measured: Measurement, subject: Subject, network: Network, reading: Reading, series: Beside, *,
-    branch: str, refinement: Mapping[str, Any] | None = None,
-) -> Placed:  # fmt: skip
+    lake: Lake,
+    measured: Measurement,
+    subject: Subject,
+    network: Network,
+    reading: Reading,
+    series: Beside,
+    *,
+    branch: str,
+    refinement: Mapping[str, Any] | None = None,
+) -> Placed:
     """Commit a measurement where it is new, see `flagdata.lake.results`.
 
     Args:
@@ -79,9 +99,12 @@ def keep(
         FlagdataError: as `Lake.transaction`.
     """
     return results.keep(
-        lake, artifact(measured, subject, network, reading), lambda staged: write(staged, measured, series, refinement),
-        f"measure {measured.film}", branch=branch,
-    )  # fmt: skip
+        lake,
+        artifact(measured, subject, network, reading),
+        lambda staged: write(staged, measured, series, refinement),
+        f"measure {measured.film}",
+        branch=branch,
+    )
 
 
 def write(path: Path, measured: Measurement, series: Beside, refinement: Mapping[str, Any] | None = None) -> None:
@@ -92,10 +115,15 @@ def write(path: Path, measured: Measurement, series: Beside, refinement: Mapping
     import zarr
 
     group = zarr.open_group(path, mode="w-", zarr_format=3)
-    group.update_attributes({
-        _HEAD: {"format": _FORMAT}, "targets": list(measured.names), "answer": dict(measured.as_dict(anyway=True)),
-        "series": series.as_dict(), "refinement": None if refinement is None else dict(refinement),
-    })  # fmt: skip
+    group.update_attributes(
+        {
+            _HEAD: {"format": _FORMAT},
+            "targets": list(measured.names),
+            "answer": dict(measured.as_dict(anyway=True)),
+            "series": series.as_dict(),
+            "refinement": None if refinement is None else dict(refinement),
+        }
+    )
     write_plain(group, "draws", measured.draws.astype(np.float32), ("draw", "target"))
     for name, values in {**series.columns(), "time": series.time}.items():
         write_plain(group, name, values.astype(np.float64 if name == "time" else np.float32), ("time",))

@@ -61,9 +61,10 @@ class Dependence:
 
 
 UNKNOWN = Dependence(
-    wind=1.0, cloth=1.0,
+    wind=1.0,
+    cloth=1.0,
     source="not measured for this model, so that windows count as repetitions of one and narrow no interval",
-)  # fmt: skip
+)
 
 
 def effective(count: int, correlation: float) -> float:
@@ -72,9 +73,15 @@ def effective(count: int, correlation: float) -> float:
 
 
 def combined(
-    logits: NDArray[np.floating], *, names: Sequence[str], centre: NDArray[np.float64], spread: NDArray[np.float64],
-    dependence: Dependence, generator: np.random.Generator, given: Sequence[str] = (),
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # fmt: skip
+    logits: NDArray[np.floating],
+    *,
+    names: Sequence[str],
+    centre: NDArray[np.float64],
+    spread: NDArray[np.float64],
+    dependence: Dependence,
+    generator: np.random.Generator,
+    given: Sequence[str] = (),
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """One posterior of all windows.
 
     Args:
@@ -130,9 +137,12 @@ def _cloth(white: NDArray[np.float64], correlation: float) -> NDArray[np.float64
 
 
 def _winds(
-    winds: NDArray[np.float64], cloths: NDArray[np.float64], shared: NDArray[np.float64], correlation: float,
+    winds: NDArray[np.float64],
+    cloths: NDArray[np.float64],
+    shared: NDArray[np.float64],
+    correlation: float,
     generator: np.random.Generator,
-) -> NDArray[np.float64]:  # fmt: skip
+) -> NDArray[np.float64]:
     """(k, n, own) draws of each window's wind at the shared cloth."""
     count, n, _ = winds.shape
     common = generator.standard_normal(n)

@@ -43,34 +43,81 @@ if TYPE_CHECKING:
 @click.command(cls=LongCommand)
 @click.argument("source", required=False, metavar="[SOURCE]")
 @click.option("--query", metavar="EXPR", help='SQL condition over clips, instead of SOURCE: "wind between 3 and 6".')
-@click.option("--flag-size", metavar="LxH", help="Length along the wind and height along the pole [m], as in 1.5x1.0; "
-              "of a hanging cloth its width and height.")  # fmt: skip
-@click.option("--area-weight", type=STATED, metavar="VALUE",
-              help="Area weight of the cloth [kg/m²]: 0.284, 0.284±0.01 (deviation) or 0.27:0.30.")  # fmt: skip
-@click.option("--material", metavar="NAME", help="Cloth whose area weight is taken, a material of the catalog or a "
-              "fabric that films of the lake declare; nothing else of it is used.")  # fmt: skip
-@click.option("--windows", "--window", "step", type=DURATION, metavar="TIME",
-              help="A wind series, one window every so often, as in 1.2s.")  # fmt: skip
+@click.option(
+    "--flag-size",
+    metavar="LxH",
+    help="Length along the wind and height along the pole [m], as in 1.5x1.0; of a hanging cloth its width and height.",
+)
+@click.option(
+    "--area-weight",
+    type=STATED,
+    metavar="VALUE",
+    help="Area weight of the cloth [kg/m²]: 0.284, 0.284±0.01 (deviation) or 0.27:0.30.",
+)
+@click.option(
+    "--material",
+    metavar="NAME",
+    help="Cloth whose area weight is taken, a material of the catalog or a "
+    "fabric that films of the lake declare; nothing else of it is used.",
+)
+@click.option(
+    "--windows",
+    "--window",
+    "step",
+    type=DURATION,
+    metavar="TIME",
+    help="A wind series, one window every so often, as in 1.2s.",
+)
 @film_options
-@click.option("--level", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.9, show_default=True,
-              help="Level of the intervals.")  # fmt: skip
+@click.option(
+    "--level",
+    type=click.FloatRange(0, 1, min_open=True, max_open=True),
+    default=0.9,
+    show_default=True,
+    help="Level of the intervals.",
+)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of all draws.")
-@click.option("--model", metavar="NAME|FOLDER|ID", help="Network that measures, or reading model of flagdata "
-              "calibrate; by default flow-outdoor, of flags.")  # fmt: skip
-@click.option("--refine", type=click.IntRange(min=20), metavar="N",
-              help="Refine the first window by N simulated clips, 20 or more; 50 take minutes.")  # fmt: skip
-@click.option("--cache", type=LocalPath(), metavar="FOLDER",
-              help="Where simulated clips are kept, so that an interrupted refinement goes on.")  # fmt: skip
-@click.option("--false-alarm", type=click.FloatRange(0, 1, min_open=True, max_open=True), default=0.05,
-              show_default=True, help="Share of familiar films that the gate may refuse.")  # fmt: skip
-@click.option("--anyway", is_flag=True, help="Show, marked, what the model says of a film that the gate refuses, if "
-              "anything moves in it.")  # fmt: skip
+@click.option(
+    "--model",
+    metavar="NAME|FOLDER|ID",
+    help="Network that measures, or reading model of flagdata calibrate; by default flow-outdoor, of flags.",
+)
+@click.option(
+    "--refine",
+    type=click.IntRange(min=20),
+    metavar="N",
+    help="Refine the first window by N simulated clips, 20 or more; 50 take minutes.",
+)
+@click.option(
+    "--cache",
+    type=LocalPath(),
+    metavar="FOLDER",
+    help="Where simulated clips are kept, so that an interrupted refinement goes on.",
+)
+@click.option(
+    "--false-alarm",
+    type=click.FloatRange(0, 1, min_open=True, max_open=True),
+    default=0.05,
+    show_default=True,
+    help="Share of familiar films that the gate may refuse.",
+)
+@click.option(
+    "--anyway",
+    is_flag=True,
+    help="Show, marked, what the model says of a film that the gate refuses, if anything moves in it.",
+)
 @click.option("--report", type=LocalPath(), metavar="FILE.html", help="Write a page that needs no other.")
-@click.option("--zarr", "zarr_path", type=LocalPath(), metavar="FOLDER",
-              help="Write draws and series as a Zarr data set.")  # fmt: skip
+@click.option(
+    "--zarr", "zarr_path", type=LocalPath(), metavar="FOLDER", help="Write draws and series as a Zarr data set."
+)
 @click.option("--csv", "as_csv", is_flag=True, help="The windows as comma-separated values on stdout.")
-@click.option("--lake", "lake_path", type=LakePlace(), envvar="FLAGDATA_LAKE",
-              help="Where artifacts are, and where measurements go; also FLAGDATA_LAKE.")  # fmt: skip
+@click.option(
+    "--lake",
+    "lake_path",
+    type=LakePlace(),
+    envvar="FLAGDATA_LAKE",
+    help="Where artifacts are, and where measurements go; also FLAGDATA_LAKE.",
+)
 @click.option(
     "--at", metavar="REF", help="Tag, branch or version of the lake to look at; by default the branch's head."
 )
@@ -146,14 +193,30 @@ def measure(
     aspect = None if size is None else size.aspect
     reading = Reading(crop=box, flag=flag, aspect=aspect, true_fps=true_fps, sequence_fps=sequence_fps)
     options = Options(
-        size=size, step=step, first=first, last=last, level=level, false_alarm=false_alarm, seed=seed, refine=refine,
+        size=size,
+        step=step,
+        first=first,
+        last=last,
+        level=level,
+        false_alarm=false_alarm,
+        seed=seed,
+        refine=refine,
         area_weight=stated,
-    )  # fmt: skip
+    )
     found = subjects(source, query=query, lake=lake, at=seen, reading=reading)
     job = _Job(
-        options=options, reading=reading, network=network(model, lake=lake, at=seen), lake=lake, at=seen, branch=branch,
-        commit=not read_only, anyway=anyway, report=report, zarr=zarr_path, cache=cache,
-    )  # fmt: skip
+        options=options,
+        reading=reading,
+        network=network(model, lake=lake, at=seen),
+        lake=lake,
+        at=seen,
+        branch=branch,
+        commit=not read_only,
+        anyway=anyway,
+        report=report,
+        zarr=zarr_path,
+        cache=cache,
+    )
     if query is not None:
         if report is not None or zarr_path is not None or as_csv or refine is not None:
             raise UsageError(
@@ -183,12 +246,14 @@ class _Done:
         shown = self.measured.shown(anyway=anyway)
         known = self.subject.known or {}
         return {
-            **self.measured.as_dict(anyway=anyway), "series": self.series.as_dict() if shown else None,
-            "source": None if self.subject.artifact is None else self.subject.artifact.id, "artifact": self.artifact,
+            **self.measured.as_dict(anyway=anyway),
+            "series": self.series.as_dict() if shown else None,
+            "source": None if self.subject.artifact is None else self.subject.artifact.id,
+            "artifact": self.artifact,
             "refinement": None if self.refinement is None else self.refinement.as_dict(),
             "conditioning": self.subject.film.as_dict(),
             "simulated_with": {name: known[name] for name in self.measured.names if name in known} or None,
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -268,14 +333,19 @@ class _Job:
             for reason in verdict.reasons[1:]:
                 say(f"also: {reason.what}")
             raise RefusedError(
-                verdict.sentence, where=where,
+                verdict.sentence,
+                where=where,
                 fix=verdict.reasons[0].fix,
-            )  # fmt: skip
+            )
 
     def _page(
-        self, measured: Measurement, series: Beside, subject: Subject, artifact: str | None,
+        self,
+        measured: Measurement,
+        series: Beside,
+        subject: Subject,
+        artifact: str | None,
         refinement: Refinement | None,
-    ) -> str:  # fmt: skip
+    ) -> str:
         """The page of a report.
 
         Args:
@@ -300,9 +370,14 @@ class _Job:
                     advance=advance,
                 )
         context = Context(
-            provenance=self._provenance(subject, artifact), known=subject.known or {}, neighbours=neighbours,
-            compared=compared, rate=model.front_end.rate, steps=steps(subject.film), figures=subject.film.sentences,
-        )  # fmt: skip
+            provenance=self._provenance(subject, artifact),
+            known=subject.known or {},
+            neighbours=neighbours,
+            compared=compared,
+            rate=model.front_end.rate,
+            steps=steps(subject.film),
+            figures=subject.film.sentences,
+        )
         sections = ()
         if refinement is not None:
             sections = (Section(anchor="refinement", title="Refined by simulation", body=section(refinement)),)
@@ -337,9 +412,10 @@ def _several(job: _Job, found: Sequence[Subject], *, as_json: bool) -> None:
             echo(f"{source}  {answer}")
     if not shown:
         raise RefusedError(
-            f"all {len(done)} clips are unlike what the network was trained on", where="--query",
+            f"all {len(done)} clips are unlike what the network was trained on",
+            where="--query",
             fix="look at one with --report, or at all with --anyway",
-        )  # fmt: skip
+        )
 
 
 def _warn(findings: Sequence[Finding]) -> None:

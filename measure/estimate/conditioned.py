@@ -68,9 +68,10 @@ class ConditionedFilm:
     ) -> None:
         if crop is not None and (crop.x + crop.width > film.width or crop.y + crop.height > film.height):
             raise UsageError(
-                f"the crop {crop} reaches beyond the picture of {film.width} × {film.height} px", where="--crop",
+                f"the crop {crop} reaches beyond the picture of {film.width} × {film.height} px",
+                where="--crop",
                 fix="give x,y,width,height of a region inside it",
-            )  # fmt: skip
+            )
         self._film, self._crop, self._flag, self._aspect = film, crop, flag, aspect
         self._follower: Follower | None = None
         self._watch: FilmWatch | None = None
@@ -113,9 +114,12 @@ class ConditionedFilm:
             return
         pictures = [picture for _, picture in sample]
         self.found = conditioning_of(
-            pictures, size=FRAME_SIZE, times=np.array([time for time, _ in sample]), flag=self._flag,
+            pictures,
+            size=FRAME_SIZE,
+            times=np.array([time for time, _ in sample]),
+            flag=self._flag,
             within=self._within(pictures[0].shape),
-        )  # fmt: skip
+        )
         self.reference = pictures[len(pictures) // 2]
         self._cut = cut = CutOff.of(self.found, np.array([time for time, _ in sample]))
         del sample, pictures
@@ -163,12 +167,16 @@ class ConditionedFilm:
         found, follower = self.found, self._follower
         return {
             "camera": {
-                "moves": found.camera.moves, "evidence": found.camera.evidence, **follower.motion(),
+                "moves": found.camera.moves,
+                "evidence": found.camera.evidence,
+                **follower.motion(),
                 "lost": follower.lost,
             },
             "flags": [
                 {
-                    "box": [edge / found.scale for edge in region.box], "share": region.share, "hoist": region.hoist,
+                    "box": [edge / found.scale for edge in region.box],
+                    "share": region.share,
+                    "hoist": region.hoist,
                     "aspect": region.aspect,
                 }
                 for region in found.regions
@@ -176,7 +184,7 @@ class ConditionedFilm:
             "chosen": found.chosen + 1 if found.regions else None,
             "square": [found.square.x, found.square.y, found.square.side],
             "cut_off": found.cut_share,
-        }  # fmt: skip
+        }
 
 
 def _chosen(rate: float, duration: float) -> Callable[[int], bool]:
@@ -198,35 +206,44 @@ def _of_camera(found: Conditioning, follower: Follower) -> list[Finding]:
     if not found.camera.known:
         return [
             Finding(
-                kind="camera-unknown", severity=Severity.NOTE,
+                kind="camera-unknown",
+                severity=Severity.NOTE,
                 what="no feature of the background shows the camera's motion; no frame was moved",
             )
-        ]  # fmt: skip
+        ]
     if not found.camera.moves:
         return [
             Finding(
-                kind="camera-still", severity=Severity.NOTE, count=found.camera.support,
+                kind="camera-still",
+                severity=Severity.NOTE,
+                count=found.camera.support,
                 what=f"the camera is still: {found.camera.evidence} stay in place",
             )
-        ]  # fmt: skip
+        ]
     motion = follower.motion()
     notes = [
         Finding(
-            kind="camera-moves", severity=Severity.NOTE, value=motion["drift"], count=found.camera.support,
+            kind="camera-moves",
+            severity=Severity.NOTE,
+            value=motion["drift"],
+            count=found.camera.support,
             what=f"the camera drifts {motion['drift']:.1f} px and shakes {motion['shake']:.2f} px from frame to frame, "
             f"by {found.camera.evidence}; the frames were moved back",
         )
-    ]  # fmt: skip
+    ]
     total = len(follower.path)
     if follower.lost > _LOST * total:
         notes.append(
             Finding(
-                kind="camera-lost", severity=Severity.WARNING, count=follower.lost, value=follower.lost / total,
+                kind="camera-lost",
+                severity=Severity.WARNING,
+                count=follower.lost,
+                value=follower.lost / total,
                 what=f"in {follower.lost} of {total} frames the background's features were not found, and the place of "
                 "the frame before was used",
                 fix="choose a part of the film without cuts by --start and --end",
             )
-        )  # fmt: skip
+        )
     return notes
 
 
@@ -239,29 +256,36 @@ def _of_flag(found: Conditioning, reference: NDArray[np.uint8] | None, *, given:
     square, beyond = found.square, found.square.beyond(width, height)
     notes = [
         Finding(
-            kind="flag-found", severity=Severity.NOTE, count=len(found.regions), value=found.region.share,
+            kind="flag-found",
+            severity=Severity.NOTE,
+            count=len(found.regions),
+            value=found.region.share,
             what=f"{len(found.regions)} moving {'cloths' if len(found.regions) > 1 else 'cloth'}; number "
             f"{found.chosen + 1} visits {right - left} × {bottom - top} px and is shown in a square of {square.side} px"
             + (f", {beyond:.0%} of which lie beyond the picture and were padded" if beyond > 0 else ""),
         )
-    ]  # fmt: skip
+    ]
     if len(found.regions) > 1 and not given:
         notes.append(
             Finding(
-                kind="several-flags-found", severity=Severity.WARNING, count=len(found.regions),
+                kind="several-flags-found",
+                severity=Severity.WARNING,
+                count=len(found.regions),
                 what=f"{len(found.regions)} regions move like cloth; number {found.chosen + 1} was measured, with "
                 f"{found.region.share:.0%} of the motion",
                 fix="choose another by --flag, as numbered on the page of --report",
             )
-        )  # fmt: skip
+        )
     if found.size > _ENLARGED * square.side:
         notes.append(
             Finding(
-                kind="enlarged", severity=Severity.WARNING, value=found.size / square.side,
+                kind="enlarged",
+                severity=Severity.WARNING,
+                value=found.size / square.side,
                 what=f"the flag fills {square.side} px of the picture and the network takes {found.size} px: it was "
                 f"enlarged {found.size / square.side:.3g}-fold",
             )
-        )  # fmt: skip
+        )
     return notes
 
 
@@ -271,9 +295,11 @@ def _of_aspect(found: Conditioning, given: float | None) -> list[Finding]:
         return []
     return [
         Finding(
-            kind="flag-size-contradicted", severity=Severity.WARNING, value=region.aspect,
+            kind="flag-size-contradicted",
+            severity=Severity.WARNING,
+            value=region.aspect,
             what=f"the flag's outline is {region.aspect:.2f} times as long as high at the hoist; a flag of the size "
             f"given would be at most {given:.2f} times",
             fix="check --flag-size: length along the wind times height along the pole",
         )
-    ]  # fmt: skip
+    ]

@@ -70,8 +70,10 @@ class CutOff:
         done = "; those are left out" if self.partly else ""
         return (
             Finding(
-                kind="flag-cut-off", severity=Severity.WARNING, value=share,
+                kind="flag-cut-off",
+                severity=Severity.WARNING,
+                value=share,
                 what=f"the flag reaches beyond the picture at {where} of the film's frames{done}",
                 fix="film so that the whole flag is in the picture",
             ),
-        )  # fmt: skip
+        )

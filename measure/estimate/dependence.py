@@ -115,9 +115,11 @@ def posteriors(model: Estimator, films: Iterable[LongFilm], *, draws: int, seed:
     place = scaling.learned(torch.from_numpy(known)).double().numpy()
     centre, spread = (part.double().cpu().numpy() for part in (model.learners[0].centre, model.learners[0].spread))
     return Posteriors(
-        names=scaling.quantities, logits=np.array(logits), known=known,
+        names=scaling.quantities,
+        logits=np.array(logits),
+        known=known,
         errors=errors_of((np.array(logits) - centre) / spread, (place - centre) / spread, scaling.quantities),
-    )  # fmt: skip
+    )
 
 
 def errors(model: Estimator, films: Iterable[LongFilm], *, seed: int = 0) -> Errors:
@@ -171,9 +173,11 @@ def card_entry(found: Errors, *, seed: int = 0) -> dict[str, Any]:
     used = found.dependence(seed=seed)
     each = {name: found.correlation(name, seed=seed) for name in found.names}
     return {
-        "wind": used.wind, "cloth": used.cloth, "source": used.source,
+        "wind": used.wind,
+        "cloth": used.cloth,
+        "source": used.source,
         "targets": {name: {"correlation": value, "upper": upper} for name, (value, upper) in each.items()},
-    }  # fmt: skip
+    }
 
 
 def of_model(model: Estimator) -> Dependence:

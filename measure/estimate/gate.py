@@ -123,8 +123,9 @@ def gate_of(model: Estimator) -> Gate:
     if model.cloud is None:
         raise InputError(
             "the network has no data on its training clips, so it cannot be checked whether it applies to this film",
-            where=f"model {model.name!r}", fix="ship it by python -m models.shipping, which stores its training clips",
-        )  # fmt: skip
+            where=f"model {model.name!r}",
+            fix="ship it by python -m models.shipping, which stores its training clips",
+        )
     return FamiliarityGate(cloud=model.cloud)
 
 
@@ -216,16 +217,25 @@ class Verdict:
     def as_dict(self) -> Mapping[str, Any]:
         """JSON values."""
         return {
-            "refused": self.refused, "p": self.p, "level": self.level, "false_alarm": self.false_alarm,
-            "strange": int(self.strange.sum()), "refusing": self.refusing, "windows": list(self.window_p),
-            "blank": int(sum(self.blank)), "reasons": [reason.as_dict() for reason in self.reasons],
-        }  # fmt: skip
+            "refused": self.refused,
+            "p": self.p,
+            "level": self.level,
+            "false_alarm": self.false_alarm,
+            "strange": int(self.strange.sum()),
+            "refusing": self.refusing,
+            "windows": list(self.window_p),
+            "blank": int(sum(self.blank)),
+            "reasons": [reason.as_dict() for reason in self.reasons],
+        }
 
 
 def verdict(
-    windows: Sequence[Sequence[Sequence[Reason]]], *, false_alarm: float, level: Callable[[float], float],
+    windows: Sequence[Sequence[Sequence[Reason]]],
+    *,
+    false_alarm: float,
+    level: Callable[[float], float],
     faults: Sequence[Finding] = (),
-) -> Verdict:  # fmt: skip
+) -> Verdict:
     """The verdict on a recording.
 
     Args:
@@ -248,9 +258,15 @@ def verdict(
     order = np.argsort(p[:, size], kind="stable")
     speaking = int((p[:, size] <= at).sum()) if deciding[size] <= at else count
     return Verdict(
-        false_alarm=false_alarm, level=at, refusing=needed, considered=p.shape[1], sizes=kept, size=size,
-        p=float(deciding[size]), window_p=tuple(p[:, size].tolist()),
+        false_alarm=false_alarm,
+        level=at,
+        refusing=needed,
+        considered=p.shape[1],
+        sizes=kept,
+        size=size,
+        p=float(deciding[size]),
+        window_p=tuple(p[:, size].tolist()),
         blank=tuple(all(reasons[0].blank for reasons in sizes) for sizes in windows),
         faults=tuple(Reason.counted(fault) for fault in faults),
         window_reasons=tuple(windows[int(order[speaking // 2])][size]),
-    )  # fmt: skip
+    )

@@ -57,9 +57,11 @@ class WindowAnswer:
     def as_dict(self) -> dict[str, Any]:
         """JSON values."""
         return {
-            "start": self.start, "end": self.end, "p": self.p,
+            "start": self.start,
+            "end": self.end,
+            "p": self.p,
             "quantities": {quantity.name: quantity.as_dict() for quantity in self.quantities},
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,9 +86,13 @@ class Look:
         """The same at some of the sizes."""
         chosen = list(places)
         return replace(
-            self, posterior=self.posterior.rows(chosen), logits=self.logits[chosen], summaries=self.summaries[chosen],
-            reasons=tuple(self.reasons[place] for place in chosen), log_factor=self.log_factor[chosen],
-        )  # fmt: skip
+            self,
+            posterior=self.posterior.rows(chosen),
+            logits=self.logits[chosen],
+            summaries=self.summaries[chosen],
+            reasons=tuple(self.reasons[place] for place in chosen),
+            log_factor=self.log_factor[chosen],
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -120,7 +126,7 @@ class Joint:
 
     def by_weight(
         self, seen: Sequence[Look], dependence: Dependence, found: Sequence[Quantity], draws: NDArray[np.float64]
-    ) -> Finding | None:  # fmt: skip
+    ) -> Finding | None:
         """How the wind would change with the weight of the cloth, where that is open and matters: the answers for a
         light and a heavy cloth of those that the answer leaves possible; None where it does not.
 
@@ -150,10 +156,12 @@ class Joint:
             return None
         light, heavy = (f"at {weight:g} kg/m² {own:.1f} m/s" for weight, own in zip(weights, winds, strict=True))
         return Finding(
-            kind="weight-open", severity=Severity.NOTE, value=winds[1] - winds[0],
+            kind="weight-open",
+            severity=Severity.NOTE,
+            value=winds[1] - winds[0],
             what=f"the wind depends on the weight of the cloth, which was not given: {light}, {heavy}",
             fix="weigh the cloth and give --area-weight",
-        )  # fmt: skip
+        )
 
     def joint(self, seen: Sequence[Look], dependence: Dependence) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(n, target) draws of all windows together, the wind their mean, and (m, target) places of the windows' own in
@@ -164,10 +172,14 @@ class Joint:
         for stratum in range(len(self.sizes.scale)):
             prior = self.prior_logits[stratum]
             winds, shared = combined(
-                np.stack([one.logits[stratum] for one in seen]), names=self.names, centre=prior.mean(axis=0),
-                spread=prior.std(axis=0), dependence=dependence, given=self.stated_exactly,
+                np.stack([one.logits[stratum] for one in seen]),
+                names=self.names,
+                centre=prior.mean(axis=0),
+                spread=prior.std(axis=0),
+                dependence=dependence,
+                given=self.stated_exactly,
                 generator=stream(self.options.seed, "combine", stratum),
-            )  # fmt: skip
+            )
             logits = np.empty((*winds.shape[:2], len(self.names)))
             logits[..., own] = winds
             logits[..., cloth] = shared
@@ -189,9 +201,11 @@ class Joint:
         places = np.concatenate([self._places(v) for v in values])
         rows = self._rows(one.log_factor, "window")
         return WindowAnswer(
-            start=one.start, end=one.start + layout.length,
-            quantities=self.quantities(np.concatenate(draws)[rows], places[rows]), p=p,
-        )  # fmt: skip
+            start=one.start,
+            end=one.start + layout.length,
+            quantities=self.quantities(np.concatenate(draws)[rows], places[rows]),
+            p=p,
+        )
 
     def _rows(self, log_factor: NDArray[np.float64], *names: str) -> NDArray[np.intp]:
         """Which of the draws, those of all sizes in a row, make the answer: each as often as the Bayes factor (i, n) of
@@ -210,9 +224,14 @@ class Joint:
 
     def quantities(self, draws: NDArray[np.float64], places: NDArray[np.float64]) -> tuple[Quantity, ...]:
         return quantities(
-            draws, self.prior, self.names, level=self.options.level, assumed=self.assumed, places=places,
+            draws,
+            self.prior,
+            self.names,
+            level=self.options.level,
+            assumed=self.assumed,
+            places=places,
             stated=self.options.stated(self.model),
-        )  # fmt: skip
+        )
 
     def _places(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Places of values (…, target) in the network's range, 0 to 1: the range moves with the flag's size."""
@@ -228,9 +247,7 @@ class Joint:
     def prior(self) -> NDArray[np.float64]:
         """(n, target) draws of what is assumed of a flag of these sizes."""
         logits = self.prior_logits
-        return scaled_back(
-            self._values(logits.reshape(-1, len(self.names))), self.names, self.sizes.draws.ravel()
-        )  # fmt: skip
+        return scaled_back(self._values(logits.reshape(-1, len(self.names))), self.names, self.sizes.draws.ravel())
 
     @cached_property
     def prior_logits(self) -> NDArray[np.float64]:

@@ -71,9 +71,10 @@ def _shares(model: Estimator, count: int) -> dict[str, int]:
     recipe = model.card.get("recipe")
     if not isinstance(recipe, dict) or "data" not in recipe:
         raise InputError(
-            f"the card of the model {model.name!r} does not say what it was trained on", where="recipe.data",
+            f"the card of the model {model.name!r} does not say what it was trained on",
+            where="recipe.data",
             fix="give a model that was trained by a recipe",
-        )  # fmt: skip
+        )
     names = DataSpec.of_identity(recipe["data"]).datasets
     each = np.array([load(name).side(_SIDE).sequences for name in names])
     ends = np.rint(count * np.cumsum(each) / each.sum()).astype(int)
@@ -116,15 +117,24 @@ def _batch(
         member = outcome.member
         seed = child_seed(simulation.seed, "film", member.index)
         job = Film(
-            name=f"{simulation.name}-{member.index}", dataset=recipe.name, cast=cast, index=member.index, sequence="",
-            seed=seed, sequence_seed=member.seed, look=seed, begin=EPOCH, filming={},
-        )  # fmt: skip
+            name=f"{simulation.name}-{member.index}",
+            dataset=recipe.name,
+            cast=cast,
+            index=member.index,
+            sequence="",
+            seed=seed,
+            sequence_seed=member.seed,
+            look=seed,
+            begin=EPOCH,
+            filming={},
+        )
         zeta, drawn = recipe.prior.draw(seed, assets), picture.settings(recipe.camera, seed=seed)
         seen = jobs.shot(recipe, job, outcome.sequence, zeta, assets, device="cpu").numpy()
         film = np.stack(decode(picture.coded(seen, drawn, recipe.camera, seed=seed), where=job.name))
         if model.cropping.conditioned:
             film = FitFilm.of(film, np.arange(len(film)) / simulation.time.rate).frames
         yield LongFilm(
-            dataset=recipe.name, windows=film.reshape(windows, -1, *film.shape[1:]),
+            dataset=recipe.name,
+            windows=film.reshape(windows, -1, *film.shape[1:]),
             parameters=parameters_of(member, zeta, {**cast.stated, **drawn}, recipe.anemometer.truth),
-        )  # fmt: skip
+        )

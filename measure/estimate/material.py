@@ -36,8 +36,9 @@ def weight_of(name: str, *, lake: Lake | None, at: str | None) -> tuple[Stated, 
     if len(weights) > 1:
         raise UsageError(
             f"films of {name!r} declare {len(weights)} area weights, {min(weights):g} to {max(weights):g} kg/m²",
-            where="--material", fix="give --area-weight",
-        )  # fmt: skip
+            where="--material",
+            fix="give --area-weight",
+        )
     return Stated.of(next(iter(weights))), "declared by films of the lake"
 
 

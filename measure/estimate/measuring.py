@@ -94,23 +94,34 @@ class Measurement:
         """JSON values. What is not `shown` is left out."""
         shown = self.shown(anyway=anyway)
         return {
-            "film": self.film, "rate": self.rate, "duration": self.duration, "model": self.model,
-            "options": {**self.options.recipe(), "seed": self.options.seed}, "gate": self.verdict.as_dict(),
+            "film": self.film,
+            "rate": self.rate,
+            "duration": self.duration,
+            "model": self.model,
+            "options": {**self.options.recipe(), "seed": self.options.seed},
+            "gate": self.verdict.as_dict(),
             "sentence": self.sentence if shown else None,
             "quantities": {q.name: q.as_dict() for q in self.quantities} if shown else None,
             "windows": [window.as_dict() for window in self.windows] if shown else None,
             "combined": self.combined,
             "dependence": {
-                "wind": self.dependence.wind, "cloth": self.dependence.cloth, "source": self.dependence.source,
+                "wind": self.dependence.wind,
+                "cloth": self.dependence.cloth,
+                "source": self.dependence.source,
             },
             "findings": [finding.as_dict() for finding in self.noticed(anyway=anyway)],
-        }  # fmt: skip
+        }
 
 
 def measure(
-    film: Film, model: Estimator, *, gate: Gate, dependence: Dependence, options: Options,
+    film: Film,
+    model: Estimator,
+    *,
+    gate: Gate,
+    dependence: Dependence,
+    options: Options,
     advance: Callable[[int, int], None] | None = None,
-) -> Measurement:  # fmt: skip
+) -> Measurement:
     """Measure a film.
 
     Args:
@@ -125,18 +136,28 @@ def measure(
     """
     if model.learners[0].objective is not Loss.POSTERIOR:
         raise UsageError(
-            f"the model {model.name!r} gives values without intervals", where="--model",
+            f"the model {model.name!r} gives values without intervals",
+            where="--model",
             fix="name a model that was trained for a posterior, as the shipped one",
-        )  # fmt: skip
+        )
     considered = sizes(
-        options.size, rate=film.rate, frames_rate=model.front_end.rate, draws=DRAWS,
-        generator=stream(options.seed, "sizes"), trained=trained_on(model.targets),
-    )  # fmt: skip
+        options.size,
+        rate=film.rate,
+        frames_rate=model.front_end.rate,
+        draws=DRAWS,
+        generator=stream(options.seed, "sizes"),
+        trained=trained_on(model.targets),
+    )
     given = Joint(model=model, sizes=considered, options=options)
     layout = lay_out(
-        frames=model.front_end.frames, rate=film.rate, duration=film.duration, step=options.step, first=options.first,
-        last=options.last, spacings=tuple(spacing(s, rate=model.front_end.rate) for s in considered.scale.tolist()),
-    )  # fmt: skip
+        frames=model.front_end.frames,
+        rate=film.rate,
+        duration=film.duration,
+        step=options.step,
+        first=options.first,
+        last=options.last,
+        spacings=tuple(spacing(s, rate=model.front_end.rate) for s in considered.scale.tolist()),
+    )
     seen: list[Look] = []
     clips: NDArray[np.uint8] | None = None  # of the first window, or of the first with something to measure
     interpolated = 0
@@ -172,13 +193,24 @@ def measure(
     own = answer.quantities(draws, places)
     open_weight = answer.by_weight([whole[k] for k in used], dependence, own, draws)
     return Measurement(
-        film=film.name, rate=film.rate, duration=film.duration, model=model.name, options=options,
-        names=tuple(answer.names), draws=draws, quantities=own, windows=windows, combined=len(used),
-        dependence=dependence, verdict=judged, sizes=kept, summary=middle.summaries[judged.size],
+        film=film.name,
+        rate=film.rate,
+        duration=film.duration,
+        model=model.name,
+        options=options,
+        names=tuple(answer.names),
+        draws=draws,
+        quantities=own,
+        windows=windows,
+        combined=len(used),
+        dependence=dependence,
+        verdict=judged,
+        sizes=kept,
+        summary=middle.summaries[judged.size],
         clip=clips[judged.size],
         findings=(*of_film, *kept.findings, *found, *_about_windows(whole, judged, used, dependence)),
         bounds=(*_at_ends(own, windows), *([] if open_weight is None else [open_weight])),
-    )  # fmt: skip
+    )
 
 
 @torch.no_grad()
@@ -194,9 +226,13 @@ def _look(window: Window, gate: Gate, given: Joint) -> Look:
     summaries = embeddings[0].cpu().numpy().astype(np.float32)
     reasons = tuple(gate.judge(clip, summary) for clip, summary in zip(window.clips, summaries, strict=True))
     return Look(
-        start=window.start, posterior=posterior, logits=logits, summaries=summaries,
-        reasons=reasons, log_factor=log_factor,
-    )  # fmt: skip
+        start=window.start,
+        posterior=posterior,
+        logits=logits,
+        summaries=summaries,
+        reasons=reasons,
+        log_factor=log_factor,
+    )
 
 
 def _without_windows(film: Film, layout: Layout, distinct: Distinct, faults: Sequence[Finding]) -> FlagdataError:
@@ -208,14 +244,16 @@ def _without_windows(film: Film, layout: Layout, distinct: Distinct, faults: Seq
             f"{repeated.sentence}: {distinct.share:.0%} of {distinct.frames} frames repeat the one before, and "
             f"{(1 - distinct.share) * film.rate:.3g} different pictures a second are left; none of {layout.count} "
             "windows has enough",
-            where=film.name, fix=repeated.fix,
-        )  # fmt: skip
+            where=film.name,
+            fix=repeated.fix,
+        )
     if faults:
         return RefusedError(faults[0].what, where=film.name, fix=faults[0].fix or "give another film")
     return UsageError(
-        f"none of {layout.count} windows has all its frames", where=film.name,
+        f"none of {layout.count} windows has all its frames",
+        where=film.name,
         fix="the film's stamps have gaps: choose another part by --start and --end",
-    )  # fmt: skip
+    )
 
 
 def _used(seen: Sequence[Look], judged: Verdict, layout: Layout) -> list[int]:
@@ -238,41 +276,49 @@ def _about_windows(seen: Sequence[Look], judged: Verdict, used: Sequence[int], d
     if factor < CONTRADICTION:
         found.append(
             Finding(
-                kind="area-weight-contradicted", severity=Severity.WARNING, value=factor,
+                kind="area-weight-contradicted",
+                severity=Severity.WARNING,
+                value=factor,
                 what=f"the area weight that was given makes the film much less probable (Bayes factor {factor:.2g}): "
                 "either it is wrong, or the flag's size is, or the model errs on this film",
                 fix="check --area-weight and --flag-size",
             )
-        )  # fmt: skip
+        )
     excluded = float(np.isneginf(seen[0].log_factor).mean())
     if excluded > EXCLUDED:
         found.append(
             Finding(
-                kind="sizes-excluded-by-weight", severity=Severity.WARNING, value=excluded,
+                kind="sizes-excluded-by-weight",
+                severity=Severity.WARNING,
+                value=excluded,
                 what=f"{excluded:.0%} of the sizes that were taken as possible were left out: of a flag of these the "
                 "network does not know the area weight that was given",
                 fix="give --flag-size LENGTHxHEIGHT",
             )
-        )  # fmt: skip
+        )
     strange = int(judged.strange.sum())
     if strange and not judged.refused:
         found.append(
             Finding(
-                kind="strange-windows", severity=Severity.WARNING, count=strange,
+                kind="strange-windows",
+                severity=Severity.WARNING,
+                count=strange,
                 what=f"{strange} of {len(seen)} windows are unlike what the network was trained on, p at most "
                 f"{judged.level:.2g}, and were left out of the answer; {judged.refusing} would refuse the film",
                 fix="choose a part of the film without them by --start and --end",
             )
-        )  # fmt: skip
+        )
     if len(used) > 1:
         found.append(
             Finding(
-                kind="windows-combined", severity=Severity.NOTE, count=len(used),
+                kind="windows-combined",
+                severity=Severity.NOTE,
+                count=len(used),
                 what=f"the answer combines {len(used)} windows of one cloth, each with its own wind; their errors "
                 f"count as correlated by {dependence.wind:.2f} in wind and {dependence.cloth:.2f} in cloth "
                 f"({dependence.source})",
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -283,10 +329,12 @@ def _at_ends(found: Sequence[Quantity], windows: Sequence[WindowAnswer]) -> list
     if any(bounded) and not any(quantity.value is None for quantity in found if quantity.name in OWN):
         own.append(
             Finding(
-                kind="windows-at-end", severity=Severity.WARNING, count=sum(bounded),
+                kind="windows-at-end",
+                severity=Severity.WARNING,
+                count=sum(bounded),
                 what=f"{sum(bounded)} of {len(windows)} windows bound the wind on one side only: theirs may lie beyond "
                 "what the model knows, and so may the mean over all windows lie beyond its interval",
                 fix="give the wind of single windows by --windows",
             )
-        )  # fmt: skip
+        )
     return own

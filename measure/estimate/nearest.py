@@ -46,9 +46,15 @@ class Neighbour:
 
 @torch.no_grad()
 def nearest(
-    lake: Lake, model: Estimator, summary: NDArray[np.float32], *, without: str | None, at: str | None, seed: int,
+    lake: Lake,
+    model: Estimator,
+    summary: NDArray[np.float32],
+    *,
+    without: str | None,
+    at: str | None,
+    seed: int,
     advance: Callable[[int, int], None] | None = None,
-) -> tuple[tuple[Neighbour, ...], int]:  # fmt: skip
+) -> tuple[tuple[Neighbour, ...], int]:
     """The `SHOWN` nearest of `COMPARED` simulated clips, and how many were compared; none where the lake has none.
 
     Args:

@@ -52,10 +52,15 @@ class Options:
     def recipe(self) -> dict[str, Any]:
         """JSON values."""
         return {
-            "flag_size": None if self.size is None else [self.size.length, self.size.height], "step": self.step,
-            "first": self.first, "last": self.last, "level": self.level, "false_alarm": self.false_alarm,
-            "refine": self.refine, "area_weight": None if self.area_weight is None else self.area_weight.recipe(),
-        }  # fmt: skip
+            "flag_size": None if self.size is None else [self.size.length, self.size.height],
+            "step": self.step,
+            "first": self.first,
+            "last": self.last,
+            "level": self.level,
+            "false_alarm": self.false_alarm,
+            "refine": self.refine,
+            "area_weight": None if self.area_weight is None else self.area_weight.recipe(),
+        }
 
     def stated(self, model: Estimator) -> Mapping[str, Stated]:
         """What is stated about quantities, by their names: the weight that was given, and of a model that
@@ -76,9 +81,10 @@ class Options:
             target = next((target for target in model.targets if target.name == name), None)
             if target is None:
                 raise UsageError(
-                    f"the model {model.name!r} does not estimate an area weight", where="--area-weight",
+                    f"the model {model.name!r} does not estimate an area weight",
+                    where="--area-weight",
                     fix="leave it out",
-                )  # fmt: skip
+                )
             power = POWERS.get(name, 0.0)  # an aspect has none
             least, most = (end * sizes.scale**power for end in (target.low, target.high))
             if not ((least * (1 - 1e-9) <= stated.low) & (stated.high <= most * (1 + 1e-9))).any():
@@ -87,7 +93,7 @@ class Options:
                     f"{least.min():.3g} to {most.max():.3g}",
                     where="--area-weight",
                     fix="give kg/m² within that (100 g/m² is 0.1)" + ("" if sizes.given else ", and --flag-size"),
-                )  # fmt: skip
+                )
             scale = sizes.draws if sizes.given is None else sizes.scale[:, None]
             found.append(Known.stated(name, stated, scale=scale**power))
         return tuple(found)

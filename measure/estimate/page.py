@@ -70,24 +70,34 @@ def page(
     spacing = measured.windows[0].end - measured.windows[0].start
     clip_rate = (len(measured.clip) - 1) / spacing if spacing > 0 else context.rate
     values = {
-        "film": measured.film, "shown": shown, "refused": measured.verdict.refused, "gate": measured.verdict.sentence,
-        "reasons": [reason.what for reason in measured.verdict.reasons], "answer": measured.sentence,
+        "film": measured.film,
+        "shown": shown,
+        "refused": measured.verdict.refused,
+        "gate": measured.verdict.sentence,
+        "reasons": [reason.what for reason in measured.verdict.reasons],
+        "answer": measured.sentence,
         "rows": [_row(quantity, context.known) for quantity in measured.quantities],
-        "simulated": bool(context.known), "level": f"{measured.options.level * 100:.3g} %",
+        "simulated": bool(context.known),
+        "level": f"{measured.options.level * 100:.3g} %",
         "clip": moving(measured.clip, rate=clip_rate, side=_SIDE),
-        "neighbours": [_neighbour(one, context.rate) for one in context.neighbours], "compared": context.compared,
-        "steps": context.steps, "figures": list(context.figures),
+        "neighbours": [_neighbour(one, context.rate) for one in context.neighbours],
+        "compared": context.compared,
+        "steps": context.steps,
+        "figures": list(context.figures),
         "corner": pictures.corner(measured) if shown else None,
-        "series": pictures.series(series, level=measured.verdict.level)
-        if shown and len(series.time) > 1 else None,
+        "series": pictures.series(series, level=measured.verdict.level) if shown and len(series.time) > 1 else None,
         "spectra": None if series.spectrum is None or not shown else pictures.spectra(series.spectrum),
         "agreement": [_agreement("over the window", series.window), _agreement("minute mean", series.of_minute)]
-        if series.logged is not None and shown else [],
+        if series.logged is not None and shown
+        else [],
         "delay": _delay(series) if shown else None,
-        "windows": len(measured.verdict.window_p), "combined": measured.combined, "dependence": measured.dependence,
+        "windows": len(measured.verdict.window_p),
+        "combined": measured.combined,
+        "dependence": measured.dependence,
         "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in noticed],
-        "sections": list(sections), "provenance": {**context.provenance, "code": code_version()},
-    }  # fmt: skip
+        "sections": list(sections),
+        "provenance": {**context.provenance, "code": code_version()},
+    }
     return render("measure.estimate", "page.html.j2", values)
 
 
@@ -96,24 +106,29 @@ def _row(quantity: Quantity, known: Mapping[str, float]) -> dict[str, str | bool
     truth = known.get(quantity.name)
     bound_level = "" if quantity.span.bound is None else f" ({quantity.span.level * 100:.3g} %)"
     return {
-        "name": SHORT[quantity.name], "unit": "" if quantity.unit == "1" else quantity.unit,
+        "name": SHORT[quantity.name],
+        "unit": "" if quantity.unit == "1" else quantity.unit,
         "constrained": quantity.constrained,
         "value": "" if quantity.value is None else f"{quantity.value:.{digits}f}",
         "interval": quantity.span.phrase(digits) + bound_level,
         "assumed": f"{quantity.assumed[0]:.{digits}f} to {quantity.assumed[1]:.{digits}f}",
-        "information": f"{quantity.information:.2f}", "known": "" if truth is None else f"{truth:.{digits}f}",
-    }  # fmt: skip
+        "information": f"{quantity.information:.2f}",
+        "known": "" if truth is None else f"{truth:.{digits}f}",
+    }
 
 
 def _neighbour(one: Neighbour, rate: float) -> dict[str, str]:
     known = [
         f"{SHORT[name]} {one.known[name]:.{digits}f} {unit}"
-        for name, digits, unit in (("wind_speed", 1, "m/s"), ("density", 3, "kg/m²")) if name in one.known
-    ]  # fmt: skip
+        for name, digits, unit in (("wind_speed", 1, "m/s"), ("density", 3, "kg/m²"))
+        if name in one.known
+    ]
     return {
-        "name": one.name, "image": moving(one.frames, rate=rate, side=_SIDE), "known": ", ".join(known),
+        "name": one.name,
+        "image": moving(one.frames, rate=rate, side=_SIDE),
+        "known": ", ".join(known),
         "distance": f"{one.distance:.1f}",
-    }  # fmt: skip
+    }
 
 
 def _agreement(title: str, found: Agreement | None) -> dict[str, str]:

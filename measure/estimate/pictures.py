@@ -65,9 +65,15 @@ def corner(measured: Measurement) -> str:
     side = 2.1 * count + 0.6
     figure = Figure(figsize=(side, side))
     grid = figure.add_gridspec(
-        count, count, left=0.7 / side, right=1 - 0.1 / side, bottom=0.5 / side, top=1 - 0.1 / side, hspace=0.22,
+        count,
+        count,
+        left=0.7 / side,
+        right=1 - 0.1 / side,
+        bottom=0.5 / side,
+        top=1 - 0.1 / side,
+        hspace=0.22,
         wspace=0.22,
-    )  # fmt: skip
+    )
     for row in range(count):
         for column in range(row + 1):
             axes = figure.add_subplot(grid[row, column])

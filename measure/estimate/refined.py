@@ -40,18 +40,24 @@ def refined(
     """
     if model.cloth is not Cloth.FLAG:
         raise UsageError(
-            f"the model {model.name!r} is of {model.cloth.value}, refinement simulates flags", where="--refine",
+            f"the model {model.name!r} is of {model.cloth.value}, refinement simulates flags",
+            where="--refine",
             fix="leave --refine out, or name a model of flags",
-        )  # fmt: skip
+        )
     clip = Clip(name=measured.film, frames=measured.clip, recording=subject.artifact)
     options = measured.options
     s = float(measured.sizes.scale[0])
     known = options.area_weight
     found = run(
-        [clip], model, budget=budget, seed=options.seed, level=options.level, cache=cache,
+        [clip],
+        model,
+        budget=budget,
+        seed=options.seed,
+        level=options.level,
+        cache=cache,
         area_weight=None if known is None else _searched(known, s),
         aspect=None if options.size is None or ASPECT not in options.stated(model) else options.size.aspect,
-    )  # fmt: skip
+    )
     return scaled(found, s)
 
 
@@ -68,9 +74,12 @@ def scaled(found: Refinement, s: float) -> Refinement:
     if math.isclose(s, 1.0):
         return found
     return replace(
-        found, intervals=_all(found.intervals, s), amortised=_all(found.amortised, s), bending=found.bending * s**4,
+        found,
+        intervals=_all(found.intervals, s),
+        amortised=_all(found.amortised, s),
+        bending=found.bending * s**4,
         rounds=tuple(replace(one, intervals=_all(one.intervals, s)) for one in found.rounds),
-    )  # fmt: skip
+    )
 
 
 def _all(intervals: tuple[Interval, ...], s: float) -> tuple[Interval, ...]:

@@ -41,9 +41,13 @@ def run(
         )
     gate = gate_beside(network, false_alarm=options.false_alarm)
     return measure(
-        subject.film, network.estimator, gate=gate, dependence=of_model(network.estimator), options=options,
+        subject.film,
+        network.estimator,
+        gate=gate,
+        dependence=of_model(network.estimator),
+        options=options,
         advance=advance,
-    )  # fmt: skip
+    )
 
 
 def weight(
@@ -61,12 +65,26 @@ def weight(
 
 
 def measured(
-    source: Path | str | Frames, *, flag_size: tuple[float, float] | None,
-    area_weight: float | tuple[float, float] | str | Stated | None, material: str | None, step: float | None,
-    crop: tuple[int, int, int, int] | None, flag: int | None, start: float | None, end: float | None,
-    true_fps: float | None, sequence_fps: float | None, level: float, seed: int, model: str | None,
-    false_alarm: float, lake: Lake | None, at: str | None, anyway: bool,
-) -> Measured:  # fmt: skip
+    source: Path | str | Frames,
+    *,
+    flag_size: tuple[float, float] | None,
+    area_weight: float | tuple[float, float] | str | Stated | None,
+    material: str | None,
+    step: float | None,
+    crop: tuple[int, int, int, int] | None,
+    flag: int | None,
+    start: float | None,
+    end: float | None,
+    true_fps: float | None,
+    sequence_fps: float | None,
+    level: float,
+    seed: int,
+    model: str | None,
+    false_alarm: float,
+    lake: Lake | None,
+    at: str | None,
+    anyway: bool,
+) -> Measured:
     """What `flagdata.measure` does; see there for what it takes.
 
     Raises:
@@ -78,9 +96,15 @@ def measured(
     if not isinstance(source, Frames):
         size = size_of(source, size)
     options = Options(
-        size=size, step=step, first=start, last=end, level=level, false_alarm=false_alarm, seed=seed,
+        size=size,
+        step=step,
+        first=start,
+        last=end,
+        level=level,
+        false_alarm=false_alarm,
+        seed=seed,
         area_weight=stated,
-    )  # fmt: skip
+    )
     box = None if crop is None else CropBox(x=crop[0], y=crop[1], width=crop[2], height=crop[3])
     reading = Reading(
         crop=box, flag=flag, aspect=None if size is None else size.aspect, true_fps=true_fps, sequence_fps=sequence_fps
@@ -89,18 +113,26 @@ def measured(
     found = run(subject, network(model, lake=lake, at=at), options)
     verdict = found.verdict
     return Measured(
-        film=found.film, rate=found.rate, duration=found.duration, network=found.model, refused=verdict.refused,
+        film=found.film,
+        rate=found.rate,
+        duration=found.duration,
+        network=found.model,
+        refused=verdict.refused,
         verdict=verdict.sentence,
         reasons=tuple(
             Finding(
-                kind=one.kind, severity=Severity.WARNING, what=one.what, fix=one.fix,
+                kind=one.kind,
+                severity=Severity.WARNING,
+                what=one.what,
+                fix=one.fix,
                 value=one.value if one.p is None else one.p,
             )
             for one in verdict.reasons
         ),
-        findings=found.noticed(anyway=anyway), figures=subject.film.as_dict(),
+        findings=found.noticed(anyway=anyway),
+        figures=subject.film.as_dict(),
         given=_answer(found) if found.shown(anyway=anyway) else None,
-    )  # fmt: skip
+    )
 
 
 def _subjects(source: Path | str | Frames, *, lake: Lake | None, at: str | None, reading: Reading) -> list[Subject]:
@@ -119,18 +151,25 @@ def _answer(found: Measurement) -> Answer:
     nan = float("nan")
     windows = Windows(
         start=np.array([window.start for window in found.windows]),
-        end=np.array([window.end for window in found.windows]), p=np.array([window.p for window in found.windows]),
+        end=np.array([window.end for window in found.windows]),
+        p=np.array([window.p for window in found.windows]),
         value={name: np.array([nan if q.value is None else q.value for q in own]) for name, own in rows.items()},
         low={name: np.array([q.span.low for q in own]) for name, own in rows.items()},
         high={name: np.array([q.span.high for q in own]) for name, own in rows.items()},
-    )  # fmt: skip
+    )
     draws = {name: found.draws[:, column] for column, name in enumerate(found.names)}
     return Answer(sentence=found.sentence, quantities=quantities, draws=draws, windows=windows)
 
 
 def _estimate(one: Quantity) -> Estimate:
     return Estimate(
-        unit=one.unit, value=one.value, sigma=one.sigma, interval=(one.span.low, one.span.high), level=one.span.level,
-        bound=None if one.span.bound is None else one.span.bound.value, constrained=one.constrained,
-        assumed=one.assumed, given=one.given,
-    )  # fmt: skip
+        unit=one.unit,
+        value=one.value,
+        sigma=one.sigma,
+        interval=(one.span.low, one.span.high),
+        level=one.span.level,
+        bound=None if one.span.bound is None else one.span.bound.value,
+        constrained=one.constrained,
+        assumed=one.assumed,
+        given=one.given,
+    )

@@ -76,9 +76,13 @@ class Agreement:
     def as_dict(self) -> dict[str, Any]:
         """JSON values."""
         return {
-            "count": self.count, "bounded": self.bounded, "bias": self.bias, "rmse": self.rmse,
-            "interval": None if self.interval is None else list(self.interval), "covered": self.covered,
-        }  # fmt: skip
+            "count": self.count,
+            "bounded": self.bounded,
+            "bias": self.bias,
+            "rmse": self.rmse,
+            "interval": None if self.interval is None else list(self.interval),
+            "covered": self.covered,
+        }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,9 +107,13 @@ class Spectrum:
     def as_dict(self) -> dict[str, Any]:
         """JSON values."""
         return {
-            "frequency": self.frequency.tolist(), "estimated": self.estimated.tolist(), "logged": self.logged.tolist(),
-            "coherence": self.coherence.tolist(), "chance": self.chance, "windows": self.windows,
-        }  # fmt: skip
+            "frequency": self.frequency.tolist(),
+            "estimated": self.estimated.tolist(),
+            "logged": self.logged.tolist(),
+            "coherence": self.coherence.tolist(),
+            "chance": self.chance,
+            "windows": self.windows,
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,9 +192,10 @@ def beside(measured: Measurement, *, start: int | None, wind: WindSeries | None)
     series = Beside(
         time=np.array([(window.start + window.end) / 2 for window in measured.windows]),
         wind=np.array([math.nan if one.value is None else one.value for one in found]),
-        low=np.array([one.span.low for one in found]), high=np.array([one.span.high for one in found]),
+        low=np.array([one.span.low for one in found]),
+        high=np.array([one.span.high for one in found]),
         p=np.array([window.p for window in measured.windows]),
-    )  # fmt: skip
+    )
     if start is None or wind is None or over_ground(wind) is None:
         return series
     truth = TruthSeries.of(wind)
@@ -196,11 +205,18 @@ def beside(measured: Measurement, *, start: int | None, wind: WindSeries | None)
     logged = np.array([truth.before(end, window=max(length, truth.period)).wind for end in ends])
     minute = np.array([truth.before(end, window=TRUTH_WINDOW).wind for end in ends])
     return Beside(
-        time=series.time, wind=series.wind, low=series.low, high=series.high, p=series.p, logged=logged, minute=minute,
+        time=series.time,
+        wind=series.wind,
+        low=series.low,
+        high=series.high,
+        p=series.p,
+        logged=logged,
+        minute=minute,
         window=agreement(series, logged, seed=measured.options.seed),
         of_minute=agreement(series, minute, seed=measured.options.seed),
-        spectrum=spectrum(series.time, series.wind, logged), delay=_delay(series, start, wind, measured.options.seed),
-    )  # fmt: skip
+        spectrum=spectrum(series.time, series.wind, logged),
+        delay=_delay(series, start, wind, measured.options.seed),
+    )
 
 
 def agreement(series: Beside, reference: NDArray[np.float64], *, seed: int) -> Agreement | None:
@@ -213,10 +229,13 @@ def agreement(series: Beside, reference: NDArray[np.float64], *, seed: int) -> A
     inside = (series.low[known] <= reference[known]) & (reference[known] <= series.high[known])
     found = bool(len(off))
     return Agreement(
-        count=count, bounded=count - len(off), bias=float(off.mean()) if found else None,
-        rmse=float(np.sqrt(np.mean(off**2))) if found else None, interval=_rmse_interval(off, seed) if found else None,
+        count=count,
+        bounded=count - len(off),
+        bias=float(off.mean()) if found else None,
+        rmse=float(np.sqrt(np.mean(off**2))) if found else None,
+        interval=_rmse_interval(off, seed) if found else None,
         covered=float(inside.mean()),
-    )  # fmt: skip
+    )
 
 
 def _rmse_interval(off: NDArray[np.float64], seed: int) -> tuple[float, float]:
@@ -251,9 +270,13 @@ def spectrum(time: NDArray[np.float64], estimated: NDArray[np.float64], logged: 
     _, other = signal.welch(pair[1], fs=1 / step, nperseg=segment)
     _, coherent = signal.coherence(*pair, fs=1 / step, nperseg=segment)
     return Spectrum(
-        frequency=frequency[1:], estimated=own[1:], logged=other[1:], coherence=coherent[1:],
-        chance=1 - 0.05 ** (1 / (_SEGMENTS - 1)), windows=len(run),
-    )  # fmt: skip
+        frequency=frequency[1:],
+        estimated=own[1:],
+        logged=other[1:],
+        coherence=coherent[1:],
+        chance=1 - 0.05 ** (1 / (_SEGMENTS - 1)),
+        windows=len(run),
+    )
 
 
 def _delay(series: Beside, start: int, wind: WindSeries, seed: int) -> Delay:
@@ -268,16 +291,18 @@ def _delay(series: Beside, start: int, wind: WindSeries, seed: int) -> Delay:
     try:
         bins = wind_bins(wind, shortest=max(1.0, 2 * step))
         found = estimate_offset(
-            MotionSeries(time=instants, energy=np.maximum(series.wind, 0.0)), bins.average,
+            MotionSeries(time=instants, energy=np.maximum(series.wind, 0.0)),
+            bins.average,
             search=LagSearch(
                 window=_SEARCHED, response=_RESPONSE[0], response_sigma=_RESPONSE[1], stamp_sigma=bins.sigma
             ),
             generator=stream(seed, "delay"),
-        )  # fmt: skip
+        )
     except InputError as error:
         return Delay(offset=None, sigma=None, reasons=(error.what,))
     known = math.isfinite(found.offset)
     return Delay(
-        offset=found.offset if known else None, sigma=found.sigma if known and math.isfinite(found.sigma) else None,
+        offset=found.offset if known else None,
+        sigma=found.sigma if known and math.isfinite(found.sigma) else None,
         reasons=found.reasons,
-    )  # fmt: skip
+    )

@@ -92,9 +92,10 @@ class FlagSize:
     def __post_init__(self) -> None:
         if not (_SHORTEST <= self.length <= _LONGEST and _SHORTEST <= self.height <= _LONGEST):
             raise UsageError(
-                f"a flag of {self.length:g} m × {self.height:g} m", where="--flag-size",
+                f"a flag of {self.length:g} m × {self.height:g} m",
+                where="--flag-size",
                 fix=f"give length x height in metres, each from {_SHORTEST:g} to {_LONGEST:g}, as in 1.5x1.0",
-            )  # fmt: skip
+            )
 
     @property
     def aspect(self) -> float:
@@ -113,12 +114,14 @@ class FlagSize:
             return ()
         return (
             Finding(
-                kind="aspect-ratio", severity=Severity.WARNING, value=aspect,
+                kind="aspect-ratio",
+                severity=Severity.WARNING,
+                value=aspect,
                 what=f"the {trained.noun} is {aspect:.2f} times as long as it is high, those of the training "
                 + (f"{least:.2f}" if least == most else f"{least:.2f} to {most:.2f}")
                 + " times: similarity is exact for one shape only, so that intervals may be too narrow",
             ),
-        )  # fmt: skip
+        )
 
 
 def parse_size(text: str) -> FlagSize:
@@ -192,19 +195,27 @@ class Sizes:
         if not left_out:
             return self
         finding = Finding(
-            kind="sizes-left-out", severity=Severity.WARNING, count=len(left_out),
+            kind="sizes-left-out",
+            severity=Severity.WARNING,
+            count=len(left_out),
             what=f"{len(left_out)} of {len(self.scale)} sizes of flag were left out of the answer: at "
             + " and ".join(f"{self.scale[place]:.2f}" for place in left_out)
             + " times the size of the training's flags the film is unlike what the network was trained on",
             fix="give --flag-size LENGTHxHEIGHT",
-        )  # fmt: skip
+        )
         return replace(self, scale=self.scale[chosen], draws=self.draws[chosen], findings=(*self.findings, finding))
 
 
 def sizes(
-    given: FlagSize | None, *, rate: float, frames_rate: float, draws: int, generator: np.random.Generator,
-    prior: SizePrior | None = None, trained: Trained = FLAG,
-) -> Sizes:  # fmt: skip
+    given: FlagSize | None,
+    *,
+    rate: float,
+    frames_rate: float,
+    draws: int,
+    generator: np.random.Generator,
+    prior: SizePrior | None = None,
+    trained: Trained = FLAG,
+) -> Sizes:
     """The lengths to consider for a film.
 
     Of an unknown size the prior is cut into `STRATA` parts of equal probability. The model looks at the film as that
@@ -231,8 +242,9 @@ def sizes(
             raise RefusedError(
                 f"{REASONS['low-frame-rate'].sentence}: {rate:.4g}, and a {trained.noun} of {given.length:g} m needs "
                 f"{needed:.4g}",
-                where="frame rate", fix=f"film at {math.ceil(10 * needed) / 10:g} frames a second or more",
-            )  # fmt: skip
+                where="frame rate",
+                fix=f"film at {math.ceil(10 * needed) / 10:g} frames a second or more",
+            )
         return Sizes(
             given=given, scale=np.array([own]), draws=np.full((1, draws), own), findings=given.findings(trained)
         )
@@ -245,7 +257,7 @@ def sizes(
             f"{least:.2f} m, and its size was not given",
             where="frame rate",
             fix=f"give --flag-size if the {trained.noun} is larger, or film at {enough:.3g} Hz or more",
-        )  # fmt: skip
+        )
     below = 1 - admitted
     edges = below + admitted * np.arange(STRATA + 1) / STRATA
     middles = (edges[:-1] + edges[1:]) / 2
@@ -253,25 +265,31 @@ def sizes(
     low, high = prior.quantile(np.array([below + 0.05 * admitted, 1 - 0.05 * admitted]))
     found = [
         Finding(
-            kind="size-assumed", severity=Severity.WARNING, value=prior.median,
+            kind="size-assumed",
+            severity=Severity.WARNING,
+            value=prior.median,
             what=f"the {trained.noun}'s size was not given: lengths from {low:.2f} to {high:.2f} m (90 %) were taken "
             "as possible and widen the intervals",
             fix="give --flag-size LENGTHxHEIGHT",
         )
-    ]  # fmt: skip
+    ]
     if below > 0.01:
         found.append(
             Finding(
-                kind="small-sizes-left-out", severity=Severity.WARNING, value=below,
+                kind="small-sizes-left-out",
+                severity=Severity.WARNING,
+                value=below,
                 what=f"at {rate:.4g} frames a second {trained.noun}s shorter than {least:.2f} m cannot be judged; "
                 f"{below:.0%} of what was assumed of the size was left out",
                 fix="give --flag-size, or film faster",
             )
-        )  # fmt: skip
+        )
     return Sizes(
-        given=None, scale=prior.quantile(middles) / trained.length, draws=prior.quantile(within) / trained.length,
+        given=None,
+        scale=prior.quantile(middles) / trained.length,
+        draws=prior.quantile(within) / trained.length,
         findings=tuple(found),
-    )  # fmt: skip
+    )
 
 
 def spacing(scale: float, *, rate: float) -> float:

@@ -248,15 +248,18 @@ def _calibrated(folder: Path, artifact: Artifact, lake: Lake, at: str | None) ->
     own = network(reading.network, lake=lake, at=at)
     if own.identity != reading.identity:
         raise InputError(
-            f"the network {reading.network!r} is another one than when the flag was calibrated", where=artifact.name,
+            f"the network {reading.network!r} is another one than when the flag was calibrated",
+            where=artifact.name,
             fix="calibrate the flag again",
-        )  # fmt: skip
+        )
     return replace(own, identity=artifact.id, artifact=artifact, reading=reading)
 
 
 def _loaded(folder: Path, artifact: Artifact | None) -> Network:
     loaded = estimator.load(folder)
     return Network(
-        estimator=loaded, identity=digest(f"{file_hash(folder / CARD)} {file_hash(folder / WEIGHTS)}"),
-        artifact=artifact, folder=folder,
-    )  # fmt: skip
+        estimator=loaded,
+        identity=digest(f"{file_hash(folder / CARD)} {file_hash(folder / WEIGHTS)}"),
+        artifact=artifact,
+        folder=folder,
+    )

@@ -82,9 +82,15 @@ class Window:
 
 
 def lay_out(
-    *, frames: int, spacings: tuple[float, ...], rate: float, duration: float, step: float | None,
-    first: float | None = None, last: float | None = None,
-) -> Layout:  # fmt: skip
+    *,
+    frames: int,
+    spacings: tuple[float, ...],
+    rate: float,
+    duration: float,
+    step: float | None,
+    first: float | None = None,
+    last: float | None = None,
+) -> Layout:
     """Windows that follow each other, or start every `step` [s].
 
     Args:
@@ -100,21 +106,27 @@ def lay_out(
     begin, end = first if first is not None else 0.0, last if last is not None else duration
     if not 0 <= begin < end or begin >= duration:
         raise UsageError(
-            f"from {begin:g} s to {end:g} s of a film of {duration:.2f} s", where="--start, --end",
+            f"from {begin:g} s to {end:g} s of a film of {duration:.2f} s",
+            where="--start, --end",
             fix="give a part that it has",
-        )  # fmt: skip
+        )
     if step is not None and not step > 0:
         raise UsageError(f"a window every {step:g} s", where="--windows", fix="give a time above 0, as in 1.2s")
     longest = frames * max(spacings)
     layout = Layout(
-        frames=frames, spacings=spacings, step=step if step is not None else longest, period=1 / rate,
-        first=begin, last=min(end, duration),
-    )  # fmt: skip
+        frames=frames,
+        spacings=spacings,
+        step=step if step is not None else longest,
+        period=1 / rate,
+        first=begin,
+        last=min(end, duration),
+    )
     if layout.count < 1:
         raise InputError(
             f"{layout.last - layout.first:.2f} s of film, a measurement takes {layout.length:.2f} s",
-            where="length", fix=f"give at least {layout.length:.2f} s, {frames} frames at {1 / max(spacings):.3g} Hz",
-        )  # fmt: skip
+            where="length",
+            fix=f"give at least {layout.length:.2f} s, {frames} frames at {1 / max(spacings):.3g} Hz",
+        )
     return layout
 
 
@@ -179,26 +191,34 @@ def findings_of(layout: Layout, *, found: int, interpolated: int, frames: int, r
     shown = found * layout.frames * len(layout.spacings)
     notes = [
         Finding(
-            kind="resampled", severity=Severity.NOTE, value=interpolated / max(shown, 1), count=interpolated,
+            kind="resampled",
+            severity=Severity.NOTE,
+            value=interpolated / max(shown, 1),
+            count=interpolated,
             what=f"windows of {layout.frames} frames, "
             + " or ".join(f"{spacing * 1e3:.1f}" for spacing in layout.spacings)
             + f" ms apart, out of a film of {1 / layout.period:.4g} frames a second; {interpolated} of {shown} lie "
             "between two frames and were interpolated by the motion of the picture",
         )
-    ]  # fmt: skip
+    ]
     if found < layout.count:
         notes.append(
             Finding(
-                kind="windows-left-out", severity=Severity.WARNING, count=layout.count - found,
+                kind="windows-left-out",
+                severity=Severity.WARNING,
+                count=layout.count - found,
                 what=f"{layout.count - found} of {layout.count} windows lack frames and were left out",
             )
-        )  # fmt: skip
+        )
     if repeated:
         notes.append(
             Finding(
-                kind="frames-repeated", severity=Severity.WARNING, count=repeated, value=repeated / frames,
+                kind="frames-repeated",
+                severity=Severity.WARNING,
+                count=repeated,
+                value=repeated / frames,
                 what=f"{repeated} of {frames} frames ({repeated / frames:.0%}) repeat the one before and were left "
                 f"out: {(1 - repeated / frames) / layout.period:.3g} different pictures a second are left",
             )
-        )  # fmt: skip
+        )
     return tuple(notes)

@@ -18,9 +18,14 @@ ANSWER = 3
 
 
 def answer_of(
-    verdict: Verdict, outcome: Outcome, *, name: str, models: tuple[NamedModel, ...], reading: Mapping[str, Any],
+    verdict: Verdict,
+    outcome: Outcome,
+    *,
+    name: str,
+    models: tuple[NamedModel, ...],
+    reading: Mapping[str, Any],
     parents: tuple[str, ...],
-) -> Answer:  # fmt: skip
+) -> Answer:
     """That of films and of tables of observables.
 
     Args:
@@ -31,11 +36,22 @@ def answer_of(
     """
     recordings = outcome.recordings
     recipe = {
-        "close-loop-on-films": ANSWER, "simulations": VERSION, "sources": [one.source for one in recordings],
-        "spans": [[one.first, one.duration] for one in recordings], **reading, **outcome.options.recipe(),
-    }  # fmt: skip
+        "close-loop-on-films": ANSWER,
+        "simulations": VERSION,
+        "sources": [one.source for one in recordings],
+        "spans": [[one.first, one.duration] for one in recordings],
+        **reading,
+        **outcome.options.recipe(),
+    }
     return Answer(
-        name=name, verdict=verdict, models=models, effects=acting(verdict)[:1], findings=outcome.findings,
-        page=page(verdict, outcome), words=words(verdict), recipe=recipe, parents=parents,
+        name=name,
+        verdict=verdict,
+        models=models,
+        effects=acting(verdict)[:1],
+        findings=outcome.findings,
+        page=page(verdict, outcome),
+        words=words(verdict),
+        recipe=recipe,
+        parents=parents,
         seed=outcome.options.calibration.seed,
-    )  # fmt: skip
+    )

@@ -57,9 +57,10 @@ def close_films(
     """
     if given.flag_size is None:
         raise UsageError(
-            "the flag's size is missing: what is simulated is a flag of its size", where="--flag-size",
+            "the flag's size is missing: what is simulated is a flag of its size",
+            where="--flag-size",
             fix="give length x height in metres, as in 1.5x1.0",
-        )  # fmt: skip
+        )
     begun = time.monotonic()
     size = parse_size(given.flag_size)
     flag = Flag(length=size.length, height=size.height, attachment=given.attachment)
@@ -68,33 +69,51 @@ def close_films(
             flag=flag,
             azimuth=AZIMUTH if given.azimuth is None else known(AZIMUTH, given.azimuth, where="--azimuth"),
             elevation=ELEVATION if given.elevation is None else known(ELEVATION, given.elevation, where="--elevation"),
-            distance=given.distance, simulations=given.simulations, seed=seed,
+            distance=given.distance,
+            simulations=given.simulations,
+            seed=seed,
         ),
         area_weight=None if given.area_weight is None else weight(given.area_weight),
-        level=CRITERIA.level if level is None else level, kinds=CRITERIA.film_kinds if nulls is None else nulls,
+        level=CRITERIA.level if level is None else level,
+        kinds=CRITERIA.film_kinds if nulls is None else nulls,
         suspected=None if given.suspect is None else Suspicion.parse(given.suspect, flag),
-    )  # fmt: skip
+    )
     reading = Reading(crop=box_of(given.crop), flag=given.flag, aspect=size.aspect)
     opened = Sources.open(
-        sources, size, reading, lake=lake, at=branch, first=given.first, last=given.last, log=given.log,
+        sources,
+        size,
+        reading,
+        lake=lake,
+        at=branch,
+        first=given.first,
+        last=given.last,
+        log=given.log,
         offset=given.clock_offset,
-    )  # fmt: skip
+    )
     with progress(None, label="observe", unit="window") as advance:
         gathered = opened.read(size, advance=advance)
     recordings = distinct(gathered.recordings)
     processes = workers or len(os.sched_getaffinity(0))
     say(announced(workload([one.duration for one in recordings], options), workers=processes))
     outcome = solve(
-        recordings, options, folder=given.cache or user_cache() / "calibrate", workers=processes, stage=stage_bars(),
-    )  # fmt: skip
+        recordings,
+        options,
+        folder=given.cache or user_cache() / "calibrate",
+        workers=processes,
+        stage=stage_bars(),
+    )
     verdict = verdict_of(outcome)
     left_out = tuple((one.kind, one.what) for one in gathered.left_out)
     verdict = replace(verdict, findings=(*left_out, *verdict.findings), seconds=time.monotonic() - begun)
     called = name or recordings[0].name
     return answer_of(
-        verdict, outcome, name=called, models=models(verdict, outcome, name=called), reading=reading.recipe(),
+        verdict,
+        outcome,
+        name=called,
+        models=models(verdict, outcome, name=called),
+        reading=reading.recipe(),
         parents=gathered.parents,
-    )  # fmt: skip
+    )
 
 
 def workload(durations: Sequence[float], options: Options) -> float:

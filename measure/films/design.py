@@ -66,9 +66,9 @@ def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
     own = design.batches()
     size = len(own[0].seeds)
     steps = [batch.step or 0.0 for batch in own]
-    candidates = np.concatenate([
-        place * size + np.arange(len(batch.seeds)) for place, batch in enumerate(own) if steps[place] == max(steps)
-    ])  # fmt: skip
+    candidates = np.concatenate(
+        [place * size + np.arange(len(batch.seeds)) for place, batch in enumerate(own) if steps[place] == max(steps)]
+    )
     rng = stream(design.seed, "films", "pairs", effect.name)
     count = min(PAIRS, len(candidates))
     places = np.sort(rng.choice(candidates, count, replace=False))
@@ -82,11 +82,14 @@ def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
         part = places[begin : begin + TOGETHER]
         batches.append(
             replace(
-                first, values={name: values[name][part] for name in first.values}, places=seen[part][:, None],
-                seeds=tuple(seeds[place] for place in part), until=min(until, design.duration),
+                first,
+                values={name: values[name][part] for name in first.values},
+                places=seen[part][:, None],
+                seeds=tuple(seeds[place] for place in part),
+                until=min(until, design.duration),
                 effects=((effect.column, strengths[begin : begin + TOGETHER]),),
             )
-        )  # fmt: skip
+        )
     return Pairs(effect=effect, places=places, strengths=strengths, batches=tuple(batches))
 
 
@@ -118,10 +121,13 @@ def nulls(designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed:
             values["damping"] = _damping(values["damping"], explicit=numerics.step is None)
             batches.append(
                 replace(
-                    first, values=values, places=seen[part][:, None], discretisation=numerics,
+                    first,
+                    values=values,
+                    places=seen[part][:, None],
+                    discretisation=numerics,
                     seeds=tuple(child_seed(seed, "films", "null", design.recording, int(place)) for place in part),
                 )
-            )  # fmt: skip
+            )
         found.append(batches)
     return found
 

@@ -70,9 +70,10 @@ class Experiments:
     def repeated(self, times: int) -> Experiments:
         """Each so many times, one after the other."""
         return Experiments(
-            summaries=tuple(np.repeat(own, times, axis=0) for own in self.summaries), sigma=self.sigma,
+            summaries=tuple(np.repeat(own, times, axis=0) for own in self.summaries),
+            sigma=self.sigma,
             stated=None if self.stated is None else np.repeat(self.stated, times),
-        )  # fmt: skip
+        )
 
     def off(self, weight: Floats) -> Floats:
         """(n,) by how many standard deviations stated weights are off from (n,) [kg/m²]; 0 where none was stated."""
@@ -160,9 +161,11 @@ class Hypothesis:
         evidence = logsumexp(ratio, axis=1) - np.log(scores.shape[1])
         misfits = np.array([misfit for _, _, misfit in modes])
         return Fit(
-            evidence=evidence, misfit=misfits.min(axis=0), scores=scores,
+            evidence=evidence,
+            misfit=misfits.min(axis=0),
+            scores=scores,
             weights=np.exp(ratio - logsumexp(ratio, axis=1, keepdims=True)),
-        )  # fmt: skip
+        )
 
     def misfit(self, observed: Experiments) -> Floats:
         """(n,) that of `fit`, without the rest of it."""

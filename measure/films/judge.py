@@ -80,16 +80,23 @@ def judge(
     order = np.argsort(-probability)
     count = 1 + int(np.searchsorted(np.cumsum(probability[order]), CONFIDENCE - 1e-9))
     confident = tuple(int(place) for place in order[:count])
-    leftover = np.array([
-        ClusteredNulls(null=nulls.left[:, place], kinds=kinds).p(float(own.misfits.left[0, place]))
-        for place in range(len(own.effects))
-    ])  # fmt: skip
+    leftover = np.array(
+        [
+            ClusteredNulls(null=nulls.left[:, place], kinds=kinds).p(float(own.misfits.left[0, place]))
+            for place in range(len(own.effects))
+        ]
+    )
 
     def judged(conclusion: Conclusion, named: tuple[int, ...] = (), reasons: tuple[str, ...] = ()) -> Judged:
         return Judged(
-            conclusion=conclusion, named=named, confident=confident, probability=probability, leftover=leftover,
-            scored=scored, open=reasons,
-        )  # fmt: skip
+            conclusion=conclusion,
+            named=named,
+            confident=confident,
+            probability=probability,
+            leftover=leftover,
+            scored=scored,
+            open=reasons,
+        )
 
     if not scored.nulls.tests(level):
         return judged(Conclusion.UNTESTED)

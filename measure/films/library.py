@@ -42,9 +42,11 @@ class Weighable:
         """Of the strength beyond its null value."""
         scale = Scale.LOG if self.low > 0 else Scale.LINEAR
         return Uncertain(
-            name=self.name, unit=self.column.unit, prior=Range(low=self.low, high=self.high, scale=scale),
+            name=self.name,
+            unit=self.column.unit,
+            prior=Range(low=self.low, high=self.high, scale=scale),
             source="from what a minute of film hardly shows to beyond what is expected in the field",
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,9 +86,10 @@ class Suspicion:
             raise UsageError(f"{wanted} cannot be less than none", where=WHERE, fix=f"give {wanted} without the sign")
         if one.low < 0 and not sign:
             raise UsageError(
-                f"{wanted} may be above or below {one.column.described.null:g}", where=WHERE,
+                f"{wanted} may be above or below {one.column.described.null:g}",
+                where=WHERE,
                 fix=f"give the sign that is suspected, {wanted}+ or {wanted}-",
-            )  # fmt: skip
+            )
         sign = sign or 1
         return cls(name=one.name, sign=sign, words=f"{wanted}{'+' if sign > 0 else '-'}")
 

@@ -122,11 +122,15 @@ def responded(
     # The regression was fitted to the flags without the effect: their residuals are the smaller for it.
     fitted, fresh = (2 - stretch)[:, None], stretch[:, None]
     return Response(
-        effect=effect, logarithmic=logarithmic, coefficients=coefficients, inverse=inverse,
+        effect=effect,
+        logarithmic=logarithmic,
+        coefficients=coefficients,
+        inverse=inverse,
         residual=float(np.square(missed).sum() / (max(len(z) - z.shape[1], 1) * missed.shape[1])),
         excess=max(0.0, float((np.square(off + missed) / fresh).mean() - (np.square(off) / fitted).mean())),
-        expected=float(np.abs(strengths).mean()), change=(np.sign(strengths)[:, None] * change).mean(axis=0),
-    )  # fmt: skip
+        expected=float(np.abs(strengths).mean()),
+        change=(np.sign(strengths)[:, None] * change).mean(axis=0),
+    )
 
 
 def _features(effect: Weighable, logarithmic: bool, strength: Floats, weight: Floats) -> Floats:

@@ -36,18 +36,25 @@ def _content(verdict: Verdict, outcome: Outcome, title: str, effects: Sequence[C
     speeds = [float(one.speed.mean()) for one in outcome.recordings]
     speed: Any = speeds[0] if min(speeds) == max(speeds) else {"low": min(speeds), "high": max(speeds)}
     return {
-        "title": title, "seed": calibration.seed, "batch": 1,
+        "title": title,
+        "seed": calibration.seed,
+        "batch": 1,
         "scene": {
-            "shape": "flag", "width": calibration.flag.length, "height": calibration.flag.height, "columns": COLUMNS,
-            "attachment": calibration.flag.attachment, "start-noise": _ROUGH,
+            "shape": "flag",
+            "width": calibration.flag.length,
+            "height": calibration.flag.height,
+            "columns": COLUMNS,
+            "attachment": calibration.flag.attachment,
+            "start-noise": _ROUGH,
         },
         "wind": {"speed": speed},
         "integrator": {"name": "implicit", "step": _STEP},
         "time": {"settle": SETTLE, "frames": _FRAMES, "rate": _RATE},
         "material": {
-            "name": FABRIC, "density": own["area_weight"],
+            "name": FABRIC,
+            "density": own["area_weight"],
             "bending-factor": own["bending"] / mean_bending(named(FABRIC)),
             "damping": max(own["damping"] - _STEP, 0.0),
         },
         **acted(effects),
-    }  # fmt: skip
+    }

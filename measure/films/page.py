@@ -32,30 +32,49 @@ def page(verdict: Verdict, outcome: Outcome) -> str:
     """The page, HTML."""
     after = sentences.after_label(verdict) if verdict.named else ""
     values = {
-        "verdict": verdict, "tone": TONES[verdict.conclusion], **opening(verdict),
-        "test_sentence": sentences.test_sentence(verdict), "remark": sentences.test_remark(verdict.test),
-        "named": sentences.named_candidates(verdict), "after_label": after, "level": level_of(verdict),
+        "verdict": verdict,
+        "tone": TONES[verdict.conclusion],
+        **opening(verdict),
+        "test_sentence": sentences.test_sentence(verdict),
+        "remark": sentences.test_remark(verdict.test),
+        "named": sentences.named_candidates(verdict),
+        "after_label": after,
+        "level": level_of(verdict),
         "has_control": any(quantity.known(c.control) for c in verdict.comparisons),
-        "null": figures.null_distribution(verdict.test), "power": sentences.power_mean(verdict),
-        "shares": sorted(verdict.power, key=lambda one: -one.share), "whole": outcome.judged.scored.whole,
+        "null": figures.null_distribution(verdict.test),
+        "power": sentences.power_mean(verdict),
+        "shares": sorted(verdict.power, key=lambda one: -one.share),
+        "whole": outcome.judged.scored.whole,
         "title": lambda c: sentences.candidate_title(verdict, c),
         "recordings": [
-            {"name": one.name, "windows": len(one.readings), "wind": f"{one.speed.mean():.1f}",
-             "picture": _against_wind(outcome, place, named=bool(verdict.named)),
-             "beside": side_by_side(outcome, place, after=after)}
+            {
+                "name": one.name,
+                "windows": len(one.readings),
+                "wind": f"{one.speed.mean():.1f}",
+                "picture": _against_wind(outcome, place, named=bool(verdict.named)),
+                "beside": side_by_side(outcome, place, after=after),
+            }
             for place, one in enumerate(outcome.recordings)
         ],
-        "provenance": [(name, value if isinstance(value, str) else json.dumps(value))
-                       for name, value in {**verdict.provenance.get("options", {}), **verdict.provenance}.items()
-                       if name != "options"],
-    }  # fmt: skip
+        "provenance": [
+            (name, value if isinstance(value, str) else json.dumps(value))
+            for name, value in {**verdict.provenance.get("options", {}), **verdict.provenance}.items()
+            if name != "options"
+        ],
+    }
     return render("measure.report", "films.html.j2", values, filters=FILTERS)
 
 
 def bands(
-    sight: Sight, observed: Observed, values: dict[str, Floats], weights: Floats, effect: Weighable | None,
-    strength: Floats | None, *, seed: int,
-) -> Floats:  # fmt: skip
+    sight: Sight,
+    observed: Observed,
+    values: dict[str, Floats],
+    weights: Floats,
+    effect: Weighable | None,
+    strength: Floats | None,
+    *,
+    seed: int,
+) -> Floats:
     """(3, window, observable) lower end, middle and upper end of what a model of the posterior shows in the windows'
     winds, without the scatter among windows; NaN of observables that are not used. A change with the wind that is not
     used is drawn as none.
@@ -67,9 +86,10 @@ def bands(
     rng = stream(seed, "films", "bands")
     rows = rng.choice(len(weights), _DRAWS, p=weights / weights.sum())
     mean, stretch = sight.model.predict(
-        {name: own[rows] for name, own in values.items()}, None if effect is None else effect.name,
+        {name: own[rows] for name, own in values.items()},
+        None if effect is None else effect.name,
         None if strength is None else strength[rows],
-    )  # fmt: skip
+    )
     mean = mean + (rng.standard_normal(mean.shape) @ sight.model.base.factor.T) * np.sqrt(stretch)[:, None]
     whole = np.full((_DRAWS, len(sight.model.used)), np.nan)
     whole[:, len(OBSERVED) :] = 0.0  # changes that nothing predicts are none
@@ -89,9 +109,14 @@ def _against_wind(outcome: Outcome, place: int, *, named: bool) -> str:
     for effect, fit, colour in both:
         cloth, places, strength = hypothesis(outcome.sights, effect).values(fit.scores[0])
         found = bands(
-            sight, one, {**cloth, **places[place]}, fit.weights[0], effect, strength,
+            sight,
+            one,
+            {**cloth, **places[place]},
+            fit.weights[0],
+            effect,
+            strength,
             seed=outcome.options.calibration.seed,
-        )  # fmt: skip
+        )
         drawn.append(Band(found=found, colour=colour))
     names = [name for column, name in enumerate(OBSERVED) if np.isfinite(drawn[0].found[:, :, column]).all()]
     return against_wind(one, names, drawn, dots=_DOT, opacity=0.25)

@@ -68,9 +68,10 @@ class Options:
     def __post_init__(self) -> None:
         if not 0 < self.level < 1 or self.kinds < CRITERIA.fewest_kinds:
             raise UsageError(
-                f"{self.kinds} kinds of numerics cannot test at a level of {self.level!r}", where="close-loop",
+                f"{self.kinds} kinds of numerics cannot test at a level of {self.level!r}",
+                where="close-loop",
                 fix=f"give a level between 0 and 1, and {CRITERIA.fewest_kinds} kinds or more",
-            )  # fmt: skip
+            )
         known = [one.name for one in weighable(self.calibration.flag)]
         if unknown := set(self.only) - set(known):
             raise UsageError(f"{', '.join(sorted(unknown))}: not weighed on films", fix=f"give {', '.join(known)}")
@@ -83,10 +84,13 @@ class Options:
     def recipe(self) -> dict[str, Any]:
         """JSON values."""
         return {
-            **self.calibration.recipe(), "area_weight": None if self.area_weight is None else list(self.area_weight),
-            "test_level": self.level, "kinds": self.kinds, "only": list(self.only),
+            **self.calibration.recipe(),
+            "area_weight": None if self.area_weight is None else list(self.area_weight),
+            "test_level": self.level,
+            "kinds": self.kinds,
+            "only": list(self.only),
             "suspected": None if self.suspected is None else self.suspected.words,
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -185,11 +189,18 @@ def solve(
         first = effects[judged.confident[0]]
         best = first, fitted(sights, seen, first, seed=seed)
     return Outcome(
-        options=options, recordings=tuple(recordings), simulations=simulations, sights=sights, weighing=own,
-        judged=judged, base=base, best=best, departures=departing,
+        options=options,
+        recordings=tuple(recordings),
+        simulations=simulations,
+        sights=sights,
+        weighing=own,
+        judged=judged,
+        base=base,
+        best=best,
+        departures=departing,
         sensitivity=sensitivity(sights, effects, base, seen),
         together=hypothesis(sights, None).scatter.together,
-    )  # fmt: skip
+    )
 
 
 def verdict_of(outcome: Outcome) -> Verdict:
@@ -200,27 +211,43 @@ def verdict_of(outcome: Outcome) -> Verdict:
     acting = outcome.best if judged.named else None
     others = [place for place in np.argsort(-judged.probability) if place not in judged.confident]
     comparisons = compared(
-        outcome.recordings, outcome.simulations, outcome.sights, effect=None if acting is None else acting[0],
-        control=effects[others[0]] if others and acting is not None else None, weighed=options.area_weight,
+        outcome.recordings,
+        outcome.simulations,
+        outcome.sights,
+        effect=None if acting is None else acting[0],
+        control=effects[others[0]] if others and acting is not None else None,
+        weighed=options.area_weight,
         seed=options.calibration.seed,
-    )  # fmt: skip
+    )
     verdict = Verdict(
-        conclusion=judged.conclusion, named=named, words="", test=_test(outcome), parameters=_parameters(outcome),
-        ranking=_ranking(outcome), comparisons=comparisons, residuals=(),
+        conclusion=judged.conclusion,
+        named=named,
+        words="",
+        test=_test(outcome),
+        parameters=_parameters(outcome),
+        ranking=_ranking(outcome),
+        comparisons=comparisons,
+        residuals=(),
         provenance={
-            "seed": options.calibration.seed, "code": code_version(), "criteria": CRITERIA.as_dict(),
+            "seed": options.calibration.seed,
+            "code": code_version(),
+            "criteria": CRITERIA.as_dict(),
             "options": options.recipe(),
         },
-        power=_power(outcome), open=judged.open,
+        power=_power(outcome),
+        open=judged.open,
         findings=tuple((f.kind, f.what) for f in outcome.findings if f.severity is not Severity.NOTE),
-    )  # fmt: skip
+    )
     unseen = [
         one.column.effect for one, errors in zip(effects, outcome.sensitivity.tolist(), strict=True) if errors < SEEN
     ]
     return stated(
-        verdict, outcome.recordings, weighed=options.area_weight is not None, unseen=tuple(dict.fromkeys(unseen)),
+        verdict,
+        outcome.recordings,
+        weighed=options.area_weight is not None,
+        unseen=tuple(dict.fromkeys(unseen)),
         departing=tuple(one for one in outcome.departures if abs(one.deviations) >= SEEN),
-    )  # fmt: skip
+    )
 
 
 def _test(outcome: Outcome) -> NullTest:
@@ -228,15 +255,21 @@ def _test(outcome: Outcome) -> NullTest:
     nulls, statistic = scored.nulls, scored.statistic
     low, high = nulls.interval(statistic, level=CRITERIA.interval)
     return NullTest(
-        statistic=statistic, null=nulls.null.tolist(), kinds=nulls.count, level=level,
+        statistic=statistic,
+        null=nulls.null.tolist(),
+        kinds=nulls.count,
+        level=level,
         p_value=Estimate(value=scored.p_value, low=low, high=high, unit="1", level=CRITERIA.interval),
-        critical=nulls.critical(level), open=low <= level <= high,
+        critical=nulls.critical(level),
+        open=low <= level <= high,
         settling=nulls.settling(statistic, at=level, level=CRITERIA.interval) if low <= level <= high else None,
-        effective=nulls.effective, correlation=nulls.correlation, tail=nulls.tail(statistic),
+        effective=nulls.effective,
+        correlation=nulls.correlation,
+        tail=nulls.tail(statistic),
         suspected="" if suspected is None else suspected.words,
         nulls=f"{len(nulls.null)} flags of {nulls.count} meshes and methods in the same minutes of wind, over "
         "the priors of cloth, view and anemometer",
-    )  # fmt: skip
+    )
 
 
 def _power(outcome: Outcome) -> tuple[Power, ...]:
@@ -244,12 +277,14 @@ def _power(outcome: Outcome) -> tuple[Power, ...]:
     effects, power = outcome.weighing.effects, outcome.judged.scored.power
     return tuple(
         Power(
-            effect=effects[place].column.effect, parameter=effects[place].column.parameter,
-            strength=expected(outcome.sights, effects[place]), unit=effects[place].column.unit,
+            effect=effects[place].column.effect,
+            parameter=effects[place].column.parameter,
+            strength=expected(outcome.sights, effects[place]),
+            unit=effects[place].column.unit,
             share=float(power[place]),
         )
         for place in np.argsort(-power, kind="stable").tolist()
-    )  # fmt: skip
+    )
 
 
 def _parameters(outcome: Outcome) -> tuple[Parameter, ...]:
@@ -263,10 +298,12 @@ def _parameters(outcome: Outcome) -> tuple[Parameter, ...]:
         later = None if after is None else after[place]
         made.append(
             Parameter(
-                name=one.name, before=before[place][0], after=None if later is None else later[0],
+                name=one.name,
+                before=before[place][0],
+                after=None if later is None else later[0],
                 shift=None if later is None else (later[0].value - before[place][0].value) / before[place][1],
             )
-        )  # fmt: skip
+        )
     return tuple(made)
 
 
@@ -292,9 +329,12 @@ def strength_of(outcome: Outcome, effect: Weighable, fit: Fit) -> Estimate:
     inward, outward = size * (1 - 1 / whole), size * (whole - 1)
     below, above = (inward, outward) if value > 0 else (outward, inward)
     return Estimate(
-        value=null + value, low=null + value - float(np.hypot(below, value - found.low)),
-        high=null + value + float(np.hypot(above, found.high - value)), unit=found.unit, level=found.level,
-    )  # fmt: skip
+        value=null + value,
+        low=null + value - float(np.hypot(below, value - found.low)),
+        high=null + value + float(np.hypot(above, found.high - value)),
+        unit=found.unit,
+        level=found.level,
+    )
 
 
 def _ranking(outcome: Outcome) -> tuple[Candidate, ...]:
@@ -306,14 +346,21 @@ def _ranking(outcome: Outcome) -> tuple[Candidate, ...]:
         fit = fitted(outcome.sights, seen, effect, seed=outcome.options.calibration.seed)
         made.append(
             Candidate(
-                effect=effect.column.effect, parameter=effect.column.parameter,
-                strength=strength_of(outcome, effect, fit), z=float(judged.scored.z[place]),
-                p_value=float(judged.scored.alone[place]), p_family=float(judged.scored.family[place]),
-                gain=float(own.factors[0, place]), gain_error=float("nan"), behind=0.0,
-                leftover=float(judged.leftover[place]), null=effect.column.described.null,
-                probability=float(judged.probability[place]), why_not=_why_not(outcome, place),
+                effect=effect.column.effect,
+                parameter=effect.column.parameter,
+                strength=strength_of(outcome, effect, fit),
+                z=float(judged.scored.z[place]),
+                p_value=float(judged.scored.alone[place]),
+                p_family=float(judged.scored.family[place]),
+                gain=float(own.factors[0, place]),
+                gain_error=float("nan"),
+                behind=0.0,
+                leftover=float(judged.leftover[place]),
+                null=effect.column.described.null,
+                probability=float(judged.probability[place]),
+                why_not=_why_not(outcome, place),
             )
-        )  # fmt: skip
+        )
     return tuple(made)
 
 

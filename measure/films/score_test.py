@@ -141,9 +141,13 @@ class Scene:
             each.whole - _regressors(one) @ coefficients for each, one in zip((own, base, nulls), at, strict=True)
         ]
         return cls(
-            own=residuals[0], base=residuals[1], null=residuals[2], kinds=kinds, changes=changes,
+            own=residuals[0],
+            base=residuals[1],
+            null=residuals[2],
+            kinds=kinds,
+            changes=changes,
             alike=np.asarray(np.abs(at[2]) < ALIKE, dtype=np.bool_),
-        )  # fmt: skip
+        )
 
     def axes(self, *without: int) -> Axes:
         """Of V without some kinds."""
@@ -156,14 +160,15 @@ class Scene:
     def standing(self, without: int | None) -> Standing:
         """By null flags of all kinds but one; None for all."""
         left = () if without is None else (without,)
-        found = np.concatenate([
-            self.axes(*left, kind).z(self.null[self.alike & (self.kinds == kind)])
-            for kind in np.unique(self.kinds[self.alike]).tolist() if kind not in left
-        ])  # fmt: skip
+        found = np.concatenate(
+            [
+                self.axes(*left, kind).z(self.null[self.alike & (self.kinds == kind)])
+                for kind in np.unique(self.kinds[self.alike]).tolist()
+                if kind not in left
+            ]
+        )
         spread = found.std(axis=0, ddof=1)
-        return Standing(
-            axes=self.axes(*left), centre=found.mean(axis=0), spread=np.where(spread > 0, spread, 1.0)
-        )  # fmt: skip
+        return Standing(axes=self.axes(*left), centre=found.mean(axis=0), spread=np.where(spread > 0, spread, 1.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -235,13 +240,19 @@ def score(
     power = _power(scene, apart, directions, farthest.critical(level))
     suspected = directions.suspected
     return Scored(
-        z=z[0, :-1], whole=float(z[0, -1]), statistic=float(directions.far(z).max()), nulls=farthest,
-        alone=np.array([
-            ClusteredNulls(null=alone[:, place], kinds=shown).p(float(along[place])) for place in range(len(along))
-        ]),
-        family=family, power=power, tested=power if suspected is None else power[suspected[0] : suspected[0] + 1],
-        pointed=suspected is not None or bool((family <= level).any()), alike=scene.alike,
-    )  # fmt: skip
+        z=z[0, :-1],
+        whole=float(z[0, -1]),
+        statistic=float(directions.far(z).max()),
+        nulls=farthest,
+        alone=np.array(
+            [ClusteredNulls(null=alone[:, place], kinds=shown).p(float(along[place])) for place in range(len(along))]
+        ),
+        family=family,
+        power=power,
+        tested=power if suspected is None else power[suspected[0] : suspected[0] + 1],
+        pointed=suspected is not None or bool((family <= level).any()),
+        alike=scene.alike,
+    )
 
 
 def _power(scene: Scene, apart: dict[int, Standing], directions: Directions, critical: float | None) -> Floats:
@@ -256,8 +267,9 @@ def _power(scene: Scene, apart: dict[int, Standing], directions: Directions, cri
         beyond = [
             directions.far(standing.of(scene.null[scene.alike & (scene.kinds == kind)] + sign * change)).max(axis=1)
             > critical
-            for kind, standing in apart.items() for sign in signs
-        ]  # fmt: skip
+            for kind, standing in apart.items()
+            for sign in signs
+        ]
         found[place] = float(np.concatenate(beyond).mean())
     return found
 

@@ -18,9 +18,7 @@ SEEN = 2.0
 _DIFFERENCE = 1e-3
 
 
-def sensitivity(
-    sights: Sequence[Sight], effects: Sequence[Weighable], base: Fit, observed: Experiments
-) -> Floats:  # fmt: skip
+def sensitivity(sights: Sequence[Sight], effects: Sequence[Weighable], base: Fit, observed: Experiments) -> Floats:
     """(effect,) standard errors by which the strong effect moves the summaries, what a change of cloth, view and
     anemometer makes up for left out.
 

@@ -100,9 +100,13 @@ def side_by_side(outcome: Outcome, place: int, *, after: str) -> SideBySide | No
 
 
 def _flown(
-    outcome: Outcome, place: int, number: int, values: dict[str, Floats], effect: Weighable | None,
+    outcome: Outcome,
+    place: int,
+    number: int,
+    values: dict[str, Floats],
+    effect: Weighable | None,
     strength: Floats | None,
-) -> tuple[ClothWindow, Floats]:  # fmt: skip
+) -> tuple[ClothWindow, Floats]:
     """One flag in the wind of a window, as its place sees it, and how far away (frame, vertex) its cloth is [m].
 
     Args:
@@ -117,19 +121,27 @@ def _flown(
     view = View(azimuth=float(values["azimuth"][0]), elevation=float(values["elevation"][0]), distance=design.distance)
     start = number * WINDOW
     batch = Batch(
-        flag=design.flag, log=replace(design.log.cut(start, start + WINDOW), clock=0.0), duration=WINDOW,
+        flag=design.flag,
+        log=replace(design.log.cut(start, start + WINDOW), clock=0.0),
+        duration=WINDOW,
         values={name: own for name, own in values.items() if name not in ("azimuth", "elevation")},
         places=np.array([[[view.azimuth, view.elevation, view.distance]]]),
         seeds=(child_seed(design.seed, "films", "side by side", number),),
         effects=() if effect is None or strength is None else ((effect.column, strength),),
-    )  # fmt: skip
+    )
     mesh = design.flag.mesh(batch.columns)
     positions = batch.positions(mesh)[..., 0] * float(values["scale"][0])
     hoist, free = edges_of(mesh.rest)
     window = seen_from(
-        view, positions, times=np.arange(len(positions)) / RATE, faces=mesh.faces, hoist=hoist, free=free,
-        length=design.flag.length, height=design.flag.height,
-    )  # fmt: skip
+        view,
+        positions,
+        times=np.arange(len(positions)) / RATE,
+        faces=mesh.faces,
+        hoist=hoist,
+        free=free,
+        length=design.flag.length,
+        height=design.flag.height,
+    )
     return window, positions @ view.axes(0.0)[2]
 
 

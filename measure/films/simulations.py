@@ -93,16 +93,23 @@ def gathered(
         beside.append(tuple(zip(own, np.split(found, ends), strict=True)))
     read_nulls = [all_of(f"nulls, {one.name}", own) for one, own in zip(recordings, null, strict=True)]
     return Simulations(
-        designs=tuple(designs), base=tuple(base), pairs=tuple(beside), nulls=tuple(read_nulls),
+        designs=tuple(designs),
+        base=tuple(base),
+        pairs=tuple(beside),
+        nulls=tuple(read_nulls),
         kinds=np.repeat(np.arange(kinds), TOGETHER),
         weights=np.concatenate([batch.values["area_weight"] for batch in null[0]]),
-    )  # fmt: skip
+    )
 
 
 def sight(
-    observed: Observed, design: Design, base: Floats, own: Sequence[tuple[Pairs, Floats]], *,
+    observed: Observed,
+    design: Design,
+    base: Floats,
+    own: Sequence[tuple[Pairs, Floats]],
+    *,
     windows: slice | None = None,
-) -> Sight:  # fmt: skip
+) -> Sight:
     """A recording's model, fitted to simulations.
 
     Args:
@@ -141,9 +148,15 @@ def sight(
 def part_of(observed: Observed, windows: slice) -> Observed:
     """Some windows of a recording, of which means alone are taken."""
     return _Part(
-        name=observed.name, source=observed.source, readings=observed.readings[windows], log=observed.log,
-        first=observed.first, place=observed.place, sigma=observed.sigma, speeds=observed.speed[windows],
-    )  # fmt: skip
+        name=observed.name,
+        source=observed.source,
+        readings=observed.readings[windows],
+        log=observed.log,
+        first=observed.first,
+        place=observed.place,
+        sigma=observed.sigma,
+        speeds=observed.speed[windows],
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -215,9 +228,14 @@ def of_base(
 
 
 def _weighed(
-    made: Experiments, weights: Floats, which: NDArray[np.bool_], weighed: tuple[float, float] | None, *, seed: int,
+    made: Experiments,
+    weights: Floats,
+    which: NDArray[np.bool_],
+    weighed: tuple[float, float] | None,
+    *,
+    seed: int,
     what: str,
-) -> Experiments:  # fmt: skip
+) -> Experiments:
     """Experiments with their area weights as a scale reads them that is as good as the one of the recordings' cloth.
 
     Args:

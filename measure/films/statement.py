@@ -19,9 +19,13 @@ _MOST = 4
 
 
 def stated(
-    verdict: Verdict, recordings: Sequence[Observed], *, weighed: bool, unseen: tuple[str, ...],
+    verdict: Verdict,
+    recordings: Sequence[Observed],
+    *,
+    weighed: bool,
+    unseen: tuple[str, ...],
     departing: tuple[Departure, ...],
-) -> Verdict:  # fmt: skip
+) -> Verdict:
     """The verdict with all that it says in sentences.
 
     Args:
@@ -30,10 +34,12 @@ def stated(
         departing: what departs from the base model.
     """
     return replace(
-        verdict, words=lead(verdict), assumptions=assumptions(recordings, weighed=weighed, unseen=unseen),
+        verdict,
+        words=lead(verdict),
+        assumptions=assumptions(recordings, weighed=weighed, unseen=unseen),
         proposal=missing(departing) if verdict.conclusion not in NOT_REJECTED else "",
         separating=separating(verdict, weighed=weighed),
-    )  # fmt: skip
+    )
 
 
 def separating(verdict: Verdict, *, weighed: bool) -> str:

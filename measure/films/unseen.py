@@ -108,7 +108,7 @@ def halved(recordings: Sequence[Observed], simulations: Simulations) -> tuple[tu
     sides: list[list[tuple[Sight, Observed]]] = [[], []]
     for one, design, base, own in zip(
         recordings, simulations.designs, simulations.base, simulations.pairs, strict=True
-    ):  # fmt: skip
+    ):
         middle = len(one.readings) // 2
         for side, windows in zip(sides, (slice(0, middle), slice(middle, None)), strict=True):
             side.append((sight(one, design, base, own, windows=windows), part_of(one, windows)))
@@ -139,9 +139,11 @@ def _predicted(
         own, places, strength = hypothesis(sights, which).values(found.scores[0])
         made = []
         for place, one, _ in task.predicted:
-            values = places[place] if place is not None else {
-                q.name: q.at(rng.random(len(found.weights[0]))) for q in one.quantities
-            }  # fmt: skip
+            values = (
+                places[place]
+                if place is not None
+                else {q.name: q.at(rng.random(len(found.weights[0]))) for q in one.quantities}
+            )
             mean, _ = one.model.predict({**own, **values}, None if which is None else which.name, strength)
             full = np.full(len(one.model.used), np.nan)
             full[one.model.used] = found.weights[0] @ mean
@@ -161,17 +163,20 @@ def _predicted(
         scatter[one.model.used] = one.model.base.deviations
         result.append(
             Prediction(
-                observed=own.summary[: len(OBSERVED)], before=before[number],
-                after=None if after is None else after[number], control=None if wrong is None else wrong[number],
-                scatter=scatter[: len(OBSERVED)], windows=len(own.readings),
+                observed=own.summary[: len(OBSERVED)],
+                before=before[number],
+                after=None if after is None else after[number],
+                control=None if wrong is None else wrong[number],
+                scatter=scatter[: len(OBSERVED)],
+                windows=len(own.readings),
             )
-        )  # fmt: skip
+        )
     return result
 
 
 def _comparison(
     words: str, name: str, place: int, own: Sequence[Prediction], control: Weighable | None, *, seed: int
-) -> Comparison:  # fmt: skip
+) -> Comparison:
     """Root mean squares over the predicted parts, with intervals by the scatter of replicates."""
     unit = OBSERVABLES[name].unit
     observed, scatter = (np.array([getattr(one, key)[place] for one in own]) for key in ("observed", "scatter"))
@@ -189,13 +194,16 @@ def _comparison(
     reduction = None if after is None else (before[0] - after[0], before[1] - after[1])
     stated = _estimate(before, unit)
     return Comparison(
-        what=words, frames=sum(one.windows for one in own), before=stated,
-        after=_estimate(after, unit), reduction=_estimate(reduction, unit),
+        what=words,
+        frames=sum(one.windows for one in own),
+        before=stated,
+        after=_estimate(after, unit),
+        reduction=_estimate(reduction, unit),
         floor=Estimate(value=floor, low=floor, high=floor, unit=unit, level=CRITERIA.interval),
         share=None if reduction is None or stated.low <= floor else reduction[0] / (before[0] - floor),
         control=None if wrong is None else _estimate(wrong, unit),
         control_name="" if wrong is None or control is None else control.column.effect,
-    )  # fmt: skip
+    )
 
 
 def _estimate(found: tuple[float, Floats] | None, unit: str) -> Estimate:

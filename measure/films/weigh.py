@@ -73,9 +73,10 @@ def weigh(
     base = fitted(sights, observed, None, seed=seed)
     fits = [fitted(sights, observed, effect, seed=seed) for effect in effects]
     return Weighing(
-        effects=tuple(effects), factors=_side_by_side([one.evidence - base.evidence for one in fits], len(observed)),
+        effects=tuple(effects),
+        factors=_side_by_side([one.evidence - base.evidence for one in fits], len(observed)),
         misfits=Misfits(base=base.misfit, left=_side_by_side([one.misfit for one in fits], len(observed))),
-    )  # fmt: skip
+    )
 
 
 def misfits(sights: Sequence[Sight], observed: Experiments, effects: Sequence[Weighable]) -> Misfits:
@@ -114,16 +115,17 @@ def directions(sights: Sequence[Sight], effects: Sequence[Weighable], suspected:
     names = [one.name for one in effects]
     if suspected is not None and suspected.name not in names:
         raise InputError(
-            f"too few flags with {suspected.name} show what the recordings show", where="--suspect",
+            f"too few flags with {suspected.name} show what the recordings show",
+            where="--suspect",
             fix="suspect another effect, or leave it out",
-        )  # fmt: skip
+        )
     changes = [np.concatenate([own.model.responses[name].change for own in sights]) for name in names]
     size = sum(int(own.model.used.sum()) for own in sights)
     return Directions(
         changes=np.array(changes).reshape(len(names), size),
         signs=np.array([int(one.low > 0) for one in effects], dtype=np.int64),
         suspected=None if suspected is None else (names.index(suspected.name), suspected.sign),
-    )  # fmt: skip
+    )
 
 
 def expected(sights: Sequence[Sight], effect: Weighable) -> float:

@@ -70,9 +70,12 @@ def _items(verdict: Verdict) -> Iterator[tuple[str, str]]:
 
 def _wrapped(label: str, text: str) -> list[str]:
     return textwrap.wrap(
-        f"  {label}: {text}" if label else text, _WIDTH, subsequent_indent="    " if label else "",
-        break_long_words=False, break_on_hyphens=False,
-    )  # fmt: skip
+        f"  {label}: {text}" if label else text,
+        _WIDTH,
+        subsequent_indent="    " if label else "",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def level_of(verdict: Verdict) -> str:

@@ -29,12 +29,13 @@ def aligned(experiment: Experiment) -> Experiment:
     turns = [_turn(recording, lowest, base) for recording in experiment.recordings]
     recordings = tuple(
         replace(
-            recording, positions=(recording.positions - base) @ turn.T,
+            recording,
+            positions=(recording.positions - base) @ turn.T,
             attachments=None if recording.attachments is None else (recording.attachments - base) @ turn.T,
             wind=replace(recording.wind, velocity=recording.wind.velocity @ turn.T),
         )
         for recording, turn in zip(experiment.recordings, turns, strict=True)
-    )  # fmt: skip
+    )
     moved: Specimen = replace(specimen, anchors=(specimen.anchors - base) @ turns[0].T)
     return Experiment(specimen=moved, recordings=recordings)
 

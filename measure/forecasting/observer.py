@@ -123,11 +123,15 @@ class Forecaster:
         materials = {c: c.material(specimen.material) for c in set(calibrations)}
         scenes = [
             Scene(
-                mesh=specimen.mesh, material=materials[c], handles=handles, gravity=specimen.gravity, air=specimen.air,
+                mesh=specimen.mesh,
+                material=materials[c],
+                handles=handles,
+                gravity=specimen.gravity,
+                air=specimen.air,
                 position=_held(start, specimen.held, specimen.anchors if own.anchors is None else own.anchors),
             )
             for own, c in zip(segments.items, calibrations, strict=True)
-        ]  # fmt: skip
+        ]
         system, state = assemble(scenes, dtype=self.dtype, device=self.device)
         wind = SegmentWind.of(segments, dtype=self.dtype, device=self.device)
         return replace(system, wind=wind, motion=self._motion(segments)), state

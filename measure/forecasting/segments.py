@@ -125,13 +125,15 @@ class Segments:
             if recording.rate != first.rate or not np.array_equal(recording.markers, first.markers):
                 raise InputError(
                     "its markers or its rate differ from the first recording's",
-                    where=f"recording {recording.name!r}", fix="close the loop on such recordings one by one",
-                )  # fmt: skip
+                    where=f"recording {recording.name!r}",
+                    fix="close the loop on such recordings one by one",
+                )
             if np.isnan(recording.positions).any():
                 raise InputError(
-                    "a marker was lost in some frames", where=f"recording {recording.name!r}",
+                    "a marker was lost in some frames",
+                    where=f"recording {recording.name!r}",
                     fix="fill its gaps (measure.observe.fill)",
-                )  # fmt: skip
+                )
             frames = recording.positions[:: cut.stride]
             seen = None if recording.seen is None else recording.seen[:: cut.stride]
             held = None if recording.attachments is None else recording.attachments[:: cut.stride]
@@ -139,19 +141,23 @@ class Segments:
                 needed = 2 * _SHORTEST + (cut.warm + 2) * period
                 raise InputError(
                     f"{len(frames) * period:.2f} s is too short: at least {needed:.2f} s are needed",
-                    where=f"recording {recording.name!r}", fix="record for 10 s or more",
-                )  # fmt: skip
+                    where=f"recording {recording.name!r}",
+                    fix="record for 10 s or more",
+                )
             for place in range(cut.segments(len(recording.positions))):
                 begin = place * cut.length
                 items.append(
                     Segment(
-                        recording=index, start=begin * period, wind=recording.wind, noise=recording.noise,
+                        recording=index,
+                        start=begin * period,
+                        wind=recording.wind,
+                        noise=recording.noise,
                         positions=frames[begin : begin + span],
                         seen=None if seen is None else seen[begin : begin + span],
                         attachments=None if held is None else held[begin : begin + span],
                         anchors=None if held is None else held[begin],
                     )
-                )  # fmt: skip
+                )
         return cls(items=tuple(items), markers=first.markers, cut=cut)
 
     def tied(self, anchors: Sequence[Floats]) -> Segments:

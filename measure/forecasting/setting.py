@@ -78,9 +78,11 @@ class Setting:
     def design(self) -> Design:
         """Its markers are as noisy as in the noisiest recording."""
         return Design(
-            noise=float(self.segments.noise.max()), period=self.segments.period,
-            cloth=self.experiment.specimen.material.fingerprint, damping=self.calibration.damping,
-        )  # fmt: skip
+            noise=float(self.segments.noise.max()),
+            period=self.segments.period,
+            cloth=self.experiment.specimen.material.fingerprint,
+            damping=self.calibration.damping,
+        )
 
     def moved(self, lags: Sequence[float]) -> Setting:
         """With each recording's log moved by what it lags [s]."""
@@ -90,9 +92,10 @@ class Setting:
         )
         items = tuple(replace(item, wind=recordings[item.recording].wind) for item in self.segments.items)
         return replace(
-            self, experiment=replace(self.experiment, recordings=recordings),
+            self,
+            experiment=replace(self.experiment, recordings=recordings),
             segments=replace(self.segments, items=items),
-        )  # fmt: skip
+        )
 
     @property
     def prior(self) -> Floats:

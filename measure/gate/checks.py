@@ -75,41 +75,62 @@ CHECKS: dict[str, Check] = {
         measure=motion.height, what="height of what moves [sides]", high="scale", low="scale", resolution=0.03
     ),
     "second-region": Check(
-        measure=motion.second_region, what="motion of a second region over the first's", high="several-flags",
+        measure=motion.second_region,
+        what="motion of a second region over the first's",
+        high="several-flags",
         resolution=0.05,
     ),
     "scatter": Check(
-        measure=motion.scatter, what="share of the motion apart from its largest region", high="unlike-cloth",
+        measure=motion.scatter,
+        what="share of the motion apart from its largest region",
+        high="unlike-cloth",
         resolution=0.03,
     ),
     "edges-moving": Check(
         measure=motion.edges_moving, what="share of edges that move", high="moving-camera", resolution=0.03
     ),
     "shift": Check(
-        measure=camera.shift, what="shift of the picture's rim [1/112 of its side]", high="moving-camera",
-        resolution=0.1, logarithm=True,
+        measure=camera.shift,
+        what="shift of the picture's rim [1/112 of its side]",
+        high="moving-camera",
+        resolution=0.1,
+        logarithm=True,
     ),
     "sway": Check(
-        measure=camera.sway, what="sway of the picture's rim [1/112 of its side a frame]", high="moving-camera",
-        resolution=0.1, logarithm=True,
+        measure=camera.sway,
+        what="sway of the picture's rim [1/112 of its side a frame]",
+        high="moving-camera",
+        resolution=0.1,
+        logarithm=True,
     ),
     "held": Check(
-        measure=timing.held, what="smallest changes of frames over the largest", low="low-frame-rate", resolution=0.05,
+        measure=timing.held,
+        what="smallest changes of frames over the largest",
+        low="low-frame-rate",
+        resolution=0.05,
         logarithm=True,
     ),
     "uneven": Check(
-        measure=timing.uneven, what="unevenness of the changes from frame to frame", high="low-frame-rate",
+        measure=timing.uneven,
+        what="unevenness of the changes from frame to frame",
+        high="low-frame-rate",
         resolution=0.03,
     ),
     "stopped": Check(
-        measure=timing.stopped, what="change in the last third of the clip over all of it", low="repeated-frames",
-        resolution=0.05, logarithm=True,
+        measure=timing.stopped,
+        what="change in the last third of the clip over all of it",
+        low="repeated-frames",
+        resolution=0.05,
+        logarithm=True,
     ),
     "loop": Check(
-        measure=timing.loop, what="difference of the most alike frames over the median", low="repeated-frames",
-        resolution=0.05, logarithm=True,
+        measure=timing.loop,
+        what="difference of the most alike frames over the median",
+        low="repeated-frames",
+        resolution=0.05,
+        logarithm=True,
     ),
-}  # fmt: skip
+}
 
 
 def measured(frames: NDArray[np.uint8]) -> NDArray[np.float64]:

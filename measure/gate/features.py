@@ -69,15 +69,17 @@ def features_of(model: Estimator, frames: NDArray[np.uint8], summary: NDArray[np
     return Features(
         checks=measured(frames),
         handmade=handmade(torch.from_numpy(square.copy())[None, None], rate=model.front_end.rate)[0].double().numpy(),
-        summary=own, distance=float(cloud.distance(own[None])[0]),
+        summary=own,
+        distance=float(cloud.distance(own[None])[0]),
         moved=np.linalg.norm(moved, axis=1),
-    )  # fmt: skip
+    )
 
 
 def _cloud(model: Estimator) -> Familiarity:
     if model.cloud is None:
         raise InputError(
-            "the model keeps no summaries of its training clips", where=f"model {model.name!r}",
+            "the model keeps no summaries of its training clips",
+            where=f"model {model.name!r}",
             fix="ship it by python -m models.shipping, which keeps them",
-        )  # fmt: skip
+        )
     return model.cloud

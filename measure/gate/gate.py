@@ -131,10 +131,15 @@ class Gate:
         whitening = vectors.T / np.sqrt(np.maximum(values, 1e-9))[:, None]
         blank = ExponentialTails(start=np.zeros(len(SCORES)), excess=np.ones(len(SCORES)))
         gate = cls(
-            centre=centre, scale=scale, whitening=whitening, directions=np.array(directions),
-            offsets=np.array(offsets), tails=blank, calibration=np.zeros(0),
+            centre=centre,
+            scale=scale,
+            whitening=whitening,
+            directions=np.array(directions),
+            offsets=np.array(offsets),
+            tails=blank,
+            calibration=np.zeros(0),
             statistics=calibration[:, : len(CHECKS)],
-        )  # fmt: skip
+        )
         return gate._calibrated(rest, calibration)
 
     def _calibrated(self, rest: Vector, calibration: Vector) -> Gate:

@@ -93,9 +93,13 @@ class Judgement:
     def as_dict(self) -> dict[str, object]:
         """As JSON."""
         return {
-            "familiar": self.familiar, "p": self.p, "level": self.level, "false_alarm": self.false_alarm,
-            "confidence": self.confidence, "reasons": [vars(one) for one in self.reasons],
-        }  # fmt: skip
+            "familiar": self.familiar,
+            "p": self.p,
+            "level": self.level,
+            "false_alarm": self.false_alarm,
+            "confidence": self.confidence,
+            "reasons": [vars(one) for one in self.reasons],
+        }
 
 
 def judge(
@@ -135,8 +139,13 @@ def judge(
 
     def refused(cause: Cause) -> Judgement:
         return Judgement(
-            familiar=False, p=least, level=at, false_alarm=false_alarm, confidence=confidence, reasons=(cause,),
-        )  # fmt: skip
+            familiar=False,
+            p=least,
+            level=at,
+            false_alarm=false_alarm,
+            confidence=confidence,
+            reasons=(cause,),
+        )
 
     if len(frames) < wanted:
         reason = REASONS["too-few-frames"]
@@ -154,8 +163,13 @@ def judge(
     still = found.checks[_AREA] <= np.log10(LEAST_AREA)
     reasons = () if p > at else _reasons(gate, scores, surprises, at, still=bool(still))
     return Judgement(
-        familiar=p > at, p=p, level=at, false_alarm=false_alarm, confidence=confidence, reasons=reasons,
-    )  # fmt: skip
+        familiar=p > at,
+        p=p,
+        level=at,
+        false_alarm=false_alarm,
+        confidence=confidence,
+        reasons=reasons,
+    )
 
 
 def _reasons(gate: Gate, scores: Vector, surprises: Vector, at: float, *, still: bool) -> tuple[Cause, ...]:
@@ -202,6 +216,11 @@ def _cause(gate: Gate, place: int, value: float, p: float) -> Cause:
         usual = f"normal from {low:.3g} to {high:.3g}, as 98 % of the simulated clips"
     figure = f"{score.what}: {shown:.3g}; {usual}"
     return Cause(
-        kind=score.reason, sentence=f"{reason.sentence} ({figure})", figure=figure, fix=reason.fix, check=score.name,
-        value=shown, p=p,
-    )  # fmt: skip
+        kind=score.reason,
+        sentence=f"{reason.sentence} ({figure})",
+        figure=figure,
+        fix=reason.fix,
+        check=score.name,
+        value=shown,
+        p=p,
+    )

@@ -109,9 +109,10 @@ class FilmsOf(Sequence[Film]):
         rows = self._lake.rows(films, columns=["name", "seed", "object"], at=at).to_pylist()
         if not rows:
             raise InputError(
-                f"no films of the {side} side of {', '.join(data.datasets)}", where=str(lake_path),
+                f"no films of the {side} side of {', '.join(data.datasets)}",
+                where=str(lake_path),
                 fix=f"build them: flagdata build {data.datasets[0]}",
-            )  # fmt: skip
+            )
         firsts: dict[int, tuple[str, str]] = {}
         for row in sorted(rows, key=lambda row: row["name"]):
             firsts.setdefault(row["seed"], (row["name"], row["object"]))
@@ -145,10 +146,16 @@ def rate_of(model: Estimator) -> float | None:
 
 @click.command()
 @click.argument("model", type=LocalPath(), default=SHIPPED / DEFAULT)
-@click.option("--lake", "lake_path", type=LocalPath(exists=True), required=True,
-              help="Where the films are that the network was trained on and validated by.")  # fmt: skip
-@click.option("--dataset", "datasets", multiple=True,
-              help="Name of the films' data set; by default all that it was trained on.")  # fmt: skip
+@click.option(
+    "--lake",
+    "lake_path",
+    type=LocalPath(exists=True),
+    required=True,
+    help="Where the films are that the network was trained on and validated by.",
+)
+@click.option(
+    "--dataset", "datasets", multiple=True, help="Name of the films' data set; by default all that it was trained on."
+)
 @click.option("--at", metavar="REF", help="Version of the lake; by default its head.")
 @click.option("--seed", type=int, default=1, show_default=True, help="Random seed of the distortions.")
 def main(model: Path, lake_path: Path, datasets: tuple[str, ...], at: str | None, seed: int) -> None:

@@ -71,9 +71,10 @@ def window_rate(windows: int, false_alarm: float) -> float:
     """
     if windows < 1 or not 0 < false_alarm < 1:
         raise InputError(
-            f"a false-alarm rate of {false_alarm:g} of {windows} windows", where="--false-alarm",
+            f"a false-alarm rate of {false_alarm:g} of {windows} windows",
+            where="--false-alarm",
             fix="give a share between 0 and 1, as in 0.05",
-        )  # fmt: skip
+        )
     if windows <= _MOST:
         return false_alarm
     low, high = 0.0, false_alarm / _FADING

@@ -95,12 +95,17 @@ class Evidence(Rows):
         precision = np.linalg.inv(null.covariance)
         weighted = np.einsum("sia,ij->saj", response, precision)
         return cls(
-            recording=statistics.recording, curvature=weighted @ response,
+            recording=statistics.recording,
+            curvature=weighted @ response,
             score=np.einsum("saj,sj->sa", weighted, left),
-            energy=np.einsum("si,ij,sj->s", left, precision, left), columns=statistics.response.shape[2],
-            logged=response.shape[2] - plain, lines=statistics.lines, course=statistics.course,
-            settled=statistics.settled, prior=null.prior,
-        )  # fmt: skip
+            energy=np.einsum("si,ij,sj->s", left, precision, left),
+            columns=statistics.response.shape[2],
+            logged=response.shape[2] - plain,
+            lines=statistics.lines,
+            course=statistics.course,
+            settled=statistics.settled,
+            prior=null.prior,
+        )
 
     @property
     def nuisance(self) -> list[int]:
@@ -157,9 +162,15 @@ class Evidence(Rows):
         curvature[:, column, :] = curvature[:, :, column] = score[:, column] = 0.0
         curvature[:, column, column] = 1.0
         return Evidence(
-            recording=self.recording, curvature=curvature, score=score, energy=self.energy - slope**2 / own,
-            columns=self.columns, logged=self.logged, lines=self.lines, prior=self.prior,
-        )  # fmt: skip
+            recording=self.recording,
+            curvature=curvature,
+            score=score,
+            energy=self.energy - slope**2 / own,
+            columns=self.columns,
+            logged=self.logged,
+            lines=self.lines,
+            prior=self.prior,
+        )
 
     def with_directions(self) -> Evidence:
         """With the directions of the logs taken as they are logged: nothing is fitted to them."""

@@ -73,10 +73,11 @@ class NullModel:
             means = means - np.stack([by_cloth[cloth] for cloth in nulls.cloth[first]])
         turning, size = nulls.statistics.turning, (design.damping / Calibration().damping) ** grown
         return cls(
-            coefficients=size * coefficients[:_POWERS], covariance=size**2 * covariance,
+            coefficients=size * coefficients[:_POWERS],
+            covariance=size**2 * covariance,
             shifts=size * _principal(means, covariance),
             turning=None if turning is None else cls.fit(replace(nulls, statistics=turning), design),
-        )  # fmt: skip
+        )
 
     def under(self, prior: Floats) -> NullModel:
         """With another prior of the calibrated parameters."""
@@ -119,10 +120,12 @@ class Nulls(Rows):
     def joined(cls, parts: Sequence[Self]) -> Self:  # pyright: ignore[reportIncompatibleMethodOverride]
         """One after another, of as many markers as all have; recordings and numerics are those of the parts."""
         least = min(part.statistics.marker_error.shape[1] for part in parts)
-        return super().joined([
-            replace(p, statistics=replace(p.statistics, marker_error=p.statistics.marker_error[:, :least]))
-            for p in parts
-        ])  # fmt: skip
+        return super().joined(
+            [
+                replace(p, statistics=replace(p.statistics, marker_error=p.statistics.marker_error[:, :least]))
+                for p in parts
+            ]
+        )
 
     def beyond(self, design: Design) -> Floats:
         """(segment, k) by how much squared noise [mm²] and period [10 ms] differ from a design's, where they vary."""

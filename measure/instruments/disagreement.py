@@ -68,9 +68,10 @@ class Rows:
     def __post_init__(self) -> None:
         if self.times.shape != self.values.shape or self.times.ndim != 1 or len(self.times) < _FEWEST:
             raise InputError(
-                f"{self.times.shape} times and {self.values.shape} values", where="rows",
+                f"{self.times.shape} times and {self.values.shape} values",
+                where="rows",
                 fix=f"give (n,) each, {_FEWEST} or more",
-            )  # fmt: skip
+            )
         if not (np.diff(self.times) > 0).all() or not np.isfinite(self.values).all() or not self.span > 0:
             raise InputError(
                 "times that do not ascend, or values that are not finite", where="rows", fix="leave such rows out"
@@ -151,9 +152,15 @@ class Disagreement:
 
 
 def fit(
-    rows: Rows, log: Readings, effects: Sequence[str], *, use: Mask | None = None,
-    known: Mapping[str, Stated] | None = None, near: Disagreement | None = None, seed: int = 0,
-) -> Disagreement:  # fmt: skip
+    rows: Rows,
+    log: Readings,
+    effects: Sequence[str],
+    *,
+    use: Mask | None = None,
+    known: Mapping[str, Stated] | None = None,
+    near: Disagreement | None = None,
+    seed: int = 0,
+) -> Disagreement:
     """The law and the effects' strengths that agree best.
 
     Args:
@@ -225,9 +232,15 @@ def _descended(
 
 
 def jackknife(
-    rows: Rows, log: Readings, effects: Sequence[str], found: Disagreement, *, blocks: NDArray[np.int64],
-    use: Mask | None = None, known: Mapping[str, Stated] | None = None,
-) -> tuple[Mapping[str, float], Floats]:  # fmt: skip
+    rows: Rows,
+    log: Readings,
+    effects: Sequence[str],
+    found: Disagreement,
+    *,
+    blocks: NDArray[np.int64],
+    use: Mask | None = None,
+    known: Mapping[str, Stated] | None = None,
+) -> tuple[Mapping[str, float], Floats]:
     """Standard errors of scale, exponent and the strengths, and errors (n,) of each row by the fit without its block
     [m/s]; NaN outside `use`.
 
@@ -261,8 +274,12 @@ def without(found: Disagreement, name: str) -> Disagreement:
 def _vector(found: Disagreement, effects: Sequence[str]) -> list[float]:
     strengths = [found.chain.strengths.get(name, about(name).null) for name in effects]
     return [
-        math.log(found.law.scale), found.law.exponent, math.log(found.floor), math.log(found.share), *strengths,
-    ]  # fmt: skip
+        math.log(found.law.scale),
+        found.law.exponent,
+        math.log(found.floor),
+        math.log(found.share),
+        *strengths,
+    ]
 
 
 def _range(name: str, known: Stated | None) -> tuple[float, float]:

@@ -174,14 +174,22 @@ def _round(
         origin = origin.halved()
     else:
         raise DivergedError(
-            "its cloth does not stay one", where=", ".join(column.name for column, _ in origin.effects) or "base model",
+            "its cloth does not stay one",
+            where=", ".join(column.name for column, _ in origin.effects) or "base model",
             fix="look at the recordings' residuals: no model of the library is near them",
-        )  # fmt: skip
+        )
     step, errors = _step(found, null, speeds, origin, anchor)
     return Refined(
-        model=origin.moved(cut(step)), chosen=chosen, errors=tuple(float(e) for e in errors), statistics=found,
-        origin=origin, anchor=anchor, null=null, speeds=speeds, stays=bool(np.abs(step / errors).max() < STAYS),
-    )  # fmt: skip
+        model=origin.moved(cut(step)),
+        chosen=chosen,
+        errors=tuple(float(e) for e in errors),
+        statistics=found,
+        origin=origin,
+        anchor=anchor,
+        null=null,
+        speeds=speeds,
+        stays=bool(np.abs(step / errors).max() < STAYS),
+    )
 
 
 def cut(step: Floats) -> tuple[float, ...]:
@@ -192,9 +200,11 @@ def cut(step: Floats) -> tuple[float, ...]:
 
 def _part(null: NullModel, places: list[int]) -> NullModel:
     return NullModel(
-        coefficients=null.coefficients[:, places], covariance=null.covariance[np.ix_(places, places)],
-        shifts=null.shifts[:_FEW, places], prior=null.prior,
-    )  # fmt: skip
+        coefficients=null.coefficients[:, places],
+        covariance=null.covariance[np.ix_(places, places)],
+        shifts=null.shifts[:_FEW, places],
+        prior=null.prior,
+    )
 
 
 def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Statistics:

@@ -56,9 +56,12 @@ def _estimate(name: str, calibration: Calibration, half: float, weighed: float) 
     }[name]
     whole = min(math.hypot(half, CRITERIA.reach * between), max(half, CRITERIA.reach * known))
     return Estimate(
-        value=value, low=value * math.exp(-whole), high=value * math.exp(whole), unit="of nominal",
+        value=value,
+        low=value * math.exp(-whole),
+        high=value * math.exp(whole),
+        unit="of nominal",
         level=CRITERIA.interval,
-    )  # fmt: skip
+    )
 
 
 def _damping(value: float, half: float) -> Estimate:

@@ -89,9 +89,12 @@ class Profile:
             farthest = float(self.sizes[-1])
         # In the logarithm, in which strengths are spaced.
         found = of_profile(
-            np.log(self.sizes), self.misfit, level=CRITERIA.interval, larger=larger,
+            np.log(self.sizes),
+            self.misfit,
+            level=CRITERIA.interval,
+            larger=larger,
             limits=(-math.inf, math.log(farthest)),
-        )  # fmt: skip
+        )
         return replace(found, low=math.exp(found.low), high=float(np.exp(found.high)))
 
 
@@ -105,9 +108,7 @@ def profiled(
     """
     column, coefficient = model.effects[place]
     sizes, sign = across(column, coefficient)
-    effects = [
-        (*model.effects[:place], (column, sign * float(size)), *model.effects[place + 1 :]) for size in sizes
-    ]  # fmt: skip
+    effects = [(*model.effects[:place], (column, sign * float(size)), *model.effects[place + 1 :]) for size in sizes]
     centre = Calibration().steps_from(model.calibration)
     left = []
     for errors in errors_of([replace(model, effects=own) for own in effects], forecaster, segments):

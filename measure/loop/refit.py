@@ -133,10 +133,12 @@ def refit(fits: Fits, reference: Reference, candidates: Sequence[int], *, worker
         if not np.isfinite(gains).all():
             return None
         return Refit(
-            coefficient=fitted.model.effects[0][1], gains=gains,
-            leftover=reference.p_left_by(evidence, names(), [column]), evidence=evidence,
+            coefficient=fitted.model.effects[0][1],
+            gains=gains,
+            leftover=reference.p_left_by(evidence, names(), [column]),
+            evidence=evidence,
             profile=profiled(fits.forecaster, fits.segments, fits.whitened, fitted.model),
-        )  # fmt: skip
+        )
 
     with ThreadPoolExecutor(max_workers=workers) as pool:
         list(pool.map(fits.of, [(), *((column,) for column in candidates)]))

@@ -40,19 +40,24 @@ def residuals(
         predicted = _joined(before.predicted, places)[shown]
         made.append(
             Residual(
-                recording=own.name, speed=own.wind.speed, held_out=held_out, times=_list(times),
+                recording=own.name,
+                speed=own.wind.speed,
+                held_out=held_out,
+                times=_list(times),
                 in_time=_list(_over(first, counted, 1)),
                 in_time_after=[] if second is None else _list(_over(second, counted, 1)),
-                markers=segments.markers.tolist(), in_space=_list(_over(first, counted, 0)),
+                markers=segments.markers.tolist(),
+                in_space=_list(_over(first, counted, 0)),
                 in_space_after=[] if second is None else _list(_over(second, counted, 0)),
                 mean=(first.sum(axis=0) / np.maximum(counted.sum(axis=0), 1)[:, None]).tolist(),
-                frequencies=_list(frequencies), spectrum=_list(spectrum),
+                frequencies=_list(frequencies),
+                spectrum=_list(spectrum),
                 spectrum_after=[] if second is None else _list(_spectrum(second, segments.period)[1]),
                 observed=np.where(counted[shown, :, None], predicted + first[shown], np.nan).tolist(),
                 before=predicted.tolist(),
                 after=[] if after is None else _joined(after.predicted, places)[shown].tolist(),
             )
-        )  # fmt: skip
+        )
     return tuple(made)
 
 

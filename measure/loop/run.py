@@ -82,9 +82,10 @@ class Options(plan.NullOptions):
         needed = banks.WINDS * kinds_needed(self.level)
         if self.bank is None and self.nulls < needed:
             raise UsageError(
-                f"{self.nulls} nulls cannot test at a level of {self.level:g}", where="close-loop",
+                f"{self.nulls} nulls cannot test at a level of {self.level:g}",
+                where="close-loop",
                 fix=f"give {needed} nulls or more, or a higher level",
-            )  # fmt: skip
+            )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -237,9 +238,12 @@ def _looked_at(setting: Setting) -> tuple[Statistics, Projection]:
 def _fits(setting: Setting, found: Statistics, projection: Projection, bank: NullBank) -> Fits:
     """Models of the experiment, which begin at the one that statistics were taken at."""
     whitened = WhitenedMisfit(
-        found=found, projection=projection, null=bank.model(setting.design).under(setting.prior),
-        speeds=setting.speeds[setting.recording], origin=setting.calibration,
-    )  # fmt: skip
+        found=found,
+        projection=projection,
+        null=bank.model(setting.design).under(setting.prior),
+        speeds=setting.speeds[setting.recording],
+        origin=setting.calibration,
+    )
     return Fits(forecaster=setting.forecaster, segments=setting.segments, whitened=whitened)
 
 
@@ -263,11 +267,16 @@ def _settling(setting: Setting, fits: Fits, seed: int) -> Fits:
     """With what the recordings settle at beside the models, run freely in the same winds."""
     recordings = setting.experiment.recordings
     plain = NullBatch(
-        specimen=setting.experiment.specimen, markers=setting.segments.markers, rate=1 / setting.segments.period,
-        duration=max(float(r.times[-1]) for r in recordings), noise=0.0,
-        calibrations=(setting.calibration,) * len(recordings), speeds=tuple(float(u) for u in setting.speeds),
-        winds=tuple(r.wind for r in recordings), seed=child_seed(seed, "settled"),
-    )  # fmt: skip
+        specimen=setting.experiment.specimen,
+        markers=setting.segments.markers,
+        rate=1 / setting.segments.period,
+        duration=max(float(r.times[-1]) for r in recordings),
+        noise=0.0,
+        calibrations=(setting.calibration,) * len(recordings),
+        speeds=tuple(float(u) for u in setting.speeds),
+        winds=tuple(r.wind for r in recordings),
+        seed=child_seed(seed, "settled"),
+    )
 
     def settling(model: Model) -> Floats:
         batch = replace(plain, calibrations=(model.calibration,) * len(recordings), effects=model.acting)
@@ -297,9 +306,13 @@ def _trial(solved: Solved, options: Options) -> Trial:
 
     with ThreadPoolExecutor(max_workers=options.workers) as pool:
         simulated = pool.submit(
-            numerical_floor, setting, np.arange(len(setting.speeds)), larger.model, copies=_FLOOR_COPIES,
+            numerical_floor,
+            setting,
+            np.arange(len(setting.speeds)),
+            larger.model,
+            copies=_FLOOR_COPIES,
             seed=options.seed,
-        )  # fmt: skip
+        )
         tried = list(pool.map(left, fitted))
         of_recording, floor = simulated.result()
     made: list[Comparison] = []
@@ -311,20 +324,26 @@ def _trial(solved: Solved, options: Options) -> Trial:
         near = np.isin(of_recording, np.unique(setting.recording[fold.outside]))
         made.append(
             compare(
-                fold, recording=setting.recording[fold.outside], frames=int(fold.outside.sum()) * frames,
-                before=before, after=after,
-                control=wrong[0] if wrong else None, floor=floor[near],
+                fold,
+                recording=setting.recording[fold.outside],
+                frames=int(fold.outside.sum()) * frames,
+                before=before,
+                after=after,
+                control=wrong[0] if wrong else None,
+                floor=floor[near],
                 control_name="" if control is None else control[0].candidate.effect,
             )
-        )  # fmt: skip
+        )
         if len(every) == 1 or place < len(setting.speeds):  # the late parts are in the recordings as well
             squared += after.squared.sum() - before.squared.sum()
             places.append(np.full(len(after.misfit), place))
             apart += [own.misfit - after.misfit for own in wrong]
     return Trial(
-        comparisons=tuple(made), apart=np.concatenate(apart) if apart else None, recording=np.concatenate(places),
+        comparisons=tuple(made),
+        apart=np.concatenate(apart) if apart else None,
+        recording=np.concatenate(places),
         rises=bool(squared > 0),
-    )  # fmt: skip
+    )
 
 
 def _outcome(
@@ -334,29 +353,38 @@ def _outcome(
     before = _unseen(setting, solved.base)
     after = None if larger is None else _unseen(setting, larger)
     verdict = Verdict(
-        conclusion=judgement.conclusion, named=_named(judgement), words="", test=_test(solved, bank, options),
+        conclusion=judgement.conclusion,
+        named=_named(judgement),
+        words="",
+        test=_test(solved, bank, options),
         parameters=(
             *parameters(solved.base, larger, solved.reference.reach, weighed=float(setting.prior[0])),
             *_direction(judgement),
         ),
         ranking=_ranking(solved, larger),
-        comparisons=trial.comparisons, apart=trial.control,
+        comparisons=trial.comparisons,
+        apart=trial.control,
         residuals=residuals(setting.experiment, setting.segments, before, after, held_out=len(setting.speeds) > 1),
         provenance={
-            "seed": options.seed, "code": code_version(),
+            "seed": options.seed,
+            "code": code_version(),
             "criteria": replace(CRITERIA, level=options.level).as_dict(),
             "parents": [r.source for r in setting.experiment.recordings if r.source],
         },
-    )  # fmt: skip
+    )
     beyond = judgement.conclusion in (Conclusion.OUTSIDE, Conclusion.PARTLY)
     field = _field(solved) if beyond else ()
     fitted = solved.base if larger is None else larger
     return Outcome(
-        verdict=replace(verdict, seconds=time.perf_counter() - began), experiment=setting.experiment, lags=late,
-        at_bounds=fitted.model.calibration.at_bounds, field=field, whole=larger is None,
+        verdict=replace(verdict, seconds=time.perf_counter() - began),
+        experiment=setting.experiment,
+        lags=late,
+        at_bounds=fitted.model.calibration.at_bounds,
+        field=field,
+        whole=larger is None,
         line=judgement.line if beyond else None,
         course=judgement.course if beyond else None,
-    )  # fmt: skip
+    )
 
 
 def _direction(judgement: Judgement) -> tuple[Parameter, ...]:
@@ -378,11 +406,16 @@ def _test(solved: Solved, bank: NullBank, options: Options) -> NullTest:
     undecided = low <= options.level <= high and conformal.tests(options.level)
     more = conformal.settling(judgement.statistic, at=options.level, level=CRITERIA.interval) if undecided else None
     return NullTest(
-        statistic=judgement.statistic, null=[float(v) for v in conformal.null], kinds=conformal.count,
+        statistic=judgement.statistic,
+        null=[float(v) for v in conformal.null],
+        kinds=conformal.count,
         p_value=Estimate(value=judgement.p_value, low=low, high=high, unit="1", level=CRITERIA.interval),
-        level=options.level, critical=conformal.critical(options.level), nulls=bank.words, open=undecided,
+        level=options.level,
+        critical=conformal.critical(options.level),
+        nulls=bank.words,
+        open=undecided,
         settling=more,
-    )  # fmt: skip
+    )
 
 
 def _field(solved: Solved) -> tuple[Mode, ...]:

@@ -156,11 +156,17 @@ def judge(
             for w in ranking
         ]
         return Judgement(
-            conclusion=conclusion, named=tuple(w.column for w in named), ranking=tuple(reasoned),
-            confident=tuple(w.column for w in confident), statistic=statistic, p_value=p_value,
-            line=_swinging(left, reference, level), course=_blown(left, reference, level), direction=direction,
+            conclusion=conclusion,
+            named=tuple(w.column for w in named),
+            ranking=tuple(reasoned),
+            confident=tuple(w.column for w in confident),
+            statistic=statistic,
+            p_value=p_value,
+            line=_swinging(left, reference, level),
+            course=_blown(left, reference, level),
+            direction=direction,
             departed=tuple(w.column for w in departed),
-        )  # fmt: skip
+        )
 
     if not reference.conformal.tests(level):
         return judgement(Conclusion.UNTESTED, (), "there are too few kinds of numerics to test the base model")
@@ -198,9 +204,12 @@ def _within(weighed: Weighed, direction: Estimate, tolerance: float) -> Weighed:
     low, high, allowed = (number(math.degrees(v), digits=2) for v in (direction.low, direction.high, tolerance))
     unlike = f"the wind is turned by {low}° to {high}° from its log, which {allowed}° of tolerance allow for"
     return replace(
-        weighed, measured=direction, admissible=weighed.admissible and not inside, unlike=unlike if inside else "",
+        weighed,
+        measured=direction,
+        admissible=weighed.admissible and not inside,
+        unlike=unlike if inside else "",
         candidate=replace(weighed.candidate, strength=direction),
-    )  # fmt: skip
+    )
 
 
 def withdrawn(judgement: Judgement) -> Judgement:
@@ -392,17 +401,27 @@ def _weigh(
         () if bounded is not None else _each(left, [column], column, about=about, larger=larger, unit=effect.unit)
     )
     return Weighed(
-        column=column, error=error, gains=gained, recording=evidence.recording,
+        column=column,
+        error=error,
+        gains=gained,
+        recording=evidence.recording,
         admissible=effect.described.admits(null + value) and not lost,
         candidate=Candidate(
-            effect=effect.effect, parameter=effect.parameter, null=null,
+            effect=effect.effect,
+            parameter=effect.parameter,
+            null=null,
             strength=bounded or strength(null, value, error, effect.unit),
-            z=z, p_value=reference.p_alone(statistic, column),
-            p_family=reference.p_family(statistic, column), gain=float(gained.sum()),
-            gain_error=total_error(gained, evidence.recording), behind=0.0, leftover=leftover,
-            by_recording=by_recording, heterogeneity=heterogeneity(by_recording),
+            z=z,
+            p_value=reference.p_alone(statistic, column),
+            p_family=reference.p_family(statistic, column),
+            gain=float(gained.sum()),
+            gain_error=total_error(gained, evidence.recording),
+            behind=0.0,
+            leftover=leftover,
+            by_recording=by_recording,
+            heterogeneity=heterogeneity(by_recording),
         ),
-    )  # fmt: skip
+    )
 
 
 def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighed:
@@ -417,17 +436,27 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
         own = fluctuation(evidence.select(evidence.recording == index), place)
         by_recording.append(estimate(own.deviation / 2, own.error / 2, described.unit))
     return Weighed(
-        column=GUST_COLUMN, gains=gained, recording=evidence.recording, error=found.error / 2,
-        admissible=bool(found.deviation > CRITERIA.reach * found.error) and not unlike, unlike=unlike,
+        column=GUST_COLUMN,
+        gains=gained,
+        recording=evidence.recording,
+        error=found.error / 2,
+        admissible=bool(found.deviation > CRITERIA.reach * found.error) and not unlike,
+        unlike=unlike,
         candidate=Candidate(
-            effect="gusts", parameter="intensity", null=described.null,
+            effect="gusts",
+            parameter="intensity",
+            null=described.null,
             strength=strength(described.null, found.deviation / 2, found.error / 2, described.unit),
-            z=math.sqrt(statistic), p_value=reference.p_alone(statistic, len(names())),
+            z=math.sqrt(statistic),
+            p_value=reference.p_alone(statistic, len(names())),
             p_family=reference.p_family(statistic, len(names())),
-            gain=float(gained.sum()), gain_error=total_error(gained, evidence.recording), behind=0.0,
-            leftover=reference.beside().p_left_by(evidence.freed(place), names(), ()), by_recording=tuple(by_recording),
+            gain=float(gained.sum()),
+            gain_error=total_error(gained, evidence.recording),
+            behind=0.0,
+            leftover=reference.beside().p_left_by(evidence.freed(place), names(), ()),
+            by_recording=tuple(by_recording),
         ),
-    )  # fmt: skip
+    )
 
 
 def strength(null: float, coefficient: float, error: float, unit: str) -> Estimate:
@@ -447,9 +476,12 @@ def strength(null: float, coefficient: float, error: float, unit: str) -> Estima
 def estimate(value: float, error: float, unit: str) -> Estimate:
     """A normal interval at the level of all intervals."""
     return Estimate(
-        value=value, low=value - CRITERIA.reach * error, high=value + CRITERIA.reach * error, unit=unit,
+        value=value,
+        low=value - CRITERIA.reach * error,
+        high=value + CRITERIA.reach * error,
+        unit=unit,
         level=CRITERIA.interval,
-    )  # fmt: skip
+    )
 
 
 def _ranked(weighed: Sequence[Weighed]) -> list[Weighed]:

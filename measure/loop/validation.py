@@ -193,11 +193,17 @@ def compare(
     """
     old, new = before.squared, after.squared
     return Comparison(
-        what=fold.words, frames=frames, before=root(old), after=root(new), reduction=paired(old, new),
-        floor=root(floor), share=share_removed(old, new, floor),
-        control=None if control is None else root(control.squared), control_name=control_name,
+        what=fold.words,
+        frames=frames,
+        before=root(old),
+        after=root(new),
+        reduction=paired(old, new),
+        floor=root(floor),
+        share=share_removed(old, new, floor),
+        control=None if control is None else root(control.squared),
+        control_name=control_name,
         apart=None if control is None else a_segment(control.misfit - after.misfit, recording),
-    )  # fmt: skip
+    )
 
 
 def share_removed(before: Floats, after: Floats, floor: Floats) -> float | None:
@@ -226,9 +232,12 @@ def root(squared: Floats) -> Estimate:
     mean = float(squared.mean())
     reach = _reach(squared)
     return Estimate(
-        value=math.sqrt(mean), low=math.sqrt(max(mean - reach, 0.0)), high=math.sqrt(mean + reach), unit="m",
+        value=math.sqrt(mean),
+        low=math.sqrt(max(mean - reach, 0.0)),
+        high=math.sqrt(mean + reach),
+        unit="m",
         level=CRITERIA.interval,
-    )  # fmt: skip
+    )
 
 
 def paired(before: Floats, after: Floats) -> Estimate:
@@ -263,12 +272,18 @@ def numerical_floor(
     own = child_seed(seed, "floor")
     recorded, specimen = setting.experiment.recordings, setting.experiment.specimen
     batch = NullBatch(
-        specimen=specimen, markers=first.markers, rate=1 / setting.segments.period,
-        duration=_DURATION, noise=first.noise, calibrations=(model.calibration,) * len(simulated), speeds=speeds,
+        specimen=specimen,
+        markers=first.markers,
+        rate=1 / setting.segments.period,
+        duration=_DURATION,
+        noise=first.noise,
+        calibrations=(model.calibration,) * len(simulated),
+        speeds=speeds,
         winds=winds.like(recorded, speeds, duration=_DURATION, seed=own),
-        tracks=tracks.like(recorded, specimen.seats, len(speeds), duration=_DURATION, seed=own), seed=own,
+        tracks=tracks.like(recorded, specimen.seats, len(speeds), duration=_DURATION, seed=own),
+        seed=own,
         effects=model.acting,
-    )  # fmt: skip
+    )
     made = batch.simulate()
     segments = Segments.of(made)
     forecaster = replace(setting.forecaster, specimen=as_seen(batch.specimen, made))

@@ -21,10 +21,17 @@ from models.storage import WEIGHTS, write_card, write_tensors
 
 
 @click.command()
-@click.option("--lake", "lake_path", type=LocalPath(exists=True), required=True,
-              help="Lake with the data sets' mesh sequences.")  # fmt: skip
-@click.option("--dataset", "datasets", multiple=True, default=("outdoor", "outdoor-damped"), show_default=True,
-              help="Data set whose sequences are filmed.")  # fmt: skip
+@click.option(
+    "--lake", "lake_path", type=LocalPath(exists=True), required=True, help="Lake with the data sets' mesh sequences."
+)
+@click.option(
+    "--dataset",
+    "datasets",
+    multiple=True,
+    default=("outdoor", "outdoor-damped"),
+    show_default=True,
+    help="Data set whose sequences are filmed.",
+)
 @click.option("--films", default=520, show_default=True, help="Number of films to train on.")
 @click.option("--judged", default=48, show_default=True, help="Films of the validation side that are judged.")
 @click.option("--epochs", default=12, show_default=True)
@@ -33,9 +40,16 @@ from models.storage import WEIGHTS, write_card, write_tensors
 @click.option("--examples", "kept", type=LocalPath(), required=True, help="Folder of the examples, kept between runs.")
 @click.option("--out", type=LocalPath(), default=FOLDER, help="Folder of the network; new.")
 def main(
-    lake_path: Path, datasets: tuple[str, ...], films: int, judged: int, epochs: int, seed: int, workers: int,
-    kept: Path, out: Path,
-) -> None:  # fmt: skip
+    lake_path: Path,
+    datasets: tuple[str, ...],
+    films: int,
+    judged: int,
+    epochs: int,
+    seed: int,
+    workers: int,
+    kept: Path,
+    out: Path,
+) -> None:
     """Film simulated flags, train the network of the cloth's mask on them, and write it with its card."""
     check_folder(out)
     lake = Lake.open(lake_path)
@@ -51,18 +65,28 @@ def main(
     torch.set_num_threads(max(1, workers))
     network = train(sides["train"], sides["validation"], epochs=epochs, seed=seed, advance=advance)
     recipe: dict[str, Any] = {
-        "datasets": list(datasets), "films": films, "judged": judged, "epochs": epochs, "seed": seed,
-    }  # fmt: skip
+        "datasets": list(datasets),
+        "films": films,
+        "judged": judged,
+        "epochs": epochs,
+        "seed": seed,
+    }
     with fresh_folder(out) as scratch:
         write_card(
             scratch,
             {
-                "name": "cloth-mask", "title": "The cloth and its hoist in pictures of a film that was made fit",
-                "licence": "CC-BY-4.0", "recipe": recipe, "recipe_hash": recipe_hash(recipe), "seed": seed,
-                "code_version": code_version(), "trained": {side: len(some) for side, some in sides.items()},
-                "parameters": sum(w.numel() for w in network.parameters()), "scores": asdict(reached[-1]),
+                "name": "cloth-mask",
+                "title": "The cloth and its hoist in pictures of a film that was made fit",
+                "licence": "CC-BY-4.0",
+                "recipe": recipe,
+                "recipe_hash": recipe_hash(recipe),
+                "seed": seed,
+                "code_version": code_version(),
+                "trained": {side: len(some) for side, some in sides.items()},
+                "parameters": sum(w.numel() for w in network.parameters()),
+                "scores": asdict(reached[-1]),
             },
-        )  # fmt: skip
+        )
         tensors = {k: v.half() if v.is_floating_point() else v for k, v in network.state_dict().items()}
         write_tensors(scratch / WEIGHTS, tensors)
         write_sums(scratch)

@@ -42,9 +42,10 @@ def batches(lake: Lake, datasets: Sequence[str], *, side: str) -> list[list[str]
             found[batch].append((row["name"], row["object"]))
     if not found:
         raise NotFoundError(
-            f"no sequences of the {side} side of {', '.join(datasets)}", where=str(lake.path),
+            f"no sequences of the {side} side of {', '.join(datasets)}",
+            where=str(lake.path),
             fix=f"build them: flagdata build {datasets[0]}",
-        )  # fmt: skip
+        )
     return [[stored for _, stored in sorted(found[batch])] for batch in sorted(found)]
 
 
@@ -83,6 +84,8 @@ def read(folder: Path) -> Iterator[Example]:
                 arrays: dict[str, NDArray[np.generic]] = {name: kept[name] for name in kept.files}
             stills = Stills(**{name: arrays.pop(name).astype(np.uint8) for name in _STILLS})
             yield Example(
-                pictures=arrays["pictures"].astype(np.uint8), stills=stills, cloth=arrays["cloth"].astype(np.uint8),
+                pictures=arrays["pictures"].astype(np.uint8),
+                stills=stills,
+                cloth=arrays["cloth"].astype(np.uint8),
                 hoist=arrays["hoist"].astype(np.float32),
-            )  # fmt: skip
+            )

@@ -94,7 +94,7 @@ def example(runs: Sequence[MeshSequence], *, seed: int, assets: Assets) -> Examp
         return None
     return Example(
         pictures=small[kept], stills=Stills.of(small), cloth=cloth, hoist=_hoist(places, runs[0].rest, found)
-    )  # fmt: skip
+    )
 
 
 def _look(rng: np.random.Generator, seed: int, assets: Assets) -> RenderParameters:
@@ -111,7 +111,7 @@ def _joined(runs: Sequence[MeshSequence]) -> MeshSequence:
     positions = np.concatenate([run.positions[::_EVERY] for run in runs])
     return MeshSequence(
         time=np.arange(len(positions), dtype=np.int64) * step, positions=positions, faces=first.faces, rest=first.rest
-    )  # fmt: skip
+    )
 
 
 def _lit(colour: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
@@ -140,7 +140,7 @@ def _places(meshes: Meshes, zeta: RenderParameters, picked: Sequence[int]) -> ND
 
 def _cloth(
     places: NDArray[np.float64], faces: NDArray[np.int32], zeta: RenderParameters, found: Conditioning
-) -> NDArray[np.uint8]:  # fmt: skip
+) -> NDArray[np.uint8]:
     fine = np.zeros((zeta.height * _FINE, zeta.width * _FINE), np.uint8)
     corners = np.rint((places * _FINE - 0.5) * 16).astype(np.int32)
     for face in faces:

@@ -47,9 +47,13 @@ class Scores:
 
 
 def train(
-    examples: Sequence[Example], judged: Sequence[Example], *, epochs: int, seed: int,
+    examples: Sequence[Example],
+    judged: Sequence[Example],
+    *,
+    epochs: int,
+    seed: int,
     advance: Callable[[int, float, Scores], object],
-) -> MaskNetwork:  # fmt: skip
+) -> MaskNetwork:
     """Weights after some epochs.
 
     Args:
@@ -96,7 +100,7 @@ def scores(network: MaskNetwork, examples: Sequence[Example]) -> Scores:
             apart.append(np.hypot(*(places - np.median(one.hoist, axis=0)).T))
     return Scores(
         dice=float(np.mean(each)), poor=float(np.mean(np.array(each) < 0.9)), ends=float(np.median(np.stack(apart)))
-    )  # fmt: skip
+    )
 
 
 def _drawn(one: Example, rng: np.random.Generator) -> tuple[Tensor, Tensor, Tensor]:

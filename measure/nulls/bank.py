@@ -45,9 +45,24 @@ _VERSION = 5
 """Raised whenever the arrays of a batch mean something else; 2: one cloth a batch, the damping by its logarithm;
 3: sensitivities of how cloth bends in double precision; 4: what recordings settle at; 5: whether cloths are carried."""
 _SEGMENTS = (
-    "recording", "r", "response", "error", "marker_error", "lines", "speeds", "calibration", "noise", "period", "cloth",
-    "turned", "turning", "moment", "course", "course_curvature", "settled",
-)  # fmt: skip
+    "recording",
+    "r",
+    "response",
+    "error",
+    "marker_error",
+    "lines",
+    "speeds",
+    "calibration",
+    "noise",
+    "period",
+    "cloth",
+    "turned",
+    "turning",
+    "moment",
+    "course",
+    "course_curvature",
+    "settled",
+)
 """Arrays with a row for each segment."""
 _SINGLE = ("duration", "anchors_told", "carried")
 """Arrays of one value for the batch."""
@@ -84,11 +99,16 @@ def prior_batch(
     cloth = Calibration(density=_log(rng, _DENSITY), bending=_log(rng, _BENDING), damping=_log(rng, _DAMPING))
     shares = (np.arange(WINDS) + rng.random(WINDS)) / WINDS
     return NullBatch(
-        specimen=specimen, markers=markers, rate=rate, duration=duration, noise=noise, calibrations=(cloth,) * WINDS,
+        specimen=specimen,
+        markers=markers,
+        rate=rate,
+        duration=duration,
+        noise=noise,
+        calibrations=(cloth,) * WINDS,
         stiffness=stiffness.drawn(rng),
         speeds=tuple(float(u) for u in speeds[0] + (speeds[1] - speeds[0]) * shares),
         seed=child_seed(seed, "null", "batch"),
-    )  # fmt: skip
+    )
 
 
 def _log(rng: np.random.Generator, span: tuple[float, float]) -> float:
@@ -106,11 +126,14 @@ def evaluate(batch: NullBatch, numerics: int, weighed: Sequence[Column]) -> tupl
     found = replace(found, settled=settled_off(recordings, mistaken(batch))[found.recording])
     cloths = np.array([c.steps_from(Calibration()) for c in batch.calibrations])
     nulls = Nulls(
-        statistics=found, speeds=np.array(batch.speeds)[found.recording], calibration=cloths[found.recording],
-        numerics=np.full(len(found.recording), numerics), noise=np.full(len(found.recording), batch.noise),
+        statistics=found,
+        speeds=np.array(batch.speeds)[found.recording],
+        calibration=cloths[found.recording],
+        numerics=np.full(len(found.recording), numerics),
+        noise=np.full(len(found.recording), batch.noise),
         period=np.full(len(found.recording), segments.period),
         cloth=np.full(len(found.recording), batch.specimen.material.fingerprint),
-    )  # fmt: skip
+    )
     return nulls, segments.duration
 
 
@@ -155,14 +178,30 @@ def _cache(folder: Path, batch: NullBatch, index: int) -> None:
         )
     buffer = BytesIO()
     np.savez(
-        buffer, version=np.array(_VERSION), columns=np.array(names()), recording=own.recording, r=own.r,
-        response=own.response, error=own.error, marker_error=own.marker_error, lines=own.lines, speeds=nulls.speeds,
-        calibration=nulls.calibration, noise=nulls.noise, period=nulls.period, cloth=nulls.cloth,
-        duration=np.array(duration), anchors_told=np.array(batch.specimen.anchors_given),
-        carried=np.array(bool(batch.tracks)), turned=own.turning.r,
-        turning=own.turning.response, moment=own.turning.error, course=own.course.score,
-        course_curvature=own.course.curvature, settled=own.settled,
-    )  # fmt: skip
+        buffer,
+        version=np.array(_VERSION),
+        columns=np.array(names()),
+        recording=own.recording,
+        r=own.r,
+        response=own.response,
+        error=own.error,
+        marker_error=own.marker_error,
+        lines=own.lines,
+        speeds=nulls.speeds,
+        calibration=nulls.calibration,
+        noise=nulls.noise,
+        period=nulls.period,
+        cloth=nulls.cloth,
+        duration=np.array(duration),
+        anchors_told=np.array(batch.specimen.anchors_given),
+        carried=np.array(bool(batch.tracks)),
+        turned=own.turning.r,
+        turning=own.turning.response,
+        moment=own.turning.error,
+        course=own.course.score,
+        course_curvature=own.course.curvature,
+        settled=own.settled,
+    )
     put_if_absent(_file(folder, index), buffer.getvalue())
 
 
@@ -183,15 +222,17 @@ def _content(path: Path) -> Mapping[str, np.ndarray]:
     segments = content["recording"].size
     kinds = {name: "U" if name == "cloth" else "biuf" for name in _SEGMENTS}
     wrong = [
-        name for name, kind in kinds.items()
+        name
+        for name, kind in kinds.items()
         if content[name].dtype.kind not in kind or content[name].shape[:1] != (segments,)
-    ]  # fmt: skip
+    ]
     single = all(content[name].size == 1 and content[name].dtype.kind in "biuf" for name in _SINGLE)
     if wrong or not segments or not single:
         raise CorruptError(
             f"its arrays do not fit one another: {', '.join(wrong or ('recording', *_SINGLE))}",
-            where=str(path), fix=rebuild,
-        )  # fmt: skip
+            where=str(path),
+            fix=rebuild,
+        )
     return content
 
 
@@ -234,21 +275,34 @@ def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
     for path in paths:
         content = _content(path)
         own = Statistics(
-            recording=content["recording"] + count, r=content["r"], response=content["response"],
-            error=content["error"], marker_error=content["marker_error"], lines=content["lines"],
+            recording=content["recording"] + count,
+            r=content["r"],
+            response=content["response"],
+            error=content["error"],
+            marker_error=content["marker_error"],
+            lines=content["lines"],
             turning=Statistics(
-                recording=content["recording"] + count, r=content["turned"], response=content["turning"],
-                error=content["moment"], marker_error=content["moment"][:, None],
+                recording=content["recording"] + count,
+                r=content["turned"],
+                response=content["turning"],
+                error=content["moment"],
+                marker_error=content["moment"][:, None],
             ),
-            course=Course(score=content["course"], curvature=content["course_curvature"]), settled=content["settled"],
-        )  # fmt: skip
+            course=Course(score=content["course"], curvature=content["course_curvature"]),
+            settled=content["settled"],
+        )
         numerics = np.full(len(own.r), _number(path))
         parts.append(
             Nulls(
-                statistics=own, speeds=content["speeds"], calibration=content["calibration"], numerics=numerics,
-                noise=content["noise"], period=content["period"], cloth=content["cloth"],
+                statistics=own,
+                speeds=content["speeds"],
+                calibration=content["calibration"],
+                numerics=numerics,
+                noise=content["noise"],
+                period=content["period"],
+                cloth=content["cloth"],
             )
-        )  # fmt: skip
+        )
         durations.add(round(float(content["duration"]), 1))
         given.add(bool(content["anchors_told"]))
         carried.add(bool(content["carried"]))
@@ -258,9 +312,14 @@ def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
         raise CorruptError(
             f"segments of {lengths}, anchors {' and '.join('given' if g else 'taken from recordings' for g in given)}, "
             f"cloths {' and '.join('carried' if c else 'held still' for c in carried)}",
-            where=str(folder), fix="build a bank of one design into a folder of its own",
-        )  # fmt: skip
+            where=str(folder),
+            fix="build a bank of one design into a folder of its own",
+        )
     return NullBank(
-        nulls=Nulls.joined(parts), columns=names(), duration=durations.pop(), words=words, anchors_given=given.pop(),
+        nulls=Nulls.joined(parts),
+        columns=names(),
+        duration=durations.pop(),
+        words=words,
+        anchors_given=given.pop(),
         carried=carried.pop(),
-    )  # fmt: skip
+    )

@@ -28,9 +28,13 @@ def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> Floats:
     count = len(recordings)
     tracks = tuple(recording.track for recording in recordings if recording.track is not None)
     copies = replace(
-        batch, calibrations=batch.calibrations * _COPIES, speeds=batch.speeds * _COPIES, winds=batch.winds * _COPIES,
-        tracks=tracks * _COPIES, seed=child_seed(batch.seed, "free"),
-    )  # fmt: skip
+        batch,
+        calibrations=batch.calibrations * _COPIES,
+        speeds=batch.speeds * _COPIES,
+        winds=batch.winds * _COPIES,
+        tracks=tracks * _COPIES,
+        seed=child_seed(batch.seed, "free"),
+    )
     runs, period = copies.as_fitted(), 1 / batch.rate
     modelled = np.stack([settled(batch.markers, runs[..., place], period=period) for place in range(runs.shape[-1])])
     observed = [settled(r.markers, r.positions, period=1 / r.rate, noise=r.noise) for r in recordings]

@@ -52,9 +52,10 @@ class NullOptions:
             raise UsageError(f"a level of {self.level!r}", where="nulls", fix="give one between 0 and 1")
         if self.nulls < FEWEST_NULLS or self.workers < 1:
             raise UsageError(
-                f"{self.nulls} nulls by {self.workers} workers", where="nulls",
+                f"{self.nulls} nulls by {self.workers} workers",
+                where="nulls",
                 fix=f"give {FEWEST_NULLS} or more, and 1 or more",
-            )  # fmt: skip
+            )
 
 
 def bank_for(setting: Setting, options: NullOptions, *, nulls: int | None = None, stage: Stage) -> NullBank:
@@ -121,19 +122,22 @@ def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None
         raise InputError(
             f"the bank's anchors were {ways[bank.anchors_given]}, those of the recordings are "
             f"{ways[not bank.anchors_given]}",
-            where=where, fix="simulate nulls for these recordings: leave the bank out",
-        )  # fmt: skip
+            where=where,
+            fix="simulate nulls for these recordings: leave the bank out",
+        )
     if bank.carried != setting.experiment.carried:
         ways = ("held still", "carried")
         raise InputError(
             f"the bank's cloths were {ways[bank.carried]}, that of the recordings is {ways[not bank.carried]}",
-            where=where, fix="simulate nulls for these recordings: leave the bank out",
-        )  # fmt: skip
+            where=where,
+            fix="simulate nulls for these recordings: leave the bank out",
+        )
     if abs(bank.duration - setting.segments.duration) > 0.1 * bank.duration:
         raise InputError(
             f"its segments last {bank.duration:.2g} s, those of the recordings {setting.segments.duration:.2g} s",
-            where=where, fix="simulate nulls for these recordings: leave the bank out; or record for longer",
-        )  # fmt: skip
+            where=where,
+            fix="simulate nulls for these recordings: leave the bank out; or record for longer",
+        )
 
 
 def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
@@ -143,23 +147,30 @@ def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
     segments, recordings = setting.segments, setting.experiment.recordings
     made = [
         banks.prior_batch(
-            setting.experiment.specimen, markers=segments.markers, rate=1 / segments.period, noise=setting.design.noise,
+            setting.experiment.specimen,
+            markers=segments.markers,
+            rate=1 / segments.period,
+            noise=setting.design.noise,
             duration=segments.cut.lasting(banks.each(len(segments))),
             speeds=banks.around(float(setting.speeds.min()), float(setting.speeds.max())),
             seed=child_seed(seed, "null", index),
         )
         for index in range(kinds)
-    ]  # fmt: skip
+    ]
     return [
         replace(
-            batch, winds=winds.like(recordings, batch.speeds, duration=batch.duration, seed=batch.seed),
+            batch,
+            winds=winds.like(recordings, batch.speeds, duration=batch.duration, seed=batch.seed),
             tracks=tracks.like(
-                recordings, setting.experiment.specimen.seats, len(batch.speeds), duration=batch.duration,
+                recordings,
+                setting.experiment.specimen.seats,
+                len(batch.speeds),
+                duration=batch.duration,
                 seed=batch.seed,
             ),
         )
         for batch in made
-    ]  # fmt: skip
+    ]
 
 
 def simulated(setting: Setting, *, nulls: int, seed: int, workers: int, stage: Stage) -> NullBank:
@@ -193,9 +204,11 @@ def design_hash(setting: Setting) -> str:
     content, arrays = described(setting.experiment.specimen)
     del content["density-uncertainty"]  # nulls are judged under it, not made by it
     content |= {
-        "period": segments.period, "noise": setting.design.noise, "segments": len(segments),
+        "period": segments.period,
+        "noise": setting.design.noise,
+        "segments": len(segments),
         "lengths": [float(r.times[-1]) for r in recordings],
-    }  # fmt: skip
+    }
     blown = [part for r in recordings for part in (r.wind.times, r.wind.velocity)]
     ways = [r.attachments for r in recordings if r.attachments is not None]
     return array_hash(content, [*arrays, segments.markers, *blown, *ways])

@@ -66,9 +66,10 @@ def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> I
             chosen = np.concatenate([places[k] for k in rng.permutation(len(places))])[:segments]
             if len(chosen) < segments:
                 raise InputError(
-                    f"{segments} segments of data against {len(chosen)} nulls of one cloth", where="null bank",
+                    f"{segments} segments of data against {len(chosen)} nulls of one cloth",
+                    where="null bank",
                     fix="simulate longer nulls, or give shorter recordings",
-                )  # fmt: skip
+                )
             groups.append(chosen)
         others = nulls.select(nulls.numerics != outside.numerics[0])
         yield LeftOut(model=NullModel.fit(others, outside.design), outside=outside, groups=tuple(groups))
@@ -101,10 +102,11 @@ class NullBank:
         kinds = len(np.unique(self.nulls.numerics))
         if kinds < CRITERIA.fewest_kinds:
             raise InputError(
-                f"nulls of {kinds} kinds of numerics", where="null bank",
+                f"nulls of {kinds} kinds of numerics",
+                where="null bank",
                 fix=f"simulate at least {CRITERIA.fewest_kinds}, and {kinds_needed(CRITERIA.level)} to test at a level "
                 f"of {CRITERIA.level:g}",
-            )  # fmt: skip
+            )
 
     def model(self, design: Design) -> NullModel:
         """Learnt from all, for data of a design."""
@@ -181,13 +183,17 @@ class _Found(Rows):
         nominal = -own.calibration[0] * np.minimum(evidence.prior / PRIOR, 1.0)
         swing, settles = (np.zeros(0) if own is None else own for own in (evidence.swing, evidence.settles))
         return cls(
-            shares=unscaled(evidence, columns)[None], left=np.array([evidence.fit(()).left]),
-            gained=np.array([best_gain(evidence, without=_uncounted(columns))]), swings=swing[None],
+            shares=unscaled(evidence, columns)[None],
+            left=np.array([evidence.fit(()).left]),
+            gained=np.array([best_gain(evidence, without=_uncounted(columns))]),
+            swings=swing[None],
             settled=settles[None],
             lines=None if evidence.lines is None else strongest(evidence.lines)[None],
             deviations=evidence.fit((), centre=nominal).in_errors(range(len(THETA)))[None],
-            noise=own.noise, kinds=own.numerics, damping=own.calibration[:, DAMPING],
-        )  # fmt: skip
+            noise=own.noise,
+            kinds=own.numerics,
+            damping=own.calibration[:, DAMPING],
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -206,9 +212,12 @@ class _Usual:
         powers = np.array([power(np.abs(own), found.damping) for own in found.swings.T])
         roots = _roots(found, lines, powers)
         return cls(
-            powers=powers, spread=np.maximum(found.shares.mean(axis=0), _NOTHING), centre=roots.mean(axis=0),
-            width=np.maximum(roots.std(axis=0), np.cbrt(_NOTHING)), lines=lines,
-        )  # fmt: skip
+            powers=powers,
+            spread=np.maximum(found.shares.mean(axis=0), _NOTHING),
+            centre=roots.mean(axis=0),
+            width=np.maximum(roots.std(axis=0), np.cbrt(_NOTHING)),
+            lines=lines,
+        )
 
     def far(self, found: _Found) -> Floats:
         """(group, column + 2 to 11) how far groups are from their mean, in their standard deviations."""
@@ -288,9 +297,10 @@ class Reference:
         count, needed = len(np.unique(kinds[similar])), kinds_needed(1 - CRITERIA.interval)
         if count < needed:
             raise InputError(
-                f"{count} kinds of numerics with markers as noisy as {1e3 * noise:.2g} mm", where="null bank",
+                f"{count} kinds of numerics with markers as noisy as {1e3 * noise:.2g} mm",
+                where="null bank",
                 fix=f"build a bank of {needed} or more with such noise, or leave it out",
-            )  # fmt: skip
+            )
         usual = _Usual.of(found.select(similar))
         scaled, far = np.empty_like(found.shares), np.empty((len(kinds), len(usual.centre)))
         for kind in np.unique(kinds):
@@ -301,10 +311,17 @@ class Reference:
             others = _Usual.of(found.select(near))
             scaled[own], far[own] = found.shares[own] / others.spread, others.far(found.select(own))
         return cls(
-            scaled=scaled, spread=usual.spread, far=far, kinds=kinds, deviations=found.deviations,
-            centre=usual.centre, width=usual.width, lines=usual.lines, powers=usual.powers,
+            scaled=scaled,
+            spread=usual.spread,
+            far=far,
+            kinds=kinds,
+            deviations=found.deviations,
+            centre=usual.centre,
+            width=usual.width,
+            lines=usual.lines,
+            powers=usual.powers,
             beside_gusts=beside_gusts,
-        )  # fmt: skip
+        )
 
     def at(self, calibration: Calibration) -> Reference:
         """For data whose statistics are taken at a calibration."""

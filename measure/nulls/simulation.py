@@ -86,11 +86,15 @@ class NullBatch:
         jitter = self.noise * stream(self.seed, "null", "markers").standard_normal(seen.shape)
         made = [
             Trajectory(
-                name=f"null {self.seed}-{place}", markers=self.markers, positions=seen[..., place] + jitter[..., place],
-                rate=self.rate, wind=wind, noise=self.noise,
+                name=f"null {self.seed}-{place}",
+                markers=self.markers,
+                positions=seen[..., place] + jitter[..., place],
+                rate=self.rate,
+                wind=wind,
+                noise=self.noise,
             )
             for place, wind in enumerate(self.winds or [WindTrack.constant((u, 0.0, 0.0)) for u in self.speeds])
-        ]  # fmt: skip
+        ]
         return [carried(recording, self.specimen.seats) for recording in made] if self.tracks else made
 
     @property
@@ -132,7 +136,7 @@ class NullBatch:
             where=f"{self.calibrations[0]}, stretching × {self.stiffness.stretching:.3g}, winds "
             f"{', '.join(f'{speed:.3g}' for speed in self.speeds)} m/s",
             fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",
-        )  # fmt: skip
+        )
 
     def as_fitted(self) -> Floats:
         """(frame, marker, 3, recording) of the same by the mesh and the steps of the fit, without noise [m].
@@ -144,9 +148,10 @@ class NullBatch:
         found = self._run(specimen.mesh, specimen.held, SplitEuler(), 0.0)
         if not np.isfinite(found).all():
             raise FlagdataError(
-                "a free run of the model diverges", where=f"{self.calibrations[0]}",
+                "a free run of the model diverges",
+                where=f"{self.calibrations[0]}",
                 fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",
-            )  # fmt: skip
+            )
         return np.einsum("mv,fvcb->fmcb", onto(specimen.mesh.rest, self.markers), found)
 
     def _run(self, flat: Mesh, held: tuple[int, ...], integrator: Integrator, damped: float) -> Floats:
@@ -162,11 +167,15 @@ class NullBatch:
             material = calibration.material(self.stiffness.of(specimen.material))
             scenes.append(
                 Scene(
-                    mesh=flat, position=position, gravity=specimen.gravity, air=specimen.air, wind=(speed, 0.0, 0.0),
+                    mesh=flat,
+                    position=position,
+                    gravity=specimen.gravity,
+                    air=specimen.air,
+                    wind=(speed, 0.0, 0.0),
                     material=replace(material, damping=max(material.damping - damped, 0.0)),
                     handles=Handles(vertices=held, stiffness=specimen.stiffness),
                 )
-            )  # fmt: skip
+            )
         system, state = assemble(scenes)
         if self.winds:  # before the effects, of which some change the wind
             system = replace(system, wind=self._blowing(system))

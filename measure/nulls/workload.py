@@ -48,6 +48,8 @@ def of_recordings(
 
 def _simulated(seconds: float, work: float, *, workers: int) -> str:
     return announced(
-        f"simulating null recordings of {seconds / 60:.0f} minutes in all", work / _PACE, workers=workers,
+        f"simulating null recordings of {seconds / 60:.0f} minutes in all",
+        work / _PACE,
+        workers=workers,
         kept="what was simulated before is kept and taken up",
-    )  # fmt: skip
+    )

@@ -12,8 +12,12 @@ def area(window: Window) -> float:
 
 
 AREA = Observable(
-    name="area", unit="1",
+    name="area",
+    unit="1",
     meaning="mean area of the silhouette over the area of the flat flag",
     blind="whether cloth is hidden by folds or by the angle of the view",
-    pixels=area, geometry=area, bias=-0.001, sigma=0.038,
-)  # fmt: skip
+    pixels=area,
+    geometry=area,
+    bias=-0.001,
+    sigma=0.038,
+)

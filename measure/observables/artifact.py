@@ -30,12 +30,16 @@ def artifact(table: Table, subject: Subject, options: Mapping[str, Any]) -> Arti
         for at in (float(table.time[0]) - half, float(table.time[-1]) + half)
     )
     return Artifact(
-        kind=Kind.MEASUREMENT, name=f"{table.film} observables",
-        parents=[] if subject.artifact is None else [subject.artifact.id], source_hash=subject.content_hash(),
-        source_name=None if subject.path is None else subject.path.name, start=start, end=end,
+        kind=Kind.MEASUREMENT,
+        name=f"{table.film} observables",
+        parents=[] if subject.artifact is None else [subject.artifact.id],
+        source_hash=subject.content_hash(),
+        source_name=None if subject.path is None else subject.path.name,
+        start=start,
+        end=end,
         recipe={"observe": VERSION, "conditioned": CONDITIONED, **table.head(), **options},
         report=canonical(table.as_dict()),
-    )  # fmt: skip
+    )
 
 
 def keep(lake: Lake, table: Table, subject: Subject, options: Mapping[str, Any], *, branch: str) -> Placed:

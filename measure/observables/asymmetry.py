@@ -16,9 +16,13 @@ def asymmetry(window: Window) -> float:
 
 
 ASYMMETRY = Observable(
-    name="asymmetry", unit="1",
+    name="asymmetry",
+    unit="1",
     meaning="area of the silhouette above the mean line from the middle of the hoist to the middle of the free edge, "
     "less the area below it, over their sum",
     blind="asymmetries that the view from above or below makes as well",
-    pixels=asymmetry, geometry=asymmetry, bias=-0.026, sigma=0.067,
-)  # fmt: skip
+    pixels=asymmetry,
+    geometry=asymmetry,
+    bias=-0.026,
+    sigma=0.067,
+)

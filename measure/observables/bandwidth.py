@@ -17,9 +17,13 @@ def bandwidth(window: Window) -> float:
 
 
 BANDWIDTH = Observable(
-    name="bandwidth", unit="Hz",
+    name="bandwidth",
+    unit="Hz",
     meaning="standard deviation of the frequencies in the same spectrum",
     blind="whether a broad spectrum is of many waves or of one whose frequency follows the wind",
-    pixels=bandwidth, geometry=bandwidth, bias=0.325, sigma=0.225,
+    pixels=bandwidth,
+    geometry=bandwidth,
+    bias=0.325,
+    sigma=0.225,
     quadratic=True,
-)  # fmt: skip
+)

@@ -39,9 +39,10 @@ class View:
     def __post_init__(self) -> None:
         if not abs(self.elevation) < math.radians(80) or not self.distance > 0:
             raise InputError(
-                f"elevation {math.degrees(self.elevation):.0f}°, distance {self.distance:g} m", where="view",
+                f"elevation {math.degrees(self.elevation):.0f}°, distance {self.distance:g} m",
+                where="view",
                 fix="give an elevation below 80° and a distance above 0",
-            )  # fmt: skip
+            )
 
     def axes(self, heading: float) -> NDArray[np.float64]:
         """(3, 3) rows: the picture's right, its up, and the direction of view, of a wind that goes to `heading`."""
@@ -81,8 +82,9 @@ class ClothWindow:
         if self.points.shape != (n, vertices, 2) or n < 2 or not np.isfinite(self.points).all():
             raise InputError(
                 f"points of shape {self.points.shape} at {n} instants, all finite: {np.isfinite(self.points).all()}",
-                where="cloth", fix="give finite points (n, vertex, 2) at two instants or more",
-            )  # fmt: skip
+                where="cloth",
+                fix="give finite points (n, vertex, 2) at two instants or more",
+            )
         for name, some in (("hoist", self.hoist), ("free edge", self.free), ("faces", self.faces)):
             if some.size < 2 or some.min() < 0 or some.max() >= vertices:
                 raise InputError(f"vertices of the {name} that are not there", where="cloth", fix="give their indices")
@@ -132,9 +134,17 @@ class ClothWindow:
 
 
 def seen_from(
-    view: View, positions: NDArray[np.floating], *, times: NDArray[np.float64], faces: NDArray[np.integer],
-    hoist: NDArray[np.integer], free: NDArray[np.integer], length: float, height: float, heading: float = 0.0,
-) -> ClothWindow:  # fmt: skip
+    view: View,
+    positions: NDArray[np.floating],
+    *,
+    times: NDArray[np.float64],
+    faces: NDArray[np.integer],
+    hoist: NDArray[np.integer],
+    free: NDArray[np.integer],
+    length: float,
+    height: float,
+    heading: float = 0.0,
+) -> ClothWindow:
     """Cloth as a place sees it.
 
     Args:
@@ -163,9 +173,14 @@ def seen_from(
     places = places * (upright / (places[:, upper, 1] - places[:, lower, 1]).mean())
     places = places - places[:, [upper, lower]].mean(axis=(0, 1))
     return ClothWindow(
-        times=times, points=places, faces=np.asarray(faces, np.int64), hoist=np.asarray(hoist, np.int64),
-        free=np.asarray(free, np.int64), length=length, height=height,
-    )  # fmt: skip
+        times=times,
+        points=places,
+        faces=np.asarray(faces, np.int64),
+        hoist=np.asarray(hoist, np.int64),
+        free=np.asarray(free, np.int64),
+        length=length,
+        height=height,
+    )
 
 
 def edges_of(rest: NDArray[np.floating]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

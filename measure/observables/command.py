@@ -17,16 +17,30 @@ from measure.film_options import film_options
 
 @click.command(cls=LongCommand)
 @click.argument("source", metavar="SOURCE")
-@click.option("--flag-size", metavar="LxH", required=True, help="Length along the wind and height along the pole [m], "
-              "as in 1.5x1.0; the height gives the scale.")  # fmt: skip
+@click.option(
+    "--flag-size",
+    metavar="LxH",
+    required=True,
+    help="Length along the wind and height along the pole [m], as in 1.5x1.0; the height gives the scale.",
+)
 @click.option("--window", "seconds", type=DURATION, default="2.5s", show_default=True, help="Length of a window.")
 @film_options
 @click.option("--parquet", "parquet_path", type=LocalPath(), metavar="FILE.parquet", help="Write the table as Parquet.")
 @click.option("--zarr", "zarr_path", type=LocalPath(), metavar="FOLDER", help="Write the table as a Zarr data set.")
-@click.option("--picture", "picture_path", type=LocalPath(), metavar="FILE.png", help="Draw each observable against "
-              "time, and against the log's wind where the recording has one.")  # fmt: skip
-@click.option("--lake", "lake_path", type=LakePlace(), envvar="FLAGDATA_LAKE", help="Where recordings are, and where "
-              "tables go; also FLAGDATA_LAKE.")  # fmt: skip
+@click.option(
+    "--picture",
+    "picture_path",
+    type=LocalPath(),
+    metavar="FILE.png",
+    help="Draw each observable against time, and against the log's wind where the recording has one.",
+)
+@click.option(
+    "--lake",
+    "lake_path",
+    type=LakePlace(),
+    envvar="FLAGDATA_LAKE",
+    help="Where recordings are, and where tables go; also FLAGDATA_LAKE.",
+)
 @click.option(
     "--at", metavar="REF", help="Tag, branch or version of the lake to look at; by default the branch's head."
 )
@@ -34,11 +48,24 @@ from measure.film_options import film_options
 @click.option("--read-only", is_flag=True, help="Read the lake, commit nothing.")
 @json_option
 def observe(
-    source: str, flag_size: str, seconds: float, crop: str | None, flag: int | None, first: float | None,
-    last: float | None, true_fps: float | None, sequence_fps: float | None, parquet_path: Path | None,
-    zarr_path: Path | None, picture_path: Path | None, lake_path: Place | None, at: str | None, branch: str,
-    read_only: bool, as_json: bool,
-) -> None:  # fmt: skip
+    source: str,
+    flag_size: str,
+    seconds: float,
+    crop: str | None,
+    flag: int | None,
+    first: float | None,
+    last: float | None,
+    true_fps: float | None,
+    sequence_fps: float | None,
+    parquet_path: Path | None,
+    zarr_path: Path | None,
+    picture_path: Path | None,
+    lake_path: Place | None,
+    at: str | None,
+    branch: str,
+    read_only: bool,
+    as_json: bool,
+) -> None:
     """Read observables off a film: droop, extension, speeds, frequency, amplitudes, wave, area.
 
     SOURCE is a video file, a folder of images, or a recording, clip or camera of --lake by its name or id. Each window
@@ -78,16 +105,21 @@ def observe(
     with progress(count, label="observe", unit="window") as advance:
         windows = watched(subject.film, size, first=first, last=last, seconds=seconds, advance=advance)
     table = table_of(
-        windows, film=subject.film.name, length=size.length, height=size.height, start=subject.film.start,
+        windows,
+        film=subject.film.name,
+        length=size.length,
+        height=size.height,
+        start=subject.film.start,
         wind=None if subject.record is None else subject.record.wind(),
-    )  # fmt: skip
+    )
     for sentence in subject.film.sentences:
         say(f"  {sentence}")
     if table.empty:
         raise RefusedError(
             f"none of {len(table.time)} windows shows the cloth: its outline or its hoist was not found",
-            where=subject.film.name, fix="give --crop around one whole flag on its pole, or another film",
-        )  # fmt: skip
+            where=subject.film.name,
+            fix="give --crop around one whole flag on its pole, or another film",
+        )
     identity = None
     if lake is not None and not read_only:
         place = keep(lake, table, subject, {**reading.recipe(), "part": [first, last]}, branch=branch)

@@ -15,8 +15,12 @@ def droop(window: Window) -> float:
 
 
 DROOP = Observable(
-    name="droop", unit="rad",
+    name="droop",
+    unit="rad",
     meaning="mean angle below the horizontal of the line from the middle of the hoist to the middle of the free edge",
     blind="weight and the air's dynamic pressure in one steady wind: only their ratio is shown",
-    pixels=droop, geometry=droop, bias=-0.010, sigma=0.030,
-)  # fmt: skip
+    pixels=droop,
+    geometry=droop,
+    bias=-0.010,
+    sigma=0.030,
+)

@@ -50,9 +50,10 @@ class FilmWindow:
         n = len(self.times)
         if self.frames.shape != self.masks.shape or len(self.frames) != n or self.shown.shape != (n,):
             raise InputError(
-                f"{self.frames.shape} frames, {self.masks.shape} masks at {n} instants", where="window of a film",
+                f"{self.frames.shape} frames, {self.masks.shape} masks at {n} instants",
+                where="window of a film",
                 fix="give one frame and one mask of the same size at each instant",
-            )  # fmt: skip
+            )
 
     @cached_property
     def silhouettes(self) -> Silhouettes:
@@ -69,9 +70,13 @@ class FilmWindow:
         if masks.sum(axis=(1, 2)).mean() > _LARGEST * self.length * self.height * self.scale**2:
             raise UnseenError("no-silhouette")
         return Silhouettes(
-            times=self.times[self.shown], masks=masks, scale=self.scale, hoist=middle, length=self.length,
+            times=self.times[self.shown],
+            masks=masks,
+            scale=self.scale,
+            hoist=middle,
+            length=self.length,
             height=self.height,
-        )  # fmt: skip
+        )
 
     @cached_property
     def free_edge(self) -> NDArray[np.float64]:

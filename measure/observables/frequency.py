@@ -32,8 +32,12 @@ def frequency(window: Window) -> float:
 
 
 FREQUENCY = Observable(
-    name="frequency", unit="Hz",
+    name="frequency",
+    unit="Hz",
     meaning="centroid of the power spectrum, 0.4 to 8 Hz, of the motion of the middle of the free edge in the picture",
     blind="slower changes of the wind; which of size, tension and damping sets it",
-    pixels=frequency, geometry=frequency, bias=0.212, sigma=0.209,
-)  # fmt: skip
+    pixels=frequency,
+    geometry=frequency,
+    bias=0.212,
+    sigma=0.209,
+)

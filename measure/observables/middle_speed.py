@@ -13,9 +13,14 @@ def middle_speed(window: Window) -> float:
 
 
 MIDDLE_SPEED = Observable(
-    name="middle-speed", unit="1/s",
+    name="middle-speed",
+    unit="1/s",
     meaning="root mean square speed, in flag lengths, of the centroid of the middle third of the silhouette",
     blind="motion along the line of sight",
-    pixels=middle_speed, geometry=middle_speed, bias=-0.004, sigma=0.048,
-    counted_in="length", quadratic=True,
-)  # fmt: skip
+    pixels=middle_speed,
+    geometry=middle_speed,
+    bias=-0.004,
+    sigma=0.048,
+    counted_in="length",
+    quadratic=True,
+)

@@ -27,10 +27,14 @@ def outline_speed(window: Window) -> float:
 
 
 OUTLINE_SPEED = Observable(
-    name="outline-speed", unit="1/s",
+    name="outline-speed",
+    unit="1/s",
     meaning="mean speed across itself, in flag lengths, of the outline of the free part: the area that it sweeps a "
     "second, over the free edges' length (twice 85 % of the flag's length and its height)",
     blind="motion inside the outline and along the line of sight",
-    pixels=outline_speed, geometry=outline_speed, bias=-0.053, sigma=0.038,
+    pixels=outline_speed,
+    geometry=outline_speed,
+    bias=-0.053,
+    sigma=0.038,
     counted_in="length",
-)  # fmt: skip
+)

@@ -42,9 +42,10 @@ class Silhouettes:
     def __post_init__(self) -> None:
         if self.masks.ndim != 3 or len(self.masks) != len(self.times) or not (np.diff(self.times) > 0).all():
             raise InputError(
-                f"masks of shape {self.masks.shape} at {len(self.times)} instants", where="silhouettes",
+                f"masks of shape {self.masks.shape} at {len(self.times)} instants",
+                where="silhouettes",
                 fix="give one mask a frame, in the order of time",
-            )  # fmt: skip
+            )
 
     @cached_property
     def area(self) -> NDArray[np.float64]:

@@ -104,26 +104,33 @@ class Table:
     def head(self) -> dict[str, Any]:
         """What the table is of: JSON values."""
         return {
-            "schema": SCHEMA, "film": self.film, "flag": [self.length, self.height], "window": self.seconds,
-        }  # fmt: skip
+            "schema": SCHEMA,
+            "film": self.film,
+            "flag": [self.length, self.height],
+            "window": self.seconds,
+        }
 
     def as_dict(self) -> dict[str, Any]:
         """JSON values: mean, its standard error and the windows of each observable."""
         return {
-            **self.head(), "windows": len(self.time),
+            **self.head(),
+            "windows": len(self.time),
             "wind": None if self.wind is None else [None if math.isnan(v) else v for v in self.wind.tolist()],
             "observables": {name: self._summary(name) for name in self.readings},
-        }  # fmt: skip
+        }
 
     def _summary(self, name: str) -> dict[str, Any]:
         values = self.values(name)
         shown = values[np.isfinite(values)]
         found: Observable = OBSERVABLES[name]
         return {
-            "unit": found.unit, "windows": len(shown), "mean": float(shown.mean()) if len(shown) else None,
-            "deviation": float(shown.std(ddof=1)) if len(shown) > 1 else None, "sigma": found.sigma,
+            "unit": found.unit,
+            "windows": len(shown),
+            "mean": float(shown.mean()) if len(shown) else None,
+            "deviation": float(shown.std(ddof=1)) if len(shown) > 1 else None,
+            "sigma": found.sigma,
             "unseen": dict(self.unseen(name)),
-        }  # fmt: skip
+        }
 
     def lines(self) -> list[str]:
         """For people: an observable a line."""
@@ -140,8 +147,15 @@ class Table:
         return found
 
 
-def table_of(watched: Watched, *, film: str, length: float, height: float, start: int | None = None,
-             wind: WindSeries | None = None) -> Table:  # fmt: skip
+def table_of(
+    watched: Watched,
+    *,
+    film: str,
+    length: float,
+    height: float,
+    start: int | None = None,
+    wind: WindSeries | None = None,
+) -> Table:
     """All observables of all windows.
 
     Args:
@@ -159,9 +173,14 @@ def table_of(watched: Watched, *, film: str, length: float, height: float, start
         ends = [start + round((begin + watched.seconds) * NANOSECONDS) for begin in watched.starts.tolist()]
         logged = np.array([truth.before(end, window=max(watched.seconds, truth.period)).wind for end in ends])
     return Table(
-        film=film, length=length, height=height, seconds=watched.seconds, time=watched.starts + watched.seconds / 2,
-        readings=readings, wind=logged,
-    )  # fmt: skip
+        film=film,
+        length=length,
+        height=height,
+        seconds=watched.seconds,
+        time=watched.starts + watched.seconds / 2,
+        readings=readings,
+        wind=logged,
+    )
 
 
 def _about(found: Observable) -> dict[str, Any]:

@@ -56,16 +56,22 @@ def count_of(
     count = int((end - begin + 1 / film.rate) / seconds + 1e-6)
     if count < 1:
         raise RefusedError(
-            f"{end - begin:.1f} s of film have no window of {seconds:g} s", where=film.name,
+            f"{end - begin:.1f} s of film have no window of {seconds:g} s",
+            where=film.name,
             fix="give a longer part of the film",
-        )  # fmt: skip
+        )
     return count
 
 
 def watched(
-    film: ConditionedFilm, size: FlagSize, *, first: float | None = None, last: float | None = None,
-    seconds: float = WINDOW, advance: Callable[[int], object] | None = None,
-) -> Watched:  # fmt: skip
+    film: ConditionedFilm,
+    size: FlagSize,
+    *,
+    first: float | None = None,
+    last: float | None = None,
+    seconds: float = WINDOW,
+    advance: Callable[[int], object] | None = None,
+) -> Watched:
     """The windows of a film, one after another.
 
     Args:
@@ -105,9 +111,15 @@ class Watcher:
     """
 
     def __init__(
-        self, film: ConditionedFilm, size: FlagSize, *, begin: float, count: int, seconds: float,
+        self,
+        film: ConditionedFilm,
+        size: FlagSize,
+        *,
+        begin: float,
+        count: int,
+        seconds: float,
         found: Callable[[Sequence[FilmWindow | None]], object],
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._film, self._size, self._found = film, size, found
         self._begin, self._count, self._seconds = begin, count, seconds
         self._a_chunk = max(1, round(CHUNK / seconds))
@@ -133,9 +145,10 @@ class Watcher:
         self._held = []
         if self._film.found is None or self._film.found.region is None:
             raise RefusedError(
-                "no motion like cloth's was found in the film", where=self._film.name,
+                "no motion like cloth's was found in the film",
+                where=self._film.name,
                 fix="give another film, or --crop around the flag",
-            )  # fmt: skip
+            )
 
     def _read(self, held: Sequence[tuple[float, NDArray[np.uint8]]], some: int) -> None:
         some = min(some, self._count - self._done)
@@ -146,9 +159,13 @@ class Watcher:
 
 
 def _chunk(
-    film: ConditionedFilm, held: Sequence[tuple[float, NDArray[np.uint8]]], begin: float, count: int, seconds: float,
+    film: ConditionedFilm,
+    held: Sequence[tuple[float, NDArray[np.uint8]]],
+    begin: float,
+    count: int,
+    seconds: float,
     size: FlagSize,
-) -> list[FilmWindow | None]:  # fmt: skip
+) -> list[FilmWindow | None]:
     """The windows of one still picture."""
     nothing: list[FilmWindow | None] = [None] * count
     if film.found is None or not held:
@@ -170,9 +187,15 @@ def _chunk(
         usual = np.abs(area - np.median(area)) <= _STEADY * np.median(area)
         found.append(
             FilmWindow(
-                times=times[own], frames=frames[own], masks=cloth[own], shown=(expected[own] >= _EXPECTED) & usual,
-                scale=float(hoist[1, 1] - hoist[0, 1]) / size.height, hoist=hoist,
-                side=outliner.side, length=size.length, height=size.height,
+                times=times[own],
+                frames=frames[own],
+                masks=cloth[own],
+                shown=(expected[own] >= _EXPECTED) & usual,
+                scale=float(hoist[1, 1] - hoist[0, 1]) / size.height,
+                hoist=hoist,
+                side=outliner.side,
+                length=size.length,
+                height=size.height,
             )
-        )  # fmt: skip
+        )
     return found

@@ -16,9 +16,13 @@ def wave_length(window: Window) -> float:
 
 
 WAVE_LENGTH = Observable(
-    name="wave-length", unit="1",
+    name="wave-length",
+    unit="1",
     meaning="length, in flag lengths along the picture, of the wave that travels along the silhouette's middle line",
     blind="waves whose crests are along the line of sight's direction of motion, and standing waves",
-    pixels=wave_length, geometry=wave_length, bias=0.278, sigma=0.388,
+    pixels=wave_length,
+    geometry=wave_length,
+    bias=0.278,
+    sigma=0.388,
     counted_in="length",
-)  # fmt: skip
+)

@@ -16,9 +16,13 @@ def wave_speed(window: Window) -> float:
 
 
 WAVE_SPEED = Observable(
-    name="wave-speed", unit="1/s",
+    name="wave-speed",
+    unit="1/s",
     meaning="speed, in flag lengths a second, at which the silhouette's middle line travels away from the hoist",
     blind="waves whose crests are along the line of sight's direction of motion, and standing waves",
-    pixels=wave_speed, geometry=wave_speed, bias=0.408, sigma=0.793,
+    pixels=wave_speed,
+    geometry=wave_speed,
+    bias=0.408,
+    sigma=0.793,
     counted_in="length",
-)  # fmt: skip
+)

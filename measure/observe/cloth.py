@@ -33,9 +33,7 @@ def rectangle(width: float, height: float, *, vertices: int = VERTICES) -> Mesh:
     # (w/s + 1) (h/s + 1) = n, solved for the cell s.
     n, total = max(vertices, 4) - 1, width + height
     cell = (total + math.sqrt(total**2 + 4 * n * width * height)) / (2 * n)
-    return grid(
-        width=width, height=height, columns=max(1, round(width / cell)), rows=max(1, round(height / cell))
-    )  # fmt: skip
+    return grid(width=width, height=height, columns=max(1, round(width / cell)), rows=max(1, round(height / cell)))
 
 
 def hull(points: Points, *, where: str) -> Points:
@@ -48,9 +46,10 @@ def hull(points: Points, *, where: str) -> Points:
         return points[ConvexHull(points).vertices]
     except (QhullError, ValueError):
         raise InputError(
-            "the points on the cloth lie on a line, or are fewer than three", where=where,
+            "the points on the cloth lie on a line, or are fewer than three",
+            where=where,
             fix="check that u and v are the two coordinates in the flat cloth",
-        ) from None  # fmt: skip
+        ) from None
 
 
 def outline(rest: Points, faces: NDArray[np.int64], *, where: str) -> Points:
@@ -69,16 +68,18 @@ def outline(rest: Points, faces: NDArray[np.int64], *, where: str) -> Points:
     while here != first:
         if here not in follows:
             raise InputError(
-                "the outline of the cloth is broken", where=f"{where}, vertex {here}",
+                "the outline of the cloth is broken",
+                where=f"{where}, vertex {here}",
                 fix="join vertices that are doubled, and orient all faces alike",
-            )  # fmt: skip
+            )
         loop.append(here)
         here = follows.pop(here)
     if follows:
         raise InputError(
-            "the cloth has holes or several pieces", where=f"{where}, vertex {min(follows)}",
+            "the cloth has holes or several pieces",
+            where=f"{where}, vertex {min(follows)}",
             fix="name the width and height of the sheet, or give one sheet without holes",
-        )  # fmt: skip
+        )
     return rest[loop]
 
 
@@ -126,8 +127,9 @@ def model_mesh(corners: Points, *, vertices: int = VERTICES) -> Mesh:
     if len(used) < len(edge) or abs(covered - whole) > 0.02 * whole:
         raise InputError(
             f"an outline that {len(points)} vertices do not fill: {covered:.4g} of {whole:.4g} m²",
-            where="cloth", fix="ask for more vertices, or name the width and height of a plain sheet",
-        )  # fmt: skip
+            where="cloth",
+            fix="ask for more vertices, or name the width and height of a plain sheet",
+        )
     return Mesh(rest=points[used], faces=compact.reshape(-1, 3))
 
 

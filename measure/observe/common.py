@@ -48,11 +48,14 @@ def at_same_rate(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ..
         moved.append(replace(own, rate=rate, positions=CubicSpline(own.times, own.positions)(times), seen=seen))
         found.append(
             Finding(
-                kind="recording-resampled", severity=Severity.NOTE, where=f"recording {own.name!r}", value=rate,
+                kind="recording-resampled",
+                severity=Severity.NOTE,
+                where=f"recording {own.name!r}",
+                value=rate,
                 what=f"its {own.rate:.4g} frames a second are not those of the other recordings: it is followed at "
                 f"{rate:.4g} Hz",
             )
-        )  # fmt: skip
+        )
     return tuple(moved), tuple(found)
 
 
@@ -80,8 +83,9 @@ def at_same_points(
             raise InputError(
                 f"its {count} markers are not those of the other recordings, and too few to follow the cloth at "
                 f"the same {len(points)} points",
-                where=where, fix="track the same points in all recordings, or close the loop on them one by one",
-            )  # fmt: skip
+                where=where,
+                fix="track the same points in all recordings, or close the loop on them one by one",
+            )
         weights = onto(own.markers, points)
         grown = float(np.sqrt((weights**2).sum(axis=1).mean()))
         positions = np.einsum("pm,fmc->fpc", weights, own.positions)
@@ -89,11 +93,14 @@ def at_same_points(
         moved.append(replace(own, markers=points, positions=positions, noise=own.noise * grown, seen=seen))
         found.append(
             Finding(
-                kind="markers-resampled", severity=Severity.NOTE, where=where, count=len(points),
+                kind="markers-resampled",
+                severity=Severity.NOTE,
+                where=where,
+                count=len(points),
                 what=f"its {count} markers are not those of the other recordings: all are followed at {len(points)} "
                 "points of the cloth",
             )
-        )  # fmt: skip
+        )
     return tuple(moved), tuple(found)
 
 
@@ -111,16 +118,21 @@ def _shared(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ...], t
         return None
     made = [
         replace(
-            own, markers=most.markers[there], positions=own.positions[:, place[there]],
+            own,
+            markers=most.markers[there],
+            positions=own.positions[:, place[there]],
             seen=None if own.seen is None else own.seen[:, place[there]],
         )
         for own, place in zip(recordings, places, strict=True)
-    ]  # fmt: skip
+    ]
     found = Finding(
-        kind="markers-shared", severity=Severity.WARNING, where="experiment", count=int(there.sum()),
+        kind="markers-shared",
+        severity=Severity.WARNING,
+        where="experiment",
+        count=int(there.sum()),
         what=f"the {int(there.sum())} of {len(there)} markers that are in all recordings are followed",
         fix="track them again, if they matter",
-    )  # fmt: skip
+    )
     return tuple(made), (found,)
 
 

@@ -43,13 +43,11 @@ def of_arcsim(scene: Mapping[str, Any], rest: Floats, *, where: str) -> tuple[Kn
         pins=_arcsim_pins(scene, rest, where),
         stiffness=_number(magic, "handle_stiffness", ARCSIM_STIFFNESS, where),
         gravity=_vector(scene.get("gravity", [0, 0, 0]), where),
-        air=QuadraticNormal(
-            density=_number(wind, "density", 1.0, where), drag=_number(wind, "drag", 0.0, where)
-        ),
-        wind=None if velocity is None else WindTrack.constant(
-            (velocity["wind_x"], velocity["wind_y"], velocity["wind_z"])
-        ),
-    )  # fmt: skip
+        air=QuadraticNormal(density=_number(wind, "density", 1.0, where), drag=_number(wind, "drag", 0.0, where)),
+        wind=None
+        if velocity is None
+        else WindTrack.constant((velocity["wind_x"], velocity["wind_y"], velocity["wind_z"])),
+    )
     return known, _arcsim_findings(scene, entry, where)
 
 
@@ -72,17 +70,23 @@ def of_simulation(artifact: Artifact, rest: Floats) -> Known:
     try:
         scene = recipe["scene"]
         material = Material(
-            name=str(drawn["material"]), source=where, density=float(drawn["density"]), damping=float(drawn["damping"]),
+            name=str(drawn["material"]),
+            source=where,
+            density=float(drawn["density"]),
+            damping=float(drawn["damping"]),
             stretching=np.reshape(drawn["stretching"], STRETCHING_SHAPE),
             bending=np.reshape(drawn["bending"], BENDING_SHAPE),
-        )  # fmt: skip
+        )
         speed, toward = float(drawn["wind_speed"]), float(drawn["wind_toward"])
         wind = (speed * math.cos(toward), speed * math.sin(toward), float(drawn["wind_vertical"]))
         return Known(
-            material=material, pins=_simulated_pins(scene, rest), stiffness=ARCSIM_STIFFNESS,
-            gravity=(0.0, 0.0, -float(scene["gravity"])), air=_force(recipe["wind"]["force"]),
+            material=material,
+            pins=_simulated_pins(scene, rest),
+            stiffness=ARCSIM_STIFFNESS,
+            gravity=(0.0, 0.0, -float(scene["gravity"])),
+            air=_force(recipe["wind"]["force"]),
             wind=WindTrack.constant(wind),
-        )  # fmt: skip
+        )
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
             f"its parameters cannot be read: {error!r}", where=where, fix="simulate it again with this version"
@@ -139,16 +143,26 @@ def _arcsim_findings(scene: Mapping[str, Any], entry: Mapping[str, Any], where: 
     found: list[Finding] = []
     if isinstance(steps, int) and steps > 0 and isinstance(frame, int | float):
         step = float(frame) / steps
-        found.append(Finding(
-            kind="simulated-with-numerical-damping", severity=Severity.NOTE, where=where, value=step / 2,
-            what=f"ArcSim ran with implicit steps of {1e3 * step:.3g} ms, which damp the cloth by {5e2 * step:.3g} ms "
-            "beside its own damping",
-        ))  # fmt: skip
+        found.append(
+            Finding(
+                kind="simulated-with-numerical-damping",
+                severity=Severity.NOTE,
+                where=where,
+                value=step / 2,
+                what=f"ArcSim ran with implicit steps of {1e3 * step:.3g} ms, which damp the cloth by {5e2 * step:.3g} "
+                "ms beside its own damping",
+            )
+        )
     if acting:
-        found.append(Finding(
-            kind="simulated-with-other-stages", severity=Severity.NOTE, where=where, count=len(acting),
-            what=f"ArcSim ran with {', '.join(acting)}, which the base model is without",
-        ))  # fmt: skip
+        found.append(
+            Finding(
+                kind="simulated-with-other-stages",
+                severity=Severity.NOTE,
+                where=where,
+                count=len(acting),
+                what=f"ArcSim ran with {', '.join(acting)}, which the base model is without",
+            )
+        )
     return tuple(found)
 
 

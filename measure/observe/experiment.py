@@ -55,15 +55,21 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
     if setup.carried:
         recordings = tuple(carried(recording, seats) for recording in recordings)
     specimen = Specimen(
-        mesh=mesh, material=_material(known, setup), mass_known=setup.mass_known,
-        density_uncertainty=setup.density_uncertainty, held=held,
-        anchors=anchors_of(recordings, seats), anchors_given=False, stiffness=_stiffness(known, setup),
+        mesh=mesh,
+        material=_material(known, setup),
+        mass_known=setup.mass_known,
+        density_uncertainty=setup.density_uncertainty,
+        held=held,
+        anchors=anchors_of(recordings, seats),
+        anchors_given=False,
+        stiffness=_stiffness(known, setup),
         gravity=(
             _agreed([k.gravity for k in known], None, GRAVITY, "gravity")
-            if setup.gravity is None else (0.0, 0.0, -setup.gravity)
+            if setup.gravity is None
+            else (0.0, 0.0, -setup.gravity)
         ),
         air=_agreed([k.air for k in known], setup.air, QuadraticNormal(), "wind force"),
-    )  # fmt: skip
+    )
     experiment = Experiment(specimen=specimen, recordings=recordings)
     found = (*found, *(f for seen in prepared for f in seen.findings), *resampled, *moved, *_checked(experiment))
     return Observed(experiment=experiment, findings=found)
@@ -101,13 +107,20 @@ def _prepared(seen: Observation, corners: Floats) -> Observation:
         )
     wind = seen.wind or seen.known.wind
     seen = replace(
-        seen, markers=markers, positions=filled.positions, times=times - begin, seen=filled.seen,
+        seen,
+        markers=markers,
+        positions=filled.positions,
+        times=times - begin,
+        seen=filled.seen,
         wind=None if wind is None else wind.later(begin),
         findings=(
-            *seen.findings, *scaled, *filled.findings, *shape.check_cover(markers, corners, where=where),
+            *seen.findings,
+            *scaled,
+            *filled.findings,
+            *shape.check_cover(markers, corners, where=where),
             *frames.lost_frames(filled.positions, where=where),
         ),
-    )  # fmt: skip
+    )
     # What is filled in is smoother than what was tracked, and would make the noise look smaller.
     seen = replace(seen, noise=sigma if filled.seen is not None or not filled.findings else _noise(seen))
     frames.check_motion(filled.positions, seen.noise or 0.0, float(np.ptp(corners, axis=0).max()), where=where)
@@ -164,11 +177,13 @@ def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[Floats,
         edge = cloth.hull(markers, where="cloth")
         size = np.ptp(edge, axis=0)
         found = Finding(
-            kind="cloth-assumed-to-end-at-markers", severity=Severity.WARNING, where="cloth",
+            kind="cloth-assumed-to-end-at-markers",
+            severity=Severity.WARNING,
+            where="cloth",
             what=f"the size of the cloth is not given; it is taken to be {size[0]:.4g} m × {size[1]:.4g} m, as far "
             "as the markers reach",
             fix="give its width and height, or its rest mesh",
-        )  # fmt: skip
+        )
         return edge, (found,)
     return (corners if cloth.area(corners) > 0 else corners[::-1]), ()
 
@@ -180,9 +195,15 @@ def _trajectory(seen: Observation, low: Floats) -> Trajectory:
     # Rounded, so that recordings of one rate and of different lengths have the same one to the last bit.
     rate = float(f"{(len(seen.times) - 1) / float(seen.times[-1] - seen.times[0]):.9g}")
     return Trajectory(
-        name=seen.name, markers=seen.markers - low, positions=seen.positions, rate=rate, wind=seen.wind,
-        noise=_noise(seen), source=seen.source, seen=seen.seen,
-    )  # fmt: skip
+        name=seen.name,
+        markers=seen.markers - low,
+        positions=seen.positions,
+        rate=rate,
+        wind=seen.wind,
+        noise=_noise(seen),
+        source=seen.source,
+        seen=seen.seen,
+    )
 
 
 def _material(known: Sequence[Known], setup: Setup) -> Material:
@@ -191,9 +212,10 @@ def _material(known: Sequence[Known], setup: Setup) -> Material:
     given = [k.material for k in known if k.material is not None]
     if not given:
         raise InputError(
-            "the material is not known, or not one of the catalog", where="cloth",
+            "the material is not known, or not one of the catalog",
+            where="cloth",
             fix="name one of the catalog (--material), or a file in a recipe ([material] file)",
-        )  # fmt: skip
+        )
     first = given[0]
     for other in given[1:]:
         same = (first.density, first.damping) == (other.density, other.damping)
@@ -201,8 +223,9 @@ def _material(known: Sequence[Known], setup: Setup) -> Material:
         if not same or not all(np.array_equal(a, b) for a, b in tables):
             raise InputError(
                 f"recordings of two materials, {first.name!r} and {other.name!r}",
-                where="cloth", fix="take recordings of one cloth, or say by the setup which material it is",
-            )  # fmt: skip
+                where="cloth",
+                fix="take recordings of one cloth, or say by the setup which material it is",
+            )
     return first
 
 
@@ -215,9 +238,10 @@ def _pins(known: Sequence[Known], setup: Setup, low: Floats) -> Hold | Floats:
     given = [k.pins for k in known if k.pins is not None]
     if not given:
         raise InputError(
-            "where the cloth is held is not known", where="cloth",
+            "where the cloth is held is not known",
+            where="cloth",
             fix=f"name its pins (--pins): {', '.join(Hold)}, or their rest coordinates",
-        )  # fmt: skip
+        )
     for other in given[1:]:
         if other.shape != given[0].shape or not np.allclose(other, given[0]):
             raise InputError(
@@ -237,6 +261,7 @@ def _agreed(known: Sequence[T | None], given: T | None, default: T, what: str) -
     if any(value != said[0] for value in said[1:]):
         raise InputError(
             f"recordings of different {what}: {', '.join(map(repr, said))}",
-            where="experiment", fix="take recordings of one set-up, or say by the setup which it is",
-        )  # fmt: skip
+            where="experiment",
+            fix="take recordings of one set-up, or say by the setup which it is",
+        )
     return said[0] if said else default

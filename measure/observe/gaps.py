@@ -60,9 +60,12 @@ def fill(trajectory: Trajectory) -> tuple[Trajectory, tuple[Finding, ...]]:
         trajectory.positions, trajectory.markers, period=1 / trajectory.rate, where=f"recording {trajectory.name!r}"
     )
     complete = replace(
-        trajectory, markers=trajectory.markers[filled.markers], positions=filled.positions, seen=filled.seen,
+        trajectory,
+        markers=trajectory.markers[filled.markers],
+        positions=filled.positions,
+        seen=filled.seen,
         wind=trajectory.wind.later(filled.frames.start / trajectory.rate),
-    )  # fmt: skip
+    )
     return complete, filled.findings
 
 
@@ -90,10 +93,15 @@ def fill_positions(positions: Floats, markers: Floats, *, period: float, where: 
     found: list[Finding] = []
     cut = len(tracked) - (frames.stop - frames.start)
     if cut:
-        found.append(Finding(
-            kind="recording-cut", severity=Severity.WARNING, where=where, count=cut,
-            what=f"{cut} frames at its ends are left out, in which clearly fewer markers were tracked than usually",
-        ))  # fmt: skip
+        found.append(
+            Finding(
+                kind="recording-cut",
+                severity=Severity.WARNING,
+                where=where,
+                count=cut,
+                what=f"{cut} frames at its ends are left out, in which clearly fewer markers were tracked than usually",
+            )
+        )
     tracked = tracked[frames]
     kept = tracked.mean(axis=0) >= _LEAST
     lost = int((~kept).sum())
@@ -101,27 +109,41 @@ def fill_positions(positions: Floats, markers: Floats, *, period: float, where: 
         marker = int(np.flatnonzero(~kept)[0])
         raise InputError(
             f"{lost} of {len(kept)} markers were tracked in fewer than half of the frames",
-            where=f"{where}, marker {marker}", fix="track them again, or cut the recording to where they are tracked",
-        )  # fmt: skip
+            where=f"{where}, marker {marker}",
+            fix="track them again, or cut the recording to where they are tracked",
+        )
     if lost:
-        found.append(Finding(
-            kind="markers-left-out", severity=Severity.WARNING, where=f"{where}, marker {int(np.argmin(kept))}",
-            count=lost, what=f"{lost} of {len(kept)} markers were tracked in fewer than half of the frames: left out",
-            fix="track them again, if they matter",
-        ))  # fmt: skip
+        found.append(
+            Finding(
+                kind="markers-left-out",
+                severity=Severity.WARNING,
+                where=f"{where}, marker {int(np.argmin(kept))}",
+                count=lost,
+                what=f"{lost} of {len(kept)} markers were tracked in fewer than half of the frames: left out",
+                fix="track them again, if they matter",
+            )
+        )
     there = tracked[:, kept]
     missing = int((~there).sum())
     if not missing:
         return Filled(
-            frames=frames, markers=kept, positions=np.array(positions[frames][:, kept]), seen=None,
+            frames=frames,
+            markers=kept,
+            positions=np.array(positions[frames][:, kept]),
+            seen=None,
             findings=tuple(found),
-        )  # fmt: skip
-    found.append(Finding(
-        kind="markers-missing", severity=Severity.WARNING, where=f"{where}, frame {frames.start + _first(~there)}",
-        count=missing, value=missing / there.size,
-        what=f"{missing} positions ({100 * missing / there.size:.2g} %) were not tracked; predictions are not compared "
-        "with them",
-    ))  # fmt: skip
+        )
+    found.append(
+        Finding(
+            kind="markers-missing",
+            severity=Severity.WARNING,
+            where=f"{where}, frame {frames.start + _first(~there)}",
+            count=missing,
+            value=missing / there.size,
+            what=f"{missing} positions ({100 * missing / there.size:.2g} %) were not tracked; predictions are not "
+            "compared with them",
+        )
+    )
     whole = _filled(positions[frames][:, kept], there, markers[kept], frames_of(LONGEST, period))
     return Filled(frames=frames, markers=kept, positions=whole, seen=there, findings=tuple(found))
 

@@ -35,9 +35,10 @@ def onto(source_rest: NDArray[np.float64], target_rest: NDArray[np.float64]) -> 
     for name, rest in (("source", source), ("target", target)):
         if rest.ndim != 2 or rest.shape[1] != 2 or not np.isfinite(rest).all():
             raise InputError(
-                f"{name} points of shape {rest.shape}, or not finite", where="interpolation",
+                f"{name} points of shape {rest.shape}, or not finite",
+                where="interpolation",
                 fix="give (point, 2) finite metres",
-            )  # fmt: skip
+            )
     return _matrix(source.tobytes(), target.tobytes())
 
 

@@ -33,15 +33,19 @@ def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None) ->
     """
     if artifact.kind is not Kind.MARKERS or artifact.object is None:
         raise InputError(
-            f"a {artifact.kind.value}, not markers", where=f"artifact {artifact.id}",
+            f"a {artifact.kind.value}, not markers",
+            where=f"artifact {artifact.id}",
             fix="name a marker artifact; flagdata ls lists them",
-        )  # fmt: skip
+        )
     sequence = read_markers(lake.whole_object(artifact.object))  # damage must not be measured
     return _observation(sequence, name=name or artifact.name, source=artifact.id)
 
 
 def _observation(sequence: MarkerSequence, *, name: str, source: str = "") -> Observation:
     return Observation(
-        name=name, markers=sequence.rest, positions=sequence.positions, source=source,
+        name=name,
+        markers=sequence.rest,
+        positions=sequence.positions,
+        source=source,
         times=(sequence.time - sequence.time[0]).astype(np.float64) / NANOSECONDS,
-    )  # fmt: skip
+    )

@@ -48,10 +48,13 @@ def from_folder(
     if rate is None or not isinstance(stated, int | float) or abs(rate * stated - 1) < _SAME_RATE:
         return seen
     found = Finding(
-        kind="rate-not-as-described", severity=Severity.WARNING, where=f"recording {seen.name!r}", value=1 / stated,
+        kind="rate-not-as-described",
+        severity=Severity.WARNING,
+        where=f"recording {seen.name!r}",
+        value=1 / stated,
         what=f"frames are taken at {rate:.6g} Hz, conf.json says {1 / stated:.6g} Hz",
         fix="leave the rate out, if conf.json is right",
-    )  # fmt: skip
+    )
     return replace(seen, findings=(*seen.findings, found))
 
 
@@ -64,9 +67,10 @@ def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None, ma
     """
     if artifact.kind is not Kind.MESHES or artifact.object is None:
         raise InputError(
-            f"a {artifact.kind.value}, not a mesh sequence", where=f"artifact {artifact.id}",
+            f"a {artifact.kind.value}, not a mesh sequence",
+            where=f"artifact {artifact.id}",
             fix="name a mesh sequence; flagdata ls lists them",
-        )  # fmt: skip
+        )
     sequence = read_meshes(lake.whole_object(artifact.object))  # damage must not be measured
     seen = from_sequence(sequence, name=name or artifact.name, markers=markers)
     first = sequence.frame(0).rest.astype(np.float64)
@@ -97,9 +101,14 @@ def from_sequence(sequence: MeshSequence | RaggedMeshSequence, *, name: str, mar
         seats, positions = mesh.rest, sample(sequence, mesh.rest)
         found = (*found, _resampled(len(seats), remeshed=not fixed, where=where))
     return Observation(
-        name=name, markers=seats, positions=positions, times=(sequence.time - sequence.time[0]) / NANOSECONDS,
-        outline=corners, known=known, findings=found,
-    )  # fmt: skip
+        name=name,
+        markers=seats,
+        positions=positions,
+        times=(sequence.time - sequence.time[0]) / NANOSECONDS,
+        outline=corners,
+        known=known,
+        findings=found,
+    )
 
 
 def _described(attributes: Mapping[str, Any], rest: Any, where: str) -> tuple[Known, tuple[Finding, ...]]:
@@ -112,6 +121,9 @@ def _described(attributes: Mapping[str, Any], rest: Any, where: str) -> tuple[Kn
 def _resampled(count: int, *, remeshed: bool, where: str) -> Finding:
     why = "its topology changes" if remeshed else f"it has more than {MARKERS} vertices"
     return Finding(
-        kind="mesh-resampled", severity=Severity.NOTE, where=where, count=count,
+        kind="mesh-resampled",
+        severity=Severity.NOTE,
+        where=where,
+        count=count,
         what=f"the mesh is followed at {count} fixed points of the cloth, since {why}",
-    )  # fmt: skip
+    )

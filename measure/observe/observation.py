@@ -99,8 +99,9 @@ class Observation:
         if len(markers) != 2 or markers[1] != 2 or np.shape(self.positions) != (*frames, markers[0], 3):
             raise InputError(
                 f"{frames} times and markers of shape {markers} with positions of shape {np.shape(self.positions)}",
-                where=where, fix="give (frame,), (marker, 2) and (frame, marker, 3)",
-            )  # fmt: skip
+                where=where,
+                fix="give (frame,), (marker, 2) and (frame, marker, 3)",
+            )
         if not np.isfinite(self.times).all() or (np.diff(self.times) <= 0).any():
             raise InputError("its times do not increase", where=where, fix="sort the frames by time, each once")
 
@@ -145,7 +146,12 @@ def from_arrays(
     if faces is not None:
         corners = outline(rest, np.asarray(faces, dtype=np.int64), where=f"recording {name!r}")
     return Observation(
-        name=name, markers=rest, positions=positions,
-        times=np.arange(len(positions)) / rate, wind=wind, noise=noise, known=known or Known(),
+        name=name,
+        markers=rest,
+        positions=positions,
+        times=np.arange(len(positions)) / rate,
+        wind=wind,
+        noise=noise,
+        known=known or Known(),
         outline=corners,
-    )  # fmt: skip
+    )

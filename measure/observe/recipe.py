@@ -147,11 +147,14 @@ def parse(path: Path) -> ExperimentRecipe:
     folder = path.parent
     test = top.table("test")
     recipe = ExperimentRecipe(
-        title=top.text("title", path.stem) or path.stem, up=top.choice("up", Up.Z), folder=folder,
-        setup=_setup(top, folder), recordings=tuple(_recording(table, folder) for table in top.tables("recording")),
+        title=top.text("title", path.stem) or path.stem,
+        up=top.choice("up", Up.Z),
+        folder=folder,
+        setup=_setup(top, folder),
+        recordings=tuple(_recording(table, folder) for table in top.tables("recording")),
         level=test.number("level", 0.0, above=0.0) if "level" in test else None,
         nulls=test.whole("nulls", 0, least=1) if "nulls" in test else None,
-    )  # fmt: skip
+    )
     test.done()
     top.done()
     return recipe
@@ -200,9 +203,17 @@ def _setup(top: Table, folder: Path) -> Setup:
         )
     air.done()
     return Setup(
-        material=_material(stuff, folder), mass_known=mass_known, density_uncertainty=uncertainty,
-        outline=corners, pins=pins, carried=carried, stiffness=stiffness, gravity=gravity, air=force, vertices=vertices,
-    )  # fmt: skip
+        material=_material(stuff, folder),
+        mass_known=mass_known,
+        density_uncertainty=uncertainty,
+        outline=corners,
+        pins=pins,
+        carried=carried,
+        stiffness=stiffness,
+        gravity=gravity,
+        air=force,
+        vertices=vertices,
+    )
 
 
 def _weighed(stuff: Table) -> tuple[bool, float]:
@@ -212,9 +223,10 @@ def _weighed(stuff: Table) -> tuple[bool, float]:
         return not unknown, DENSITY_UNCERTAINTY
     if unknown:
         raise UsageError(
-            "both mass-unknown and a density-uncertainty are given", where=stuff.where,
+            "both mass-unknown and a density-uncertainty are given",
+            where=stuff.where,
             fix="keep mass-unknown for a cloth that nobody weighed, density-uncertainty for one whose density is known",
-        )  # fmt: skip
+        )
     return True, stuff.number("density-uncertainty", DENSITY_UNCERTAINTY, above=0.0)
 
 
@@ -252,9 +264,10 @@ def _material(table: Table, folder: Path) -> Material | None:
         bending=thicken * table.number("bending-factor", 1.0, least=0.0),
     )
     made = replace(
-        made, density=table.number("density", made.density, above=0.0),
+        made,
+        density=table.number("density", made.density, above=0.0),
         damping=table.number("damping", made.damping, least=0.0),
-    )  # fmt: skip
+    )
     table.done()
     return made
 
@@ -263,9 +276,11 @@ def _recording(table: Table, folder: Path) -> RecordingSource:
     if not table.text("source", None):
         raise InputError("no source is named", where=table.where, fix="add source, an artifact's id or a path")
     return table.record(
-        RecordingSource, {"wind": lambda: _wind(table.table("wind"), folder) if "wind" in table else None},
-        rate=POSITIVE, noise=NOT_NEGATIVE,
-    )  # fmt: skip
+        RecordingSource,
+        {"wind": lambda: _wind(table.table("wind"), folder) if "wind" in table else None},
+        rate=POSITIVE,
+        noise=NOT_NEGATIVE,
+    )
 
 
 def _wind(table: Table, folder: Path) -> WindSource:
@@ -284,10 +299,11 @@ def _wind(table: Table, folder: Path) -> WindSource:
         axis = _triple(table, "axis", table.numbers("axis"))
         start = table.text("start", None)
         placement = LogPlacement(
-            axis=axis, north=table.one_angle("north", 0.0) if _stated(table, "north") else None,
+            axis=axis,
+            north=table.one_angle("north", 0.0) if _stated(table, "north") else None,
             offset=table.number("offset", 0.0) if "offset" in table else None,
             start=timebase.parse(start, where=f"{table.where} start") if start is not None else None,
-        )  # fmt: skip
+        )
         sensor = table.text("sensor", None)
         if sensor is not None and (folder / local_path(sensor)).is_file():
             sensor = str(folder / sensor)
@@ -377,9 +393,10 @@ def _refuse(source: RecordingSource, keys: tuple[str, ...], what: str) -> None:
 def _take(found: tuple[Observation, ...], source: RecordingSource) -> Observation:
     if not source.take and len(found) > 1:
         raise UsageError(
-            f"the table holds {len(found)} recordings", where=source.source,
+            f"the table holds {len(found)} recordings",
+            where=source.source,
             fix=f"add take, one of {', '.join(seen.name for seen in found)}",
-        )  # fmt: skip
+        )
     for seen in found:
         if seen.name == source.take or not source.take:
             return seen
@@ -396,7 +413,7 @@ def _track(source: WindSource, folder: Path, lake: Lake | None) -> tuple[WindTra
     if source.options not in (None, WindOptions()):
         raise UsageError(
             "an artifact's wind was read before", where=source.log, fix="leave the sensor and the zone out"
-        )  # fmt: skip
+        )
     if lake is None:
         raise NotFoundError("no such log", where=source.log, fix="check the path, or open a lake for ids")
     return wind.from_artifact(lake, lake.artifact(source.log, kinds=(Kind.WIND,)), placement)

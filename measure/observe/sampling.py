@@ -64,8 +64,9 @@ def locate(rest: NDArray[np.float64], faces: NDArray[np.int64], points: NDArray[
             u, v = points[lost]
             raise InputError(
                 f"the point (u, v) = ({u:.4g}, {v:.4g}) m is on no face of the cloth",
-                where=where, fix="give points within the rest shape, in its own coordinates",
-            )  # fmt: skip
+                where=where,
+                fix="give points within the rest shape, in its own coordinates",
+            )
         found[first : first + step] = best
         second, third = second[rows, best], third[rows, best]
         weights[first : first + step] = np.stack([1 - second - third, second, third], axis=1)

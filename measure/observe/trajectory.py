@@ -54,13 +54,15 @@ class WindTrack:
         if times.ndim != 1 or velocity.shape != (len(times), 3) or not len(times):
             raise InputError(
                 f"{times.shape} times with velocities of shape {velocity.shape}",
-                where="wind", fix="give (n,) seconds and (n, 3) m/s",
-            )  # fmt: skip
+                where="wind",
+                fix="give (n,) seconds and (n, 3) m/s",
+            )
         if not (np.isfinite(times).all() and np.isfinite(velocity).all()) or (np.diff(times) <= 0).any():
             raise InputError(
-                "times that do not increase, or a value that is not finite", where="wind",
+                "times that do not increase, or a value that is not finite",
+                where="wind",
                 fix="sort the log and leave its gaps out",
-            )  # fmt: skip
+            )
         if not all(0 <= deviation < math.inf for deviation in self.uncertainty):
             raise InputError(
                 f"standard deviations of {self.uncertainty}", where="wind", fix="give gain, direction and clock, or 0"
@@ -116,14 +118,16 @@ class AttachmentTrack:
         times, places = _frozen(self.times), _frozen(self.places)
         if times.ndim != 1 or not len(times) or places.ndim != 3 or places.shape[::2] != (len(times), 3):
             raise InputError(
-                f"{times.shape} times with places of shape {places.shape}", where="attachments",
+                f"{times.shape} times with places of shape {places.shape}",
+                where="attachments",
                 fix="give (n,) seconds and (n, held, 3) metres",
-            )  # fmt: skip
+            )
         if not (np.isfinite(times).all() and np.isfinite(places).all()) or (np.diff(times) <= 0).any():
             raise InputError(
-                "times that do not increase, or a value that is not finite", where="attachments",
+                "times that do not increase, or a value that is not finite",
+                where="attachments",
                 fix="sort the track and fill its gaps",
-            )  # fmt: skip
+            )
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "places", places)
 
@@ -170,8 +174,9 @@ class Trajectory:
         if markers.ndim != 2 or markers.shape[1] != 2 or positions.shape[1:] != (len(markers), 3):
             raise InputError(
                 f"markers of shape {markers.shape} with positions of shape {positions.shape}",
-                where=where, fix="give (marker, 2) and (frame, marker, 3), in metres",
-            )  # fmt: skip
+                where=where,
+                fix="give (marker, 2) and (frame, marker, 3), in metres",
+            )
         if not np.isfinite(markers).all() or np.isinf(positions).any():
             raise InputError("a coordinate is not finite", where=where, fix="mark points that were lost by NaN")
         if not (np.isfinite(self.rate) and self.rate > 0):
@@ -180,16 +185,18 @@ class Trajectory:
             raise InputError(f"a noise of {self.noise!r} m", where=where, fix="give at least 0 metres")
         if self.seen is not None and self.seen.shape != positions.shape[:2]:
             raise InputError(
-                f"a mask of shape {self.seen.shape} with positions of shape {positions.shape}", where=where,
+                f"a mask of shape {self.seen.shape} with positions of shape {positions.shape}",
+                where=where,
                 fix="give (frame, marker)",
-            )  # fmt: skip
+            )
         if self.attachments is not None:
             held = _frozen(self.attachments)
             if held.ndim != 3 or held.shape[::2] != (len(positions), 3) or not np.isfinite(held).all():
                 raise InputError(
                     f"attachments of shape {held.shape}, or not finite, with positions of shape {positions.shape}",
-                    where=where, fix="give (frame, held, 3), in metres, without gaps",
-                )  # fmt: skip
+                    where=where,
+                    fix="give (frame, held, 3), in metres, without gaps",
+                )
             object.__setattr__(self, "attachments", held)
         object.__setattr__(self, "markers", markers)
         object.__setattr__(self, "positions", positions)
@@ -241,8 +248,9 @@ class Specimen:
         if not self.held or anchors.shape != (len(self.held), 3) or not np.isfinite(anchors).all():
             raise InputError(
                 f"{len(self.held)} attachments with anchors of shape {anchors.shape}",
-                where="specimen", fix="give one finite (x, y, z) for each attached vertex",
-            )  # fmt: skip
+                where="specimen",
+                fix="give one finite (x, y, z) for each attached vertex",
+            )
         object.__setattr__(self, "anchors", anchors)
 
     @property
@@ -277,8 +285,9 @@ class Experiment:
         if held not in ({None}, {len(self.specimen.held)}):
             raise InputError(
                 "recordings with and without attachments that move, or with others than the cloth's",
-                where="experiment", fix="give the tracks of all attachments in all recordings, or none",
-            )  # fmt: skip
+                where="experiment",
+                fix="give the tracks of all attachments in all recordings, or none",
+            )
         for recording in self.recordings:
             beyond = (recording.markers < rest.min(axis=0) - slack) | (recording.markers > rest.max(axis=0) + slack)
             if beyond.any():
@@ -300,12 +309,18 @@ def described(specimen: Specimen) -> tuple[dict[str, Any], list[NDArray[Any]]]:
     """Plain values and arrays that say all of a cloth and its uncertainties, to be hashed; no names and files."""
     material = specimen.material
     content: dict[str, Any] = {
-        "held": list(specimen.held), "stiffness": repr(specimen.stiffness),
-        "anchors-told": specimen.anchors_given, "gravity": list(specimen.gravity),
+        "held": list(specimen.held),
+        "stiffness": repr(specimen.stiffness),
+        "anchors-told": specimen.anchors_given,
+        "gravity": list(specimen.gravity),
         "air": [type(specimen.air).__name__, *vars(specimen.air).items()],
         "material": [material.density, material.damping],
         "density-uncertainty": specimen.density_uncertainty if specimen.mass_known else None,
-    }  # fmt: skip
+    }
     return content, [
-        specimen.mesh.rest, specimen.mesh.faces, specimen.anchors, material.stretching, material.bending,
-    ]  # fmt: skip
+        specimen.mesh.rest,
+        specimen.mesh.faces,
+        specimen.anchors,
+        material.stretching,
+        material.bending,
+    ]

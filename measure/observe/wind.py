@@ -76,24 +76,37 @@ def track(series: WindSeries, placement: LogPlacement, *, where: str) -> tuple[W
     times = (series.time[good] - begin) / NANOSECONDS
     found: list[Finding] = []
     if placement.offset is None and placement.start is None:
-        found.append(Finding(
-            kind="clock-of-wind-assumed", severity=Severity.WARNING, where=where,
-            what=f"the first frame is taken to be at the log's first sample, {iso(begin)}",
-            fix="give the first frame's instant on the log's clock",
-        ))  # fmt: skip
+        found.append(
+            Finding(
+                kind="clock-of-wind-assumed",
+                severity=Severity.WARNING,
+                where=where,
+                what=f"the first frame is taken to be at the log's first sample, {iso(begin)}",
+                fix="give the first frame's instant on the log's clock",
+            )
+        )
     left = int((~good).sum())
     if left:
-        found.append(Finding(
-            kind="wind-samples-left-out", severity=Severity.NOTE, where=where, count=left,
-            what=f"{left} of {len(good)} samples of the wind are unusable and left out",
-        ))  # fmt: skip
+        found.append(
+            Finding(
+                kind="wind-samples-left-out",
+                severity=Severity.NOTE,
+                where=where,
+                count=left,
+                what=f"{left} of {len(good)} samples of the wind are unusable and left out",
+            )
+        )
     gap = float(np.diff(times).max(initial=0.0))
     if gap > _LONG_GAP:
-        found.append(Finding(
-            kind="wind-gap", severity=Severity.WARNING, value=gap,
-            where=f"{where}, {times[int(np.diff(times).argmax())]:.4g} s after the first frame",
-            what=f"no usable sample of the wind for {gap:.3g} s; it is taken to change evenly",
-        ))  # fmt: skip
+        found.append(
+            Finding(
+                kind="wind-gap",
+                severity=Severity.WARNING,
+                value=gap,
+                where=f"{where}, {times[int(np.diff(times).argmax())]:.4g} s after the first frame",
+                what=f"no usable sample of the wind for {gap:.3g} s; it is taken to change evenly",
+            )
+        )
     return WindTrack(times=times, velocity=velocity[good]), tuple(found)
 
 
@@ -154,9 +167,10 @@ def _velocity(series: WindSeries, placement: LogPlacement, *, where: str) -> Flo
     if "wind_direction" in channels and "wind_speed" in channels:
         if placement.north is None:
             raise UsageError(
-                "the log has directions, but where north lies in the recording is not said", where=where,
+                "the log has directions, but where north lies in the recording is not said",
+                where=where,
                 fix="give north, the angle from +x towards +y, or the axis along which the air goes",
-            )  # fmt: skip
+            )
         # The direction it comes from is clockwise from north, angles from +x are counter-clockwise.
         heading = placement.north - channels["wind_direction"] + math.pi
         upward = channels.get("wind_z", np.zeros(len(series)))
@@ -166,14 +180,16 @@ def _velocity(series: WindSeries, placement: LogPlacement, *, where: str) -> Flo
     if "wind_x" in channels and "wind_y" in channels:
         if placement.north is not None:
             raise UsageError(
-                "the log has components in the sensor's axes, to which north says nothing", where=where,
+                "the log has components in the sensor's axes, to which north says nothing",
+                where=where,
                 fix="leave north out and turn the recording into the sensor's axes, or give an axis",
-            )  # fmt: skip
+            )
         return np.stack([channels.get(name, np.zeros(len(series))) for name in _COMPONENTS], axis=1)
     raise InputError(
-        f"the log gives no direction: {', '.join(sorted(channels))}", where=where,
+        f"the log gives no direction: {', '.join(sorted(channels))}",
+        where=where,
         fix="give the axis along which the air goes",
-    )  # fmt: skip
+    )
 
 
 def _speed(series: WindSeries, where: str) -> Floats:

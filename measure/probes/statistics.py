@@ -156,10 +156,12 @@ def projected(
         along.append(own)
     whole = Projection(
         directions=torch.cat([own.directions for own in along]),
-        scale=torch.cat([piece.scale for piece in pieces], dim=1), spectrum=_spectrum(forecaster, segments),
+        scale=torch.cat([piece.scale for piece in pieces], dim=1),
+        spectrum=_spectrum(forecaster, segments),
         pole_moment=PoleMoment.joined([piece.pole_moment for piece in pieces]),
-        turning=torch.cat([piece.turning for piece in pieces]), gauge=Gauge.joined([piece.gauge for piece in pieces]),
-    )  # fmt: skip
+        turning=torch.cat([piece.turning for piece in pieces]),
+        gauge=Gauge.joined([piece.gauge for piece in pieces]),
+    )
     return Statistics.joined(parts), whole
 
 
@@ -196,13 +198,21 @@ def _pieces(
         turned, turning = _turned(pole_moment, base, changes, recording)
         found = replace(
             reduced(base, changes, recording, own.noise, own.counted),
-            lines=_spectrum(forecaster, own).prominence(base), turning=turned,
+            lines=_spectrum(forecaster, own).prominence(base),
+            turning=turned,
             course=gauge.course(_clipped(base, scale)),
-        )  # fmt: skip
+        )
         yield _Piece(
-            segments=own, calibrations=starts, base=base, changes=changes, scale=scale, pole_moment=pole_moment,
-            turning=turning, gauge=gauge, found=found,
-        )  # fmt: skip
+            segments=own,
+            calibrations=starts,
+            base=base,
+            changes=changes,
+            scale=scale,
+            pole_moment=pole_moment,
+            turning=turning,
+            gauge=gauge,
+            found=found,
+        )
 
 
 def _with_log(piece: _Piece, along: Projection, off: Sequence[Tensor]) -> Statistics:
@@ -232,9 +242,12 @@ def _turned(
     directions = moved / moved.norm(dim=2, keepdim=True).clamp(min=1e-9)
     size = ((moment * pole_moment.scale) ** 2).mean(0).cpu().numpy()
     return Statistics(
-        recording=recording, r=torch.einsum("scf,fs->sc", directions, moment).cpu().numpy(),
-        response=(directions @ moved.transpose(1, 2)).cpu().numpy(), error=size, marker_error=size[:, None],
-    ), directions  # fmt: skip
+        recording=recording,
+        r=torch.einsum("scf,fs->sc", directions, moment).cpu().numpy(),
+        response=(directions @ moved.transpose(1, 2)).cpu().numpy(),
+        error=size,
+        marker_error=size[:, None],
+    ), directions
 
 
 def _spectrum(forecaster: Forecaster, segments: Segments) -> Spectrum:
@@ -311,6 +324,9 @@ def reduced(
         r[place] = (moved @ error).cpu().numpy() / length
         response[place] = inner / length[:, None]
     return Statistics(
-        recording=recording, r=r, response=response, error=mean.mean(0).double().cpu().numpy() * 3,
+        recording=recording,
+        r=r,
+        response=response,
+        error=mean.mean(0).double().cpu().numpy() * 3,
         marker_error=mean.T.double().cpu().numpy() * 3,
-    )  # fmt: skip
+    )

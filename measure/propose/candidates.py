@@ -42,11 +42,13 @@ def from_file(spec: str) -> tuple[FileColumn, ...]:
     described = effect.parameters()
     return tuple(
         FileColumn(
-            effect=effect.__name__, parameter=name, spec=spec,
+            effect=effect.__name__,
+            parameter=name,
+            spec=spec,
             step=max(described[name].prior, key=lambda end: abs(end - described[name].null)) / 2,
         )
         for name in effect.strengths()
-    )  # fmt: skip
+    )
 
 
 def weighed(name: str) -> EffectColumn:

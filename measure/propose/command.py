@@ -23,10 +23,20 @@ if TYPE_CHECKING:
     "--known", multiple=True, metavar="EFFECT.STRENGTH", help="Effect that the model has already; may be repeated."
 )
 @null_options(level="Significance level of the test of every term; 0.05 by default.")
-@click.option("--lake", "lake_path", type=LakePlace(), envvar="FLAGDATA_LAKE",
-              help="Lake that artifacts are read from; also FLAGDATA_LAKE.")  # fmt: skip
-@click.option("--out", type=LocalPath(), default=Path("out/close-loop"), show_default=True,
-              help="Folder in which proposal/ is written: the effect file, its tests and proposals.json.")  # fmt: skip
+@click.option(
+    "--lake",
+    "lake_path",
+    type=LakePlace(),
+    envvar="FLAGDATA_LAKE",
+    help="Lake that artifacts are read from; also FLAGDATA_LAKE.",
+)
+@click.option(
+    "--out",
+    type=LocalPath(),
+    default=Path("out/close-loop"),
+    show_default=True,
+    help="Folder in which proposal/ is written: the effect file, its tests and proposals.json.",
+)
 @json_option
 def propose(
     recipe_path: Path,
@@ -76,9 +86,13 @@ def propose(
     recordings, cloth = observed.experiment.recordings, observed.experiment.specimen
     say(of_recordings(recordings, cloth.mesh.vertex_count, options, workers=options.workers))
     outcome = seek(
-        observed.experiment, tried, known=[candidates.weighed(name) for name in known],
-        controls=controls, options=options, stage=stage_bars(),
-    )  # fmt: skip
+        observed.experiment,
+        tried,
+        known=[candidates.weighed(name) for name in known],
+        controls=controls,
+        options=options,
+        stage=stage_bars(),
+    )
     spec = effect or ""
     if effect is None and outcome.strengths:
         spec = effect_file.write(outcome, folder).spec

@@ -58,10 +58,15 @@ def course(setting: Setting, model: Model, place: int) -> Course:
     speeds = [float(u) for u in setting.speeds]
     height = float(np.ptp(setting.experiment.specimen.mesh.rest[:, 1]))
     return Course(
-        bin=stretch * period, times=[t.tolist() for t in times], amplitudes=[a.tolist() for a in binned],
-        by_recording=by_recording, speeds=speeds, fluctuation=spread, lines=lines,
+        bin=stretch * period,
+        times=[t.tolist() for t in times],
+        amplitudes=[a.tolist() for a in binned],
+        by_recording=by_recording,
+        speeds=speeds,
+        fluctuation=spread,
+        lines=lines,
         words=_words(by_recording, speeds, spread, lines, height),
-    )  # fmt: skip
+    )
 
 
 def _amplitudes(

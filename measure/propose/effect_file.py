@@ -55,15 +55,25 @@ def write(outcome: Outcome, folder: Path) -> EffectFile:
     forces, masses = [p for p in parts if not p["mass"]], [p for p in parts if p["mass"]]
     pieces = (("FieldEffect",) if forces else ()) + (("Flat",) if masses else ()) + (("Seen",) if forces else ())
     values: Mapping[str, Any] = {
-        "forces": forces, "masses": masses, "pieces": ", ".join([*pieces, *(["heavier"] if masses else [])]),
-        "title": _sentence([s.words for s in outcome.strengths]), "data": outcome.proposed_from, "strengths": parts,
-        "class_name": class_name, "module": module, "name": module.replace("_", "-"),
+        "forces": forces,
+        "masses": masses,
+        "pieces": ", ".join([*pieces, *(["heavier"] if masses else [])]),
+        "title": _sentence([s.words for s in outcome.strengths]),
+        "data": outcome.proposed_from,
+        "strengths": parts,
+        "class_name": class_name,
+        "module": module,
+        "name": module.replace("_", "-"),
         "source": f"from zero to the fit and its interval beyond; fitted to data {short}",
-    }  # fmt: skip
+    }
     environment = Environment(
-        loader=PackageLoader("measure.propose", "templates"), undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True, keep_trailing_newline=True, autoescape=False,
-    )  # fmt: skip
+        loader=PackageLoader("measure.propose", "templates"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
     templates = {
         f"{module}.py": "effect.py.j2",
         f"test_{module}.py": "test_effect.py.j2",
@@ -99,11 +109,18 @@ def _part(strength: Strength) -> dict[str, Any]:
     least, _ = TermColumn.of(term).described.admissible
     prior = (max(least, min(0.0, estimate.value - reach)), max(0.0, estimate.value + reach))
     return {
-        "name": strength.name, "field": term.field, "shape": term.at.code, "mass": term.field == MASS,
-        "unit": estimate.unit, "words": strength.words,
-        "value": f"{estimate.value:.6g}", "low": f"{estimate.low:.3g}", "high": f"{estimate.high:.3g}",
-        "level": f"{100 * estimate.level:.0f} %", "prior": tuple(f"{v:#.4g}" for v in prior),
-    }  # fmt: skip
+        "name": strength.name,
+        "field": term.field,
+        "shape": term.at.code,
+        "mass": term.field == MASS,
+        "unit": estimate.unit,
+        "words": strength.words,
+        "value": f"{estimate.value:.6g}",
+        "low": f"{estimate.low:.3g}",
+        "high": f"{estimate.high:.3g}",
+        "level": f"{100 * estimate.level:.0f} %",
+        "prior": tuple(f"{v:#.4g}" for v in prior),
+    }
 
 
 def _sentence(words: Sequence[str]) -> str:

@@ -62,9 +62,11 @@ class ProjectedSegments:
     def select(self, chosen: NDArray[np.int64]) -> ProjectedSegments:
         """The same for some segments only."""
         return replace(
-            self, segments=self.segments.select(chosen), base=self.base[..., chosen],
+            self,
+            segments=self.segments.select(chosen),
+            base=self.base[..., chosen],
             directions=tuple(direction[..., chosen] for direction in self.directions),
-        )  # fmt: skip
+        )
 
     def whitened(self, null: NullModel, of_recordings: Floats) -> WhitenedMisfit:
         """Misfit of the projected errors, whitened by the null model; `of_recordings` are wind speeds [m/s]."""
@@ -74,8 +76,9 @@ class ProjectedSegments:
             projection=Projection.along(
                 self.directions, error_scale(self.base, recording, noise, self.segments.counted)
             ),
-            null=null, speeds=self.speeds(of_recordings),
-        )  # fmt: skip
+            null=null,
+            speeds=self.speeds(of_recordings),
+        )
 
     @property
     def calibrated(self) -> Statistics:

@@ -87,8 +87,9 @@ def made_ready(experiment: Experiment) -> Setting:
     if setting.speeds[slowest] < _CALM:
         raise InputError(
             f"its wind is {setting.speeds[slowest]:.2g} m/s: it has no direction",
-            where=f"recording {experiment.recordings[slowest].name!r}", fix="leave the calm recording out",
-        )  # fmt: skip
+            where=f"recording {experiment.recordings[slowest].name!r}",
+            fix="leave the calm recording out",
+        )
     return setting
 
 
@@ -148,21 +149,34 @@ def weigh(
         unlike = [column for column in physical if _kind(tried.columns[column - len(THETA)]) not in kinds]
         instead = wrong(own, unlike, [step.column for step in taken], beside)
         tested = retest(
-            setting, whole.whitened(null, setting.speeds), parts.seen, before.model, after.model, words=parts.words,
+            setting,
+            whole.whitened(null, setting.speeds),
+            parts.seen,
+            before.model,
+            after.model,
+            words=parts.words,
             seed=options.seed,
             control=fitted([*beside, *instead]).model if instead else None,
             control_names=[labels[column] for column in instead],
-        )  # fmt: skip
+        )
         strengths = _strengths(setting, own, family, taken, beside, after)
         decision, reason = tested.decided
         stage("test on untouched data", 1, 1)
     return Outcome(
-        decision=decision, reason=reason, steps=steps, tried=len(others) - len(controls),
-        ranking=_ranking(own, family, labels, pool), strengths=strengths, retest=tested, level=options.level,
-        nulls=bank.words, proposed_from=data_hash(projected.segments),
+        decision=decision,
+        reason=reason,
+        steps=steps,
+        tried=len(others) - len(controls),
+        ranking=_ranking(own, family, labels, pool),
+        strengths=strengths,
+        retest=tested,
+        level=options.level,
+        nulls=bank.words,
+        proposed_from=data_hash(projected.segments),
         tested_on=data_hash(setting.segments.select(np.flatnonzero(~parts.seen))),
-        known=tuple(column.name for column in known), seed=options.seed,
-    )  # fmt: skip
+        known=tuple(column.name for column in known),
+        seed=options.seed,
+    )
 
 
 def _admissible(column: EffectColumn, own: Evidence, place: int, beside: Sequence[int]) -> bool:

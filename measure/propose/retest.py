@@ -46,14 +46,17 @@ def retest(
 
     first, second, recording = left(before), left(after), setting.recording[~seen]
     wrong = None if control is None else left(control)
-    _, floor = numerical_floor(
-        setting, np.unique(recording), after, copies=_FLOOR_COPIES, seed=seed
-    )  # fmt: skip
+    _, floor = numerical_floor(setting, np.unique(recording), after, copies=_FLOOR_COPIES, seed=seed)
     return Retest(
-        what=words, segments=int((~seen).sum()), before=root(first.squared), after=root(second.squared),
-        reduction=paired(first.squared, second.squared), helped=a_segment(first.misfit - second.misfit, recording),
-        floor=root(floor), share=share_removed(first.squared, second.squared, floor),
+        what=words,
+        segments=int((~seen).sum()),
+        before=root(first.squared),
+        after=root(second.squared),
+        reduction=paired(first.squared, second.squared),
+        helped=a_segment(first.misfit - second.misfit, recording),
+        floor=root(floor),
+        share=share_removed(first.squared, second.squared, floor),
         control=None if wrong is None else root(wrong.squared),
         apart=None if wrong is None else a_segment(wrong.misfit - second.misfit, recording),
         control_names=tuple(control_names),
-    )  # fmt: skip
+    )

@@ -114,10 +114,15 @@ def _best(
         reason = "it does not predict what was left out better than the model before"
     column = looked[place]
     return Step(
-        name=names[column], column=column, statistic=float(statistics[column]),
-        p_family=family.p_value(float(statistics[column]), candidates), gain=gain, gain_error=error, taken=not reason,
+        name=names[column],
+        column=column,
+        statistic=float(statistics[column]),
+        p_family=family.p_value(float(statistics[column]), candidates),
+        gain=gain,
+        gain_error=error,
+        taken=not reason,
         reason=reason,
-    )  # fmt: skip
+    )
 
 
 def wrong(evidence: Evidence, pool: Sequence[int], taken: Sequence[int], beside: Sequence[int]) -> list[int]:

@@ -49,9 +49,10 @@ def split(segments: Segments, speeds: NDArray[np.float64]) -> Split:
         words = f"all of the recording at {speeds[middle]:.1f} m/s and the last third of the others"
     if min(int(seen.sum()), int((~seen).sum())) < _LEAST:
         raise InputError(
-            f"{int(seen.sum())} segments to propose from and {int((~seen).sum())} to test on", where="propose",
+            f"{int(seen.sum())} segments to propose from and {int((~seen).sum())} to test on",
+            where="propose",
             fix=f"record for longer, or more recordings: {_LEAST} of each are needed, of up to 2 s",
-        )  # fmt: skip
+        )
     return Split(seen=seen, words=words)
 
 

@@ -83,9 +83,10 @@ def shape_named(name: str) -> Shape:
     place = () if found is None else tuple(int(part) / 100 for part in found.groups()[1:] if part is not None)
     if found is None or len(place) != (2 if found[1] == "near" else 1) or max(place) > 1:
         raise UsageError(
-            f"no shape {name!r}", where="terms",
+            f"no shape {name!r}",
+            where="terms",
             fix=f"take one of {', '.join(SHAPES)}, or near_U_V, stripe_U, band_V in hundredths from 0 to 100",
-        )  # fmt: skip
+        )
     return Shape(method=found[1], place=place, words=_LOCAL_WORDS[found[1]].format(*place))
 
 
@@ -141,12 +142,16 @@ FIELDS: dict[str, Field] = {
     ),
     "across": Field(unit="1/s", step=0.2, words="a pressure in proportion to the wind across it", shapes=_QUARTERS),
     "across_squared": Field(
-        unit="1/m", step=0.1, words="a pressure as the square of the wind across it",
+        unit="1/m",
+        step=0.1,
+        words="a pressure as the square of the wind across it",
         shapes=("hoist", "fly", "upper", "lower", "upper_fly", "lower_fly"),
     ),
     "across_even": Field(
-        unit="1/m", step=0.1, words="a pressure as the square of the wind across it, always toward one side of the "
-        "cloth", shapes=_QUARTERS,
+        unit="1/m",
+        step=0.1,
+        words="a pressure as the square of the wind across it, always toward one side of the cloth",
+        shapes=_QUARTERS,
     ),
     "rising": Field(unit="1/s", step=0.2, words="the pressure of a wind that also blows upward", shapes=_HALVES),
     "crossing": Field(unit="1/s", step=0.2, words="the pressure of a wind that also blows to the left", shapes=_HALVES),
@@ -158,13 +163,15 @@ FIELDS: dict[str, Field] = {
         unit="1/s", step=0.1, words="a friction in proportion to the wind along its width", shapes=("everywhere", "fly")
     ),
     "along_height": Field(
-        unit="1/s", step=0.1, words="a friction in proportion to the wind along its height",
+        unit="1/s",
+        step=0.1,
+        words="a friction in proportion to the wind along its height",
         shapes=("everywhere", "fly"),
     ),
     MASS: Field(
         unit="1", step=0.5, words="more mass, as a share of the cloth's", shapes=(*_PLACES, *_STRIPES, *_BANDS)
     ),
-}  # fmt: skip
+}
 """Names of fields. The wind's whole pressure and the whole mass are left out: those are the calibrated model's own."""
 
 
@@ -274,9 +281,13 @@ class TermColumn(EffectColumn):
     def described(self) -> Parameter:
         admissible = NOT_NEGATIVE if self.term.field == MASS else EVERYTHING  # nothing takes mass away
         return Parameter(
-            role=Role.STRENGTH, unit=FIELDS[self.term.field].unit, prior=(-self.step, self.step), source=_SOURCE,
-            admissible=admissible, null=0.0,
-        )  # fmt: skip
+            role=Role.STRENGTH,
+            unit=FIELDS[self.term.field].unit,
+            prior=(-self.step, self.step),
+            source=_SOURCE,
+            admissible=admissible,
+            null=0.0,
+        )
 
     def at(self, coefficient: float | Tensor) -> Effect:
         kind = TermMass if self.term.field == MASS else TermEffect

@@ -103,15 +103,24 @@ def _learned(estimator: Estimator) -> Learned:
     if not found:
         raise InputError(
             f"the model estimates {', '.join(names) or 'nothing'}, but no wind and area weight of a flag",
-            where=f"model {estimator.name!r}", fix="take the model of flags that comes with the package",
-        )  # fmt: skip
+            where=f"model {estimator.name!r}",
+            fix="take the model of flags that comes with the package",
+        )
     return found[0]
 
 
 def run(
-    clips: Sequence[Clip], estimator: Estimator, *, budget: int, seed: int, level: float, cache: Path | None = None,
-    view: View | None = None, area_weight: tuple[float, float] | None = None, aspect: float | None = None,
-) -> Refinement:  # fmt: skip
+    clips: Sequence[Clip],
+    estimator: Estimator,
+    *,
+    budget: int,
+    seed: int,
+    level: float,
+    cache: Path | None = None,
+    view: View | None = None,
+    area_weight: tuple[float, float] | None = None,
+    aspect: float | None = None,
+) -> Refinement:
     """Refine clips of one flag, with a progress bar.
 
     Args:

@@ -86,9 +86,15 @@ class Metamodel:
         coefficients = inverse @ (x * weight[:, None]).T @ summaries
         residual = summaries - x @ coefficients
         return cls(
-            centre=centre, spread=spread, coefficients=coefficients, inverse=inverse,
-            scatter=(residual * weight[:, None]).T @ residual, freedom=freedom, correlation=correlation, rows=rows,
-        )  # fmt: skip
+            centre=centre,
+            spread=spread,
+            coefficients=coefficients,
+            inverse=inverse,
+            scatter=(residual * weight[:, None]).T @ residual,
+            freedom=freedom,
+            correlation=correlation,
+            rows=rows,
+        )
 
     def log_density(self, regressors: NDArray[np.float64], observed: NDArray[np.float64]) -> NDArray[np.float64]:
         """Logarithms (m,) of the density of a summary (k,), or of one each (m, k), at regressors (m, p − 1)."""

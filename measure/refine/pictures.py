@@ -69,9 +69,13 @@ def trace_picture(refinement: Refinement, clip: int = 0) -> str:
         count = [r.evaluations for r in refinement.rounds]
         winds = [r.intervals[0] for r in refinement.rounds]
         right.fill_between(
-            count, *np.clip([(w.span.low, w.span.high) for w in winds], space.wind.low, space.wind.high).T, color=_OWN,
-            alpha=0.25, linewidth=0, label=f"{refinement.level:.0%} interval",
-        )  # fmt: skip
+            count,
+            *np.clip([(w.span.low, w.span.high) for w in winds], space.wind.low, space.wind.high).T,
+            color=_OWN,
+            alpha=0.25,
+            linewidth=0,
+            label=f"{refinement.level:.0%} interval",
+        )
         right.plot(
             count,
             [np.nan if w.median is None else w.median for w in winds],

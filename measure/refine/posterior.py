@@ -56,9 +56,15 @@ class Posterior:
 
 
 def posterior(
-    space: Space, models: Sequence[Metamodel], observed: Sequence[NDArray[np.float64]], *, seed: int,
-    cloths: int = CLOTHS, winds: int = WINDS, draws: int = DRAWS,
-) -> Posterior:  # fmt: skip
+    space: Space,
+    models: Sequence[Metamodel],
+    observed: Sequence[NDArray[np.float64]],
+    *,
+    seed: int,
+    cloths: int = CLOTHS,
+    winds: int = WINDS,
+    draws: int = DRAWS,
+) -> Posterior:
     """Weigh prior draws by what was observed.
 
     Args:

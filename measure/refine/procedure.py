@@ -80,9 +80,10 @@ class Settings:
             raise InputError(f"a level of {self.level:g}", where="level", fix="give a share between 0 and 1")
         if self.batch < self.replicates:
             raise InputError(
-                f"batches of {self.batch} clips hold no {self.replicates} replicates", where="batch",
+                f"batches of {self.batch} clips hold no {self.replicates} replicates",
+                where="batch",
                 fix=f"give at least {self.replicates}",
-            )  # fmt: skip
+            )
         if self.budget < self.fewest:
             raise InputError(
                 f"{self.budget} evaluations are too few for an interval of {REGRESSORS + 1} regressors",
@@ -97,10 +98,15 @@ class Settings:
 
 
 def refine(
-    targets: Target | Sequence[Target], estimator: Estimator, recipes: Recipe | Sequence[Recipe], *,
-    space: Space | None = None, settings: Settings | None = None, cache: Path | None = None,
+    targets: Target | Sequence[Target],
+    estimator: Estimator,
+    recipes: Recipe | Sequence[Recipe],
+    *,
+    space: Space | None = None,
+    settings: Settings | None = None,
+    cache: Path | None = None,
     advance: Callable[[int], object] | None = None,
-) -> Refinement:  # fmt: skip
+) -> Refinement:
     """Measure the cloth and the wind of a clip, or of several clips of one cloth, each in a wind of its own.
 
     Args:
@@ -127,10 +133,13 @@ def refine(
             Simulator.of(
                 recipes, target.view, frames=front.frames, rate=front.rate, renderer=chosen.renderer, batch=chosen.batch
             ),
-            estimator, chosen.seed, cache, model,
+            estimator,
+            chosen.seed,
+            cache,
+            model,
         )
         for target in several
-    )  # fmt: skip
+    )
     own = evaluators[0].simulator.space
     if space is not None and space.identity != own.identity:
         raise InputError("the space has other ranges than the recipes", fix="take the space of the first recipe")
@@ -176,10 +185,13 @@ class _Run:
             ends += [time.perf_counter() - begun] * (asked.shape[1] * self.settings.replicates)
             rounds.append(
                 Round(
-                    evaluations=len(ends), distance=near, floor=floor, seconds=ends[-1],
+                    evaluations=len(ends),
+                    distance=near,
+                    floor=floor,
+                    seconds=ends[-1],
                     intervals=self._intervals(found)[:2],
                 )
-            )  # fmt: skip
+            )
             reached = near <= floor
             if reached and self.settings.to_floor and _settled(rounds, self.settings.settled):
                 stopped = "the nearest parameters fit as well as they fit themselves, and the wind's interval settled"
@@ -189,14 +201,22 @@ class _Run:
                 break
         seconds = {stage: sum(g.seconds[stage] for group in groups for g in group) for stage in STAGES}
         return Refinement(
-            targets=self.targets, level=self.settings.level, intervals=self._intervals(found),
+            targets=self.targets,
+            level=self.settings.level,
+            intervals=self._intervals(found),
             amortised=self._spans(estimates[0], self._prior()[:, :4]),
-            bending=bending_table(self.space, found, self.settings.level), rounds=tuple(rounds),
-            traces=self._traces(np.concatenate(points, axis=1), groups, metrics, embedded, ends), floor=floor,
-            reached=reached, stopped=stopped, posterior=found, evaluators=self.evaluators,
+            bending=bending_table(self.space, found, self.settings.level),
+            rounds=tuple(rounds),
+            traces=self._traces(np.concatenate(points, axis=1), groups, metrics, embedded, ends),
+            floor=floor,
+            reached=reached,
+            stopped=stopped,
+            posterior=found,
+            evaluators=self.evaluators,
             seconds={**seconds, "infer": inferring},
-            findings=self._findings(found, metrics, groups, embedded, reached), seed=self.settings.seed,
-        )  # fmt: skip
+            findings=self._findings(found, metrics, groups, embedded, reached),
+            seed=self.settings.seed,
+        )
 
     def _first(self, estimates: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
         """(clip, θ, 17): draws of the amortised posteriors, widened; the cloth of each clip's in turn."""
@@ -227,9 +247,12 @@ class _Run:
         return out
 
     def _posterior(
-        self, points: NDArray[np.float64], groups: Sequence[Sequence[Evaluated]],
-        observed: Sequence[NDArray[np.float64]], number: int,
-    ) -> Posterior:  # fmt: skip
+        self,
+        points: NDArray[np.float64],
+        groups: Sequence[Sequence[Evaluated]],
+        observed: Sequence[NDArray[np.float64]],
+        number: int,
+    ) -> Posterior:
         models = []
         for clip, group in enumerate(groups):
             rows = np.concatenate([g.embedding for g in group])
@@ -257,77 +280,100 @@ class _Run:
         if density.low > learned.low or density.high < learned.high:  # narrower: the user states it
             limits = density.low, density.high
         return intervals_of(
-            draws, prior, self.settings.level, ranges=(self.space.wind, density),
+            draws,
+            prior,
+            self.settings.level,
+            ranges=(self.space.wind, density),
             limits=(limits_of("wind_speed"), limits),
-        )  # fmt: skip
+        )
 
     def _traces(
-        self, points: NDArray[np.float64], groups: Sequence[Sequence[Evaluated]], metrics: Sequence[ReplicateMetric],
-        embedded: Sequence[NDArray[np.float64]], ends: list[float],
-    ) -> tuple[Trace, ...]:  # fmt: skip
+        self,
+        points: NDArray[np.float64],
+        groups: Sequence[Sequence[Evaluated]],
+        metrics: Sequence[ReplicateMetric],
+        embedded: Sequence[NDArray[np.float64]],
+        ends: list[float],
+    ) -> tuple[Trace, ...]:
         return tuple(
             Trace(
-                method=OWN, points=np.repeat(points[clip], self.settings.replicates, axis=0), seconds=np.array(ends),
+                method=OWN,
+                points=np.repeat(points[clip], self.settings.replicates, axis=0),
+                seconds=np.array(ends),
                 distances=np.concatenate([metric.squared(g.embedding, target) for g in group]),
             )
             for clip, (group, metric, target) in enumerate(zip(groups, metrics, embedded, strict=True))
-        )  # fmt: skip
+        )
 
     def _findings(
-        self, found: Posterior, metrics: Sequence[ReplicateMetric], groups: Sequence[Sequence[Evaluated]],
-        embedded: Sequence[NDArray[np.float64]], reached: bool,
-    ) -> tuple[Finding, ...]:  # fmt: skip
+        self,
+        found: Posterior,
+        metrics: Sequence[ReplicateMetric],
+        groups: Sequence[Sequence[Evaluated]],
+        embedded: Sequence[NDArray[np.float64]],
+        reached: bool,
+    ) -> tuple[Finding, ...]:
         out: list[Finding] = []
         failed = sum(int((~np.isfinite(g.embedding).all(axis=1)).sum()) for group in groups for g in group)
         if failed:
             out.append(
                 Finding(
-                    kind="failed-simulations", severity=Severity.WARNING, count=failed,
+                    kind="failed-simulations",
+                    severity=Severity.WARNING,
+                    count=failed,
                     what=f"{failed} simulations failed and were left out",
                 )
-            )  # fmt: skip
+            )
         if not reached:
             near = _nearest(metrics, groups, embedded)
             floor = float(np.mean([m.floor for m in metrics]))
             out.append(
                 Finding(
-                    kind="above-noise-floor", severity=Severity.WARNING, value=near / floor,
+                    kind="above-noise-floor",
+                    severity=Severity.WARNING,
+                    value=near / floor,
                     what=f"the nearest parameters are {near / floor:.1f} times as far from the target as replicates "
                     "are from each other: something of the target is in no simulation",
                     fix="give the camera and light it was filmed with, or more evaluations",
                 )
-            )  # fmt: skip
+            )
         if found.effective < 100:
             out.append(
                 Finding(
-                    kind="few-effective-draws", severity=Severity.WARNING, value=found.effective,
+                    kind="few-effective-draws",
+                    severity=Severity.WARNING,
+                    value=found.effective,
                     what=f"the cloth's posterior rests on {found.effective:.0f} effective draws of the prior",
                 )
-            )  # fmt: skip
+            )
         out += [
             Finding(
-                kind=f"{entry.name.replace('_', '-')}-at-end", severity=Severity.WARNING,
+                kind=f"{entry.name.replace('_', '-')}-at-end",
+                severity=Severity.WARNING,
                 what=f"{PILED:.0%} of the draws of {entry.name} or more lie within {WITHIN:.0%} of an end of the range "
                 "that is searched, so that only a bound is given",
             )
-            for entry in self._intervals(found) if entry.median is None
-        ]  # fmt: skip
+            for entry in self._intervals(found)
+            if entry.median is None
+        ]
         if not self.evaluators[0].simulator.draws_damping:
             out.append(
                 Finding(
-                    kind="damping-assumed", severity=Severity.WARNING,
+                    kind="damping-assumed",
+                    severity=Severity.WARNING,
                     what="clips were simulated with the material's own damping: the intervals are too narrow for a "
                     "cloth that is damped more",
                     fix="rely on the model's own interval, which allows for any damping, where that is not known",
                 )
-            )  # fmt: skip
+            )
         if not all(knows_view(target) for target in self.targets):
             out.append(
                 Finding(
-                    kind="view-drawn", severity=Severity.NOTE,
+                    kind="view-drawn",
+                    severity=Severity.NOTE,
                     what="camera and light of a target are not known: they were drawn anew for each simulated clip",
                 )
-            )  # fmt: skip
+            )
         return tuple(out)
 
 

@@ -58,10 +58,15 @@ class Interval:
         """JSON values; an end that nothing bounds is null."""
         low, high = self.span.ends()
         return {
-            "name": self.name, "unit": self.unit, "median": self.median, "low": low, "high": high,
-            "level": self.span.level, "bound": None if self.span.bound is None else self.span.bound.value,
+            "name": self.name,
+            "unit": self.unit,
+            "median": self.median,
+            "low": low,
+            "high": high,
+            "level": self.span.level,
+            "bound": None if self.span.bound is None else self.span.bound.value,
             "prior_share": self.prior_share,
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,23 +144,33 @@ class Refinement:
     def as_dict(self) -> dict[str, Any]:
         """As JSON: no arrays of draws, no pictures."""
         return {
-            "method": METHOD, "targets": [target.name for target in self.targets], "level": self.level,
+            "method": METHOD,
+            "targets": [target.name for target in self.targets],
+            "level": self.level,
             "intervals": [entry.as_dict() for entry in self.intervals],
             "amortised": [entry.as_dict() for entry in self.amortised],
             "bending": self.bending.tolist(),
             "rounds": [{**vars(r), "intervals": [entry.as_dict() for entry in r.intervals]} for r in self.rounds],
             "distances": [_finite(trace.distances) for trace in self.traces],
-            "floor": self.floor, "reached": self.reached, "stopped": self.stopped,
-            "evaluations": self.evaluations, "effective_draws": self.posterior.effective,
-            "seconds": self.seconds, "seed": self.seed,
+            "floor": self.floor,
+            "reached": self.reached,
+            "stopped": self.stopped,
+            "evaluations": self.evaluations,
+            "effective_draws": self.posterior.effective,
+            "seconds": self.seconds,
+            "seed": self.seed,
             "findings": [finding.as_dict() for finding in self.findings],
-        }  # fmt: skip
+        }
 
 
 def intervals_of(
-    draws: NDArray[np.float64], prior: NDArray[np.float64], level: float, *, ranges: Sequence[Range],
+    draws: NDArray[np.float64],
+    prior: NDArray[np.float64],
+    level: float,
+    *,
+    ranges: Sequence[Range],
     limits: Sequence[tuple[float, float]],
-) -> tuple[Interval, ...]:  # fmt: skip
+) -> tuple[Interval, ...]:
     """Intervals of draws (n, quantity) beside the prior's.
 
     Args:
@@ -176,10 +191,13 @@ def intervals_of(
             own = span(draws[:, i], places, level=level, limits=limits[i], assumed=(first, last))
         found.append(
             Interval(
-                name=quantity.name, unit=quantity.unit, median=float(middle[i]) if own.estimated else None, span=own,
+                name=quantity.name,
+                unit=quantity.unit,
+                median=float(middle[i]) if own.estimated else None,
+                span=own,
                 prior_share=float((high[i] - low[i]) / (most[i] - least[i])),
             )
-        )  # fmt: skip
+        )
     return tuple(found)
 
 

@@ -26,24 +26,40 @@ def section(refinement: Refinement, *, in_motion: bool = True) -> Markup:
         rate = evaluator.estimator.front_end.rate
         clips.append(
             {
-                "name": target.name, "trace": trace_picture(refinement, number),
+                "name": target.name,
+                "trace": trace_picture(refinement, number),
                 "target": still(target.clip[len(target.clip) // 2], side=SIDE),
-                "frames": [{"picture": None if s.frame is None else still(s.frame, side=SIDE), "step": s.step,
-                            "wind": f"{s.wind:.2f}", "distance": f"{s.distance:.3g}"} for s in shown],
+                "frames": [
+                    {
+                        "picture": None if s.frame is None else still(s.frame, side=SIDE),
+                        "step": s.step,
+                        "wind": f"{s.wind:.2f}",
+                        "distance": f"{s.distance:.3g}",
+                    }
+                    for s in shown
+                ],
                 "motion": nearest is not None
                 and [moving(clip, rate=rate, side=SIDE) for clip in (target.clip, nearest)],
             }
-        )  # fmt: skip
+        )
     found = render(
-        "measure.refine", "section.html.j2",
+        "measure.refine",
+        "section.html.j2",
         {
-            "sentence": refinement.sentence, "method": METHOD, "stopped": refinement.stopped, "level": refinement.level,
-            "rows": _rows(refinement), "clips": clips, "findings": refinement.findings,
+            "sentence": refinement.sentence,
+            "method": METHOD,
+            "stopped": refinement.stopped,
+            "level": refinement.level,
+            "rows": _rows(refinement),
+            "clips": clips,
+            "findings": refinement.findings,
             "bending": [[f"{value:.2e}" for value in row] for row in refinement.bending.tolist()],
-            "floor": f"{refinement.floor:.3g}", "evaluations": refinement.evaluations,
-            "effective": f"{refinement.posterior.effective:.0f}", "seconds": refinement.seconds,
+            "floor": f"{refinement.floor:.3g}",
+            "evaluations": refinement.evaluations,
+            "effective": f"{refinement.posterior.effective:.0f}",
+            "seconds": refinement.seconds,
         },
-    )  # fmt: skip
+    )
     return Markup(found)
 
 
@@ -58,9 +74,11 @@ def _rows(refinement: Refinement) -> list[dict[str, str]]:
         note = "the clip hardly narrows the prior" if entry.prior_share > 0.9 else ""
         rows.append(
             {
-                "about": quantity.about + (f", clip {int(clip) + 1}" if clip else ""), "unit": quantity.unit,
-                "refined": entry.phrase(quantity.digits), "note": note,
+                "about": quantity.about + (f", clip {int(clip) + 1}" if clip else ""),
+                "unit": quantity.unit,
+                "refined": entry.phrase(quantity.digits),
+                "note": note,
                 "amortised": before[entry.name].phrase(quantity.digits) if entry.name in before else "",
             }
-        )  # fmt: skip
+        )
     return rows

@@ -89,9 +89,15 @@ class Simulator:
 
     @classmethod
     def of(
-        cls, recipes: Recipe | Sequence[Recipe], view: View, *, frames: int, rate: float, renderer: str = "raster",
+        cls,
+        recipes: Recipe | Sequence[Recipe],
+        view: View,
+        *,
+        frames: int,
+        rate: float,
+        renderer: str = "raster",
         batch: int = 8,
-    ) -> Simulator:  # fmt: skip
+    ) -> Simulator:
         """A simulator of clips of this length [frames] and rate [Hz].
 
         Args:
@@ -132,10 +138,14 @@ class Simulator:
     def identity(self) -> str:
         """A hash of all that shapes a film beside its request."""
         own = {
-            "recipes": [scene.recipe.identity() for scene in self.scenes], "view": self.view.identity,
-            "renderer": self.renderer, "batch": self.batch, "start_noise": START_NOISE, "space": self.space.identity,
+            "recipes": [scene.recipe.identity() for scene in self.scenes],
+            "view": self.view.identity,
+            "renderer": self.renderer,
+            "batch": self.batch,
+            "start_noise": START_NOISE,
+            "space": self.space.identity,
             "conditioning": VERSION,
-        }  # fmt: skip
+        }
         return digest(canonical(own))
 
     def films(self, requests: Sequence[Request]) -> list[Film]:
@@ -196,13 +206,15 @@ class Scene:
         noise[list(scene.handles.vertices)] = 0.0
         damping = self.recipe.material.damping
         material = replace(
-            scene.material, density=float(values[DENSITY]), bending=values[:DENSITY].reshape(BENDING_SHAPE),
+            scene.material,
+            density=float(values[DENSITY]),
+            bending=values[:DENSITY].reshape(BENDING_SHAPE),
             damping=(
                 damping.at(stream(request.seed, "damping").random())
                 if isinstance(damping, Range)
                 else scene.material.damping
             ),
-        )  # fmt: skip
+        )
         flag = replace(scene, position=scene.position + noise, material=material, wind=(float(values[WIND]), 0.0, 0.0))
         return replace(self._template, scene=flag, seed=request.seed, parameters={})
 

@@ -48,14 +48,18 @@ QUANTITIES = (
     Quantity(name="density", unit="kg/m²", about="area weight", digits=3),
     Quantity(name="bending_scale", unit="log10(N·m)", about="mean logarithm of the bending coefficients", digits=2),
     Quantity(
-        name="anisotropy", unit="1", digits=2,
+        name="anisotropy",
+        unit="1",
+        digits=2,
         about="mean logarithm of the coefficients along the warp less that of those along the weft",
     ),
     Quantity(
-        name="nonlinearity", unit="1", digits=2,
+        name="nonlinearity",
+        unit="1",
+        digits=2,
         about="mean logarithm of the coefficients at the two largest curvatures less that at the two smallest",
     ),
-)  # fmt: skip
+)
 """What a refinement reports; the first two have the paper's ranges."""
 _ROWS, _COLUMNS = BENDING_SHAPE
 _REACH = 6.5
@@ -97,13 +101,18 @@ class Space:
         alone = len(spec.bases) == 1 and not recipe.effects and recipe.scene.shape is Shape.FLAG
         alone &= not any(isinstance(q, Range) for q in (spec.density_factor, spec.stretching, recipe.wind.toward))
         if not (
-            isinstance(factor, Range) and isinstance(density, Range) and isinstance(wind, Range)
-            and alone and ((common is not None and common.low > 0) or spec.bending == 1.0) and factor.low > 0
-        ):  # fmt: skip
+            isinstance(factor, Range)
+            and isinstance(density, Range)
+            and isinstance(wind, Range)
+            and alone
+            and ((common is not None and common.low > 0) or spec.bending == 1.0)
+            and factor.low > 0
+        ):
             raise InputError(
                 "the scene is not a flag of one material with ranges of bending factors (above 0), density and wind",
-                where=f"recipe {recipe.name!r}", fix='take "flag-wide", or a recipe of the same form',
-            )  # fmt: skip
+                where=f"recipe {recipe.name!r}",
+                fix='take "flag-wide", or a recipe of the same form',
+            )
         return cls(material=spec.bases[0], factor=factor, density=density, wind=wind, common=common)
 
     def learned(self, parts: Sequence[tuple[Space, float]]) -> Space:
@@ -155,9 +164,11 @@ class Space:
         least, most = float(table.mean()) + low, float(table.mean()) + high
         slope = min(slope, high - low)
         return (
-            self.wind, self.density, Range(low=max(middle - scale, least), high=min(middle + scale, most)),
+            self.wind,
+            self.density,
+            Range(low=max(middle - scale, least), high=min(middle + scale, most)),
             Range(low=tilt - slope, high=tilt + slope),
-        )  # fmt: skip
+        )
 
     def values(self, unit: NDArray[np.float64]) -> NDArray[np.float64]:
         """SI values of points (n, 17) of [−1, 1]¹⁷.

@@ -39,8 +39,9 @@ def require(estimator: Estimator) -> None:
     if any(name not in names for name in TARGETS):
         raise InputError(
             f"the model estimates {', '.join(names) or 'nothing'}; a refinement needs {', '.join(TARGETS)}",
-            where=f"model {estimator.name!r}", fix="take a model of the posterior loss with these targets",
-        )  # fmt: skip
+            where=f"model {estimator.name!r}",
+            fix="take a model of the posterior loss with these targets",
+        )
 
 
 @torch.no_grad()
@@ -69,7 +70,7 @@ def summaries(estimator: Estimator, embedding: NDArray[np.float64]) -> NDArray[n
 
 def amortised(
     estimator: Estimator, clip: NDArray[np.uint8], space: Space, *, aspect: float, seed: int, draws: int
-) -> NDArray[np.float64]:  # fmt: skip
+) -> NDArray[np.float64]:
     """Draws of `TARGETS` for a clip (frame, height, width): (draw, 4), in the targets' units. Where the space's area
     weights are fewer than the network's, they hold for the clip, as does the aspect (length over height) for a network
     that estimates it.

@@ -36,9 +36,10 @@ class Target:
     def __post_init__(self) -> None:
         if self.clip.ndim != 3 or self.clip.dtype != np.uint8:
             raise InputError(
-                f"a clip of shape {self.clip.shape} and type {self.clip.dtype}", where=f"target {self.name!r}",
+                f"a clip of shape {self.clip.shape} and type {self.clip.dtype}",
+                where=f"target {self.name!r}",
                 fix="give uint8 of shape (frame, height, width)",
-            )  # fmt: skip
+            )
 
 
 def of_recording(recording: Artifact, clip: NDArray[np.uint8], *, otherwise: View, space: Space) -> Target:

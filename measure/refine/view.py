@@ -46,17 +46,22 @@ class Camera:
     def filmed(self, frames: NDArray[np.uint8], *, seed: int) -> NDArray[np.uint8]:
         """Gray frames (n, height, width) as they come back from the camera's file, of colours (n, height, width, 3)."""
         spec = CameraSpec(
-            coding=Coding.H264, jpeg_quality=90.0, rate_factor=self.rate_factor, read_noise=self.read_noise,
-            shot_noise=self.shot_noise, frame_slot=1,
-        )  # fmt: skip
+            coding=Coding.H264,
+            jpeg_quality=90.0,
+            rate_factor=self.rate_factor,
+            read_noise=self.read_noise,
+            shot_noise=self.shot_noise,
+            frame_slot=1,
+        )
         coded = picture.coded(frames, picture.settings(spec, seed=seed), spec, seed=seed)
         return np.stack(decode(coded, where="a simulated film"))
 
 
 RANGES = {
-    "rate_factor": Range(low=18.0, high=24.0), "read_noise": Range(low=0.3, high=1.5),
+    "rate_factor": Range(low=18.0, high=24.0),
+    "read_noise": Range(low=0.3, high=1.5),
     "shot_noise": Range(low=0.5, high=3.0),
-}  # fmt: skip
+}
 """What an unknown camera is drawn from: as the data set `flagsim-wide`, on which models are trained."""
 
 
@@ -124,7 +129,9 @@ def of_parameters(parameters: str | Mapping[str, Any], *, where: str) -> FixedVi
     known = {entry.name for entry in fields(RenderParameters)}
     if unknown := sorted(set(stated) - known):
         raise InputError(f"render parameters {', '.join(unknown)} are not known", where=where, fix="update flagdata")
-    whole = {name: round(value) if isinstance(getattr(RenderParameters, name, None), int) else value
-             for name, value in stated.items()}  # fmt: skip
+    whole = {
+        name: round(value) if isinstance(getattr(RenderParameters, name, None), int) else value
+        for name, value in stated.items()
+    }
     camera = {name: float(content[f"camera.{name}"]) for name in RANGES if f"camera.{name}" in content}
     return FixedView(zeta=RenderParameters(**whole), camera=Camera(**camera))

@@ -58,9 +58,7 @@ class Linear(Scale):
         if low == high:
             low, high = low - max(0.5 * abs(low), 1e-9), high + max(0.5 * abs(high), 1e-9)
         margin = 0.04 * (high - low)
-        return cls(
-            low if low in at_least else low - margin, high if high in at_least else high + margin, start, stop
-        )  # fmt: skip
+        return cls(low if low in at_least else low - margin, high if high in at_least else high + margin, start, stop)
 
     def measure(self, value: float) -> float:
         return value

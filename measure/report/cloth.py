@@ -53,8 +53,9 @@ class Shade:
 
 def size_shade(residuals: Sequence[Residual]) -> Shade:
     """One scale for the errors of all recordings, before and after, from zero."""
-    return Shade(low=0.0, high=_largest([v for r in residuals for v in (*r.in_space, *r.in_space_after)]),
-                 colours="viridis")  # fmt: skip
+    return Shade(
+        low=0.0, high=_largest([v for r in residuals for v in (*r.in_space, *r.in_space_after)]), colours="viridis"
+    )
 
 
 def mean_shade(residuals: Sequence[Residual]) -> Shade:

@@ -33,9 +33,14 @@ _GAP = 10.0
 _HEAD = 22.0  # above the panels, for their names
 _FILLED = 0.86  # of a panel, by the observed cloth; the rest is for errors
 VIEW = {
-    "elevation": ELEVATION, "half": _HALF, "gap": _GAP, "head": _HEAD, "filled": _FILLED, "missing": MISSING,
+    "elevation": ELEVATION,
+    "half": _HALF,
+    "gap": _GAP,
+    "head": _HEAD,
+    "filled": _FILLED,
+    "missing": MISSING,
     "reach": _REACH,
-}  # fmt: skip
+}
 """What the player has to know of the projection and of the packing."""
 
 

@@ -83,13 +83,19 @@ def opening(verdict: Verdict) -> dict[str, Any]:
     first = lead(verdict)
     after = sentences.after_label(verdict)
     return {
-        "lead": first, "rest": verdict.words.removeprefix(first).strip(),
-        "overview": overview(verdict.comparisons, after=after), "after_label": after,
+        "lead": first,
+        "rest": verdict.words.removeprefix(first).strip(),
+        "overview": overview(verdict.comparisons, after=after),
+        "after_label": after,
         "has_after": any(quantity.known(c.after) for c in verdict.comparisons),
-        "against": [*sentences.error_warnings(verdict), *sentences.control_warnings(verdict),
-                    *sentences.reduction_warnings(verdict), *(text for _, text in verdict.findings)],
+        "against": [
+            *sentences.error_warnings(verdict),
+            *sentences.control_warnings(verdict),
+            *sentences.reduction_warnings(verdict),
+            *(text for _, text in verdict.findings),
+        ],
         "glossary": GLOSSARY,
-    }  # fmt: skip
+    }
 
 
 def _lengths(verdict: Verdict) -> quantity.Display:
@@ -143,9 +149,11 @@ def _flattened(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[st
 
 def _data(value: float | None, text: str) -> Markup:
     """A number as people read it, with the number as it is for programs."""
-    return Markup(f'<span class="none">{text}</span>') if text == quantity.NONE else Markup(
-        f'<data value="{value!r}">{escape(text)}</data>'
-    )  # fmt: skip
+    return (
+        Markup(f'<span class="none">{text}</span>')
+        if text == quantity.NONE
+        else Markup(f'<data value="{value!r}">{escape(text)}</data>')
+    )
 
 
 def _estimate(estimate: Estimate | None, shown: quantity.Display | None = None) -> Markup:

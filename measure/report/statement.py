@@ -50,9 +50,12 @@ def stated(outcome: Outcome) -> Verdict:
     verdict, experiment = outcome.verdict, outcome.experiment
     said = [lead(verdict), *by_draw(verdict.test), *bounds(outcome.at_bounds), *ratios(experiment)]
     return replace(
-        verdict, words=" ".join(said), separating=separating(verdict), proposal=_lacking(outcome),
+        verdict,
+        words=" ".join(said),
+        separating=separating(verdict),
+        proposal=_lacking(outcome),
         assumptions=(*assumptions(experiment), *unweighed(verdict), *clocks(experiment, outcome.lags)),
-    )  # fmt: skip
+    )
 
 
 def _lacking(outcome: Outcome) -> str:
@@ -155,9 +158,12 @@ def blowing(variation: Variation) -> str:
 
 def _where(mode: FieldColumn) -> str:
     shapes = {
-        (0, 0): "all over", (1, 0): "hoist against fly", (0, 1): "bottom against top", (1, 1): "corner against corner",
+        (0, 0): "all over",
+        (1, 0): "hoist against fly",
+        (0, 1): "bottom against top",
+        (1, 1): "corner against corner",
         (2, 0): "both ends against the middle",
-    }  # fmt: skip
+    }
     return f"{_AXES[mode.axis]}, {shapes[mode.mode]}"
 
 

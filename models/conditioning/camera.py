@@ -108,9 +108,12 @@ def camera_of(
     reference = pictures[middle]
     height, width = reference.shape
     found = cv2.goodFeaturesToTrack(
-        reference, _CORNERS, _QUALITY, max(4.0, _APART * float(np.hypot(height, width))),
+        reference,
+        _CORNERS,
+        _QUALITY,
+        max(4.0, _APART * float(np.hypot(height, width))),
         mask=None if outside is None else outside.astype(np.uint8),
-    )  # fmt: skip
+    )
     corners = np.zeros((0, 2), np.float32) if found is None else np.asarray(found, np.float32).reshape(-1, 2)
     still = Camera(reference=reference, corners=corners[:0], moves=False)
     unmoved = [STILL] * len(pictures)
@@ -226,10 +229,15 @@ def _followed(
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
     start = _moved(corners, guess)
     places, status, _ = cv2.calcOpticalFlowPyrLK(
-        reference, picture, corners.reshape(-1, 1, 2), start.reshape(-1, 1, 2).copy(), winSize=_WINDOW,
-        maxLevel=_LEVELS, flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+        reference,
+        picture,
+        corners.reshape(-1, 1, 2),
+        start.reshape(-1, 1, 2).copy(),
+        winSize=_WINDOW,
+        maxLevel=_LEVELS,
+        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
         criteria=(cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.01),
-    )  # fmt: skip
+    )
     return np.asarray(places, dtype=np.float32).reshape(-1, 2), status.ravel().astype(bool)
 
 

@@ -194,9 +194,13 @@ class Follower:
 
 
 def conditioning_of(
-    sample: Sequence[NDArray[np.uint8]] | NDArray[np.uint8], *, size: int, times: NDArray[np.float64] | None = None,
-    flag: int | None = None, within: tuple[int, int, int, int] | None = None,
-) -> Conditioning:  # fmt: skip
+    sample: Sequence[NDArray[np.uint8]] | NDArray[np.uint8],
+    *,
+    size: int,
+    times: NDArray[np.float64] | None = None,
+    flag: int | None = None,
+    within: tuple[int, int, int, int] | None = None,
+) -> Conditioning:
     """What a sample of a film's frames shows.
 
     Args:
@@ -220,9 +224,10 @@ def conditioning_of(
     )
     if flag is not None and not 1 <= flag <= len(regions):
         raise UsageError(
-            f"flag {flag} of a film in which {len(regions)} regions move like cloth", where="--flag",
+            f"flag {flag} of a film in which {len(regions)} regions move like cloth",
+            where="--flag",
             fix="give a number from the page's picture" if regions else "give --crop around the flag",
-        )  # fmt: skip
+        )
     chosen = 0 if flag is None else flag - 1
     box = (0.0, 0.0, float(width), float(height))
     if regions:
@@ -242,11 +247,19 @@ def conditioning_of(
     level = _noise(stack, weight)
     spread = np.maximum(stack.std(axis=0, dtype=np.float32), 1e-3)
     return Conditioning(
-        size=size, scale=scale, camera=camera, regions=regions, chosen=chosen, square=square, weight=weight,
+        size=size,
+        scale=scale,
+        camera=camera,
+        regions=regions,
+        chosen=chosen,
+        square=square,
+        weight=weight,
         background=np.median(stack, axis=0).astype(np.uint8),
-        noise=level, kept=np.minimum(_USUAL * level / spread, 1.0).astype(np.float32),
-        path=np.stack([_centre(square, transform, scale) for transform in transforms]), cut=cut,
-    )  # fmt: skip
+        noise=level,
+        kept=np.minimum(_USUAL * level / spread, 1.0).astype(np.float32),
+        path=np.stack([_centre(square, transform, scale) for transform in transforms]),
+        cut=cut,
+    )
 
 
 def shrunk(frame: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
@@ -296,12 +309,17 @@ def _outside(regions: Sequence[Region], shape: tuple[int, ...]) -> NDArray[np.bo
 def _registered(small: list[NDArray[np.uint8]], transforms: list[Transform]) -> NDArray[np.uint8]:
     height, width = small[0].shape
     moved = [
-        picture if transform is STILL else cv2.warpAffine(
-            picture, transform, (width, height), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        picture
+        if transform is STILL
+        else cv2.warpAffine(
+            picture,
+            transform,
+            (width, height),
+            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
             borderMode=cv2.BORDER_REPLICATE,
         )
         for picture, transform in zip(small, transforms, strict=True)
-    ]  # fmt: skip
+    ]
     return np.stack(moved).astype(np.uint8)
 
 

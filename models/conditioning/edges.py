@@ -65,8 +65,9 @@ class Edges:
         return cls(
             places=np.stack([columns, rows], axis=1).astype(np.float32),
             values=np.stack([picture[rows, columns] for picture in smoothed]).astype(np.float32),
-            slopes=np.stack([slope[rows, columns] for slope in slopes]).astype(np.float32), axes=np.eye(2),
-        )  # fmt: skip
+            slopes=np.stack([slope[rows, columns] for slope in slopes]).astype(np.float32),
+            axes=np.eye(2),
+        )
 
     @property
     def across(self) -> Edges:

@@ -59,9 +59,11 @@ def square_about(box: tuple[float, float, float, float], *, width: int, height: 
     side = middle.side
     margin_x, margin_y = (_MARGIN * side if longest > side else 0.0 for longest in (width, height))
     inside = (
-        left - margin_x >= middle.x and right + margin_x <= middle.x + side
-        and top - margin_y >= middle.y and bottom + margin_y <= middle.y + side
-    )  # fmt: skip
+        left - margin_x >= middle.x
+        and right + margin_x <= middle.x + side
+        and top - margin_y >= middle.y
+        and bottom + margin_y <= middle.y + side
+    )
     if whole and inside and LEAST_FILL <= extent / side <= MOST_FILL:
         return middle
     side = max(16, math.ceil(max(extent / MOST_FILL, min(extent / FILL, side))))
@@ -104,9 +106,12 @@ def warp(picture: NDArray[np.uint8], square: Square, size: int, transform: Trans
     step = square.side / (size * finer)
     place = np.array([[step, 0.0, square.x + step / 2 - 0.5], [0.0, step, square.y + step / 2 - 0.5], [0.0, 0.0, 1.0]])
     grid = cv2.warpAffine(
-        picture, transform @ place, (size * finer, size * finer), flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP,
+        picture,
+        transform @ place,
+        (size * finer, size * finer),
+        flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_REPLICATE,
-    )  # fmt: skip
+    )
     if finer > 1:
         grid = cv2.resize(grid, (size, size), interpolation=cv2.INTER_AREA)
     return np.asarray(grid, dtype=np.uint8)

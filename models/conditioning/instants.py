@@ -88,7 +88,7 @@ class Interpolator:
                 picture, columns + flow[..., 0], rows + flow[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
             )
             for picture, flow in ((a, to_first), (b, to_second))
-        )  # fmt: skip
+        )
         return cv2.addWeighted(from_first, 1 - t, from_second, t, 0.0).astype(np.uint8)
 
     def _flow(

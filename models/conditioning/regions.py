@@ -134,9 +134,11 @@ def _deviation(pictures: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def _outline(
-    own: NDArray[np.bool_], others: NDArray[np.bool_], deviation: NDArray[np.float32],
+    own: NDArray[np.bool_],
+    others: NDArray[np.bool_],
+    deviation: NDArray[np.float32],
     within: NDArray[np.bool_] | None,
-) -> NDArray[np.bool_]:  # fmt: skip
+) -> NDArray[np.bool_]:
     """All places that the cloth visits, its plain parts and the gaps between folds filled."""
     size = _size(own)
     noise = float(np.median(deviation))

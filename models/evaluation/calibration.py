@@ -98,9 +98,10 @@ def cells(predictions: Predictions, target: str) -> Cells:
 def _draws(predictions: Predictions) -> NDArray[np.float32]:
     if predictions.samples is None:
         raise InputError(
-            "the model gives no samples", where=f"predictions of {predictions.label!r}",
+            "the model gives no samples",
+            where=f"predictions of {predictions.label!r}",
             fix="calibration is a question to models with a predictive distribution",
-        )  # fmt: skip
+        )
     return predictions.samples
 
 
@@ -183,9 +184,10 @@ def _ball(predictions: Predictions, reference: Array) -> Cells:
     if not (high > low).all():
         constant = predictions.targets[int(np.argmin(high - low))]
         raise InputError(
-            f"{constant} is the same in all clips", where=f"predictions of {predictions.label!r}",
+            f"{constant} is the same in all clips",
+            where=f"predictions of {predictions.label!r}",
             fix="test on sequences that differ in it, or leave it out of the targets",
-        )  # fmt: skip
+        )
     to_truth = np.linalg.norm((predictions.truth - low) / (high - low) - reference, axis=1)
     to_draws = np.linalg.norm((draws - low) / (high - low) - reference[:, None, :], axis=2)
     return Cells.of(to_truth, to_draws)

@@ -39,18 +39,37 @@ _BEFORE: dict[str, tuple[str, ...]] = {"train": (), "validation": ("train",), "t
 @click.command(cls=LongCommand)
 @click.argument("models", metavar="MODEL...", nargs=-1, required=True)
 @click.option("--dataset", default="flagsim-wide", show_default=True, help="Data set whose clips are judged.")
-@click.option("--side", type=click.Choice(("train", "validation", "test")), default="test", show_default=True,
-              help="Side of the data set.")  # fmt: skip
+@click.option(
+    "--side",
+    type=click.Choice(("train", "validation", "test")),
+    default="test",
+    show_default=True,
+    help="Side of the data set.",
+)
 @click.option("--at", metavar="REF", help="Tag, branch or version of the lake; by default its head.")
-@click.option("--out", type=LocalPath(), metavar="DIR", default=Path("evaluation"), show_default=True,
-              help="Where the page, the table in Markdown and the JSON go.")  # fmt: skip
+@click.option(
+    "--out",
+    type=LocalPath(),
+    metavar="DIR",
+    default=Path("evaluation"),
+    show_default=True,
+    help="Where the page, the table in Markdown and the JSON go.",
+)
 @click.option("--name", default="evaluation", show_default=True, help="Name of the files, without their endings.")
-@click.option("--cache", type=LocalPath(), metavar="DIR",
-              help="Where prepared inputs are kept; by default beside the lake, LAKE.inputs.")  # fmt: skip
+@click.option(
+    "--cache",
+    type=LocalPath(),
+    metavar="DIR",
+    help="Where prepared inputs are kept; by default beside the lake, LAKE.inputs.",
+)
 @click.option("--reference", metavar="LABEL", help="Model that the others are compared with; by default the best.")
 @click.option("--tsne", metavar="LABEL", help="Model whose embedding is drawn by t-SNE.")
-@click.option("--area-weight", type=STATED, metavar="VALUE",
-              help="Area weight of all clips, if it is known [kg/m²]: 0.284, 0.284±0.01 or 0.10:0.17.")  # fmt: skip
+@click.option(
+    "--area-weight",
+    type=STATED,
+    metavar="VALUE",
+    help="Area weight of all clips, if it is known [kg/m²]: 0.284, 0.284±0.01 or 0.10:0.17.",
+)
 @click.option("--handmade", is_flag=True, help="Add ridge and gradient boosting on hand-made features.")
 @click.option(
     "--frames",
@@ -59,10 +78,12 @@ _BEFORE: dict[str, tuple[str, ...]] = {"train": (), "validation": ("train",), "t
     multiple=True,
     help="Also report triplet accuracy for clips of N frames (networks on maps only); may be repeated.",
 )
-@click.option("--linear", is_flag=True,
-              help="Also report how well a linear model predicts cloth parameters from each embedding.")  # fmt: skip
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True,
-              help="Seed of the draws and of the bootstrap.")  # fmt: skip
+@click.option(
+    "--linear", is_flag=True, help="Also report how well a linear model predicts cloth parameters from each embedding."
+)
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the draws and of the bootstrap."
+)
 @click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Threads; by default one a core.")
 @json_option
 @lake_option
@@ -141,9 +162,15 @@ class _Desk:
     """Where models are judged: a data set, and what was prepared of it."""
 
     def __init__(
-        self, source: Source, dataset: str, at: str | None, cache: Path, workers: int, seed: int,
+        self,
+        source: Source,
+        dataset: str,
+        at: str | None,
+        cache: Path,
+        workers: int,
+        seed: int,
         area_weight: Stated | None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._source, self._dataset, self._at = source, dataset, at
         self._known = {} if area_weight is None else {"density": area_weight}
         self._cache, self._workers, self._seed = cache, workers, seed
@@ -151,9 +178,16 @@ class _Desk:
         self._prepared: dict[tuple[str, str], Prepared] = {}
 
     def evaluation(
-        self, names: Sequence[str], *, side: str, reference: str | None, tsne: str | None, handmade: bool,
-        frames: Sequence[int], linear: bool,
-    ) -> Evaluation:  # fmt: skip
+        self,
+        names: Sequence[str],
+        *,
+        side: str,
+        reference: str | None,
+        tsne: str | None,
+        handmade: bool,
+        frames: Sequence[int],
+        linear: bool,
+    ) -> Evaluation:
         from models.evaluation.evaluation import evaluate as scored
         from models.training.recipe import DataSpec
 
@@ -178,11 +212,15 @@ class _Desk:
         evaluated = evaluated or [predictions for _, predictions in learned]
         data = f"{self._dataset}, {side} side, at {self._at or 'head'}{self._stated}"
         return scored(
-            evaluated, data=data, seed=self._seed, reference=reference, tsne_of=tsne,
+            evaluated,
+            data=data,
+            seed=self._seed,
+            reference=reference,
+            tsne_of=tsne,
             frames=self._triplets([estimator for _, estimator in chosen], frames, side),
             reads=self._reads(evaluated, side, data) if linear else (),
             learning=_points([point for point in learned if point[1].label in curves]),
-        )  # fmt: skip
+        )
 
     def _models(self, names: Sequence[str]) -> list[tuple[Artifact | None, Estimator]]:
         from flagdata.errors import UnknownNameError
@@ -225,9 +263,13 @@ class _Desk:
             pairs = self._side(side)
             with progress(len(pairs), f"prepare {estimator.front_end.maps} of {side}", "clip") as advance:
                 self._prepared[key] = prepare_clips(
-                    pairs, estimator.front_end, estimator.cropping, folder=self._cache, workers=self._workers,
+                    pairs,
+                    estimator.front_end,
+                    estimator.cropping,
+                    folder=self._cache,
+                    workers=self._workers,
                     advance=advance,
-                )  # fmt: skip
+                )
         return self._prepared[key]
 
     def _predictions(self, estimator: Estimator, side: str) -> Predictions:
@@ -236,10 +278,15 @@ class _Desk:
 
         contrast = estimator.learners[0].objective is Loss.CONTRASTIVE
         return predict(
-            estimator, self._clips(side, estimator), label=estimator.name, note=_note(estimator), seed=self._seed,
-            milliseconds=time_a_clip(estimator, self._side(side)), known=self._known,
+            estimator,
+            self._clips(side, estimator),
+            label=estimator.name,
+            note=_note(estimator),
+            seed=self._seed,
+            milliseconds=time_a_clip(estimator, self._side(side)),
+            known=self._known,
             fitted_on=self._clips("train", estimator) if contrast else None,
-        )  # fmt: skip
+        )
 
     def _triplets(self, chosen: Sequence[Estimator], frames: Sequence[int], side: str) -> list[FramesPoint]:
         """Triplet accuracies of the networks on maps, by label, for clips of so many frames."""
@@ -250,9 +297,14 @@ class _Desk:
             count = len(film_rows(self._side(side), sequences=None, seed=0))
             with progress(count, f"prepare {front_end.frames} frames of {side}", "film") as advance:
                 return prepare_films(
-                    self._side(side), front_end, cropping, variants=1, folder=self._cache, workers=self._workers,
+                    self._side(side),
+                    front_end,
+                    cropping,
+                    variants=1,
+                    folder=self._cache,
+                    workers=self._workers,
                     advance=advance,
-                )  # fmt: skip
+                )
 
         labels: dict[str, list[Estimator]] = {}
         for estimator in chosen:

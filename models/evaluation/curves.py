@@ -40,6 +40,7 @@ def _check(where: str, size: int, noun: str, value: float, interval: tuple[float
     low, high = interval
     if size < 1 or not 0 <= value < float("inf") or not low <= high:
         raise InputError(
-            f"{value:g} [{low:g}, {high:g}] at {size} {noun}", where=where,
+            f"{value:g} [{low:g}, {high:g}] at {size} {noun}",
+            where=where,
             fix=f"give a positive number of {noun}, a finite score and the lower end of the interval first",
-        )  # fmt: skip
+        )

@@ -28,11 +28,25 @@ _THEME = {_INK: "--ink", _QUIET: "--quiet", _RULE: "--rule"} | {
     colour: f"--series-{place}" for place, colour in enumerate(_SERIES)
 }
 _STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none", "svg.hashsalt": "flagdata", "font.size": 9, "text.color": _INK, "axes.edgecolor": _QUIET,
-    "axes.labelcolor": _INK, "xtick.color": _QUIET, "ytick.color": _QUIET, "axes.spines.top": False,
-    "axes.spines.right": False, "axes.grid": True, "grid.color": _RULE, "grid.linewidth": 0.6, "axes.axisbelow": True,
-    "legend.frameon": False, "axes.titlesize": 9, "font.family": "DejaVu Sans", "text.parse_math": False,
-}  # fmt: skip
+    "svg.fonttype": "none",
+    "svg.hashsalt": "flagdata",
+    "font.size": 9,
+    "text.color": _INK,
+    "axes.edgecolor": _QUIET,
+    "axes.labelcolor": _INK,
+    "xtick.color": _QUIET,
+    "ytick.color": _QUIET,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": _RULE,
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "axes.titlesize": 9,
+    "font.family": "DejaVu Sans",
+    "text.parse_math": False,
+}
 _WIDTH = 9.2  # inches, 72 units each
 
 

@@ -68,14 +68,24 @@ def predictions(train: Pairs, judged: Pairs, *, cache: Path, workers: int, seed:
     note = f"{len(FEATURES)} hand-made features, {_VARIANTS} crops of each film"
     return [
         Predictions(
-            label="ridge", mean=ridge.predict(wanted), samples=None, milliseconds=spent, note=note,
-            parameters=ridge.weights.size + ridge.intercept.size, **common,
+            label="ridge",
+            mean=ridge.predict(wanted),
+            samples=None,
+            milliseconds=spent,
+            note=note,
+            parameters=ridge.weights.size + ridge.intercept.size,
+            **common,
         ),
         Predictions(
-            label="boosting", mean=boosting.predict(wanted), samples=boosting.samples(wanted, count=DRAWS),
-            milliseconds=spent, note=note, parameters=0, **common,
+            label="boosting",
+            mean=boosting.predict(wanted),
+            samples=boosting.samples(wanted, count=DRAWS),
+            milliseconds=spent,
+            note=note,
+            parameters=0,
+            **common,
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _features(film: NDArray[np.uint8]) -> Tensor:

@@ -68,9 +68,10 @@ def bouman(
     for name, values in quantities.items():
         if values.shape != (len(embedding),) or not (np.isfinite(values) & (values > 0)).all():
             raise InputError(
-                f"{name} is not a positive number for each of {len(embedding)} clips", where="the quantities",
+                f"{name} is not a positive number for each of {len(embedding)} clips",
+                where="the quantities",
                 fix="its logarithm is regressed; leave out clips without a measured value",
-            )  # fmt: skip
+            )
         if np.ptp(values) == 0:
             raise InputError(
                 f"{name} is the same in all clips", where="the quantities", fix="a correlation needs cloths that differ"
@@ -105,9 +106,10 @@ def _admissible(
     size = np.unique(group, return_counts=True)[1]
     if clips < 4 or len(size) < 3:
         raise InputError(
-            f"{clips} clips of {len(size)} groups are left out one group at a time", where="the groups",
+            f"{clips} clips of {len(size)} groups are left out one group at a time",
+            where="the groups",
             fix="give at least four clips and three groups",
-        )  # fmt: skip
+        )
     if components < 1:
         raise InputError(f"{components} components", where="components", fix="give at least 1")
     training = clips - int(size.max())

@@ -28,9 +28,16 @@ READ_FROM = ("wind_speed", "density", "bending_scale", "anisotropy")
 
 
 def predict(
-    estimator: Estimator, prepared: Prepared, *, label: str, note: str, milliseconds: float, seed: int,
-    fitted_on: Prepared | None = None, known: Mapping[str, Stated] | None = None,
-) -> Predictions:  # fmt: skip
+    estimator: Estimator,
+    prepared: Prepared,
+    *,
+    label: str,
+    note: str,
+    milliseconds: float,
+    seed: int,
+    fitted_on: Prepared | None = None,
+    known: Mapping[str, Stated] | None = None,
+) -> Predictions:
     """Predictions of a model for prepared clips.
 
     Args:
@@ -52,11 +59,17 @@ def predict(
     if learner.objective is not Loss.CONTRASTIVE:
         note = "; ".join([note, *learner.scaling.beyond(truth)])
     return Predictions(
-        label=label, targets=targets, truth=truth, mean=mean, samples=samples, embedding=embedding,
+        label=label,
+        targets=targets,
+        truth=truth,
+        mean=mean,
+        samples=samples,
+        embedding=embedding,
         group=prepared.sequence,
         parameters=sum(w.numel() for one in estimator.learners for w in one.network.parameters()),
-        milliseconds=milliseconds, note=note,
-    )  # fmt: skip
+        milliseconds=milliseconds,
+        note=note,
+    )
 
 
 def _predicted(

@@ -83,15 +83,17 @@ class Predictions:
     def _check(where: str, name: str, array: NDArray, dtype: np.dtype, shape: tuple[int, ...]) -> None:
         if array.dtype != dtype or array.shape != shape:
             raise InputError(
-                f"{name} is {array.dtype} {array.shape}, not {dtype} {shape}", where=where,
+                f"{name} is {array.dtype} {array.shape}, not {dtype} {shape}",
+                where=where,
                 fix="one row a clip, one column a target, in the types that Predictions states",
-            )  # fmt: skip
+            )
         if not np.isfinite(array).all():
             bad = int(np.argwhere(~np.isfinite(array))[0][0])
             raise InputError(
-                f"{name} holds a value that is not finite", where=f"{where}, clip {bad}",
+                f"{name} holds a value that is not finite",
+                where=f"{where}, clip {bad}",
                 fix="a model that gives NaN has no score; look at its loss and its input",
-            )  # fmt: skip
+            )
 
     @property
     def clips(self) -> int:

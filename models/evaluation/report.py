@@ -80,10 +80,14 @@ def _names(name: str) -> tuple[str, str, str]:
 def page(found: Evaluation) -> str:
     """The page, HTML."""
     values = {
-        "found": found, "counts": _counts(found), "legend": table.LEGEND, "warning": paper.WARNING,
-        "tables": {title: make(found) for title, make in _TABLES.items()}, "figures": _pictures(found),
+        "found": found,
+        "counts": _counts(found),
+        "legend": table.LEGEND,
+        "warning": paper.WARNING,
+        "tables": {title: make(found) for title, make in _TABLES.items()},
+        "figures": _pictures(found),
         "version": f"flagdata {code_version()}",
-    }  # fmt: skip
+    }
     return render("models.evaluation", "page.html.j2", values)
 
 

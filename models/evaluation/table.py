@@ -122,9 +122,10 @@ def models(predictions: Sequence[Predictions]) -> dict[str, tuple[Predictions, .
         same = (first.targets, first.parameters, first.samples is None, first.embedding is None)
         if same != (own.targets, own.parameters, own.samples is None, own.embedding is None):
             raise InputError(
-                "two runs of it differ in targets, parameters, samples or embedding", where=f"model {own.label!r}",
+                "two runs of it differ in targets, parameters, samples or embedding",
+                where=f"model {own.label!r}",
                 fix="give different models different labels",
-            )  # fmt: skip
+            )
         found[own.label] = (*found.get(own.label, ()), own)
     return found
 
@@ -180,18 +181,31 @@ def rows(runs: tuple[Predictions, ...], values: Sequence[Values], resamples: Res
         spread = {name: _ends([float(found[name][0]) for found in values]) for name in values[0]}
     bounds = [row.bound for row in single if row.bound is not None]
     whole = _row(
-        first, resamples, run=None, runs=len(runs), values=mean_values(values), spread=spread,
-        bound=float(np.mean(bounds)) if bounds else None, speed=float(np.mean([own.milliseconds for own in runs])),
-    )  # fmt: skip
+        first,
+        resamples,
+        run=None,
+        runs=len(runs),
+        values=mean_values(values),
+        spread=spread,
+        bound=float(np.mean(bounds)) if bounds else None,
+        speed=float(np.mean([own.milliseconds for own in runs])),
+    )
     notes = "; ".join(dict.fromkeys(own.note for own in runs if own.note))
     whole = replace(whole, note=notes)
     return (whole, *single) if len(runs) > 1 else (whole,)
 
 
 def _row(
-    own: Predictions, resamples: Resamples, *, run: int | None, runs: int, values: Values,
-    spread: dict[str, tuple[float, float]], bound: float | None, speed: float,
-) -> Row:  # fmt: skip
+    own: Predictions,
+    resamples: Resamples,
+    *,
+    run: int | None,
+    runs: int,
+    values: Values,
+    spread: dict[str, tuple[float, float]],
+    bound: float | None,
+    speed: float,
+) -> Row:
     return Row(
         label=own.label,
         run=run,

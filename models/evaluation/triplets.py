@@ -73,6 +73,7 @@ def accuracy_values(
 def _check(group: NDArray[np.int64]) -> None:
     if not possible(group):
         raise InputError(
-            "the clips have no triplet", where="the groups of clips",
+            "the clips have no triplet",
+            where="the groups of clips",
             fix="give clips of at least two simulations, two or more of one of them",
-        )  # fmt: skip
+        )

@@ -64,8 +64,12 @@ def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXIT
             fix="lay out more clips, or lower it",
         )
     optimiser = TSNE(
-        n_components=2, perplexity=perplexity, method="barnes_hut", init="pca", learning_rate="auto",
+        n_components=2,
+        perplexity=perplexity,
+        method="barnes_hut",
+        init="pca",
+        learning_rate="auto",
         random_state=rng.child_seed(seed, "evaluation", "t-sne", "optimiser") % 2**32,
-    )  # fmt: skip
+    )
     places = optimiser.fit_transform(predictions.embedding[chosen]).astype(np.float64)
     return Layout(label=predictions.label, places=places, wind=wind[chosen], clips=predictions.clips)

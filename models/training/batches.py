@@ -75,9 +75,10 @@ class Batches:
             begin = self.cursor * self.size + self.share[0] * part
             entries = order[begin : begin + part]
             batch = Batch(
-                inputs=self.prepared.batch(entries, variant[entries]), entries=entries,
+                inputs=self.prepared.batch(entries, variant[entries]),
+                entries=entries,
                 sequence=torch.from_numpy(self.prepared.sequence[entries]),
-            )  # fmt: skip
+            )
             self.cursor += 1
             ended = self.cursor == len(self)
             if ended:
@@ -106,10 +107,16 @@ class Batches:
     def state(self) -> dict[str, Any]:
         """All that determines the batches to come."""
         return {
-            "fingerprint": self.prepared.fingerprint, "front_end": self.prepared.front_end.hash,
-            "entries": len(self.prepared), "variants": self._variants, "size": self.size, "seed": self.seed,
-            "together": self.together, "epoch": self.epoch, "cursor": self.cursor,
-        }  # fmt: skip
+            "fingerprint": self.prepared.fingerprint,
+            "front_end": self.prepared.front_end.hash,
+            "entries": len(self.prepared),
+            "variants": self._variants,
+            "size": self.size,
+            "seed": self.seed,
+            "together": self.together,
+            "epoch": self.epoch,
+            "cursor": self.cursor,
+        }
 
     def take_up(self, state: Mapping[str, Any]) -> None:
         """Go to where `state` was taken.
@@ -123,13 +130,15 @@ class Batches:
         if different:
             named = "; ".join(f"{name} was {state.get(name)!r}, is {own[name]!r}" for name in different)
             raise RefusedError(
-                f"the checkpoint is of other batches: {named}", where="the training data",
+                f"the checkpoint is of other batches: {named}",
+                where="the training data",
                 fix="train at the same tag with the same recipe, or begin anew in another folder",
-            )  # fmt: skip
+            )
         epoch, cursor = state.get("epoch"), state.get("cursor")
         if not (isinstance(epoch, int) and epoch >= 0 and isinstance(cursor, int) and 0 <= cursor < len(self)):
             raise CorruptError(
                 f"the checkpoint goes on at batch {cursor!r} of {len(self)} in epoch {epoch!r}",
-                where="the training data", fix="delete the checkpoint and train again",
-            )  # fmt: skip
+                where="the training data",
+                fix="delete the checkpoint and train again",
+            )
         self.epoch, self.cursor = epoch, cursor

@@ -68,9 +68,10 @@ def check_folder(folder: Path) -> None:
     for path in sorted(folder.rglob("*")):
         if path.relative_to(folder) not in known or path.is_symlink():
             raise ConflictError(
-                "the run folder has files that no training wrote", where=str(path),
+                "the run folder has files that no training wrote",
+                where=str(path),
                 fix="give a new or empty folder by --run",
-            )  # fmt: skip
+            )
 
 
 def save(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> None:
@@ -88,9 +89,11 @@ def save(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> None:
             write_tensors(fresh / _BEST, standing.best)
         write_tensors(fresh / _MOMENTS, _moments(standing))
         card = {
-            "identity": identity, "course": standing.course.as_list(), "batches": standing.batches,
+            "identity": identity,
+            "course": standing.course.as_list(),
+            "batches": standing.batches,
             "running": list(standing.running),
-        }  # fmt: skip
+        }
         write_card(fresh, card)
         write_sums(fresh)
         for file in files_of(fresh):
@@ -101,9 +104,10 @@ def save(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> None:
         fresh.rename(last)
     except OSError as error:
         raise FlagdataError(
-            f"writing the checkpoint failed: {error.strerror or error}", where=str(error.filename or folder),
+            f"writing the checkpoint failed: {error.strerror or error}",
+            where=str(error.filename or folder),
             fix="free some space and give the command again: it goes on from the last checkpoint",
-        ) from error  # fmt: skip
+        ) from error
 
 
 def restore(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> bool:
@@ -126,8 +130,10 @@ def restore(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> bo
         if damage is not None:
             _LOG.warning(
                 "flagdata: warning: the last checkpoint is damaged: %s; the training goes on from the one before it"
-                "\n  where: %s", damage.what, damage.where,
-            )  # fmt: skip
+                "\n  where: %s",
+                damage.what,
+                damage.where,
+            )
         _take(checkpoint, standing, identity)
         return True
     if damage is not None:
@@ -145,9 +151,10 @@ def _take(folder: Path, standing: Standing, identity: dict[str, Any]) -> None:
     different = [name for name in stored if kept.get(name) != stored[name]]
     if different:
         raise RefusedError(
-            f"the checkpoint is of another training: {', '.join(different)} differ", where=str(folder),
+            f"the checkpoint is of another training: {', '.join(different)} differ",
+            where=str(folder),
             fix="name another folder by --run, or delete this one",
-        )  # fmt: skip
+        )
     try:
         standing.learner.load_state_dict(read_tensors(folder / WEIGHTS))
         _take_moments(standing, read_tensors(folder / _MOMENTS))

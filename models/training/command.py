@@ -33,10 +33,18 @@ if TYPE_CHECKING:
 @click.option("--at", metavar="REF", help="Tag, branch or version of the lake to learn from; by default its head.")
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of weights, crops and orders, instead of the recipe's.")
 @click.option("--sequences", type=click.IntRange(min=2), metavar="N", help="Simulations to learn from, instead of all.")
-@click.option("--cache", type=LocalPath(), metavar="DIR",
-              help="Where prepared inputs are kept, outside the lake; by default beside it, LAKE.inputs.")  # fmt: skip
-@click.option("--run", type=LocalPath(), metavar="DIR",
-              help="Where the checkpoint is kept while it trains; by default in the cache.")  # fmt: skip
+@click.option(
+    "--cache",
+    type=LocalPath(),
+    metavar="DIR",
+    help="Where prepared inputs are kept, outside the lake; by default beside it, LAKE.inputs.",
+)
+@click.option(
+    "--run",
+    type=LocalPath(),
+    metavar="DIR",
+    help="Where the checkpoint is kept while it trains; by default in the cache.",
+)
 @click.option("--workers", type=click.IntRange(min=1), metavar="N", help="Threads; by default one a core.")
 @click.option("--device", default="cpu", show_default=True, help="Where the network computes: cpu, cuda.")
 @click.option("--branch", default="main", show_default=True, help="The line of work to commit the model on.")
@@ -77,17 +85,26 @@ def train(
     lake = lake_place(lake_path)
     folder = cache if cache is not None else beside(lake, ".inputs")
     report = trained(
-        loaded, lake, at=at, cache=folder, run=run, workers=workers or os.cpu_count() or 1, device=device,
-        branch=branch, bars=progress,
-    )  # fmt: skip
+        loaded,
+        lake,
+        at=at,
+        cache=folder,
+        run=run,
+        workers=workers or os.cpu_count() or 1,
+        device=device,
+        branch=branch,
+        bars=progress,
+    )
     if report is None:  # another rank of a torchrun reports
         return
     if as_json:
         document("train", report)
         return
     best = report["best"]
-    say(f"{report['epochs']} epochs of {report['seconds'] / max(1, report['epochs']):.0f} s; the best was "
-        f"{best['number'] + 1}, validation loss {best['validation']:.4f}")  # fmt: skip
+    say(
+        f"{report['epochs']} epochs of {report['seconds'] / max(1, report['epochs']):.0f} s; the best was "
+        f"{best['number'] + 1}, validation loss {best['validation']:.4f}"
+    )
     echo(f"{report['artifact']}  network {report['name']}, seed {report['seed']}")
 
 
@@ -140,8 +157,9 @@ def trained(
     films = film_rows(train_pairs, sequences=recipe.data.sequences, seed=recipe.seed)
     if names := recipe.loss.targets:
         for side, table, rows in (
-            ("training", train_pairs.table, films), ("validation", validation_pairs.table, slice(None)),
-        ):  # fmt: skip
+            ("training", train_pairs.table, films),
+            ("validation", validation_pairs.table, slice(None)),
+        ):
             Scaling(names=names).check(stated(table.parameter_columns(rows), names), where=f"the {side} side")
     torch.set_num_threads(max(1, workers))
     several = "RANK" in os.environ and int(os.environ.get("WORLD_SIZE", "1")) > 1
@@ -156,17 +174,27 @@ def trained(
         if several and not first:
             ranks.barrier()  # the first prepares the inputs for all
         if first:
-            say(announced(
-                f"preparing {len(films)} films and {len(validation_pairs)} clips",
-                _PREPARED * (len(films) * recipe.variants + len(validation_pairs)), workers=workers,
-                kept="what was prepared before is kept and taken up",
-            ))  # fmt: skip
+            say(
+                announced(
+                    f"preparing {len(films)} films and {len(validation_pairs)} clips",
+                    _PREPARED * (len(films) * recipe.variants + len(validation_pairs)),
+                    workers=workers,
+                    kept="what was prepared before is kept and taken up",
+                )
+            )
         with bars(len(films), f"{recipe.name}: prepare", "film") as advance:
             train_inputs = prepare_films(
-                train_pairs, recipe.front_end, recipe.cropping, variants=recipe.variants, folder=cache,
-                workers=workers, advance=advance, augment=recipe.augment, sequences=recipe.data.sequences,
+                train_pairs,
+                recipe.front_end,
+                recipe.cropping,
+                variants=recipe.variants,
+                folder=cache,
+                workers=workers,
+                advance=advance,
+                augment=recipe.augment,
+                sequences=recipe.data.sequences,
                 seed=recipe.seed,
-            )  # fmt: skip
+            )
         with bars(len(validation_pairs), f"{recipe.name}: prepare what validates", "clip") as advance:
             validation_inputs = prepare_clips(
                 validation_pairs, recipe.front_end, recipe.cropping, folder=cache, workers=workers, advance=advance
@@ -175,15 +203,24 @@ def trained(
             ranks.barrier()
         identity = {"recipe": recipe.identity(), "train": data["train"], "validation": data["validation"]}
         training = Training(
-            recipe=recipe, train=train_inputs.held(), validation=validation_inputs.held(), identity=identity,
-            run=folder, device=torch.device(device), bars=bars,
-        )  # fmt: skip
+            recipe=recipe,
+            train=train_inputs.held(),
+            validation=validation_inputs.held(),
+            identity=identity,
+            run=folder,
+            device=torch.device(device),
+            bars=bars,
+        )
         if first:
             say(f"order of the first epoch: {training.batches.order_hash(0)}")
-            say(announced(
-                f"training for up to {recipe.optimiser.epochs} epochs", training.length() * workers, workers=workers,
-                kept="an interrupted training goes on from its last checkpoint",
-            ))  # fmt: skip
+            say(
+                announced(
+                    f"training for up to {recipe.optimiser.epochs} epochs",
+                    training.length() * workers,
+                    workers=workers,
+                    kept="an interrupted training goes on from its last checkpoint",
+                )
+            )
         done = training.complete()
         if several:
             ranks.barrier()  # no rank leaves while another still talks to it
@@ -191,7 +228,7 @@ def trained(
             return None
         row, card, healed = publish(
             source.lake, recipe, data, recordings, done, batches=training.batches.state(), branch=branch
-        )  # fmt: skip
+        )
         if healed is not None:
             say(said(row.id, healed))
     finally:
@@ -203,9 +240,10 @@ def trained(
 
 def _refuse(folder: Path) -> None:
     raise ConflictError(
-        "another training is under way in this folder", where=str(folder),
+        "another training is under way in this folder",
+        where=str(folder),
         fix="wait until it has ended, or name another folder by --run",
-    )  # fmt: skip
+    )
 
 
 def _report(row: Artifact, card: Mapping[str, Any]) -> dict[str, Any]:

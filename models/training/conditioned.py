@@ -71,7 +71,7 @@ class FitFilm:
             raise InputError(
                 f"a film of {len(self.times)} frames at {own:.4g} Hz for clips of {count} at {rate:g} Hz",
                 fix=f"give {(count - 1) / rate:.3g} s or more, of {LEAST_RATE * rate:.3g} Hz or more",
-            )  # fmt: skip
+            )
         return fits
 
     def whole(self, rate: float) -> NDArray[np.uint8]:

@@ -76,9 +76,10 @@ class Files:
                 found.append(np.load(path, mmap_mode="r")[variant])
             except (OSError, ValueError, EOFError) as error:
                 raise CorruptError(
-                    f"a prepared input cannot be read: {error}", where=str(path),
+                    f"a prepared input cannot be read: {error}",
+                    where=str(path),
                     fix="delete the file and give the command again: it is made anew",
-                ) from None  # fmt: skip
+                ) from None
         return np.stack(found)
 
 
@@ -145,9 +146,10 @@ def stated(parameters: Mapping[str, NDArray[np.float64]], names: Sequence[str]) 
     if not np.isfinite(found).all():
         entry, column = (int(k) for k in np.argwhere(~np.isfinite(found))[0])
         raise InputError(
-            f"entry {entry} does not state its {names[column]}", where="the training data",
+            f"entry {entry} does not state its {names[column]}",
+            where="the training data",
             fix="select recordings that have ground truth, or leave the target out",
-        )  # fmt: skip
+        )
     return found
 
 
@@ -241,9 +243,17 @@ def prepare_clips(
         return [cropping.cut(clip, cropping.whole(_shape(clip)))]
 
     return _prepared(
-        pairs, np.arange(len(pairs)), front_end, key, made, 1, folder, workers, advance,
+        pairs,
+        np.arange(len(pairs)),
+        front_end,
+        key,
+        made,
+        1,
+        folder,
+        workers,
+        advance,
         conditioned=cropping.conditioned,
-    )  # fmt: skip
+    )
 
 
 def _conditioned_crops(
@@ -251,9 +261,7 @@ def _conditioned_crops(
 ) -> list[Tensor]:
     """Random crops of a film that was disturbed and conditioned once; each starts on a frame of its own."""
     recording, times = str(pairs.table.recording[row]), pairs.film_times(row)
-    disturbed = augment.before(
-        pairs.film(row), times, source=recording, other=lambda: pairs.film(_beside(pairs, row))
-    )  # fmt: skip
+    disturbed = augment.before(pairs.film(row), times, source=recording, other=lambda: pairs.film(_beside(pairs, row)))
     film = FitFilm.of(disturbed, times)
     starts, found = film.starts(front_end.frames, front_end.rate), []
     for variant in range(variants):
@@ -312,16 +320,18 @@ def _prepared(
                 _fill(still[1:], made, front_end, workers, advance)
     except OSError as error:
         raise FlagdataError(
-            f"preparing the inputs failed: {error.strerror or error}", where=str(folder),
+            f"preparing the inputs failed: {error.strerror or error}",
+            where=str(folder),
             fix="free some space or name another folder by --cache; what was done is kept",
-        ) from error  # fmt: skip
+        ) from error
     alone = -1 - np.unique(pairs.table.recording[rows], return_inverse=True)[1]
     return Prepared(
         maps=Files(paths=paths, shape=(len(rows), variants, *front_end.shape)),
         parameters=pairs.table.parameter_columns(rows),
         sequence=np.where(pairs.table.seeded[rows], pairs.table.seed[rows], alone),
-        fingerprint=digest("\n".join([pairs.fingerprint, *named])), front_end=front_end,
-    )  # fmt: skip
+        fingerprint=digest("\n".join([pairs.fingerprint, *named])),
+        front_end=front_end,
+    )
 
 
 def _check_rate(pairs: Pairs, rows: NDArray[np.int64], front_end: FrontEnd) -> None:
@@ -334,8 +344,9 @@ def _check_rate(pairs: Pairs, rows: NDArray[np.int64], front_end: FrontEnd) -> N
         raise InputError(
             f"{len(wrong)} of {len(rows)} clips have another rate than {front_end.rate:g} Hz; "
             f"the first has {rate[wrong[0]]:g}",
-            where=f"clip {table.artifact[rows[wrong[0]]]}", fix="ingest or build at that rate, or select by rate",
-        )  # fmt: skip
+            where=f"clip {table.artifact[rows[wrong[0]]]}",
+            fix="ingest or build at that rate, or select by rate",
+        )
 
 
 def _name(key: dict[str, Any], front_end: FrontEnd, content: str) -> str:
@@ -353,8 +364,10 @@ def _warn_of_damage(paths: Sequence[Path]) -> None:
     if paths:
         _LOG.warning(
             "flagdata: warning: %d prepared inputs are damaged, or of an older version; they are made anew"
-            "\n  where: %s", len(paths), paths[0],
-        )  # fmt: skip
+            "\n  where: %s",
+            len(paths),
+            paths[0],
+        )
 
 
 def _fill(
@@ -395,9 +408,10 @@ def _first_sequences(pairs: Pairs, rows: NDArray[np.int64], *, count: int | None
     seeds = np.unique(pairs.table.seed[rows])
     if count > len(seeds):
         raise InputError(
-            f"{count} sequences are asked for, the training side has {len(seeds)}", where="[data] sequences",
+            f"{count} sequences are asked for, the training side has {len(seeds)}",
+            where="[data] sequences",
             fix="build a larger data set, or ask for fewer",
-        )  # fmt: skip
+        )
     chosen = stream(seed, "sequences").permutation(seeds)[:count]
     return np.isin(pairs.table.seed[rows], chosen)
 

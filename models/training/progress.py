@@ -27,8 +27,13 @@ class Epoch:
 
 
 _KINDS: dict[str, Callable[[Any], Any]] = {
-    "number": int, "train": float, "validation": float, "rate": float, "seconds": float, "clips": int,
-}  # fmt: skip
+    "number": int,
+    "train": float,
+    "validation": float,
+    "rate": float,
+    "seconds": float,
+    "clips": int,
+}
 
 
 @dataclass(kw_only=True)

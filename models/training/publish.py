@@ -24,9 +24,11 @@ PARENTS = 100
 def data_identity(lake: Lake, train: Pairs, validation: Pairs, *, at: str | None) -> dict[str, Any]:
     """What a training learns from: the version of the lake and the pairs' fingerprints."""
     return {
-        "at": at, "view": [f"{part.branch}@{part.version}" for part in lake.view(at)],
-        "train": train.fingerprint, "validation": validation.fingerprint,
-    }  # fmt: skip
+        "at": at,
+        "view": [f"{part.branch}@{part.version}" for part in lake.view(at)],
+        "train": train.fingerprint,
+        "validation": validation.fingerprint,
+    }
 
 
 def recordings_of(train: Pairs, validation: Pairs) -> list[str]:
@@ -43,9 +45,10 @@ def network_artifact(
     sample. The fingerprints in its recipe state all data exactly.
     """
     held = {
-        "recipe": recipe.identity(), "data": {key: data[key] for key in ("train", "validation")},
+        "recipe": recipe.identity(),
+        "data": {key: data[key] for key in ("train", "validation")},
         "recordings": len(recordings),
-    }  # fmt: skip
+    }
     shown = lake.rows({"artifact": recordings}, at=branch, columns=["artifact"])["artifact"].to_pylist()
     parents = sorted(shown)[:PARENTS]
     return Artifact(kind=Kind.NETWORK, name=recipe.name, recipe=held, seed=recipe.seed, parents=parents)
@@ -58,19 +61,34 @@ def card_of(
     learner = trained.learner
     best = trained.course.best
     return {
-        "name": recipe.name, "title": recipe.title, "recipe": recipe.identity(), "recipe_hash": recipe.hash,
-        "data": data, "code_version": code_version(), "seed": recipe.seed, "batches": batches,
-        "front_end": asdict(recipe.front_end), "cropping": recipe.cropping.as_dict(),
+        "name": recipe.name,
+        "title": recipe.title,
+        "recipe": recipe.identity(),
+        "recipe_hash": recipe.hash,
+        "data": data,
+        "code_version": code_version(),
+        "seed": recipe.seed,
+        "batches": batches,
+        "front_end": asdict(recipe.front_end),
+        "cropping": recipe.cropping.as_dict(),
         "parameters": sum(weights.numel() for weights in learner.network.parameters()),
-        "epochs": len(trained.course.epochs), "best": None if best is None else asdict(best),
-        "seconds": trained.seconds, "course": trained.course.as_list(),
-    }  # fmt: skip
+        "epochs": len(trained.course.epochs),
+        "best": None if best is None else asdict(best),
+        "seconds": trained.seconds,
+        "course": trained.course.as_list(),
+    }
 
 
 def publish(
-    lake: Lake, recipe: TrainingRecipe, data: dict[str, Any], recordings: Sequence[str], trained: Trained, *,
-    batches: dict[str, Any], branch: str,
-) -> tuple[Artifact, dict[str, Any], Healing | None]:  # fmt: skip
+    lake: Lake,
+    recipe: TrainingRecipe,
+    data: dict[str, Any],
+    recordings: Sequence[str],
+    trained: Trained,
+    *,
+    batches: dict[str, Any],
+    branch: str,
+) -> tuple[Artifact, dict[str, Any], Healing | None]:
     """Commit a model and return its row and card; one that is there already is kept, unless its object is damaged or
     missing: what was done about that is returned, too. A recording that was withdrawn
     from the branch since the training began is not among its parents.

@@ -188,12 +188,17 @@ class TrainingRecipe:
     def identity(self) -> dict[str, Any]:
         """All that shapes the weights beside the data themselves, as JSON."""
         return {
-            "training": RECIPE_VERSION, "seed": self.seed, "data": self.data.identity(),
-            "front_end": asdict(self.front_end), "cropping": self.cropping.as_dict(), "variants": self.variants,
+            "training": RECIPE_VERSION,
+            "seed": self.seed,
+            "data": self.data.identity(),
+            "front_end": asdict(self.front_end),
+            "cropping": self.cropping.as_dict(),
+            "variants": self.variants,
             **({"augment": self.augment.identity(), "conditioning": VERSION} if self.cropping.conditioned else {}),
             "network": {"name": self.network.name, "options": dict(self.network.options)},
-            "loss": asdict(self.loss), "optimiser": asdict(self.optimiser),
-        }  # fmt: skip
+            "loss": asdict(self.loss),
+            "optimiser": asdict(self.optimiser),
+        }
 
     def learner(self) -> Learner:
         """The network with its head, its weights drawn by torch's generator as it stands.
@@ -203,9 +208,13 @@ class TrainingRecipe:
         """
         loss = self.loss
         return build(
-            self.network.name, self.network.options, loss=loss.name, targets=loss.targets, components=loss.components,
+            self.network.name,
+            self.network.options,
+            loss=loss.name,
+            targets=loss.targets,
+            components=loss.components,
             margin=loss.margin,
-        )  # fmt: skip
+        )
 
     def check(self) -> None:
         """Make sure that the network takes what the front end gives, by shapes alone, before anything is prepared.
@@ -220,8 +229,9 @@ class TrainingRecipe:
             shape = "×".join(map(str, self.front_end.shape))
             raise InputError(
                 f"the network {self.network.name} does not take {shape} {self.front_end.maps}: {error}",
-                where="[network]", fix="give it smaller strides, or larger clips",
-            ) from None  # fmt: skip
+                where="[network]",
+                fix="give it smaller strides, or larger clips",
+            ) from None
 
     @cached_property
     def hash(self) -> str:
@@ -246,12 +256,18 @@ def parse(text: str, *, name: str, where: str, folder: Path = Path()) -> Trainin
     top = Table(parsed(text, where=where), where=where)
     front_end, cropping, variants, augment = _input(top.table("input"))
     recipe = TrainingRecipe(
-        name=name, title=top.text("title", name) or name, seed=top.whole("seed", 0, least=0),
-        data=_data(top.table("data")), front_end=front_end, cropping=cropping, variants=variants,
+        name=name,
+        title=top.text("title", name) or name,
+        seed=top.whole("seed", 0, least=0),
+        data=_data(top.table("data")),
+        front_end=front_end,
+        cropping=cropping,
+        variants=variants,
         augment=augment,
-        network=_network(top.table("network"), front_end), loss=_loss(top.table("loss")),
+        network=_network(top.table("network"), front_end),
+        loss=_loss(top.table("loss")),
         optimiser=_optimiser(top.table("optimiser")),
-    )  # fmt: skip
+    )
     top.done()
     return recipe
 
@@ -261,9 +277,10 @@ def _data(table: Table) -> DataSpec:
     datasets = [named] if isinstance(named, str) else named
     if not isinstance(datasets, list) or not datasets or not all(is_name(dataset) for dataset in datasets):
         raise InputError(
-            f"the data set is {named!r}", where=table.where,
+            f"the data set is {named!r}",
+            where=table.where,
             fix='name one, or several in a list: dataset = "flagsim-wide"',
-        )  # fmt: skip
+        )
     sequences = table.whole("sequences", 1, least=1) if "sequences" in table else None
     table.done()
     return DataSpec(datasets=tuple(datasets), sequences=sequences)
@@ -281,15 +298,17 @@ def _input(table: Table) -> tuple[FrontEnd, Cropping, int, Augment]:
     if (values := variants * math.prod(front_end.shape)) > FILM_LIMIT:
         raise LimitError(
             f"{variants} variants of {math.prod(front_end.shape)} values are {values:.3g} values of each film",
-            where=table.where, fix=f"at most {FILM_LIMIT} are kept: give fewer variants or a smaller size",
-        )  # fmt: skip
+            where=table.where,
+            fix=f"at most {FILM_LIMIT} are kept: give fewer variants or a smaller size",
+        )
     conditioned = table.flag("conditioned")
     augment = _augment(table.table("augment"))
     if augment.strengths and not conditioned:
         raise UsageError(
-            "disturbances of films that are not conditioned", where=f"{table.where} [augment]",
+            "disturbances of films that are not conditioned",
+            where=f"{table.where} [augment]",
             fix="write conditioned = true in [input], or leave them out",
-        )  # fmt: skip
+        )
     table.done()
     cropping = Cropping(frames=frames, size=size, scales=scales, mirror=mirror, conditioned=conditioned)
     return front_end, cropping, variants, augment
@@ -312,9 +331,10 @@ def _network(table: Table, front_end: FrontEnd) -> NetworkSpec:
     takes = NETWORKS[name].takes
     if takes != front_end.maps:
         raise UsageError(
-            f"the network {name} takes {takes}, not {front_end.maps}", where=table.where,
+            f"the network {name} takes {takes}, not {front_end.maps}",
+            where=table.where,
             fix=f'write maps = "{takes}" in [input]',
-        )  # fmt: skip
+        )
     options = {
         key.replace("-", "_"): value
         for key, value in ((key, table.value(key)) for key in table.names() if key != "name")
@@ -330,17 +350,20 @@ def _loss(table: Table) -> LossSpec:
             raise UnknownNameError.of("target", target, TARGETS, where=table.where)
     if (name is Loss.CONTRASTIVE) == bool(targets):
         raise UsageError(
-            "the contrastive loss has no targets, the others have at least one", where=table.where,
+            "the contrastive loss has no targets, the others have at least one",
+            where=table.where,
             fix='write targets = ["wind_speed"], or leave them out',
-        )  # fmt: skip
+        )
     if name is not Loss.POSTERIOR and "components" in table:
         raise UsageError(f"components have no effect on {name.value}", where=table.where, fix="leave them out")
     if name is not Loss.CONTRASTIVE and "margin" in table:
         raise UsageError(f"a margin has no effect on {name.value}", where=table.where, fix="leave it out")
     return table.record(
-        LossSpec, {"name": lambda: name, "targets": lambda: targets}, components=COUNT,
+        LossSpec,
+        {"name": lambda: name, "targets": lambda: targets},
+        components=COUNT,
         margin=Bounds(above=0.0, most=NUMBER_LIMIT),
-    )  # fmt: skip
+    )
 
 
 def _optimiser(table: Table) -> OptimiserSpec:
@@ -348,7 +371,12 @@ def _optimiser(table: Table) -> OptimiserSpec:
     if schedule is not Schedule.STEPS and "drop-after" in table:
         raise UsageError(f"drop-after says nothing of {schedule.value}", where=table.where, fix="leave it out")
     return table.record(
-        OptimiserSpec, rate=Bounds(above=0.0, most=_LARGEST_STEP), decay=Bounds(least=0.0, most=_LARGEST_STEP),
-        batch=Bounds(least=2), epochs=COUNT, drop_after=COUNT, patience=COUNT,
+        OptimiserSpec,
+        rate=Bounds(above=0.0, most=_LARGEST_STEP),
+        decay=Bounds(least=0.0, most=_LARGEST_STEP),
+        batch=Bounds(least=2),
+        epochs=COUNT,
+        drop_after=COUNT,
+        patience=COUNT,
         clip_norm=Bounds(above=0.0, most=NUMBER_LIMIT),
-    )  # fmt: skip
+    )

@@ -133,9 +133,12 @@ class Training:
         """This process's part of all batches; its state is the progress of the training."""
         together = self.recipe.loss.name is Loss.CONTRASTIVE
         return Batches(
-            prepared=self.train, size=self.recipe.optimiser.batch, seed=self.recipe.seed, together=together,
+            prepared=self.train,
+            size=self.recipe.optimiser.batch,
+            seed=self.recipe.seed,
+            together=together,
             share=_share(),
-        )  # fmt: skip
+        )
 
     def _fresh(self) -> Learner:
         with torch_draws(self.recipe.seed, "weights"):
@@ -174,10 +177,13 @@ class Training:
                     written = time.monotonic()
         validation = self._validate(standing.learner)
         epoch = Epoch(
-            number=number, train=total / steps, validation=validation,
+            number=number,
+            train=total / steps,
+            validation=validation,
             rate=learning_rate(spec, (number + 1) * len(batches) - 1, len(batches)),
-            seconds=time.monotonic() - begun, clips=clips,
-        )  # fmt: skip
+            seconds=time.monotonic() - begun,
+            clips=clips,
+        )
         best = standing.course.best
         if best is None or validation < best.validation:
             standing.best = {name: value.detach().clone() for name, value in standing.learner.state_dict().items()}

@@ -53,8 +53,17 @@ _KEYS: Mapping[str, Any] = {
             "transform": dict.fromkeys(("translate", "scale", "rotate")),
             "materials": [
                 dict.fromkeys(
-                    ("data", "thicken", "density_mult", "stretching_mult", "bending_mult", "damping", "strain_limits",
-                     "yield_curv", "weakening")
+                    (
+                        "data",
+                        "thicken",
+                        "density_mult",
+                        "stretching_mult",
+                        "bending_mult",
+                        "damping",
+                        "strain_limits",
+                        "yield_curv",
+                        "weakening",
+                    )
                 )
             ],
             "remeshing": None,
@@ -63,11 +72,18 @@ _KEYS: Mapping[str, Any] = {
     "handles": [dict.fromkeys(("nodes", "type"))],
     "wind": dict.fromkeys(("velocity", "density", "drag")),
     "magic": dict.fromkeys(
-        ("handle_stiffness", "repulsion_thickness", "collision_stiffness", "projection_thickness",
-         "edge_flip_threshold", "rib_stiffening", "combine_tensors")
+        (
+            "handle_stiffness",
+            "repulsion_thickness",
+            "collision_stiffness",
+            "projection_thickness",
+            "edge_flip_threshold",
+            "rib_stiffening",
+            "combine_tensors",
+        )
     ),
     **dict.fromkeys(("motions", "obstacles", "morphs", "obs_friction")),
-}  # fmt: skip
+}
 # `remeshing`, `projection_thickness` to `combine_tensors`, `weakening` and `obs_friction` belong to stages that are not
 # simulated and to obstacles: they say nothing once those are left out.
 _EMPTY = ("motions", "obstacles", "morphs")  # known, and only supported empty
@@ -98,8 +114,9 @@ class ArcsimScene:
         if not (math.isfinite(self.frame_time) and self.frame_time > 0 and self.frame_steps >= 1 and self.frames >= 1):
             raise InputError(
                 f"a run of {self.frames} frames of {self.frame_time!r} s, each in {self.frame_steps} steps",
-                where="ArcSim scene", fix="let it last at least one frame of at least one step",
-            )  # fmt: skip
+                where="ArcSim scene",
+                fix="let it last at least one frame of at least one step",
+            )
 
     @property
     def step(self) -> float:

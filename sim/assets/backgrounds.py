@@ -138,8 +138,9 @@ def _house(rng: np.random.Generator, picture: Picture, far: float, haze: NDArray
     states = rng.uniform(0.0, 1.0, (64, 64))[row.astype(np.int64) % 64, column.astype(np.int64) % 64]
     glass = over(
         np.broadcast_to(hue(rng, (0.5, 0.65), (0.05, 0.4), (0.1, 0.5)), (*x.shape, 3)),
-        haze, 0.8 * smoothstep(0.55, 0.95, states),
-    )  # fmt: skip
+        haze,
+        0.8 * smoothstep(0.55, 0.95, states),
+    )
     shade = 1 + 0.05 * fractal(rng, *x.shape, slope=rng.uniform(0.5, 1.2)) if min(x.shape) > 1 else np.ones(x.shape)
     shade *= 1 - rng.uniform(0.0, 0.25) * (down < 0.08)
     shade *= 1 - rng.uniform(0.0, 0.4) * (x > left + width * 0.97)

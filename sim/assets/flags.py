@@ -155,7 +155,8 @@ def _upright_thirds(sheet: Sheet, hoist: str, middle: str, fly: str) -> None:
 
 FLAGS: Mapping[str, NationalFlag] = {
     "chile": NationalFlag(
-        country="Chile", draw=_chile,
+        country="Chile",
+        draw=_chile,
         source="Decreto Supremo 1534 of 1967: canton a square of half the height, star of half its side",
     ),
     "china": NationalFlag(country="China", source="GB 12982-2004, annex: stars on a grid of 15 × 10", draw=_china),
@@ -170,7 +171,8 @@ FLAGS: Mapping[str, NationalFlag] = {
         country="Italy", source="Constitution, article 12; colours of the D.P.C.M. of 14 April 2006", draw=_italy
     ),
     "japan": NationalFlag(
-        country="Japan", source="Act on National Flag and Anthem, No. 127 of 1999: disc of three fifths of the height",
+        country="Japan",
+        source="Act on National Flag and Anthem, No. 127 of 1999: disc of three fifths of the height",
         draw=_japan,
     ),
     "netherlands": NationalFlag(country="Netherlands", source="Royal Decree of 19 February 1937", draw=_netherlands),
@@ -185,11 +187,12 @@ FLAGS: Mapping[str, NationalFlag] = {
         draw=_south_korea,
     ),
     "turkey": NationalFlag(
-        country="Türkiye", draw=_turkey,
+        country="Türkiye",
+        draw=_turkey,
         source="Law 2893 of 22 September 1983, annexed drawing, without the hoist's band",
     ),
     "ukraine": NationalFlag(country="Ukraine", source="DSTU 4512:2006", draw=_ukraine),
-}  # fmt: skip
+}
 
 
 class _National:

@@ -11,9 +11,11 @@ from flagdata.console import LocalPath, document, echo, json_option, say
 
 @click.command("blender-setup")
 @click.option(
-    "--folder", type=LocalPath(file_okay=False), metavar="DIR",
+    "--folder",
+    type=LocalPath(file_okay=False),
+    metavar="DIR",
     help="Where the environment is made; by default the folder blender of flagdata's cache.",
-)  # fmt: skip
+)
 @click.option("--python", metavar="PYTHON", help="A Python 3.11 to make it with; by default one that is found.")
 @click.option("--check", "only_check", is_flag=True, help="Only say which environment is used, and whether it works.")
 @json_option
@@ -37,9 +39,10 @@ def blender_setup(folder: Path | None, python: str | None, only_check: bool, as_
 
     if only_check and (folder or python):
         raise UsageError(
-            "--check looks at the environment that is used", where="flagdata blender-setup",
+            "--check looks at the environment that is used",
+            where="flagdata blender-setup",
             fix="leave out --folder and --python",
-        )  # fmt: skip
+        )
     if only_check:
         made = environment.check(environment.find())
     else:

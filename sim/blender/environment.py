@@ -40,11 +40,18 @@ os._exit(0)
 """Ends without Blender's own clean-up, which may hang."""
 _MISSING_LIBRARY = re.compile(r"(lib[\w+-]+\.so[.\d]*): cannot open shared object file")
 _DEBIAN = {
-    "libX11.so.6": "libx11-6", "libXrender.so.1": "libxrender1", "libXfixes.so.3": "libxfixes3",
-    "libXi.so.6": "libxi6", "libXext.so.6": "libxext6", "libxkbcommon.so.0": "libxkbcommon0",
-    "libSM.so.6": "libsm6", "libICE.so.6": "libice6", "libGL.so.1": "libgl1", "libEGL.so.1": "libegl1",
+    "libX11.so.6": "libx11-6",
+    "libXrender.so.1": "libxrender1",
+    "libXfixes.so.3": "libxfixes3",
+    "libXi.so.6": "libxi6",
+    "libXext.so.6": "libxext6",
+    "libxkbcommon.so.0": "libxkbcommon0",
+    "libSM.so.6": "libsm6",
+    "libICE.so.6": "libice6",
+    "libGL.so.1": "libgl1",
+    "libEGL.so.1": "libegl1",
     "libxcb.so.1": "libxcb1",
-}  # fmt: skip
+}
 """The Debian package of each shared library that the module is linked to and does not bring along."""
 
 DEBIAN_PACKAGES = tuple(sorted(set(_DEBIAN.values())))
@@ -90,17 +97,19 @@ def find() -> Path:
     if chosen := os.environ.get(SETTING):
         if not Path(chosen).is_file():
             raise NotFoundError(
-                f"there is no Python at {chosen}", where=SETTING,
+                f"there is no Python at {chosen}",
+                where=SETTING,
                 fix="set it to the Python of Blender's environment, or unset it and run flagdata blender-setup",
-            )  # fmt: skip
+            )
         return Path(chosen)
     python = interpreter(default_folder())
     if not python.is_file():
         raise NotFoundError(
-            "Blender is not installed", where=str(default_folder()),
+            "Blender is not installed",
+            where=str(default_folder()),
             fix=f"make its environment with flagdata blender-setup, name one with {SETTING}, or take the renderer "
             "raster",
-        )  # fmt: skip
+        )
     return python
 
 
@@ -117,9 +126,10 @@ def check(python: Path) -> Environment:
         )
     except subprocess.TimeoutExpired:
         raise BlenderError(
-            f"Blender could not be imported within {_CHECK_TIMEOUT:g} s", where=str(python),
+            f"Blender could not be imported within {_CHECK_TIMEOUT:g} s",
+            where=str(python),
             fix="try again on a machine that is less busy, or make the environment anew with flagdata blender-setup",
-        ) from None  # fmt: skip
+        ) from None
     except OSError as error:
         raise BlenderError(
             f"this Python cannot be run: {error.strerror}", where=str(python), fix="run flagdata blender-setup"
@@ -129,9 +139,10 @@ def check(python: Path) -> Environment:
     found = json.loads(done.stdout.splitlines()[-1])
     if not found["blender"].startswith(f"{SERIES}."):
         raise BlenderError(
-            f"this is Blender {found['blender']}, and the worker is written for {SERIES}", where=str(python),
+            f"this is Blender {found['blender']}, and the worker is written for {SERIES}",
+            where=str(python),
             fix=f"run flagdata blender-setup, or name an environment with {REQUIREMENT} with {SETTING}",
-        )  # fmt: skip
+        )
     return Environment(python=python, blender=found["blender"], python_version=found["python"], numpy=found["numpy"])
 
 
@@ -159,15 +170,17 @@ def create(folder: Path, *, python: str | None = None, say: Callable[[str], None
     say(f"making an environment in {folder}")
     rewrite(folder / _MARK, "the environment of flagdata blender-setup, which completes it when run again\n")
     _run(
-        (base, "-m", "venv", str(folder)), folder,
+        (base, "-m", "venv", str(folder)),
+        folder,
         fix="install Python's venv (Debian: apt-get install python3.11-venv)",
-    )  # fmt: skip
+    )
     say(f"installing {REQUIREMENT}, about 1 GB on disk")
     _run(
-        (str(target), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", REQUIREMENT), folder,
+        (str(target), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", REQUIREMENT),
+        folder,
         fix="see what pip said above: the index that pip is set to must offer this version for Python "
         f"{_dotted(PYTHON)}; delete the folder if it is of another Python",
-    )  # fmt: skip
+    )
     check.cache_clear()
     return check(target)
 
@@ -186,8 +199,9 @@ def _python_for_blender(named: str | None) -> str:
     raise NotFoundError(
         f"{named or 'the running Python'} is not Python {_dotted(PYTHON)}, the only version that Blender {SERIES} "
         "is built for" + ("" if named else f", and the search path has no python{_dotted(PYTHON)}"),
-        where="flagdata blender-setup", fix=f"install Python {_dotted(PYTHON)} and name it with --python",
-    )  # fmt: skip
+        where="flagdata blender-setup",
+        fix=f"install Python {_dotted(PYTHON)} and name it with --python",
+    )
 
 
 def _version(python: str) -> tuple[int, ...] | None:

@@ -48,10 +48,12 @@ def encode(message: Message) -> bytes:
     arrays = {name: np.ascontiguousarray(values) for name, values in message.arrays.items()}
     head = json.dumps(
         {
-            "version": PROTOCOL_VERSION, "kind": message.kind, "fields": dict(message.fields),
+            "version": PROTOCOL_VERSION,
+            "kind": message.kind,
+            "fields": dict(message.fields),
             "arrays": [{"name": n, "dtype": a.dtype.name, "shape": a.shape} for n, a in arrays.items()],
         }
-    ).encode()  # fmt: skip
+    ).encode()
     return b"".join([_LENGTH.pack(len(head)), head, *(array.tobytes() for array in arrays.values())])
 
 
@@ -88,6 +90,7 @@ def decode(read: Read) -> Message:
 
 def _broken(what: str) -> CorruptError:
     return CorruptError(
-        f"the render worker's stream holds {what}", where="render worker",
+        f"the render worker's stream holds {what}",
+        where="render worker",
         fix="use one installation of flagdata for both sides",
-    )  # fmt: skip
+    )

@@ -86,10 +86,14 @@ def logged(
         channels={"wind_speed": readings, "wind_direction": blowing_from(means[:, 1], means[:, 2])},
         flags=np.where(dead, int(SampleFlag.DEAD_ZONE), 0).astype(np.uint16),
         sensor=Sensor(
-            name=_NAME, averaging=1 / spec.rate, resolution=spec.resolution, accuracy=spec.accuracy,
-            threshold=threshold, distance_constant=drawn.get("anemometer-lag", {}).get("distance"),
+            name=_NAME,
+            averaging=1 / spec.rate,
+            resolution=spec.resolution,
+            accuracy=spec.accuracy,
+            threshold=threshold,
+            distance_constant=drawn.get("anemometer-lag", {}).get("distance"),
         ),
-    )  # fmt: skip
+    )
     known = {f"{name}.{key}": value for name, values in drawn.items() for key, value in values.items()}
     return Reading(series=series, parameters={**known, "anemometer.noise": noise})
 

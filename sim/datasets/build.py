@@ -99,10 +99,15 @@ class Build:
         films = self._film(rolls)
         failed = [f"{roll.cast.simulation.name} {index}: {why}" for roll in rolls for index, why in roll.failed.items()]
         return BuildReport(
-            sequences=sum(roll.cast.simulation.count for roll in rolls), films=len(films),
-            new_sequences=self._new_sequences, new_films=self._new_films, healed=self._healed, clips=self._clips,
-            failed=tuple(failed), seconds=time.perf_counter() - begun,
-        )  # fmt: skip
+            sequences=sum(roll.cast.simulation.count for roll in rolls),
+            films=len(films),
+            new_sequences=self._new_sequences,
+            new_films=self._new_films,
+            healed=self._healed,
+            clips=self._clips,
+            failed=tuple(failed),
+            seconds=time.perf_counter() - begun,
+        )
 
     # Sequences
 
@@ -188,8 +193,9 @@ class Build:
         if others:
             raise ConflictError(
                 f"{len(others)} recordings of the data set {self.recipe.name!r} are of another recipe",
-                where=f"branch {self.branch}", fix="give the recipe another name, or build on another branch",
-            )  # fmt: skip
+                where=f"branch {self.branch}",
+                fix="give the recipe another name, or build on another branch",
+            )
 
     def _refuse_other_names(self, films: Sequence[Film]) -> None:
         """Make sure that no film of this recipe is there under another data set's name, where it would stay."""
@@ -200,8 +206,9 @@ class Build:
         if others:
             raise ConflictError(
                 f"films of this recipe are there already, in the data set {others[0]!r}",
-                where=f"branch {self.branch}", fix="use that data set, or give the recipe another seed",
-            )  # fmt: skip
+                where=f"branch {self.branch}",
+                fix="use that data set, or give the recipe another seed",
+            )
 
     def _shots(self, films: Sequence[Film]) -> Iterator[Job]:
         rows = self.lake.rows("kind = 'meshes'", at=self.branch, columns=["artifact", "object"]).to_pylist()
@@ -235,6 +242,10 @@ def _recording(done: Filmed, record: Record, *, stored: str) -> Artifact:
     times = record.frame_times
     rate = (len(times) - 1) * NANOSECONDS / (done.end - done.start) if len(times) > 1 else None
     return replace(
-        done.film.artifact(), object=stored, start=done.start, end=done.end, rate=rate,
+        done.film.artifact(),
+        object=stored,
+        start=done.start,
+        end=done.end,
+        rate=rate,
         parameters=done.parameters,
-    )  # fmt: skip
+    )

@@ -73,13 +73,20 @@ def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path:
     sides, rows = _sides(lake, recipe, branch)
     parameters = [column_json(row["parameters"], "parameters", artifact=row["artifact"]) for row in rows]
     values = {
-        "recipe": recipe, "sides": sides, "version": code_version(), "branch": branch,
-        "sheet": _sheet(lake, recipe, rows), "size": sum(row["object_bytes"] for row in rows),
-        "frames": _frames(recipe), "bar": _BAR,
-        "theta": distributions(parameters, rendered=False), "zeta": distributions(parameters, rendered=True),
-        "names": _names(parameters), "recipe_text": json.dumps(json.loads(canonical(recipe.identity())), indent=1),
+        "recipe": recipe,
+        "sides": sides,
+        "version": code_version(),
+        "branch": branch,
+        "sheet": _sheet(lake, recipe, rows),
+        "size": sum(row["object_bytes"] for row in rows),
+        "frames": _frames(recipe),
+        "bar": _BAR,
+        "theta": distributions(parameters, rendered=False),
+        "zeta": distributions(parameters, rendered=True),
+        "names": _names(parameters),
+        "recipe_text": json.dumps(json.loads(canonical(recipe.identity())), indent=1),
         "dataset": json.dumps(recipe.name, ensure_ascii=False),
-    }  # fmt: skip
+    }
     text = render("sim.datasets", "card.html.j2", values)
     if path is not None:
         write_file(path, text, command=_COMMAND)
@@ -109,12 +116,15 @@ def _sides(lake: Lake, recipe: DatasetRecipe, branch: str) -> tuple[list[dict[st
         clips = lake.rows({**own, "kind": Kind.CLIP}, at=branch, columns=["wind"])["wind"].drop_null().to_numpy()
         sides.append(
             {
-                "name": side.name, "sequences": len({row["seed"] for row in rows}), "films": len(rows),
-                "sessions": len({row["session"] for row in rows} - {None}), "clips": len(clips),
+                "name": side.name,
+                "sequences": len({row["seed"] for row in rows}),
+                "films": len(rows),
+                "sessions": len({row["session"] for row in rows} - {None}),
+                "clips": len(clips),
                 "seeds": (min(row["seed"] for row in rows), max(row["seed"] for row in rows)) if rows else None,
                 "wind": (float(clips.min()), float(np.median(clips)), float(clips.max())) if len(clips) else None,
             }
-        )  # fmt: skip
+        )
         every += sorted(rows, key=lambda row: row["name"])
     return sides, every
 

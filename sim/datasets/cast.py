@@ -67,14 +67,17 @@ def of_group(simulation: Simulation, groups: GroupSpec, side: Side, *, seed: int
     height, time = groups.height, simulation.time
     rate = groups.rates[int(drawn("rate") * len(groups.rates))]
     scene = replace(
-        simulation.scene, height=height.at(drawn("height")) if isinstance(height, Range) else height,
+        simulation.scene,
+        height=height.at(drawn("height")) if isinstance(height, Range) else height,
         attachment=groups.attachments[int(drawn("attachment") * len(groups.attachments))],
-    )  # fmt: skip
+    )
     time = replace(time, rate=rate, frames=max(1, round(time.frames / time.rate * rate)))
     return Cast(
-        side=side, session=None, simulation=replace(simulation, seed=seed, scene=scene, time=time),
+        side=side,
+        session=None,
+        simulation=replace(simulation, seed=seed, scene=scene, time=time),
         stated={"width": scene.width, "height": scene.height},
-    )  # fmt: skip
+    )
 
 
 def _of_session(simulation: Simulation, spec: SessionSpec) -> Simulation:
@@ -130,8 +133,9 @@ class Roll:
                 first = next(iter(self.failed.values()))
                 raise RefusedError(
                     f"{len(self.failed)} of {limit} sequences failed; the first: {first}",
-                    where=self.cast.simulation.name, fix="declare more damping or smaller steps in the scene",
-                )  # fmt: skip
+                    where=self.cast.simulation.name,
+                    fix="declare more damping or smaller steps in the scene",
+                )
             if index not in self.failed:
                 chosen.append(index)
             index += 1

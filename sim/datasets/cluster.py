@@ -30,9 +30,12 @@ it, so that Dask's advice to share it among jobs is of no use to anybody."""
 _AGAIN = "then give the command again: it goes on from the last commit"
 
 _OF_WORKERS = {
-    "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1",
-    "MALLOC_MMAP_THRESHOLD_": str(32 << 20), "MALLOC_TRIM_THRESHOLD_": str(1 << 30),
-}  # fmt: skip
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+    "MALLOC_MMAP_THRESHOLD_": str(32 << 20),
+    "MALLOC_TRIM_THRESHOLD_": str(1 << 30),
+}
 """Numerical libraries take one thread, and memory stays with the process. Dask has freed arrays of 64 kB handed back to
 the system at once (its setting nanny.pre-spawn-environ); filming takes and frees 1 to 30 MB a frame, and to have those
 mapped anew costs a fifth of the time."""
@@ -63,9 +66,10 @@ def connected(scheduler: str | None, *, workers: int) -> Iterator[Client]:
             client = Client(scheduler, timeout=_CONNECT_TIMEOUT, set_as_default=False)
         except (OSError, ValueError) as error:
             raise NotFoundError(
-                f"no scheduler answers: {error}", where=scheduler,
+                f"no scheduler answers: {error}",
+                where=scheduler,
                 fix="start one with dask scheduler, and workers with dask worker ADDRESS",
-            ) from None  # fmt: skip
+            ) from None
         with silence_logging_cmgr(logging.CRITICAL, "distributed.client"), client:  # errors here say what is wrong
             _check(client, where=scheduler)
             yield client
@@ -73,13 +77,16 @@ def connected(scheduler: str | None, *, workers: int) -> Iterator[Client]:
     with (
         _environment(_OF_WORKERS),
         LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, memory_limit=0,
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit=0,
             dashboard_address=None,  # pyright: ignore[reportArgumentType]  None is no dashboard, as documented
             scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # any port: two builds must not want the same
             silence_logs=logging.CRITICAL,
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
-    ):  # fmt: skip
+    ):
         yield client
 
 
@@ -94,16 +101,18 @@ def _check(client: Client, *, where: str) -> None:
         client.wait_for_workers(1, timeout=_CONNECT_TIMEOUT)
     except TimeoutError:
         raise NotFoundError(
-            f"the scheduler has no workers after {_CONNECT_TIMEOUT:g} s", where=where,
+            f"the scheduler has no workers after {_CONNECT_TIMEOUT:g} s",
+            where=where,
             fix="start some with dask worker ADDRESS",
-        ) from None  # fmt: skip
+        ) from None
     found = cast("dict[str, str]", client.run(version, "flagdata"))
     for worker, other in found.items():
         if other != version("flagdata"):
             raise UsageError(
-                f"the worker {worker} has flagdata {other}, not {version('flagdata')}", where=where,
+                f"the worker {worker} has flagdata {other}, not {version('flagdata')}",
+                where=where,
                 fix="install the same version everywhere",
-            )  # fmt: skip
+            )
 
 
 @contextmanager
@@ -199,9 +208,10 @@ def results(client: Client, jobs: Iterable[Job], *, say: Callable[[str], None]) 
                 raise _lost() from None
             except KilledWorker as error:
                 raise WorkerError(
-                    f"workers kept dying over the same job: {error}", where="dask",
+                    f"workers kept dying over the same job: {error}",
+                    where="dask",
                     fix="look at the workers' logs; they may lack memory",
-                ) from None  # fmt: skip
+                ) from None
             if isinstance(result, CancelledError):  # what Dask gives for the result of a job that was lost with it
                 raise _lost()
             future.release()

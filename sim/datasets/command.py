@@ -34,8 +34,11 @@ if TYPE_CHECKING:
 @click.option("--plan", "only_plan", is_flag=True, help="Print counts, bytes and hours, and make nothing.")
 @click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler, tcp://HOST:PORT; without it, this machine.")
 @click.option(
-    "--workers", type=click.IntRange(min=1), metavar="N", help="Processes on this machine; by default one a core.",
-)  # fmt: skip
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes on this machine; by default one a core.",
+)
 @click.option("--renderer", metavar="NAME", help="raster, cycles or workbench, instead of the recipe's.")
 @click.option("--device", default="cpu", show_default=True, help="Where workers compute: cpu, cuda.")
 @click.option("--branch", default="main", show_default=True, help="The line of work to commit on.")

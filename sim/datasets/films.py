@@ -58,11 +58,16 @@ class Film:
     def artifact(self) -> Artifact:
         """The recording's row without its result; its identity is complete."""
         return Artifact(
-            kind=Kind.RECORDING, name=self.name, parents=(self.sequence,), seed=self.sequence_seed,
-            session=self.session, dataset=self.dataset, side=self.cast.side.name,
+            kind=Kind.RECORDING,
+            name=self.name,
+            parents=(self.sequence,),
+            seed=self.sequence_seed,
+            session=self.session,
+            dataset=self.dataset,
+            side=self.cast.side.name,
             frame_count=self.cast.simulation.time.frames,
             recipe={**self.filming, "seed": self.seed, "look": self.look, "begin": self.begin},
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,10 +93,17 @@ class Sequences:
             seed = child_seed(recipe.seed, "film", self.side, number)
             look = seed if cast.session is None else child_seed(cast.simulation.seed, "look", again)
             yield Film(
-                name=f"{recipe.name}-{self.side}-{place:05d}", dataset=recipe.name, cast=cast, index=index,
-                sequence=sequence, sequence_seed=child_seed(cast.simulation.seed, "member", index), seed=seed,
-                look=look, begin=self._begin(cast, index), filming=self.filming,
-            )  # fmt: skip
+                name=f"{recipe.name}-{self.side}-{place:05d}",
+                dataset=recipe.name,
+                cast=cast,
+                index=index,
+                sequence=sequence,
+                sequence_seed=child_seed(cast.simulation.seed, "member", index),
+                seed=seed,
+                look=look,
+                begin=self._begin(cast, index),
+                filming=self.filming,
+            )
 
     def _begin(self, cast: Cast, index: int) -> int:
         """Sessions are on days of their own, the sides' one after another; their recordings follow in the morning."""

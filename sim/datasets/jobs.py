@@ -91,16 +91,24 @@ def film(recipe: DatasetRecipe, job: Film, sequence: MeshSequence, device: str) 
     frames = picture.coded(seen, drawn, recipe.camera, seed=job.seed)
     parameters = parameters_of(
         member, zeta, {**job.cast.stated, **reading.parameters, **drawn}, recipe.anemometer.truth
-    )  # fmt: skip
+    )
     times = job.begin + sequence.time
     content = Content(
-        film=job, times=times, wind=reading.series, parameters=parameters, zeta=zeta, camera=recipe.camera,
+        film=job,
+        times=times,
+        wind=reading.series,
+        parameters=parameters,
+        zeta=zeta,
+        camera=recipe.camera,
         frames=frames,
-    )  # fmt: skip
+    )
     return Filmed(
-        film=job, data=record_bytes(content), start=int(times[0]), end=int(times[-1]),
+        film=job,
+        data=record_bytes(content),
+        start=int(times[0]),
+        end=int(times[-1]),
         parameters=canonical({**parameters, **texts_of(member, zeta)}),
-    )  # fmt: skip
+    )
 
 
 def shot(

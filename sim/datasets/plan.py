@@ -79,11 +79,18 @@ class Plan:
 
     def as_dict(self) -> dict[str, Any]:
         return {
-            "recipe": self.recipe.name, "recipe_hash": self.recipe.hash, "renderer": self.recipe.renderer,
-            "sequences": self.sequences, "films": self.films, "clips": self.clips,
-            "missing": {"sequences": self.missing_sequences, "films": self.missing_films}, "rates": vars(self.rates),
-            "workers": self.workers, "bytes": round(self.size), "hours": self.seconds / 3600,
-        }  # fmt: skip
+            "recipe": self.recipe.name,
+            "recipe_hash": self.recipe.hash,
+            "renderer": self.recipe.renderer,
+            "sequences": self.sequences,
+            "films": self.films,
+            "clips": self.clips,
+            "missing": {"sequences": self.missing_sequences, "films": self.missing_films},
+            "rates": vars(self.rates),
+            "workers": self.workers,
+            "bytes": round(self.size),
+            "hours": self.seconds / 3600,
+        }
 
 
 def plan(
@@ -119,12 +126,15 @@ def plan(
             films += film.artifact().id not in known
             frames[side.name].append(film.cast.simulation.time.frames)
     return Plan(
-        recipe=recipe, sequences={side.name: side.sequences for side in recipe.sides},
+        recipe=recipe,
+        sequences={side.name: side.sequences for side in recipe.sides},
         films={side.name: side.renders for side in recipe.sides},
         clips={side: sum(count // CLIP_FRAMES for count in counts) for side, counts in frames.items()},
-        missing_sequences=sum(len(roll.pending(known)) for roll in rolls), missing_films=films,
-        rates=rates or measure(recipe, _typical([roll.cast for roll in rolls]), device=device), workers=workers,
-    )  # fmt: skip
+        missing_sequences=sum(len(roll.pending(known)) for roll in rolls),
+        missing_films=films,
+        rates=rates or measure(recipe, _typical([roll.cast for roll in rolls]), device=device),
+        workers=workers,
+    )
 
 
 def length(recipe: DatasetRecipe, lake: Lake, *, workers: int, branch: str = "main", device: str = "cpu") -> str | None:
@@ -140,18 +150,22 @@ def length(recipe: DatasetRecipe, lake: Lake, *, workers: int, branch: str = "ma
         return None
     found = usual if usual.seconds < _BRIEF else replace(usual, rates=measure(recipe, typical, device=device))
     return announced(
-        f"building {found.missing_sequences} sequences and {found.missing_films} films", found.seconds * workers,
-        workers=workers, kept="an interrupted build goes on where its last commit was",
-    )  # fmt: skip
+        f"building {found.missing_sequences} sequences and {found.missing_films} films",
+        found.seconds * workers,
+        workers=workers,
+        kept="an interrupted build goes on where its last commit was",
+    )
 
 
 def _usual(cast: Cast) -> Rates:
     """What sequences and films of the raster renderer take; bytes are not known."""
     time_ = cast.simulation.time
     return Rates(
-        sequence_seconds=time_.total / time_.rate / _USUAL_PACE, film_seconds=time_.frames / _USUAL_FRAMES,
-        sequence_bytes=0.0, film_bytes=0.0,
-    )  # fmt: skip
+        sequence_seconds=time_.total / time_.rate / _USUAL_PACE,
+        film_seconds=time_.frames / _USUAL_FRAMES,
+        sequence_bytes=0.0,
+        film_bytes=0.0,
+    )
 
 
 def _typical(every: Sequence[Cast]) -> Cast:

@@ -81,12 +81,20 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
     simulation = _simulation(top.table("simulation"), folder)
     groups = _groups(top.table("groups"), simulation) if "groups" in top else None
     recipe = DatasetRecipe(
-        name=name, title=top.text("title", name) or name, licence=top.text("licence", None) or "",
-        seed=top.whole("seed", 0, least=0, most=SEED_LIMIT), renderer=renderer,
-        simulation=simulation, prior=_prior(render), sessions=sessions, groups=groups,
-        photos=None if photos is None else folder / local_path(photos), sides=_sides(top.table("sides"), sessions),
-        camera=_camera(top.table("camera")), anemometer=_anemometer(top.table("anemometer")),
-    )  # fmt: skip
+        name=name,
+        title=top.text("title", name) or name,
+        licence=top.text("licence", None) or "",
+        seed=top.whole("seed", 0, least=0, most=SEED_LIMIT),
+        renderer=renderer,
+        simulation=simulation,
+        prior=_prior(render),
+        sessions=sessions,
+        groups=groups,
+        photos=None if photos is None else folder / local_path(photos),
+        sides=_sides(top.table("sides"), sessions),
+        camera=_camera(top.table("camera")),
+        anemometer=_anemometer(top.table("anemometer")),
+    )
     top.done()
     _check(recipe, where=where)
     return recipe
@@ -126,9 +134,10 @@ def _groups(table: Table, simulation: Simulation) -> GroupSpec:
         if name not in known:
             raise UnknownNameError.of("attachment", name, known, where=table.where)
     spec = GroupSpec(
-        height=table.quantity("height", scene.height, above=0.0), rates=rates,
+        height=table.quantity("height", scene.height, above=0.0),
+        rates=rates,
         attachments=tuple(Attachment(name) for name in attachments),
-    )  # fmt: skip
+    )
     table.done()
     return spec
 
@@ -155,9 +164,11 @@ def _sides(table: Table, sessions: SessionSpec | None) -> tuple[Side, ...]:
         inner = table.table(name)
         sequences = inner.whole("sequences", 0, least=1)
         side = Side(
-            name=name, sequences=sequences, renders=inner.whole("renders", sequences, least=sequences),
+            name=name,
+            sequences=sequences,
+            renders=inner.whole("renders", sequences, least=sequences),
             sessions=inner.whole("sessions", 0, least=1) if sessions is not None else 0,
-        )  # fmt: skip
+        )
         if side.sessions > side.sequences:
             raise InputError(
                 f"{side.sessions} sessions of {side.sequences} sequences", where=inner.where, fix="have fewer sessions"
@@ -177,9 +188,13 @@ def _camera(table: Table) -> CameraSpec:
         raise InputError(f"{idle} has no effect on {coding.value}", where=table.where, fix="leave it out")
     noise = Bounds(least=0.0, most=128.0)
     return table.record(
-        CameraSpec, jpeg_quality=Bounds(least=1.0, most=100.0), rate_factor=Bounds(least=0.0, most=51.0),
-        read_noise=noise, shot_noise=noise, frame_slot=COUNT,
-    )  # fmt: skip
+        CameraSpec,
+        jpeg_quality=Bounds(least=1.0, most=100.0),
+        rate_factor=Bounds(least=0.0, most=51.0),
+        read_noise=noise,
+        shot_noise=noise,
+        frame_slot=COUNT,
+    )
 
 
 def _anemometer(table: Table) -> AnemometerSpec:
@@ -197,9 +212,14 @@ def _anemometer(table: Table) -> AnemometerSpec:
         inner.done()
     chosen.done()
     return table.record(
-        AnemometerSpec, {"effects": lambda: effects}, rate=POSITIVE, before=NOT_NEGATIVE, noise=NOT_NEGATIVE,
-        resolution=POSITIVE, accuracy=NOT_NEGATIVE,
-    )  # fmt: skip
+        AnemometerSpec,
+        {"effects": lambda: effects},
+        rate=POSITIVE,
+        before=NOT_NEGATIVE,
+        noise=NOT_NEGATIVE,
+        resolution=POSITIVE,
+        accuracy=NOT_NEGATIVE,
+    )
 
 
 def _check(recipe: DatasetRecipe, *, where: str) -> None:
@@ -209,9 +229,10 @@ def _check(recipe: DatasetRecipe, *, where: str) -> None:
     samples = anemometer.rate * (anemometer.before + time.settle + time.frames / time.rate)
     if samples > SAMPLES_LIMIT:
         raise LimitError(
-            f"an anemometer of {samples:.3g} samples a recording", where=where,
+            f"an anemometer of {samples:.3g} samples a recording",
+            where=where,
             fix=f"have at most {SAMPLES_LIMIT}: lower its rate, or `before`",
-        )  # fmt: skip
+        )
     known = time.settle if changing(recipe.simulation) else anemometer.before
     if anemometer.truth is Truth.MEASURED and known < TRUTH_WINDOW:
         raise UsageError(

@@ -165,28 +165,37 @@ class DatasetRecipe:
             "prior": self.prior.identity(),
             "photos": None if self.photos is None else _content(self.photos),
             "camera": {
-                **_coding(camera), "read_noise": plain(camera.read_noise),
-                "shot_noise": plain(camera.shot_noise), "frame_slot": camera.frame_slot,
+                **_coding(camera),
+                "read_noise": plain(camera.read_noise),
+                "shot_noise": plain(camera.shot_noise),
+                "frame_slot": camera.frame_slot,
             },
             "anemometer": {
-                "truth": anemometer.truth.value, "rate": anemometer.rate, "before": anemometer.before,
-                "noise": plain(anemometer.noise), "resolution": anemometer.resolution,
+                "truth": anemometer.truth.value,
+                "rate": anemometer.rate,
+                "before": anemometer.before,
+                "noise": plain(anemometer.noise),
+                "resolution": anemometer.resolution,
                 "accuracy": anemometer.accuracy,
                 "effects": {
                     name: {key: plain(value) for key, value in parameters.items()}
                     for name, parameters in anemometer.effects.items()
                 },
             },
-        }  # fmt: skip
+        }
 
     def identity(self) -> dict[str, Any]:
         """All that shapes the data set, as JSON."""
         return {
-            "dataset": RECIPE_VERSION, "name": self.name, "seed": self.seed,
-            "simulation": self.simulation.identity(), "filming": self.filming(),
+            "dataset": RECIPE_VERSION,
+            "name": self.name,
+            "seed": self.seed,
+            "simulation": self.simulation.identity(),
+            "filming": self.filming(),
             "sessions": None if self.sessions is None else vars(self.sessions).copy(),
-            "sides": [vars(side).copy() for side in self.sides], **_grouped(self.groups, self.simulation.batch),
-        }  # fmt: skip
+            "sides": [vars(side).copy() for side in self.sides],
+            **_grouped(self.groups, self.simulation.batch),
+        }
 
     @cached_property
     def hash(self) -> str:
@@ -200,10 +209,12 @@ def _grouped(groups: GroupSpec | None, batch: int) -> dict[str, Any]:
         return {}
     return {
         "groups": {
-            "size": batch, "height": plain(groups.height), "rates": list(groups.rates),
+            "size": batch,
+            "height": plain(groups.height),
+            "rates": list(groups.rates),
             "attachments": [attachment.value for attachment in groups.attachments],
         }
-    }  # fmt: skip
+    }
 
 
 def _coding(camera: CameraSpec) -> dict[str, Any]:

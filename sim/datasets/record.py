@@ -61,10 +61,19 @@ def _write(path: Path, content: Content, *, fill: int) -> None:
     start, end = int(times[0]), int(times[-1])
     rate = (len(times) - 1) * NANOSECONDS / (end - start) if len(times) > 1 else film.cast.simulation.time.rate
     camera = CameraInfo(
-        container="render", codec=film.filming["renderer"], width=zeta.width, height=zeta.height, container_rate=rate,
-        true_rate=rate, variable_rate=False, rotation=0, start=start, start_from="simulation",
-        duration=(end - start) / NANOSECONDS, crop=(0, 0, zeta.width, zeta.height),
-    )  # fmt: skip
+        container="render",
+        codec=film.filming["renderer"],
+        width=zeta.width,
+        height=zeta.height,
+        container_rate=rate,
+        true_rate=rate,
+        variable_rate=False,
+        rotation=0,
+        start=start,
+        start_from="simulation",
+        duration=(end - start) / NANOSECONDS,
+        crop=(0, 0, zeta.width, zeta.height),
+    )
     provenance = {"meshes": film.sequence, "recipe": canonical(row.recipe), "recipe_hash": recipe_hash(row.recipe)}
     metadata = {PROVENANCE: provenance, CAMERA: camera_metadata(camera)}
     with RecordWriter(path, metadata=metadata, coding=content.camera.coding) as record:

@@ -93,8 +93,9 @@ def pressing(effect: Effect, air: AirForce) -> QuadraticNormal:
         return air
     raise UsageError(
         f"{type(effect).__name__} changes a normal force, which {type(air).__name__} has none of",
-        where="effects", fix="use the quadratic-normal wind force",
-    )  # fmt: skip
+        where="effects",
+        fix="use the quadratic-normal wind force",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,6 +37,4 @@ class ExposureBlur(CameraEffect):
         nodes = sampling.instants.new_tensor(_NODES)[:, None] / 2
         weights = sampling.instants.new_tensor(_WEIGHTS) / 2
         moved = sampling.instants.unsqueeze(3) + nodes * self.exposure
-        return replace(
-            sampling, instants=moved.flatten(2, 3), weights=(sampling.weights[:, None] * weights).flatten()
-        )  # fmt: skip
+        return replace(sampling, instants=moved.flatten(2, 3), weights=(sampling.weights[:, None] * weights).flatten())

@@ -34,9 +34,10 @@ def load(spec: str) -> type[Effect]:
         raise NotFoundError(f"no class {attribute!r}", where=text, fix="give the name of the effect's class")
     if not (isinstance(effect, type) and issubclass(effect, Effect) and is_dataclass(effect) and effect.strengths()):
         raise UsageError(
-            f"{attribute!r} is no effect with a strength", where=text,
+            f"{attribute!r} is no effect with a strength",
+            where=text,
             fix="derive a frozen dataclass from a kind of sim.effects.effect, with an annotated strength",
-        )  # fmt: skip
+        )
     return effect
 
 

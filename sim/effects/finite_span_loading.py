@@ -94,8 +94,9 @@ class FiniteSpanLoading(ForceEffect):
         if not (np.abs(2 * angles(system.cloth.mesh)[1] / np.pi - 1) < 0.99).any():
             raise InapplicableError(
                 "the cloth has no vertex between its two free edges, over which the load falls to nothing",
-                where="effects.finite-span-loading", fix="give a mesh of two or more rows of cells",
-            )  # fmt: skip
+                where="effects.finite-span-loading",
+                fix="give a mesh of two or more rows of cells",
+            )
         return super().apply(replace(system, loads=(*system.loads, self)), state)
 
     def given(self, cloth: Cloth) -> Given:

@@ -38,8 +38,9 @@ class FrameJitter(CameraEffect):
         if len(self.draws) < len(sampling.stamps):
             raise UsageError(
                 f"{len(self.draws)} draws for {len(sampling.stamps)} frames",
-                where="frame jitter", fix="draw as many as there are frames",
-            )  # fmt: skip
+                where="frame jitter",
+                fix="draw as many as there are frames",
+            )
         shift = self.deviation * self.draws[: len(sampling.stamps)]
         return replace(sampling, instants=sampling.instants + shift[:, None, None, :])
 

@@ -41,9 +41,10 @@ class FullHoist(Effect):
         added = [i for i, vertex in enumerate(hoist) if vertex not in system.handles.vertices]
         if not added:
             raise InapplicableError(
-                "every vertex of the hoist is held already", where="full hoist",
+                "every vertex of the hoist is held already",
+                where="full hoist",
                 fix="leave the effect out, or start from two corners on a mesh with rows between them",
-            )  # fmt: skip
+            )
         along = mesh.rest[list(hoist), 1]
         share = np.gradient(along) if len(hoist) > 2 else np.full(2, np.ptp(along) / 2)
         vertices = torch.tensor([hoist[i] for i in added], device=state.position.device)
@@ -53,7 +54,7 @@ class FullHoist(Effect):
             vertices=vertices,
             anchors=state.position[vertices],
             handles=system.handles,
-        )  # fmt: skip
+        )
         return replace(system, ties=(*system.ties, lace)), state
 
 

@@ -41,8 +41,9 @@ def at(times: tuple[float, ...], samples: Tensor, time: float, *, where: str) ->
     if not times[0] <= time <= times[-1]:
         raise UsageError(
             f"wind asked for at {time:g} s, known from {times[0]:g} to {times[-1]:g} s",
-            where=where, fix="give a series as long as the run, settling included",
-        )  # fmt: skip
+            where=where,
+            fix="give a series as long as the run, settling included",
+        )
     index = min(bisect_right(times, time), len(times) - 1) - 1
     share = (time - times[index]) / (times[index + 1] - times[index])
     return torch.lerp(samples[:, index], samples[:, index + 1], share)

@@ -72,9 +72,10 @@ class LoggedGusts(WindEffect):
         widest = float(np.max(np.diff(t)))
         if widest > _LONGEST_GAP:
             raise InputError(
-                f"the log has a gap of {widest:.1f} s", where="logged gusts",
+                f"the log has a gap of {widest:.1f} s",
+                where="logged gusts",
                 fix=f"choose a stretch without gaps of more than {_LONGEST_GAP:g} s",
-            )  # fmt: skip
+            )
         mean = complex(np.mean(s * np.exp(1j * from_north)))
         if not abs(mean) > 0:
             raise InputError("the mean wind is zero", where="logged gusts", fix="choose a stretch with wind")

@@ -85,9 +85,10 @@ class Parameter(Described):
         if not (math.isfinite(lowest) and math.isfinite(highest) and least <= lowest and highest <= most):
             shown = f"{lowest:g}" if lowest == highest else f"{lowest:g} to {highest:g}"
             raise InputError(
-                f"{shown}{'' if self.unit == '1' else f' {self.unit}'} is not admissible", where=where,
+                f"{shown}{'' if self.unit == '1' else f' {self.unit}'} is not admissible",
+                where=where,
                 fix=f"give a value from {least:g} to {most:g}; expected are {self.prior[0]:g} to {self.prior[1]:g}",
-            )  # fmt: skip
+            )
 
 
 def strength(
@@ -144,8 +145,9 @@ class Parametrised:
             if value.ndim and value.shape[-1] not in (1, batch):
                 raise UsageError(
                     f"values for {value.shape[-1]} members in a batch of {batch}",
-                    where=f"{type(self).__name__}.{entry.name}", fix="give one value, or one for each member",
-                )  # fmt: skip
+                    where=f"{type(self).__name__}.{entry.name}",
+                    fix="give one value, or one for each member",
+                )
             moved[entry.name] = value.to(dtype=dtype, device=device)
         return replace(self, **moved) if moved else self  # pyright: ignore[reportArgumentType, reportReturnType]
 
@@ -168,7 +170,11 @@ def _parameters(cls: type[Any]) -> Mapping[str, Parameter]:
         for note in getattr(hints[entry.name], "__metadata__", ()):
             if isinstance(note, Described):
                 found[entry.name] = Parameter(
-                    role=note.role, unit=note.unit, prior=note.prior, admissible=note.admissible, source=note.source,
+                    role=note.role,
+                    unit=note.unit,
+                    prior=note.prior,
+                    admissible=note.admissible,
+                    source=note.source,
                     null=cast("float", entry.default),
-                )  # fmt: skip
+                )
     return found

@@ -28,6 +28,4 @@ class RollingShutter(CameraEffect):
     ] = 0.0
 
     def sampled(self, sampling: Sampling) -> Sampling:
-        return replace(
-            sampling, instants=sampling.instants + (sampling.rows[:, None, None] - 0.5) * self.readout
-        )  # fmt: skip
+        return replace(sampling, instants=sampling.instants + (sampling.rows[:, None, None] - 0.5) * self.readout)

@@ -73,15 +73,17 @@ class Sampling:
         if n != len(time) or rows != len(self.rows) or axes != 3:
             raise InputError(
                 f"a trajectory of shape {tuple(trajectory.shape)} for {len(time)} times and {len(self.rows)} rows",
-                where="camera", fix="give (time, row, 3, batch)",
-            )  # fmt: skip
+                where="camera",
+                fix="give (time, row, 3, batch)",
+            )
         first, last = (float(v) for v in torch.aminmax(self.instants.detach()))
         if not float(time[0]) <= first <= last <= float(time[-1]):
             raise UsageError(
                 f"the camera sees from {first:g} to {last:g} s, the trajectory is known from {float(time[0]):g} to "
                 f"{float(time[-1]):g} s",
-                where="camera", fix="simulate from an exposure before the first frame to one after the last",
-            )  # fmt: skip
+                where="camera",
+                fix="simulate from an exposure before the first frame to one after the last",
+            )
         instants = self.instants.expand(-1, rows, -1, batch)
         after = torch.searchsorted(time, instants.detach().contiguous(), right=True).clamp(1, n - 1)
         share = (instants - time[after - 1]) / (time[after] - time[after - 1])

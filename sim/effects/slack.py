@@ -72,9 +72,12 @@ class Play:
             len(self.vertices), cloth.batch
         )
         return Springs(
-            vertices=self.vertices, anchors=self.anchors, stiffness=torch.full_like(slack, self.handles.stiffness),
-            slack=slack, share=0.0,
-        )  # fmt: skip
+            vertices=self.vertices,
+            anchors=self.anchors,
+            stiffness=torch.full_like(slack, self.handles.stiffness),
+            slack=slack,
+            share=0.0,
+        )
 
     def _stretch(self, time: float, position: Tensor) -> tuple[Tensor, Tensor]:
         """d (held, 3, batch) [m], and the share of it that is slack (held, 1, batch)."""

@@ -51,16 +51,18 @@ class TiltedPole(Effect):
             raise UsageError("nothing holds the cloth", where="tilted pole", fix="give handles")
         if system.motion is not None:
             raise InapplicableError(
-                "a pole that tilts, where attachments are carried", where="tilted pole",
+                "a pole that tilts, where attachments are carried",
+                where="tilted pole",
                 fix="leave it out: their ways are those that are given",
-            )  # fmt: skip
+            )
         fly = horizontal(state.position.mean(0) - system.anchors.mean(0), axis=0)
         length = norm(fly, axis=0)
         if bool((length == 0).any()):
             raise UsageError(
                 "the cloth hangs straight below its attachments: it has no fly to lean to",
-                where="tilted pole", fix="start with the flag out to one side",
-            )  # fmt: skip
+                where="tilted pole",
+                fix="start with the flag out to one side",
+            )
         fly = fly / length
         turn = self.lean * left_of(fly, axis=0) - self.sway * fly
         lowest = system.anchors[:, 2].argmin(0)

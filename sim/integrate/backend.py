@@ -39,8 +39,9 @@ def kernel_for(system: System, state: State, backend: Backend, *, kind: str | No
     if backend is Backend.WARP:
         raise UsageError(
             "the Warp kernel has only leapfrog steps, no implicit integration",
-            where="integrator", fix="use the integrator symplectic, or another backend",
-        )  # fmt: skip
+            where="integrator",
+            fix="use the integrator symplectic, or another backend",
+        )
     differentiated = _differentiated(system, state)
     if backend is Backend.TORCH or (backend is Backend.AUTO and differentiated):
         return None

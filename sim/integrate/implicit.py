@@ -88,10 +88,16 @@ class BackwardEuler:
         """Steps of `h` [s] in one call of the kernel."""
         times = list(accumulate([h] * steps, initial=state.time))
         x, v = kernel.implicit(
-            [system.wind.velocity(time) for time in times[:-1]], [system.targets(time) for time in times[1:]],
-            state.position, state.velocity, h, lag=self._lag(h), tolerance=self.tolerance, iterations=self.iterations,
+            [system.wind.velocity(time) for time in times[:-1]],
+            [system.targets(time) for time in times[1:]],
+            state.position,
+            state.velocity,
+            h,
+            lag=self._lag(h),
+            tolerance=self.tolerance,
+            iterations=self.iterations,
             offsets=[system.offset(time) for time in times[:-1]],
-        )  # fmt: skip
+        )
         return State(position=x, velocity=v, time=times[-1])
 
     def _lag(self, h: float) -> float:
@@ -103,9 +109,17 @@ class BackwardEuler:
         x, v, time = state.position, state.velocity, state.time
         if (kernel := self._kernel(system, state)) is not None:
             x, v = kernel.implicit(
-                drive.wind[:1], drive.targets[1:], x, v, h, lag=self._lag(h), tolerance=self.tolerance,
-                iterations=self.iterations, offsets=drive.offset[:1], memory=system.checked(state.memory),
-            )  # fmt: skip
+                drive.wind[:1],
+                drive.targets[1:],
+                x,
+                v,
+                h,
+                lag=self._lag(h),
+                tolerance=self.tolerance,
+                iterations=self.iterations,
+                offsets=drive.offset[:1],
+                memory=system.checked(state.memory),
+            )
             return self._ended(system, state, drive, *system.limited(x, v, h), h)
         if system.clamped:
             v = v.index_copy(0, system.held, (drive.targets[1] - x[system.held]) / h)

@@ -63,9 +63,12 @@ class _Loosening:
         anchors = own.anchors[..., :1].repeat(1, 1, self.batch)
         anchors[..., self.members] = own.anchors
         return Springs(
-            vertices=own.vertices, anchors=anchors, stiffness=self._widened(own.stiffness),
-            slack=self._widened(own.slack), share=own.share,
-        )  # fmt: skip
+            vertices=own.vertices,
+            anchors=anchors,
+            stiffness=self._widened(own.stiffness),
+            slack=self._widened(own.slack),
+            share=own.share,
+        )
 
     def force(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
         """(vertex, 3, batch) [N]."""
@@ -136,12 +139,14 @@ class JointBatch:
                 "batches with anchors that move and anchors that do not", where="joint batch", fix="run them one by one"
             )
         return replace(
-            first, ties=tuple(loosening), cloth=Cloth.joined([part.cloth for part in parts]),
+            first,
+            ties=tuple(loosening),
+            cloth=Cloth.joined([part.cloth for part in parts]),
             wind=_Winds(parts=tuple(p.wind for p in parts)),
             gravity=torch.cat([part.gravity for part in parts], dim=-1),
             anchors=torch.cat([part.anchors for part in parts], dim=-1),
             motion=_Motions(parts=tuple(motions)) if motions else None,
-        )  # fmt: skip
+        )
 
     @cached_property
     def beside(self) -> tuple[System, ...]:
@@ -166,5 +171,6 @@ def _joined(states: Sequence[State]) -> State:
     return State(
         position=torch.cat([state.position for state in states], dim=-1),
         velocity=torch.cat([state.velocity for state in states], dim=-1),
-        time=states[0].time, memory=tuple(past for state in states for past in state.memory),
-    )  # fmt: skip
+        time=states[0].time,
+        memory=tuple(past for state in states for past in state.memory),
+    )

@@ -102,10 +102,17 @@ class SplitEuler:
         """Steps of `h` [s] in one call of the kernel."""
         times = _times(state.time, h, steps)
         x, v, memory = kernel.split(
-            parts, [plain.wind.velocity(time) for time in times[:-1]], [plain.targets(time) for time in times[1:]],
-            state.position, state.velocity, h, tolerance=self.base.tolerance, iterations=self.base.iterations,
-            offsets=[plain.offset(time) for time in times[:-1]], memory=state.memory,
-        )  # fmt: skip
+            parts,
+            [plain.wind.velocity(time) for time in times[:-1]],
+            [plain.targets(time) for time in times[1:]],
+            state.position,
+            state.velocity,
+            h,
+            tolerance=self.base.tolerance,
+            iterations=self.base.iterations,
+            offsets=[plain.offset(time) for time in times[:-1]],
+            memory=state.memory,
+        )
         return State(position=x, velocity=v, time=times[-1], memory=memory)
 
     def _steps(self, duration: float) -> tuple[int, float]:

@@ -108,8 +108,9 @@ def stable_step(system: System) -> float:
         if not 0 < limit < math.inf:
             raise InputError(
                 f"no step is stable: the largest eigenvalue is {worst:.3g} 1/s², the damping {damping:.3g} s",
-                where="material", fix="give a density, stiffnesses and a damping that a cloth can have",
-            )  # fmt: skip
+                where="material",
+                fix="give a density, stiffnesses and a damping that a cloth can have",
+            )
         _LIMITS[system] = limit
     return _LIMITS[system]
 

@@ -81,8 +81,9 @@ class Symplectic:
         if not (0 < self.step < limit):
             raise UsageError(
                 f"a step of {self.step:g} s is unstable: the limit of this mesh and material is {limit:.3g} s",
-                where="integrator symplectic", fix="leave the step out, or use the implicit integrator",
-            )  # fmt: skip
+                where="integrator symplectic",
+                fix="leave the step out, or use the implicit integrator",
+            )
         return max(1, math.ceil(duration / self.step - 1e-9))
 
     def advance(self, system: System, state: State, duration: float) -> State:
@@ -220,8 +221,9 @@ def _check_outer(system: System, state: State, drive: Drive, length: float) -> N
         raise UsageError(
             f"an outer step of {length:.3g} s is too long: what acts beside the base model changes within "
             f"{known[1]:.3g} s, the longest that is stable",
-            where="integrator symplectic", fix="give a shorter outer step, or none",
-        )  # fmt: skip
+            where="integrator symplectic",
+            fix="give a shorter outer step, or none",
+        )
 
 
 def _inverse_mass(system: System) -> Tensor:

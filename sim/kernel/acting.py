@@ -122,8 +122,9 @@ def _compiled(part: Compilable, cloth: Cloth, kind: str, fitting: Sequence[Kind]
     number = Kind(getattr(code, f"{given.of.__name__}_kind")())
     if number not in fitting:
         raise UsageError(
-            f"C++ of the kind {number.name} for {given.of.__name__}", where=str(beside),
+            f"C++ of the kind {number.name} for {given.of.__name__}",
+            where=str(beside),
             fix=f"make it one of {', '.join(entry.name for entry in fitting)}",
-        )  # fmt: skip
+        )
     place.restype = ctypes.c_void_p
     return given, number, place()

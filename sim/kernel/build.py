@@ -23,15 +23,29 @@ from flagdata.caches import user_cache
 from flagdata.errors import UsageError
 
 _FLAGS = (
-    "-std=c++17", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC", "-Wno-psabi",
-)  # fmt: skip
+    "-std=c++17",
+    "-O3",
+    "-march=native",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-shared",
+    "-fPIC",
+    "-Wno-psabi",
+)
 
 _EFFECT = ("effect.hpp", "vector.hpp")
 """What the C++ of an effect is written with."""
 _SOURCES = (
-    "kernel.cpp", "block.hpp", "acting.hpp", "problem.hpp", "contact.hpp", "on_mesh.hpp", "implicit.hpp", "split.hpp",
+    "kernel.cpp",
+    "block.hpp",
+    "acting.hpp",
+    "problem.hpp",
+    "contact.hpp",
+    "on_mesh.hpp",
+    "implicit.hpp",
+    "split.hpp",
     *_EFFECT,
-)  # fmt: skip
+)
 
 
 def compiler() -> str | None:
@@ -138,9 +152,10 @@ def check_owned(path: Path) -> None:
         )
         if foreign or (writable and not sticky):
             raise UsageError(
-                f"another user could have written the compiled kernels in {str(user_cache())!r}", where=str(part),
+                f"another user could have written the compiled kernels in {str(user_cache())!r}",
+                where=str(part),
                 fix="set FLAGDATA_CACHE to a folder that only you can write (chmod go-w), on a path of such folders",
-            )  # fmt: skip
+            )
 
 
 def _alone(group: int) -> bool:

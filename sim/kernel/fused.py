@@ -22,14 +22,36 @@ from sim.system import Drive, System
 from sim.tables import Evaluation
 
 _POINTERS = (
-    "face", "gradients", "areas", "hinge", "hinge_shape", "hinge_column", "hinge_rows", "held_vertex", "tie_vertex",
+    "face",
+    "gradients",
+    "areas",
+    "hinge",
+    "hinge_shape",
+    "hinge_column",
+    "hinge_rows",
+    "held_vertex",
+    "tie_vertex",
     "samples",
-)  # fmt: skip
+)
 _SCALARS = ("origin", "spacing", "air_density", "air_drag", "stiffness")
 _BLOCKED = (
-    "mass", "inverse_mass", "added_mass", "segments", "stiffening", "damping", "table", "gravity", "tie_share",
-    "tie_stiffness", "tie_slack", "wind", "targets", "rate", "tie_targets", "tie_rate",
-)  # fmt: skip
+    "mass",
+    "inverse_mass",
+    "added_mass",
+    "segments",
+    "stiffening",
+    "damping",
+    "table",
+    "gravity",
+    "tie_share",
+    "tie_stiffness",
+    "tie_slack",
+    "wind",
+    "targets",
+    "rate",
+    "tie_targets",
+    "tie_rate",
+)
 
 _FEW = 8
 """Members that fit a narrow block: half of a wide one, with 0.6 (backward Euler) to 0.9 (leapfrog) of its time."""
@@ -185,11 +207,18 @@ class Kernel:
         }
         tensors = {name: tensor.contiguous() for name, tensor in tensors.items()}
         problem = _Problem(
-            vertices=cloth.mesh.vertex_count, faces=len(cloth.faces), hinges=len(cloth.hinges), held=len(system.held),
+            vertices=cloth.mesh.vertex_count,
+            faces=len(cloth.faces),
+            hinges=len(cloth.hinges),
+            held=len(system.held),
             ties=len(tensors["tie_vertex"]),
-            fold=int(cloth.evaluation is Evaluation.CORRECTED), origin=cloth.grid.origin, spacing=cloth.grid.spacing,
-            air_density=air.density, air_drag=air.drag, stiffness=system.handles.stiffness if system.sprung else 0.0,
-        )  # fmt: skip
+            fold=int(cloth.evaluation is Evaluation.CORRECTED),
+            origin=cloth.grid.origin,
+            spacing=cloth.grid.spacing,
+            air_density=air.density,
+            air_drag=air.drag,
+            stiffness=system.handles.stiffness if system.sprung else 0.0,
+        )
         problem.batch = cloth.batch
         problem.counts[:] = cloth.grid.counts
         for name, tensor in tensors.items():
@@ -202,10 +231,17 @@ class Kernel:
             tensors["sweep_weights"] = torch.tensor(chebyshev_weights(system.limits.sweeps), dtype=cloth.dtype)
             problem.sweep_weights = tensors["sweep_weights"].data_ptr()
         return cls(
-            code=code, batch=cloth.batch, kind=kind, lanes=lanes, blocks=blocks, problem=problem,
-            tensors=tensors, tied=torch.cat([t.anchors for t in ties]) if ties else None,
-            lists=_Lists(code, kind, blocks), beside=acting(system, kind, lambda tensor: block(tensor).contiguous()),
-        )  # fmt: skip
+            code=code,
+            batch=cloth.batch,
+            kind=kind,
+            lanes=lanes,
+            blocks=blocks,
+            problem=problem,
+            tensors=tensors,
+            tied=torch.cat([t.anchors for t in ties]) if ties else None,
+            lists=_Lists(code, kind, blocks),
+            beside=acting(system, kind, lambda tensor: block(tensor).contiguous()),
+        )
 
     def _drive(self, drive: Drive) -> tuple[_Problem, list[Tensor]]:
         """The problem with wind and handles set; the tensors must outlive the call it is made for."""
@@ -363,9 +399,17 @@ class Kernel:
         failed = torch.zeros((self.blocks, self.lanes), dtype=torch.int32)
         counts = (ctypes.c_int64(iterations), ctypes.c_int64(len(winds)))
         self._call(
-            "split", problem, xb, vb, failed, ctypes.c_double(h), ctypes.c_double(tolerance), *counts, own,
+            "split",
+            problem,
+            xb,
+            vb,
+            failed,
+            ctypes.c_double(h),
+            ctypes.c_double(tolerance),
+            *counts,
+            own,
             ctypes.c_int64(len(parts)),
-        )  # fmt: skip
+        )
         del alive, problems
         return *self._solved(xb, vb, failed), tuple(part.unpack(tensor) for part, tensor in remembered)
 

@@ -73,17 +73,19 @@ class WarpKernel:
     def _build(cls, system: System) -> WarpKernel:
         if more := lacking(system):
             raise UsageError(
-                f"the Warp kernel has only the base model, not {', '.join(more)}", where=_WHERE,
+                f"the Warp kernel has only the base model, not {', '.join(more)}",
+                where=_WHERE,
                 fix="leave them out, or use another backend",
-            )  # fmt: skip
+            )
         cloth = system.cloth
         if cloth.dtype != torch.float32:
             raise UsageError(f"numbers of type {cloth.dtype}", where=_WHERE, fix="use float32, or another backend")
         if len(cloth.faces) > FACES_LIMIT:
             raise UsageError(
-                f"a mesh of {len(cloth.faces)} faces", where=_WHERE,
+                f"a mesh of {len(cloth.faces)} faces",
+                where=_WHERE,
                 fix=f"have at most {FACES_LIMIT}, or use another backend",
-            )  # fmt: skip
+            )
         code = _code(cloth.device)
         where = code.wp.device_from_torch(cloth.device)
         if where.is_cuda:
@@ -129,10 +131,13 @@ class WarpKernel:
         with _LAUNCHING:
             kernel = self.code.kernel(mesh.vertex_count, len(mesh.faces), len(mesh.hinges))
             wp.launch_tiled(
-                kernel, dim=[self.system.cloth.batch], block_dim=self.code.THREADS, device=where,
+                kernel,
+                dim=[self.system.cloth.batch],
+                block_dim=self.code.THREADS,
+                device=where,
                 inputs=[self.sheet, self.members, motion, *(wp.from_torch(tensor) for tensor in after), h, steps],
                 stream=wp.stream_from_torch(torch.cuda.current_stream(x.device)) if where.is_cuda else None,
-            )  # fmt: skip
+            )
         return after
 
 
@@ -158,9 +163,10 @@ def _code(device: torch.device) -> ModuleType:
     name = "cpu" if device.type == "cpu" else f"{device.type}:{device.index or 0}"
     if name not in known:
         raise UsageError(
-            f"Warp has no device {name!r}, only {', '.join(known)}", where=_WHERE,
+            f"Warp has no device {name!r}, only {', '.join(known)}",
+            where=_WHERE,
             fix="install the driver of the graphics processor, or use one of these",
-        )  # fmt: skip
+        )
     return code
 
 
@@ -174,8 +180,9 @@ def _check_room(mesh: Mesh, room: int) -> None:
     if taken > room:
         raise UsageError(
             f"a mesh of {mesh.vertex_count} vertices takes {taken} bytes of shared memory, of which there are {room}",
-            where=_WHERE, fix="take a coarser mesh, or another backend",
-        )  # fmt: skip
+            where=_WHERE,
+            fix="take a coarser mesh, or another backend",
+        )
 
 
 def _sheet(mesh: Mesh, held: Tensor) -> dict[str, NDArray[np.int64]]:

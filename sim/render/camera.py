@@ -56,9 +56,10 @@ class Camera:
         distance, across = math.hypot(*forward), math.hypot(forward[0], forward[1])
         if across <= 1e-6 * distance or distance == 0:
             raise InputError(
-                f"a camera at {position} cannot look level at {target}", where="camera",
+                f"a camera at {position} cannot look level at {target}",
+                where="camera",
                 fix="move it horizontally away from what it aims at",
-            )  # fmt: skip
+            )
         ahead = (forward[0] / distance, forward[1] / distance, forward[2] / distance)
         right = (forward[1] / across, -forward[0] / across, 0.0)
         down = (
@@ -68,10 +69,15 @@ class Camera:
         )
         longer = max(width, height)
         return cls(
-            position=position, right=right, down=down, forward=ahead, width=width, height=height,
+            position=position,
+            right=right,
+            down=down,
+            forward=ahead,
+            width=width,
+            height=height,
             focal=longer / 2 / math.tan(view_angle / 2),
             centre=(width / 2 + frame_offset[0] * longer, height / 2 + frame_offset[1] * longer),
-        )  # fmt: skip
+        )
 
     def project(self, points: Tensor) -> tuple[Tensor, Tensor]:
         """Image places and depths of points in the world.

@@ -100,15 +100,23 @@ class Cycles:
         return Message(
             kind="scene",
             fields={
-                "engine": self.ENGINE, "width": zeta.width, "height": zeta.height, "threads": self._threads,
-                "samples": math.ceil(zeta.cycles_samples / pictures), "bounces": zeta.cycles_bounces,
-                "camera": _camera(placed.camera), "sky": zeta.sky_strength, "objects": objects,
+                "engine": self.ENGINE,
+                "width": zeta.width,
+                "height": zeta.height,
+                "threads": self._threads,
+                "samples": math.ceil(zeta.cycles_samples / pictures),
+                "bounces": zeta.cycles_bounces,
+                "camera": _camera(placed.camera),
+                "sky": zeta.sky_strength,
+                "objects": objects,
                 "sun": {
-                    "toward": list(placed.to_sun), "irradiance": zeta.sun_strength, "angle": zeta.sun_angular_radius,
+                    "toward": list(placed.to_sun),
+                    "irradiance": zeta.sun_strength,
+                    "angle": zeta.sun_angular_radius,
                 },
             },
             arrays={"texture/cloth": self._assets.texture(zeta.texture)},
-        )  # fmt: skip
+        )
 
 
 class Workbench(Cycles):

@@ -17,9 +17,16 @@ from sim.render import RENDERERS, Meshes, prior
 
 
 def rendered(
-    sequence: MeshSequence | RaggedMeshSequence | Simulated, *, look: str, parameters: Mapping[str, float], cloth: str,
-    heading: float | None, renderer: str, photos: Path | None, seed: int,
-) -> Frames:  # fmt: skip
+    sequence: MeshSequence | RaggedMeshSequence | Simulated,
+    *,
+    look: str,
+    parameters: Mapping[str, float],
+    cloth: str,
+    heading: float | None,
+    renderer: str,
+    photos: Path | None,
+    seed: int,
+) -> Frames:
     """A film of a moving cloth.
 
     Raises:
@@ -29,9 +36,10 @@ def rendered(
         raise UsageError(f"cloth {cloth!r}", where="cloth", fix="give 'flag' or 'hanging-cloth'")
     if isinstance(sequence, Simulated):
         raise UsageError(
-            f"a simulation of {len(sequence)} cloths", where="sequence",
+            f"a simulation of {len(sequence)} cloths",
+            where="sequence",
             fix="give one of its members, as in simulated[0]",
-        )  # fmt: skip
+        )
     assets = Assets(photos=photos)
     zeta = prior.named(look).with_quantities(dict(parameters), source="given").draw(seed, assets)
     toward = _toward(sequence) if heading is None else heading

@@ -59,9 +59,14 @@ class Geometry:
         return cls(
             positions=torch.cat([meshes.positions + meshes.positions.new_tensor(placed.shift), placed.pole_positions]),
             uv=torch.cat([meshes.uv, meshes.uv.new_zeros((len(placed.pole_positions), 2))]),
-            corners=torch.cat(corners), frame=frame, cloth=place < offset.diff()[frame], vertex_offset=vertex_offset,
-            face_offset=face_offset, cloth_faces=offset.diff(), shift=placed.shift,
-        )  # fmt: skip
+            corners=torch.cat(corners),
+            frame=frame,
+            cloth=place < offset.diff()[frame],
+            vertex_offset=vertex_offset,
+            face_offset=face_offset,
+            cloth_faces=offset.diff(),
+            shift=placed.shift,
+        )
 
     def at(self, positions: Tensor) -> Geometry:
         """The same with the cloth's vertices elsewhere: (all vertices, 3), as the meshes have them [m]."""
@@ -92,6 +97,7 @@ def check_in_front(positions: Tensor, meshes: Meshes, placed: Stage) -> None:
     if len(behind):
         frame = sum(offset <= int(behind[0]) for offset in meshes.vertex_offset) - 1
         raise InputError(
-            f"{len(behind)} vertices of the cloth are behind the camera", where=f"frame {frame}",
+            f"{len(behind)} vertices of the cloth are behind the camera",
+            where=f"frame {frame}",
             fix="enlarge camera_radius, or render fewer frames where the cloth travels",
-        )  # fmt: skip
+        )

@@ -33,6 +33,8 @@ class Light:
         """What one of the samples sees."""
         points = samples.to_sun[index].tolist()
         return cls(
-            to_sun=tuple((x, y, z) for x, y, z in points), sky=parameters.sky_strength,
-            point=samples.sun_weight * parameters.raster_samples / math.pi, translucency=parameters.translucency,
-        )  # fmt: skip
+            to_sun=tuple((x, y, z) for x, y, z in points),
+            sky=parameters.sky_strength,
+            point=samples.sun_weight * parameters.raster_samples / math.pi,
+            translucency=parameters.translucency,
+        )

@@ -61,15 +61,16 @@ class Meshes:
         if len(self.uv) != len(self.positions):
             raise _wrong(f"{len(self.uv)} texture places for {len(self.positions)} vertices", "one for each")
         for name, values, dtype in (
-            ("positions", self.positions, torch.float32), ("faces", self.faces, torch.int64),
+            ("positions", self.positions, torch.float32),
+            ("faces", self.faces, torch.int64),
             ("uv", self.uv, torch.float32),
-        ):  # fmt: skip
+        ):
             if values.dtype != dtype:
                 raise _wrong(f"{name} are of type {values.dtype}", f"{dtype}")
         for name, offset, total in (
             ("vertex_offset", self.vertex_offset, len(self.positions)),
             ("face_offset", self.face_offset, len(self.faces)),
-        ):  # fmt: skip
+        ):
             rising = all(a < b for a, b in itertools.pairwise(offset))
             if len(offset) < 2 or offset[0] != 0 or offset[-1] != total or not rising:
                 raise _wrong(f"{name} does not fit {total} rows", "from 0 to the rows, rising, at least one frame")
@@ -123,11 +124,13 @@ class Meshes:
         vertices = slice(self.vertex_offset[first], self.vertex_offset[last])
         vertex_offset, face_offset = (offset[first : last + 1] for offset in (self.vertex_offset, self.face_offset))
         return replace(
-            self, positions=self.positions[vertices], uv=self.uv[vertices],
+            self,
+            positions=self.positions[vertices],
+            uv=self.uv[vertices],
             faces=self.faces[face_offset[0] : face_offset[-1]],
             vertex_offset=tuple(offset - vertex_offset[0] for offset in vertex_offset),
             face_offset=tuple(offset - face_offset[0] for offset in face_offset),
-        )  # fmt: skip
+        )
 
     @classmethod
     def fixed(
@@ -150,11 +153,15 @@ class Meshes:
         frames, vertices, _ = positions.shape
         device = positions.device
         return cls(
-            positions=positions.flatten(0, 1).float(), faces=faces.to(device, torch.int64).repeat(frames, 1),
-            uv=uv.to(device).float().repeat(frames, 1), anchor=anchor, heading=heading, rate=rate,
+            positions=positions.flatten(0, 1).float(),
+            faces=faces.to(device, torch.int64).repeat(frames, 1),
+            uv=uv.to(device).float().repeat(frames, 1),
+            anchor=anchor,
+            heading=heading,
+            rate=rate,
             vertex_offset=tuple(range(0, frames * vertices + 1, vertices)) if vertices else (0,),
             face_offset=tuple(range(0, frames * len(faces) + 1, len(faces))) if len(faces) else (0,),
-        )  # fmt: skip
+        )
 
     @classmethod
     def flag(
@@ -205,9 +212,15 @@ class Meshes:
         if isinstance(sequence, MeshSequence):
             return cls.fixed(positions=positions, faces=faces, uv=uv, anchor=(x, y, z), heading=heading, rate=rate)
         return cls(
-            positions=positions, faces=faces.long(), uv=uv, anchor=(x, y, z), heading=heading, rate=rate,
-            vertex_offset=tuple(sequence.vertex_offset.tolist()), face_offset=tuple(sequence.face_offset.tolist()),
-        )  # fmt: skip
+            positions=positions,
+            faces=faces.long(),
+            uv=uv,
+            anchor=(x, y, z),
+            heading=heading,
+            rate=rate,
+            vertex_offset=tuple(sequence.vertex_offset.tolist()),
+            face_offset=tuple(sequence.face_offset.tolist()),
+        )
 
 
 def _wrong(what: str, wanted: str) -> InputError:

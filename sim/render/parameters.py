@@ -105,9 +105,10 @@ class RenderParameters:
                 noun = "a whole number" if whole else "a number"
                 unit = "" if entry.unit == "1" else f" {entry.unit}"
                 raise InputError(
-                    f"{name} is {value!r}", where="render parameters",
+                    f"{name} is {value!r}",
+                    where="render parameters",
                     fix=f"give {noun} from {entry.least:g} to {entry.most:g}{unit}",
-                )  # fmt: skip
+                )
         for name in ("background", "texture"):
             if not isinstance(getattr(self, name), str) or not getattr(self, name):
                 raise InputError(f"{name} is {getattr(self, name)!r}", where="render parameters", fix="give a name")

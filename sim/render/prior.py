@@ -50,17 +50,19 @@ class RenderPrior:
             low, high = ends(quantity)
             if low < described[name].least or high > described[name].most:
                 raise InputError(
-                    f"{name} from {low:g} to {high:g} {described[name].unit}", where=where,
+                    f"{name} from {low:g} to {high:g} {described[name].unit}",
+                    where=where,
                     fix=f"stay within {described[name].least:g} to {described[name].most:g}",
-                )  # fmt: skip
+                )
         low, high = ends(self.quantities.get("camera_angle", RenderParameters.camera_angle))
         across = math.floor(high / math.pi - 0.5) >= math.ceil(low / math.pi - 0.5)
         widest = math.pi / 2 if across else max(_to_line(low), _to_line(high))
         if widest < self.least_angle or (widest == self.least_angle > 0 and low < high):
             raise InputError(
-                f"no camera angle is {math.degrees(self.least_angle):g}° or more from the heading", where=where,
+                f"no camera angle is {math.degrees(self.least_angle):g}° or more from the heading",
+                where=where,
                 fix="widen the range of camera-angle, or lower least-angle",
-            )  # fmt: skip
+            )
         for noun, kinds in (("textures", self.textures), ("backgrounds", self.backgrounds)):
             if not kinds:
                 raise InputError(f"no {noun}", where=where, fix="name at least one kind")
@@ -100,8 +102,10 @@ class RenderPrior:
         """All that shapes a draw beside its seed and the assets, as JSON."""
         return {
             "quantities": {name: plain(quantity) for name, quantity in self.quantities.items()},
-            "textures": list(self.textures), "backgrounds": list(self.backgrounds), "least_angle": self.least_angle,
-        }  # fmt: skip
+            "textures": list(self.textures),
+            "backgrounds": list(self.backgrounds),
+            "least_angle": self.least_angle,
+        }
 
 
 def named(name: str) -> RenderPrior:
@@ -145,9 +149,13 @@ def read(content: Mapping[str, Any], *, name: str) -> RenderPrior:
             sources[parameter] = source
         part.done()
     return RenderPrior(
-        name=name, quantities=quantities, sources=sources, textures=textures, backgrounds=backgrounds,
+        name=name,
+        quantities=quantities,
+        sources=sources,
+        textures=textures,
+        backgrounds=backgrounds,
         least_angle=least_angle,
-    )  # fmt: skip
+    )
 
 
 def _at(quantity: Quantity, share: float) -> float:

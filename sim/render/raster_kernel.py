@@ -18,9 +18,21 @@ from sim.render.view import View
 
 _COUNTS = ("frames", "width", "height", "vertices", "pole_start", "levels", "suns", "map")
 _POINTERS = (
-    "vertex_offset", "face_offset", "cloth_faces", "corner", "position", "place", "depth", "uv", "texels",
-    "level_width", "level_height", "level_start", "basis", "out",
-)  # fmt: skip
+    "vertex_offset",
+    "face_offset",
+    "cloth_faces",
+    "corner",
+    "position",
+    "place",
+    "depth",
+    "uv",
+    "texels",
+    "level_width",
+    "level_height",
+    "level_start",
+    "basis",
+    "out",
+)
 _NUMBERS = ("sun", "sky", "translucency", "samples")
 
 
@@ -60,17 +72,36 @@ def add_sample(
     frames, height, width, _ = out.shape
     suns = torch.tensor([basis(direction) for direction in light.to_sun], dtype=torch.float32)
     tensors = {
-        "vertex_offset": geometry.vertex_offset, "face_offset": geometry.face_offset,
-        "cloth_faces": geometry.cloth_faces, "corner": geometry.corners, "position": geometry.positions,
-        "place": places, "depth": depth, "uv": geometry.uv, "texels": pyramid.padded, "level_width": pyramid.width,
-        "level_height": pyramid.height, "level_start": pyramid.start, "basis": suns,
-    }  # fmt: skip
+        "vertex_offset": geometry.vertex_offset,
+        "face_offset": geometry.face_offset,
+        "cloth_faces": geometry.cloth_faces,
+        "corner": geometry.corners,
+        "position": geometry.positions,
+        "place": places,
+        "depth": depth,
+        "uv": geometry.uv,
+        "texels": pyramid.padded,
+        "level_width": pyramid.width,
+        "level_height": pyramid.height,
+        "level_start": pyramid.start,
+        "basis": suns,
+    }
     tensors = {name: tensor.contiguous() for name, tensor in tensors.items()}
     sample = _Sample(
-        frames=frames, width=width, height=height, vertices=len(geometry.positions),
-        pole_start=int(geometry.vertex_offset[-1]), levels=len(pyramid), suns=len(suns), map=SIZE,
-        sun=light.point, sky=light.sky, translucency=light.translucency, samples=view.samples, out=out.data_ptr(),
-    )  # fmt: skip
+        frames=frames,
+        width=width,
+        height=height,
+        vertices=len(geometry.positions),
+        pole_start=int(geometry.vertex_offset[-1]),
+        levels=len(pyramid),
+        suns=len(suns),
+        map=SIZE,
+        sun=light.point,
+        sky=light.sky,
+        translucency=light.translucency,
+        samples=view.samples,
+        out=out.data_ptr(),
+    )
     sample.pole_albedo[:] = [*POLE_ALBEDO, 0.0]
     sample.camera[:] = [*view.camera.position, 0.0]
     for name, tensor in tensors.items():
@@ -83,8 +114,12 @@ def develop(code: ctypes.CDLL, scene: Tensor, behind: Tensor, *, gain: float) ->
     frames, height, width, _ = scene.shape
     out = torch.empty((frames, height, width, 3), dtype=torch.uint8)
     film = _Film(
-        frames=frames, pixels=height * width, gain=gain,
-        scene=scene.data_ptr(), behind=behind.data_ptr(), out=out.data_ptr(),
-    )  # fmt: skip
+        frames=frames,
+        pixels=height * width,
+        gain=gain,
+        scene=scene.data_ptr(),
+        behind=behind.data_ptr(),
+        out=out.data_ptr(),
+    )
     code.develop(ctypes.byref(film))
     return out

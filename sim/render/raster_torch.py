@@ -87,7 +87,9 @@ def _visible(geometry: Geometry, view: View) -> _Visible:
     pixel, triangle, shares, n = pixel[won], triangle[won], shares[won], n[won]
     linear = torch.cat([1 - shares.sum(dim=1, keepdim=True), shares], dim=1) * n
     return _Visible(
-        pixel=pixel, face=shown[triangles.face[triangle]], corners=triangles.corners[triangle],
+        pixel=pixel,
+        face=shown[triangles.face[triangle]],
+        corners=triangles.corners[triangle],
         weights=linear / linear.sum(dim=1, keepdim=True),
         image_area=triangles.area[triangle].float() * (0.5 / GRID**2),
-    )  # fmt: skip
+    )

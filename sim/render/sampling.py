@@ -48,9 +48,11 @@ class Samples:
         sun = _cone(_hammersley(count * SUNS), to_sun, radius)
         sun = _dealt(sun.reshape(count, SUNS * 3), np.concatenate([jitter, time], axis=1), "sun")
         return cls(
-            jitter=jitter, time=(time[:, 0] - 0.5) * parameters.exposure_time, to_sun=sun.reshape(count, SUNS, 3),
+            jitter=jitter,
+            time=(time[:, 0] - 0.5) * parameters.exposure_time,
+            to_sun=sun.reshape(count, SUNS, 3),
             sun_weight=parameters.sun_strength * 2 / ((1 + math.cos(radius)) * count * SUNS),
-        )  # fmt: skip
+        )
 
 
 def _hammersley(count: int) -> NDArray[np.float64]:

@@ -87,9 +87,10 @@ def _looked_up(frame: Frame, uv: Tensor, *, where: str) -> Tensor:
     face[edge] = finder(points[edge, 0], points[edge, 1])
     if (face < 0).any():
         raise InputError(
-            f"{int((face < 0).sum())} places of the cloth in one frame are in no face of the other", where=where,
+            f"{int((face < 0).sum())} places of the cloth in one frame are in no face of the other",
+            where=where,
             fix="give frames whose texture places cover the same cloth, or no exposure time",
-        )  # fmt: skip
+        )
     a, b, c = (own[faces[face, k]] for k in range(3))
     weights = np.linalg.solve(np.stack([b - a, c - a], axis=2), (points - a)[:, :, None])[:, :, 0]
     weights = np.concatenate([1 - weights.sum(axis=1, keepdims=True), weights], axis=1)

@@ -59,22 +59,28 @@ def stage(meshes: Meshes, parameters: RenderParameters) -> Stage:
             aim[1] - zeta.camera_radius * math.sin(axis),
             zeta.camera_height,
         ),
-        target=aim, view_angle=zeta.view_angle, width=zeta.width, height=zeta.height,
+        target=aim,
+        view_angle=zeta.view_angle,
+        width=zeta.width,
+        height=zeta.height,
         frame_offset=(zeta.frame_offset_x, zeta.frame_offset_y),
-    )  # fmt: skip
+    )
     azimuth = meshes.heading + zeta.sun_azimuth
     away = math.hypot(zeta.sun_radius, zeta.sun_height)
     positions, faces = _pole(
         radius=zeta.pole_radius, top=zeta.mesh_height + _POLE_ABOVE, heading=meshes.heading, device=meshes.device
     )
     return Stage(
-        camera=camera, shift=shift, pole_positions=positions, pole_faces=faces,
+        camera=camera,
+        shift=shift,
+        pole_positions=positions,
+        pole_faces=faces,
         to_sun=(
             zeta.sun_radius * math.cos(azimuth) / away,
             zeta.sun_radius * math.sin(azimuth) / away,
             zeta.sun_height / away,
         ),
-    )  # fmt: skip
+    )
 
 
 def _pole(*, radius: float, top: float, heading: float, device: torch.device) -> tuple[Tensor, Tensor]:

@@ -61,11 +61,14 @@ def _answer(recipe: Recipe, found: list[Outcome]) -> Simulated:
     failed = {one.member.index: one.failure[1] for one in found if one.failure is not None}
     if not whole:
         raise InputError(
-            f"none of {len(found)} members was simulated to the end: {next(iter(failed.values()))}", where=recipe.name,
+            f"none of {len(found)} members was simulated to the end: {next(iter(failed.values()))}",
+            where=recipe.name,
             fix="declare more damping, or a smaller step",
-        )  # fmt: skip
+        )
     names = [name for name, value in whole[0].member.parameters.items() if isinstance(value, float)]
     return Simulated(
-        name=recipe.name, members=tuple(one.sequence for one in whole if one.sequence is not None), failed=failed,
+        name=recipe.name,
+        members=tuple(one.sequence for one in whole if one.sequence is not None),
+        failed=failed,
         parameters={name: np.array([one.member.parameters[name] for one in whole], dtype=np.float64) for name in names},
-    )  # fmt: skip
+    )

@@ -63,9 +63,10 @@ class Stepper:
     def __post_init__(self) -> None:
         if self.steps > STEPS_LIMIT:
             raise LimitError(
-                f"a stable simulation needs {self.steps:.3g} steps a frame", where="recipe [integrator]",
+                f"a stable simulation needs {self.steps:.3g} steps a frame",
+                where="recipe [integrator]",
                 fix=f"at most {STEPS_LIMIT} are taken: let the cells be larger, or the cloth softer or heavier",
-            )  # fmt: skip
+            )
 
     @classmethod
     def of(cls, crew: Crew, base: int = 0) -> Stepper:
@@ -158,10 +159,12 @@ def run(
         sequence = None
         if failure is None:
             sequence = MeshSequence(
-                time=np.array(first, dtype=np.int64), positions=np.ascontiguousarray(positions[..., place]),
-                faces=crew.mesh.faces.astype(np.int32), rest=crew.mesh.rest.astype(np.float32),
+                time=np.array(first, dtype=np.int64),
+                positions=np.ascontiguousarray(positions[..., place]),
+                faces=crew.mesh.faces.astype(np.int32),
+                rest=crew.mesh.rest.astype(np.float32),
                 attributes=_attributes(crew, stepper, member, diagnosis),
-            )  # fmt: skip
+            )
         outcomes.append(Outcome(member=member, sequence=sequence, diagnosis=diagnosis, failure=failure))
     return outcomes
 

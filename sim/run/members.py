@@ -124,11 +124,17 @@ class Crew:
             for name, effect in self.recipe.effects.items()
         }
         scene = Scene(
-            mesh=self.mesh, position=self._start(seed), material=material, handles=self.handles,
+            mesh=self.mesh,
+            position=self._start(seed),
+            material=material,
+            handles=self.handles,
             wind=(speed * math.cos(toward), speed * math.sin(toward), wind.vertical),
-            gravity=_gravity(self.recipe.scene), air=wind.force, evaluation=self.recipe.scene.evaluation,
-            contact=self.recipe.contact, limits=self.recipe.limits,
-        )  # fmt: skip
+            gravity=_gravity(self.recipe.scene),
+            air=wind.force,
+            evaluation=self.recipe.scene.evaluation,
+            contact=self.recipe.contact,
+            limits=self.recipe.limits,
+        )
         parameters: dict[str, Parameter] = {
             "material": base.name,
             "wind_speed": speed,
@@ -166,9 +172,15 @@ class Crew:
                 bending=stiffest,
             )
             scene = Scene(
-                mesh=self.mesh, position=self._start(0), material=material, handles=self.handles, air=wind.force,
-                evaluation=self.recipe.scene.evaluation, contact=self.recipe.contact, limits=self.recipe.limits,
-            )  # fmt: skip
+                mesh=self.mesh,
+                position=self._start(0),
+                material=material,
+                handles=self.handles,
+                air=wind.force,
+                evaluation=self.recipe.scene.evaluation,
+                contact=self.recipe.contact,
+                limits=self.recipe.limits,
+            )
             effects = {
                 name: {key: ends(value)[end] for key, value in effect.parameters.items()}
                 for name, effect in self.recipe.effects.items()
@@ -217,10 +229,14 @@ class Crew:
             speed = member.wind_speed
             series.append(
                 effect.with_series(
-                    stream(member.seed, "effects", "gusts", "series"), batch=1, speed=max(speed, _CALM),
-                    length=spec.length or 0.0, duration=duration, rate=_GUST_RATE,
+                    stream(member.seed, "effects", "gusts", "series"),
+                    batch=1,
+                    speed=max(speed, _CALM),
+                    length=spec.length or 0.0,
+                    duration=duration,
+                    rate=_GUST_RATE,
                 )
-            )  # fmt: skip
+            )
         return replace(effect, times=series[0].times, samples=torch.cat([s.samples for s in series], dim=-1))
 
 
@@ -238,9 +254,12 @@ def _material(
     base: Material, *, density: float, stretching: float, bending: NDArray[np.float64], damping: float
 ) -> Material:
     return replace(
-        base, density=density, damping=damping, stretching=base.stretching * stretching,
+        base,
+        density=density,
+        damping=damping,
+        stretching=base.stretching * stretching,
         bending=base.bending * bending,
-    )  # fmt: skip
+    )
 
 
 def _gravity(spec: SceneSpec) -> tuple[float, float, float]:

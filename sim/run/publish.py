@@ -53,11 +53,14 @@ class RunReport:
 
     def as_dict(self) -> dict[str, Any]:
         return {
-            "added": list(self.added), "existing": list(self.existing),
+            "added": list(self.added),
+            "existing": list(self.existing),
             "healed": {artifact: asdict(how) for artifact, how in self.healed.items()},
             "failed": [dict(f) for f in self.failed],
-            "steps": dict(self.steps), "seconds": self.seconds, "rate": self.rate,
-        }  # fmt: skip
+            "steps": dict(self.steps),
+            "seconds": self.seconds,
+            "rate": self.rate,
+        }
 
 
 def simulate(
@@ -109,10 +112,14 @@ def simulate(
             healed |= done_now.healed
     seconds = time.perf_counter() - begun
     return RunReport(
-        added=tuple(added), existing=tuple(existing), healed=healed, failed=tuple(failed), seconds=seconds,
+        added=tuple(added),
+        existing=tuple(existing),
+        healed=healed,
+        failed=tuple(failed),
+        seconds=seconds,
         steps={base.name: stepper.step for base, stepper in zip(recipe.material.bases, steppers, strict=True)},
         rate=len(pending) / seconds if pending else 0.0,
-    )  # fmt: skip
+    )
 
 
 def whole(lake: Lake, artifacts: Collection[str], *, branch: str) -> frozenset[str]:
@@ -199,22 +206,35 @@ def publish(lake: Lake, recipe: Recipe, outcomes: Sequence[Outcome], *, step: fl
 def member_artifact(recipe: Recipe, identity: Mapping[str, Any], index: int, seed: int) -> Artifact:
     """The member's row without its result; its identity is complete."""
     return Artifact(
-        kind=Kind.MESHES, name=f"{recipe.name}-{index:05d}", recipe=identity, seed=seed,
-        frame_count=recipe.time.frames, rate=recipe.time.rate, parents=(recipe.model,) if recipe.model else (),
-    )  # fmt: skip
+        kind=Kind.MESHES,
+        name=f"{recipe.name}-{index:05d}",
+        recipe=identity,
+        seed=seed,
+        frame_count=recipe.time.frames,
+        rate=recipe.time.rate,
+        parents=(recipe.model,) if recipe.model else (),
+    )
 
 
 def _published(recipe: Recipe, identity: Mapping[str, Any], outcome: Outcome, step: float, *, stored: str) -> Artifact:
     member, diagnosis = outcome.member, outcome.diagnosis
     report = {
-        "schema": "flagdata.simulation-report/1", "index": member.index, "root_seed": recipe.seed,
-        "step": step, "batch": recipe.batch, "settle": recipe.time.settle, **diagnosis.summary(),
+        "schema": "flagdata.simulation-report/1",
+        "index": member.index,
+        "root_seed": recipe.seed,
+        "step": step,
+        "batch": recipe.batch,
+        "settle": recipe.time.settle,
+        **diagnosis.summary(),
         "findings": [],
-    }  # fmt: skip
+    }
     return replace(
-        member_artifact(recipe, identity, member.index, member.seed), object=stored, wind=member.wind_speed,
-        parameters=canonical(member.parameters), report=json.dumps(report, allow_nan=False),
-    )  # fmt: skip
+        member_artifact(recipe, identity, member.index, member.seed),
+        object=stored,
+        wind=member.wind_speed,
+        parameters=canonical(member.parameters),
+        report=json.dumps(report, allow_nan=False),
+    )
 
 
 def failure_of(outcome: Outcome) -> dict[str, Any]:

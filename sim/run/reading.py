@@ -60,7 +60,7 @@ from sim.run.recipe import (
     Shape,
     TimeSpec,
     WindSpec,
-)  # fmt: skip
+)
 from sim.scene import GRAVITY
 from sim.tables import Evaluation
 
@@ -113,13 +113,21 @@ def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: st
     limits = _limits(top.table("limits"), bounds, integrator) if bounds is not None or "limits" in top else None
     time = top.table("time").record(TimeSpec, settle=NOT_NEGATIVE, frames=COUNT, rate=POSITIVE)
     recipe = Recipe(
-        name=name, title=top.text("title", name) or name, seed=top.whole("seed", 0, least=0, most=SEED_LIMIT),
-        count=top.whole("count", 1, least=1), batch=top.whole("batch", 16, least=1),
+        name=name,
+        title=top.text("title", name) or name,
+        seed=top.whole("seed", 0, least=0, most=SEED_LIMIT),
+        count=top.whole("count", 1, least=1),
+        batch=top.whole("batch", 16, least=1),
         precision=top.named("precision", "float32", DTYPES, noun="precision"),
-        scene=scene, material=_material(top.table("material"), folder, scene), wind=_wind(top.table("wind"), scene),
-        contact=contact, limits=limits, integrator=integrator, time=time,
+        scene=scene,
+        material=_material(top.table("material"), folder, scene),
+        wind=_wind(top.table("wind"), scene),
+        contact=contact,
+        limits=limits,
+        integrator=integrator,
+        time=time,
         effects=_effects(top.table("effects")),
-    )  # fmt: skip
+    )
     top.done()
     return recipe
 
@@ -151,9 +159,16 @@ def _scene(table: Table, folder: Path) -> SceneSpec:
     if square and attachment is Attachment.HOIST:
         raise UsageError("a hanging cloth has no hoist", where=table.where, fix='take attachment = "corners"')
     return SceneSpec(
-        shape=shape, width=width, height=height, columns=columns, attachment=attachment, start_noise=noise,
-        evaluation=evaluation, gravity=gravity, stiffness=stiffness,
-    )  # fmt: skip
+        shape=shape,
+        width=width,
+        height=height,
+        columns=columns,
+        attachment=attachment,
+        start_noise=noise,
+        evaluation=evaluation,
+        gravity=gravity,
+        stiffness=stiffness,
+    )
 
 
 def _stiffness(table: Table) -> float:
@@ -170,40 +185,60 @@ def _given(table: Table, *, noise: float, evaluation: Evaluation, stiffness: flo
         faces=tuple((a, b, c) for a, b, c in table.indices("faces", 3)),
         held=tuple(vertex for (vertex,) in table.indices("held", 1)),
         anchors=tuple((x, y, z) for x, y, z in table.points("anchors", 3)),
-    )  # fmt: skip
+    )
     gravity = table.number("gravity", -GRAVITY[2])
     table.done()
     used = [vertex for face in cloth.faces for vertex in face]
     if not cloth.rest or not cloth.faces or not cloth.held or len(cloth.held) != len(cloth.anchors):
         raise InputError(
             f"a mesh of {len(cloth.rest)} vertices and {len(cloth.faces)} faces, {len(cloth.held)} of them held at "
-            f"{len(cloth.anchors)} anchors", where=table.where, fix="give rest, faces, held, an anchor for each held",
-        )  # fmt: skip
+            f"{len(cloth.anchors)} anchors",
+            where=table.where,
+            fix="give rest, faces, held, an anchor for each held",
+        )
     if max(*used, *cloth.held) >= len(cloth.rest):
         raise InputError(
             f"a vertex {max(*used, *cloth.held)} of {len(cloth.rest)}", where=table.where, fix="number them from 0"
         )
     width, height = (max(axis) - min(axis) for axis in zip(*cloth.rest, strict=True))
     return SceneSpec(
-        shape=Shape.MESH, width=width, height=height, columns=0, attachment=Attachment.CORNERS, start_noise=noise,
-        evaluation=evaluation, gravity=gravity, stiffness=stiffness, given=cloth,
+        shape=Shape.MESH,
+        width=width,
+        height=height,
+        columns=0,
+        attachment=Attachment.CORNERS,
+        start_noise=noise,
+        evaluation=evaluation,
+        gravity=gravity,
+        stiffness=stiffness,
+        given=cloth,
         content=digest(canonical(vars(cloth).copy())),
-    )  # fmt: skip
+    )
 
 
 def _arcsim(scene: ArcsimScene, *, noise: float, evaluation: Evaluation) -> SceneSpec:
     rest, gravity = scene.scene.mesh.rest, scene.scene.gravity
     width, height = (float(side) for side in rest.max(axis=0) - rest.min(axis=0))
     content = {
-        "positions": scene.scene.position.tolist(), "rest": rest.tolist(), "faces": scene.scene.mesh.faces.tolist(),
-        "handles": list(scene.scene.handles.vertices), "stiffness": scene.scene.handles.stiffness,
+        "positions": scene.scene.position.tolist(),
+        "rest": rest.tolist(),
+        "faces": scene.scene.mesh.faces.tolist(),
+        "handles": list(scene.scene.handles.vertices),
+        "stiffness": scene.scene.handles.stiffness,
         "gravity": list(gravity),
-    }  # fmt: skip
+    }
     return SceneSpec(
-        shape=Shape.ARCSIM, width=width, height=height, columns=0, attachment=Attachment.CORNERS, start_noise=noise,
-        evaluation=evaluation, gravity=-gravity[2], arcsim=scene,
+        shape=Shape.ARCSIM,
+        width=width,
+        height=height,
+        columns=0,
+        attachment=Attachment.CORNERS,
+        start_noise=noise,
+        evaluation=evaluation,
+        gravity=-gravity[2],
+        arcsim=scene,
         content=digest(canonical(content)),
-    )  # fmt: skip
+    )
 
 
 def _material(table: Table, folder: Path, scene: SceneSpec) -> MaterialSpec:
@@ -266,9 +301,11 @@ def _wind(table: Table, scene: SceneSpec) -> WindSpec:
             density=table.number("density", base.density, least=0.0), drag=table.number("drag", base.drag, least=0.0)
         )
     spec = WindSpec(
-        speed=table.quantity("speed", 0.0, least=0.0, most=100.0), toward=table.angle("toward", 0.0),
-        vertical=table.number("vertical", 0.0), force=force,
-    )  # fmt: skip
+        speed=table.quantity("speed", 0.0, least=0.0, most=100.0),
+        toward=table.angle("toward", 0.0),
+        vertical=table.number("vertical", 0.0),
+        force=force,
+    )
     table.done()
     if "speed" not in table:
         raise InputError("no wind speed is given", where=table.where, fix="add speed = 4.0 (m/s), or a range")
@@ -279,9 +316,10 @@ def _limits(table: Table, given: StrainLimits | None, integrator: IntegratorSpec
     """Those of the table, in what it leaves out those of an ArcSim scene; small steps need one sweep."""
     base = replace(given or StrainLimits(), sweeps=SWEEPS if integrator.name == "implicit" else 1)
     limits = StrainLimits(
-        low=table.number("low", base.low), high=table.number("high", base.high),
+        low=table.number("low", base.low),
+        high=table.number("high", base.high),
         sweeps=table.whole("sweeps", base.sweeps, least=1),
-    )  # fmt: skip
+    )
     table.done()
     return limits
 
@@ -297,8 +335,9 @@ def _integrator(table: Table) -> IntegratorSpec:
     if name == "implicit" and backend is Backend.WARP:
         raise UsageError(
             "the Warp kernel has only leapfrog steps, no implicit integration",
-            where=table.where, fix='name = "symplectic", or another backend',
-        )  # fmt: skip
+            where=table.where,
+            fix='name = "symplectic", or another backend',
+        )
     table.done()
     return IntegratorSpec(name=name, step=step, air_shape=air_shape, backend=backend)
 
@@ -311,8 +350,9 @@ def _effects(table: Table) -> dict[str, EffectSpec]:
         if name == "logged-gusts":
             raise UsageError(
                 "logged gusts need a log, which a recipe cannot name",
-                where=table.where, fix="take gusts, or apply the effect from Python",
-            )  # fmt: skip
+                where=table.where,
+                fix="take gusts, or apply the effect from Python",
+            )
         inner = table.table(name)
         length = inner.number("length", _GUST_LENGTH, above=0.0) if name == "gusts" else None
         parameters: dict[str, Quantity] = {}
@@ -338,9 +378,18 @@ def _of_scene_file(path: Path) -> Recipe:
     scene = _arcsim(file, noise=0.0, evaluation=Evaluation.ARCSIM)
     where = f"scene {path}"
     return Recipe(
-        name=path.stem, title=path.name, seed=0, count=1, batch=1, precision="float64", scene=scene,
-        material=_material(Table({}, where=where), path.parent, scene), wind=_wind(Table({}, where=where), scene),
-        contact=file.scene.contact, limits=file.scene.limits,
+        name=path.stem,
+        title=path.name,
+        seed=0,
+        count=1,
+        batch=1,
+        precision="float64",
+        scene=scene,
+        material=_material(Table({}, where=where), path.parent, scene),
+        wind=_wind(Table({}, where=where), scene),
+        contact=file.scene.contact,
+        limits=file.scene.limits,
         integrator=IntegratorSpec(name="implicit", step=file.step, air_shape=AirShape.PREVIOUS),
-        time=TimeSpec(settle=0.0, frames=file.frames + 1, rate=1 / file.frame_time), effects={},
-    )  # fmt: skip
+        time=TimeSpec(settle=0.0, frames=file.frames + 1, rate=1 / file.frame_time),
+        effects={},
+    )

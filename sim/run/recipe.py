@@ -184,9 +184,10 @@ class TimeSpec:
     def __post_init__(self) -> None:
         if not self.settle * self.rate + self.frames <= FRAMES_LIMIT:
             raise LimitError(
-                f"{self.frames} frames after {self.settle:g} s at {self.rate:g} Hz", where="[time]",
+                f"{self.frames} frames after {self.settle:g} s at {self.rate:g} Hz",
+                where="[time]",
                 fix=f"have at most {FRAMES_LIMIT} frames in all",
-            )  # fmt: skip
+            )
 
     @property
     def total(self) -> int:
@@ -242,15 +243,17 @@ class Recipe:
         vertices = self.scene.vertices
         if vertices > VERTICES_LIMIT:
             raise LimitError(
-                f"a mesh of {vertices:.3g} vertices", where=f"{self.name} [scene]",
+                f"a mesh of {vertices:.3g} vertices",
+                where=f"{self.name} [scene]",
                 fix=f"have at most {VERTICES_LIMIT}: lower columns, or mind the ratio of width and height",
-            )  # fmt: skip
+            )
         size = 12 * vertices * self.time.frames * min(self.batch, self.count)
         if size > BATCH_BYTES_LIMIT:
             raise LimitError(
-                f"a batch that keeps {size:.3g} bytes of positions", where=self.name,
+                f"a batch that keeps {size:.3g} bytes of positions",
+                where=self.name,
                 fix=f"have at most {BATCH_BYTES_LIMIT}: fewer members a batch, frames or columns",
-            )  # fmt: skip
+            )
 
     @property
     def dtype(self) -> torch.dtype:
@@ -264,26 +267,40 @@ class Recipe:
             "seed": self.seed,
             "precision": self.precision,
             "scene": {
-                "shape": scene.shape.value, "width": scene.width, "height": scene.height, "columns": scene.columns,
-                "attachment": scene.attachment.value, "start_noise": scene.start_noise,
-                "evaluation": scene.evaluation.value, "gravity": scene.gravity, "content": scene.content,
-                "left_out": list(scene.arcsim.left_out) if scene.arcsim else [], **_held(scene),
+                "shape": scene.shape.value,
+                "width": scene.width,
+                "height": scene.height,
+                "columns": scene.columns,
+                "attachment": scene.attachment.value,
+                "start_noise": scene.start_noise,
+                "evaluation": scene.evaluation.value,
+                "gravity": scene.gravity,
+                "content": scene.content,
+                "left_out": list(scene.arcsim.left_out) if scene.arcsim else [],
+                **_held(scene),
             },
             "material": {
-                "bases": [_base(base) for base in material.bases], "density": plain(material.density),
-                "stretching_factor": plain(material.stretching), "bending_factor": plain(material.bending),
+                "bases": [_base(base) for base in material.bases],
+                "density": plain(material.density),
+                "stretching_factor": plain(material.stretching),
+                "bending_factor": plain(material.bending),
                 "bending_factors": plain(material.bending_each),
-                "damping": plain(material.damping), **_weighed(material),
+                "damping": plain(material.damping),
+                **_weighed(material),
             },
             "wind": {
-                "speed": plain(wind.speed), "toward": plain(wind.toward), "vertical": wind.vertical,
+                "speed": plain(wind.speed),
+                "toward": plain(wind.toward),
+                "vertical": wind.vertical,
                 "force": _force(wind.force),
             },
             "contact": None if self.contact is None else vars(self.contact).copy(),
             **({} if self.limits is None else {"limits": vars(self.limits).copy()}),
             "integrator": {
-                "name": self.integrator.name, "step": self.integrator.step,
-                "air_shape": self.integrator.air_shape.value, **_chosen(self.integrator.backend),
+                "name": self.integrator.name,
+                "step": self.integrator.step,
+                "air_shape": self.integrator.air_shape.value,
+                **_chosen(self.integrator.backend),
             },
             "time": vars(self.time).copy(),
             "effects": {
@@ -293,7 +310,7 @@ class Recipe:
                 }
                 for name, effect in self.effects.items()
             },
-        }  # fmt: skip
+        }
 
 
 def _chosen(backend: Backend) -> dict[str, Any]:
@@ -316,8 +333,11 @@ def _weighed(material: MaterialSpec) -> dict[str, Any]:
 def _base(base: Material) -> dict[str, Any]:
     tables = {"stretching": base.stretching.tolist(), "bending": base.bending.tolist()}
     return {
-        "name": base.name, "density": base.density, "damping": base.damping, "tables": digest(canonical(tables)),
-    }  # fmt: skip
+        "name": base.name,
+        "density": base.density,
+        "damping": base.damping,
+        "tables": digest(canonical(tables)),
+    }
 
 
 def _force(force: AirForce) -> dict[str, Any]:

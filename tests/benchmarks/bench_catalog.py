@@ -126,11 +126,12 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         return {
-            "rows": ROWS, "load_average": round(os.getloadavg()[0], 1),
+            "rows": ROWS,
+            "load_average": round(os.getloadavg()[0], 1),
             "fresh process": _million(folder, seed),
             "commits as versions add up": _growth(folder / "versions"),
             "pages of view [ms]": _view(folder / "viewed", seed),
-        }  # fmt: skip
+        }
 
 
 @contextmanager
@@ -152,16 +153,32 @@ def fill(lake: Lake, rows: int, seed: int) -> None:
 def clips(first: int, count: int, draws: np.random.Generator) -> pa.Table:
     """Rows of clips, 10,000 a session."""
     one = Artifact(
-        kind=Kind.CLIP, name="clip", source_hash="a" * 64, frame_first=0, frame_count=30, start=0, end=1, rate=25.0,
-        wind=1.0, wind_sigma=0.1, session="s", day="2026-05-01", recipe={"window": 60.0},
-    )  # fmt: skip
+        kind=Kind.CLIP,
+        name="clip",
+        source_hash="a" * 64,
+        frame_first=0,
+        frame_count=30,
+        start=0,
+        end=1,
+        rate=25.0,
+        wind=1.0,
+        wind_sigma=0.1,
+        session="s",
+        day="2026-05-01",
+        recipe={"window": 60.0},
+    )
     row = replace(one, created=datetime.now(UTC)).row()
     rows = pa.Table.from_pylist([row], schema=catalog_schema()).take(pa.array(np.zeros(count, dtype=np.int64)))
     k = np.arange(first, first + count)
     own = {
-        "artifact": [draws.bytes(16).hex() for _ in range(count)], "name": [f"clip {i}" for i in k], "start": k,
-        "end": k + 1, "frame_first": 30 * k, "wind": k % 100 / 10, "session": [f"s{i // 10_000}" for i in k],
-    }  # fmt: skip
+        "artifact": [draws.bytes(16).hex() for _ in range(count)],
+        "name": [f"clip {i}" for i in k],
+        "start": k,
+        "end": k + 1,
+        "frame_first": 30 * k,
+        "wind": k % 100 / 10,
+        "session": [f"s{i // 10_000}" for i in k],
+    }
     for name, values in own.items():
         number = rows.schema.get_field_index(name)
         rows = rows.set_column(number, rows.schema.field(number), pa.array(values, rows.schema.field(number).type))
@@ -229,9 +246,10 @@ def _peers(folder: Path, table: pa.Table) -> dict[str, Any]:
             return len(connection.execute(SQL).fetchall())
 
     return {
-        "deltalake and DuckDB": _seconds(delta), "DuckDB's file": _seconds(duck_file),
+        "deltalake and DuckDB": _seconds(delta),
+        "DuckDB's file": _seconds(duck_file),
         "SQLite, 6 of the columns": _seconds(lite_file),
-    }  # fmt: skip
+    }
 
 
 def _seconds(ask: Callable[[], int]) -> dict[str, Any]:
@@ -287,10 +305,13 @@ def _view(path: Path, seed: int) -> dict[str, float]:
     site = Site(lake=Lake.open(path), media=Media(lake), base="/key/")
     known = _one_measurement(lake)
     addresses = {
-        "overview, first": "", "overview": "", "last page": f"?page={VIEWED // 60}&kind=clip",
+        "overview, first": "",
+        "overview": "",
+        "last page": f"?page={VIEWED // 60}&kind=clip",
         "search": "?name=clip%2077",
-        "artifact": f"artifact/{known}", "SQL": f"query?sql={quote(SQL)}",
-    }  # fmt: skip
+        "artifact": f"artifact/{known}",
+        "SQL": f"query?sql={quote(SQL)}",
+    }
     found: dict[str, float] = {}
     for name, address in addresses.items():
         began = time.perf_counter()

@@ -98,7 +98,10 @@ def _fresh(lake: str, environment: dict[str, str], *, before: str = "") -> dict[
 def _python(program: str, environment: dict[str, str], *arguments: str) -> str:
     own = {name: value for name, value in os.environ.items() if not name.startswith("AWS_")}
     done = subprocess.run(
-        [sys.executable, "-c", program, *arguments], check=True, stdout=subprocess.PIPE, text=True,
+        [sys.executable, "-c", program, *arguments],
+        check=True,
+        stdout=subprocess.PIPE,
+        text=True,
         env={**own, **environment},
-    )  # fmt: skip
+    )
     return done.stdout

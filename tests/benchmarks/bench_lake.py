@@ -68,9 +68,20 @@ def _catalog(folder: Path) -> dict[str, Any]:
 
 def _clip(i: int) -> Artifact:
     return Artifact(
-        kind=Kind.CLIP, name=f"clip {i}", source_hash="a" * 64, frame_first=30 * i, frame_count=30, start=i, end=i + 1,
-        rate=25.0, wind=i % 100 / 10, wind_sigma=0.1, session="s", day="2026-05-01", recipe={"window": 60.0},
-    )  # fmt: skip
+        kind=Kind.CLIP,
+        name=f"clip {i}",
+        source_hash="a" * 64,
+        frame_first=30 * i,
+        frame_count=30,
+        start=i,
+        end=i + 1,
+        rate=25.0,
+        wind=i % 100 / 10,
+        wind_sigma=0.1,
+        session="s",
+        day="2026-05-01",
+        recipe={"window": 60.0},
+    )
 
 
 def _commits(lake: Lake, label: str) -> float:

@@ -66,9 +66,11 @@ def _ingest(path: Path, lake: Lake, before: str) -> dict[str, float]:
     began = time.perf_counter()
     child = subprocess.Popen(
         [sys.executable, "-c", program, "ingest", "--lake", str(lake.path), "--zone", "UTC", str(path)],
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
         env=installed,
-    )  # fmt: skip
+    )
     assert child.stderr is not None
     said = child.stderr.read()
     _, status, usage = os.wait4(child.pid, 0)

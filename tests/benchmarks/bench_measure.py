@@ -107,10 +107,13 @@ def _stages(film: Film, shipped: Network) -> dict[str, float]:
     measure(film, model, gate=gate, dependence=of_model(model), options=options)
     measured = time.perf_counter()
     return {
-        "open_gate": prepared - begun, "decode": read - prepared, "maps_of_a_window": mapped - read,
-        "networks_of_a_window": embedded - mapped, "gate_of_a_window": judged - embedded,
+        "open_gate": prepared - begun,
+        "decode": read - prepared,
+        "maps_of_a_window": mapped - read,
+        "networks_of_a_window": embedded - mapped,
+        "gate_of_a_window": judged - embedded,
         "all_windows": measured - judged,
-    }  # fmt: skip
+    }
 
 
 def _first_clip(film: Film, shipped: Network) -> NDArray[np.uint8]:
@@ -125,6 +128,8 @@ def _refinement(clip: NDArray[np.uint8], shipped: Network, *, seed: int) -> dict
     )
     wall = time.perf_counter() - begun
     return {
-        "evaluations": found.evaluations, "wall": wall, "by_stage": dict(found.seconds),
+        "evaluations": found.evaluations,
+        "wall": wall,
+        "by_stage": dict(found.seconds),
         "an_evaluation": {stage: spent / found.evaluations for stage, spent in found.seconds.items()},
-    }  # fmt: skip
+    }

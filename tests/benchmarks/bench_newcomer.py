@@ -42,9 +42,11 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     """Commands, minutes and bytes of every Python and installation; nothing is written into `out`."""
     del seed, out
     return {
-        python: {"light": _tried(_light, python), "physics": _tried(_physics, python)} if _runs(python) else
-        {"left_out": f"no {python} on the path"} for python in PYTHONS
-    }  # fmt: skip
+        python: {"light": _tried(_light, python), "physics": _tried(_physics, python)}
+        if _runs(python)
+        else {"left_out": f"no {python} on the path"}
+        for python in PYTHONS
+    }
 
 
 def _tried(install: Callable[[str], dict[str, Any]], python: str) -> dict[str, Any]:
@@ -78,9 +80,13 @@ class _Newcomer:
         path = os.pathsep.join([str(self.environment / "bin"), os.environ["PATH"]])
         begun = time.perf_counter()
         done = subprocess.run(
-            command, cwd=within or self.clone, capture_output=True, text=True, check=False,
+            command,
+            cwd=within or self.clone,
+            capture_output=True,
+            text=True,
+            check=False,
             env={**clean, "PATH": path, "PIP_NO_CACHE_DIR": "1"},
-        )  # fmt: skip
+        )
         if done.returncode:
             raise RuntimeError(f"{' '.join(command)}: {(done.stdout + done.stderr)[-2000:]}")
         said = " ".join(command).replace(str(_ROOT), "URL").replace(str(self.clone), "flagdata")
@@ -104,13 +110,18 @@ class _Newcomer:
         found = {one["name"]: one["version"] for one in packages}
         used = subprocess.run(["du", "-sB1", str(self.environment)], capture_output=True, text=True, check=True)
         return {
-            "commands": len(self.steps), "minutes": sum(one["minutes"] for one in self.steps),
+            "commands": len(self.steps),
+            "minutes": sum(one["minutes"] for one in self.steps),
             "megabytes_downloaded": sum(one.get("megabytes", 0.0) for one in self.steps),
             "megabytes_on_disk": int(used.stdout.split()[0]) / 1e6,
-            "packages": len(set(found) - {"pip", "setuptools", "wheel"}), "torch": found.get("torch"),
-            "python": self.step("python", "--version").split()[-1], "answer": answer, "right": right,
-            "load_before": self._load, "steps": self.steps[:-1],
-        }  # fmt: skip
+            "packages": len(set(found) - {"pip", "setuptools", "wheel"}),
+            "torch": found.get("torch"),
+            "python": self.step("python", "--version").split()[-1],
+            "answer": answer,
+            "right": right,
+            "load_before": self._load,
+            "steps": self.steps[:-1],
+        }
 
 
 def _light(python: str) -> dict[str, Any]:

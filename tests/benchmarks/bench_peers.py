@@ -227,9 +227,13 @@ def _on_disk(lake: Lake, folder: Path) -> Iterator[Peer]:
     if _is_there(DATASETS):
         export(lake, Export(format="mcap", where="kind = 'recording'"), folder / "mcap")
     yield Peer(
-        title="Rerun", program=_RERUN, place=str(folder / "mcap"), environment=DATASETS, remarks=whole,
+        title="Rerun",
+        program=_RERUN,
+        place=str(folder / "mcap"),
+        environment=DATASETS,
+        remarks=whole,
         variables={"HOME": str(folder)},
-    )  # fmt: skip
+    )
     if _is_there(LEROBOT):
         export(lake, Export(format="lerobot", where=_CLIPS_ONLY, options={"frames": "av1"}), folder / "lerobot")
     home = {"HF_HUB_OFFLINE": "1", "HF_DATASETS_OFFLINE": "1", "HOME": str(folder), "HF_HOME": str(folder / "hf")}
@@ -277,8 +281,11 @@ def _measured(peer: Peer, folder: Path) -> dict[str, Any] | str:
     command = [python, *([] if peer.environment is None else ["-I"]), "-c", _MEASURE.replace("{program}", peer.program)]
     done = subprocess.run(
         [*command, peer.place, str(CLIPS), workers, "sequential" if peer.remarks else "random"],
-        capture_output=True, text=True, check=False, env=_variables(peer.variables),
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        env=_variables(peer.variables),
+    )
     if done.returncode:
         return f"failed: {done.stderr.strip().splitlines()[-1]}"
     return {**json.loads(done.stdout.splitlines()[-1]), **peer.remarks}

@@ -47,10 +47,13 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         zetas = [prior("flags").draw(seed * 1000 + index, Assets()) for index in range(DRAWS)]
         exact = _exact(meshes, zetas[:3])
         result: dict[str, Any] = {
-            "size": [300, 300], "vertices": len(meshes.frame(0).positions), "faces": len(meshes.frame(0).faces),
-            "frames": len(meshes), "zetas": DRAWS,
+            "size": [300, 300],
+            "vertices": len(meshes.frame(0).positions),
+            "faces": len(meshes.frame(0).faces),
+            "frames": len(meshes),
+            "zetas": DRAWS,
             "raster": [_raster(meshes, zetas, samples, exact) for samples in (4, 8, 16)],
-        }  # fmt: skip
+        }
     finally:
         if allowed:
             os.sched_setaffinity(0, allowed)
@@ -73,8 +76,9 @@ def _flag() -> Meshes:
     sequence = MeshSequence(
         time=np.arange(CLIP, dtype=np.int64) * round(FRAME * NANOSECONDS),
         positions=np.stack([kept[frame % len(kept)] for frame in range(CLIP)]),
-        faces=scene.mesh.faces.astype(np.int32), rest=scene.mesh.rest.astype(np.float32),
-    )  # fmt: skip
+        faces=scene.mesh.faces.astype(np.int32),
+        rest=scene.mesh.rest.astype(np.float32),
+    )
     return Meshes.flag(sequence, heading=0.0)
 
 
@@ -94,9 +98,11 @@ def _raster(meshes: Meshes, zetas: list[RenderParameters], samples: int, exact: 
     ]
     frames = len(chosen) * len(meshes)
     return {
-        "samples": samples, "frames_per_second": frames / wall, "frames_per_cpu_second": frames / used,
+        "samples": samples,
+        "frames_per_second": frames / wall,
+        "frames_per_cpu_second": frames / used,
         "rms_error_of_255": float(np.mean(errors)),
-    }  # fmt: skip
+    }
 
 
 def _exact(meshes: Meshes, zetas: list[RenderParameters]) -> list[torch.Tensor]:

@@ -189,8 +189,11 @@ def _memory(columns: int, batch: int) -> dict[str, float]:
     """Largest resident memory of a process that simulates one frame [MB], and what of it the program itself takes."""
     done = subprocess.run(
         [sys.executable, "-c", _MEASURE, str(columns), str(batch)],
-        capture_output=True, check=True, text=True, cwd=Path(__file__).parents[2],
-    )  # fmt: skip
+        capture_output=True,
+        check=True,
+        text=True,
+        cwd=Path(__file__).parents[2],
+    )
     row: dict[str, float] = json.loads(done.stdout)
     return {**row, "kb_a_flag": 1024 * (row["peak_mb"] - row["of_it_program_mb"]) / batch}
 

@@ -33,9 +33,15 @@ FLAGS = (256, 1024, 4096, 16384, 65536)
 BATCHES = (32, 64, 128, 256)
 LOOKED_AT = (1, 5, 10, 15, 20, 25)  # frames
 VARIANTS = (  # threads of a block, blocks of a multiprocessor, approximate divisions and roots
-    (192, 3, True), (256, 3, True), (320, 2, True), (320, 3, True), (416, 2, True), (512, 2, True),
-    (256, 3, False), (416, 2, False),
-)  # fmt: skip
+    (192, 3, True),
+    (256, 3, True),
+    (320, 2, True),
+    (320, 3, True),
+    (416, 2, True),
+    (512, 2, True),
+    (256, 3, False),
+    (416, 2, False),
+)
 _DISTINCT = 256
 
 
@@ -50,8 +56,10 @@ def run(
     torch.set_num_threads(1)
     result: dict[str, Any] = {"device": _named(device), "frame_s": FRAME, "vertices": None}
     with torch.no_grad():
-        scenes = [flag(material=named("camel-ponte-roma"), wind_speed=4.0 + 1.5 * i / _DISTINCT, columns=columns)
-                  for i in range(_DISTINCT)]  # fmt: skip
+        scenes = [
+            flag(material=named("camel-ponte-roma"), wind_speed=4.0 + 1.5 * i / _DISTINCT, columns=columns)
+            for i in range(_DISTINCT)
+        ]
         few, start = assemble(scenes[:: _DISTINCT // 16])
         steps = Symplectic().steps(few, FRAME)
         result |= {"vertices": few.cloth.mesh.vertex_count, "steps_a_frame": steps}
@@ -101,10 +109,12 @@ def _named(device: str) -> dict[str, Any]:
         return {"name": device}
     found = torch.cuda.get_device_properties(device)
     return {
-        "name": found.name, "memory_gib": round(found.total_memory / 2**30, 1),
-        "multiprocessors": found.multi_processor_count, "cuda_of_torch": torch.version.cuda,
+        "name": found.name,
+        "memory_gib": round(found.total_memory / 2**30, 1),
+        "multiprocessors": found.multi_processor_count,
+        "cuda_of_torch": torch.version.cuda,
         "warp": version("warp-lang"),
-    }  # fmt: skip
+    }
 
 
 def _wait(device: str) -> None:
@@ -139,9 +149,10 @@ def _compiled(system: System, start: State, steps: int) -> dict[str, float]:
     with ThreadPoolExecutor(cores) as pool:
         together = _seconds(lambda: list(pool.map(frame, range(4 * cores))), "cpu") / system.cloth.batch / 4 / cores
     return {
-        "cores": cores, "flag_frames_a_second_on_one_core": round(1 / alone, 1),
+        "cores": cores,
+        "flag_frames_a_second_on_one_core": round(1 / alone, 1),
         "flag_frames_a_second_on_all": round(1 / together, 1),
-    }  # fmt: skip
+    }
 
 
 def _rate(scenes: Sequence[Any], state: State, steps: int, count: int, device: str) -> dict[str, Any]:
@@ -156,10 +167,11 @@ def _rate(scenes: Sequence[Any], state: State, steps: int, count: int, device: s
     seconds = _seconds(lambda: advance(system, many, FRAME, steps=steps, backend=Backend.WARP), device)
     after = advance(system, many, FRAME, steps=steps, backend=Backend.WARP)
     return {
-        "flags": count, "flag_frames_a_second": round(count / seconds),
+        "flags": count,
+        "flag_frames_a_second": round(count / seconds),
         "healthy": round(float(after.healthy().float().mean()), 4),
         "peak_memory_mib": round(torch.cuda.max_memory_allocated() / 2**20) if device.startswith("cuda") else None,
-    }  # fmt: skip
+    }
 
 
 def _agreement(device: str, columns: int) -> dict[str, Any]:

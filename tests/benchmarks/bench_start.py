@@ -65,10 +65,11 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             command = [sys.executable, "-m", "flagdata.cli", *arguments, "--lake", str(lake)]
             subprocess.run(command, cwd=_ROOT, check=True, capture_output=True)
         return {
-            "load": os.getloadavg()[0], "pairs": _PAIRS,
+            "load": os.getloadavg()[0],
+            "pairs": _PAIRS,
             "seconds": {name: _paired(name, lake, before) for name in _PROGRAMS},
             "wheel": {"megabytes": _wheel(Path(folder)), "aim": _LARGEST},
-        }  # fmt: skip
+        }
 
 
 def _paired(name: str, lake: Path, before: str | None) -> Mapping[str, float]:
@@ -87,9 +88,13 @@ def _paired(name: str, lake: Path, before: str | None) -> Mapping[str, float]:
 
 def _seconds(name: str, lake: Path, place: Path) -> float:
     done = subprocess.run(
-        [sys.executable, "-c", _TIMED.format(program=_PROGRAMS[name]), str(lake), str(_FLAG / "flag.mp4")], cwd=place,
-        env={**os.environ, "PYTHONPATH": str(place)}, check=True, capture_output=True, text=True,
-    )  # fmt: skip
+        [sys.executable, "-c", _TIMED.format(program=_PROGRAMS[name]), str(lake), str(_FLAG / "flag.mp4")],
+        cwd=place,
+        env={**os.environ, "PYTHONPATH": str(place)},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
     return float(done.stdout.splitlines()[-1])
 
 

@@ -31,9 +31,12 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     """Seconds of verdicts by the number of markers, and of the bank's simulation; nothing is written into `out`."""
     del out
     return {
-        "cores": _cores(), "recordings": len(stressors.SPEEDS), "seconds_each": stressors.DURATION,
-        "kinds": CRITERIA.simulated_kinds, "verdicts": [_timed(across, seed) for across in _ACROSS],
-    }  # fmt: skip
+        "cores": _cores(),
+        "recordings": len(stressors.SPEEDS),
+        "seconds_each": stressors.DURATION,
+        "kinds": CRITERIA.simulated_kinds,
+        "verdicts": [_timed(across, seed) for across in _ACROSS],
+    }
 
 
 def _cores() -> int:
@@ -59,7 +62,10 @@ def _timed(across: int, seed: int) -> dict[str, Any]:
             solve(experiment, options)
             found.append(time.perf_counter() - began)
     return {
-        "markers": len(stressors.markers(across)), "bank": built, "with_bank": min(found),
-        "with_bank_median": statistics.median(found), "without_bank": built + statistics.median(found),
+        "markers": len(stressors.markers(across)),
+        "bank": built,
+        "with_bank": min(found),
+        "with_bank_median": statistics.median(found),
+        "without_bank": built + statistics.median(found),
         "without_bank_sufficient": first + statistics.median(found),
-    }  # fmt: skip
+    }

@@ -44,16 +44,39 @@ def fill(lake: Lake) -> None:
         write_record(path)
         name = tx.put(path)
         recording = Artifact(
-            kind=Kind.RECORDING, name="field", object=name, source_hash="a" * 64, start=START, end=START + 39 * PERIOD,
-            frame_first=0, frame_count=40, rate=25.0, session="s1", day="2026-05-01", dataset="compat", side="train",
+            kind=Kind.RECORDING,
+            name="field",
+            object=name,
+            source_hash="a" * 64,
+            start=START,
+            end=START + 39 * PERIOD,
+            frame_first=0,
+            frame_count=40,
+            rate=25.0,
+            session="s1",
+            day="2026-05-01",
+            dataset="compat",
+            side="train",
             recipe={"crop": [0, 0, 300, 300]},
-        )  # fmt: skip
+        )
         tx.add(recording)
         clip = Artifact(
-            kind=Kind.CLIP, name="field clip 0", object=name, parents=(recording.id,), recording=recording.id,
-            start=START, end=START + 29 * PERIOD, frame_first=0, frame_count=30, wind=4.5, wind_sigma=0.25,
-            dataset="compat", side="train", quality=("low-coverage",), report='[{"kind": "low-coverage"}]',
-        )  # fmt: skip
+            kind=Kind.CLIP,
+            name="field clip 0",
+            object=name,
+            parents=(recording.id,),
+            recording=recording.id,
+            start=START,
+            end=START + 29 * PERIOD,
+            frame_first=0,
+            frame_count=30,
+            wind=4.5,
+            wind_sigma=0.25,
+            dataset="compat",
+            side="train",
+            quality=("low-coverage",),
+            report='[{"kind": "low-coverage"}]',
+        )
         tx.add(clip)
     lake.tag("v1")
     lake.branch("simulated", at="v1")

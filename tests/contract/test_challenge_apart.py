@@ -8,10 +8,22 @@ import sys
 from tests.contract.imports import ROOT, imported_from, modules
 
 FITTING = (
-    "sim", "models", "measure/observe", "measure/verdict", "measure/forecasting", "measure/probes", "measure/inference",
-    "measure/nulls", "measure/loop", "measure/report", "measure/closing", "measure/propose", "measure/observables",
-    "measure/calibrate", "measure/films",
-)  # fmt: skip
+    "sim",
+    "models",
+    "measure/observe",
+    "measure/verdict",
+    "measure/forecasting",
+    "measure/probes",
+    "measure/inference",
+    "measure/nulls",
+    "measure/loop",
+    "measure/report",
+    "measure/closing",
+    "measure/propose",
+    "measure/observables",
+    "measure/calibrate",
+    "measure/films",
+)
 MODULES = modules(*FITTING)
 
 

@@ -49,11 +49,14 @@ def flag(turn: np.ndarray | None = None, shift: tuple[float, float, float] = (0.
     winds = np.array([(5.0, 1.0, 0.2), (4.0, -2.0, 0.0)])
     scenes = [
         Scene(
-            mesh=mesh, position=start @ turn.T + shift, material=named(material), handles=Handles(vertices=(0, 3)),
+            mesh=mesh,
+            position=start @ turn.T + shift,
+            material=named(material),
+            handles=Handles(vertices=(0, 3)),
             wind=tuple(turn @ wind),
         )
         for material, wind in zip(("camel-ponte-roma", "white-swim-solid"), winds, strict=True)
-    ]  # fmt: skip
+    ]
     system, state = assemble(scenes, **({"dtype": torch.float64} | options))
     speed = np.stack([np.cos(11 * v), 2 * np.sin(7 * u + 1), np.cos(5 * u) * v], axis=1) @ turn.T
     velocity = torch.tensor(speed, dtype=system.cloth.dtype).unsqueeze(-1).repeat(1, 1, BATCH)

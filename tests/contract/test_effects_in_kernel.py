@@ -38,9 +38,18 @@ EFFECTS_BY_TORCH: dict[str, str] = {}
 AIR_BY_TORCH = {"stokes": "the paper's text in place of the reference simulator's air, used by no data set"}
 """Wind forces that have none."""
 IN_THE_BASE = (
-    "internal-damping", "hem-mass", "hem-stiffness", "wet-mass", "gusts", "logged-gusts", "direction-change",
-    "vertical-wind", "full-hoist", "slack", "tilted-pole",
-)  # fmt: skip
+    "internal-damping",
+    "hem-mass",
+    "hem-stiffness",
+    "wet-mass",
+    "gusts",
+    "logged-gusts",
+    "direction-change",
+    "vertical-wind",
+    "full-hoist",
+    "slack",
+    "tilted-pole",
+)
 """They change what the base model is given (wind, masses, attachments), so that they need no C++ of their own."""
 BESIDE = [name for name in EFFECTS if name not in (*IN_THE_BASE, *EFFECTS_BY_TORCH)]
 
@@ -103,9 +112,12 @@ def test_members_of_every_block_have_their_own_numbers(name: str) -> None:
     """Twenty members in single precision: a full block, and one with spare lanes."""
     scenes = [scene.flag(material=named("camel-ponte-roma"), wind_speed=3 + 0.2 * b, columns=4) for b in range(20)]
     system, state = assemble(scenes)
-    system, state = EFFECTS[name].drawn(stream(5, name), batch=20).for_batch(
-        20, dtype=torch.float32, device=torch.device("cpu")
-    ).apply(system, state)  # fmt: skip
+    system, state = (
+        EFFECTS[name]
+        .drawn(stream(5, name), batch=20)
+        .for_batch(20, dtype=torch.float32, device=torch.device("cpu"))
+        .apply(system, state)
+    )
     moved = state.position + 0.02 * torch.sin(30 * state.position.roll(1, 1))
     velocity = torch.cos(11 * moved.roll(1, 0))
     drive = system.drive(START, START + 0.01)

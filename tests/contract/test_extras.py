@@ -63,9 +63,12 @@ def light(tmp_path_factory: pytest.TempPathFactory) -> dict:
     folder = tmp_path_factory.mktemp("light")
     (folder / "log.csv").write_text(LOG)
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, json.dumps([*EXTRAS, "pandas"])], cwd=folder, capture_output=True, text=True,
+        [sys.executable, "-c", PROGRAM, json.dumps([*EXTRAS, "pandas"])],
+        cwd=folder,
+        capture_output=True,
+        text=True,
         check=False,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])
 
@@ -77,9 +80,11 @@ def test_recordings_are_brought_in_looked_at_and_handed_on_without_any_extra(lig
 
 def test_only_the_types_of_training_data_and_the_export_of_zarr_need_one(light: dict) -> None:
     assert light["lacking"] == {
-        "flagdata.dataset.loader": "torch", "flagdata.dataset.pairs": "torch", "flagdata.dataset.sample": "torch",
+        "flagdata.dataset.loader": "torch",
+        "flagdata.dataset.pairs": "torch",
+        "flagdata.dataset.sample": "torch",
         "flagdata.export.zarr_groups": "xarray",
-    }  # fmt: skip
+    }
 
 
 def test_what_is_missing_names_the_extra_on_the_command_line_and_in_python(light: dict) -> None:

@@ -10,9 +10,12 @@ from pathlib import Path
 from tests.contract.imports import PACKAGES, ROOT, imported_from, modules, tree
 
 ALLOWED = {
-    "flagdata": {"catalogs"}, "sim": {"flagdata", "catalogs"}, "models": {"flagdata", "catalogs"},
-    "measure": {"flagdata", "sim", "models", "catalogs"}, "catalogs": set[str](),
-}  # fmt: skip
+    "flagdata": {"catalogs"},
+    "sim": {"flagdata", "catalogs"},
+    "models": {"flagdata", "catalogs"},
+    "measure": {"flagdata", "sim", "models", "catalogs"},
+    "catalogs": set[str](),
+}
 
 
 def test_a_module_imports_only_along_the_arrows() -> None:

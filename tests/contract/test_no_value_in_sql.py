@@ -99,11 +99,16 @@ def _name(function: ast.AST) -> str:
 
 
 PASTED = (
-    "lake.rows(f\"kind = '{kind}'\")", "lake.rows('name = ' + name)", "lake.rows(where='name = %s' % name)",
-    "source.pairs('name = {}'.format(name))", "where = f'{column} > 3'; lake.rows(where)",
-    "lake.rows(' and '.join(conditions))", "return f\"name like '{dataset}-{side}-%'\"",
-    "return 'kind = \\'' + kind + '\\''", "return f'seed is not null and frame_count >= {count}'",
-)  # fmt: skip
+    "lake.rows(f\"kind = '{kind}'\")",
+    "lake.rows('name = ' + name)",
+    "lake.rows(where='name = %s' % name)",
+    "source.pairs('name = {}'.format(name))",
+    "where = f'{column} > 3'; lake.rows(where)",
+    "lake.rows(' and '.join(conditions))",
+    "return f\"name like '{dataset}-{side}-%'\"",
+    "return 'kind = \\'' + kind + '\\''",
+    "return f'seed is not null and frame_count >= {count}'",
+)
 BESIDE = ("lake.rows({'kind': kind})", "lake.rows(query)", "lake.rows('seed is not null')", "say(f'name = {name}')")
 
 

@@ -21,9 +21,11 @@ def modules(part: str) -> list[Path]:
 
 def test_exact_parts_import_nothing_of_drafts() -> None:
     offenders = [
-        str(path.relative_to(HOUSE)) for part in EXACT for path in modules(part)
+        str(path.relative_to(HOUSE))
+        for part in EXACT
+        for path in modules(part)
         if any(name.startswith(f"{PACKAGE}.draft") for name in imported_names(path.read_text(encoding="utf-8")))
-    ]  # fmt: skip
+    ]
     assert not offenders
 
 

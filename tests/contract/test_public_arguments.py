@@ -53,7 +53,7 @@ def numbered(call: Callable[..., Any]) -> frozenset[str]:
 
 NUMBERED = {
     name: (call, names) for name, call in public_calls() if name not in _MADE_INSIDE and (names := numbered(call))
-}  # fmt: skip
+}
 
 
 def test_the_calls_that_count_are_found() -> None:
@@ -67,15 +67,32 @@ def test_whole_numbers_of_every_public_call_are_checked_at_its_door(name: str) -
 
 
 THREE = {
-    "int": 3, "int64": np.int64(3), "uint8": np.uint8(3), "array": np.array(3), "tensor": torch.tensor(3),
+    "int": 3,
+    "int64": np.int64(3),
+    "uint8": np.uint8(3),
+    "array": np.array(3),
+    "tensor": torch.tensor(3),
     "series": pd.Series([3]).iloc[0],
-}  # fmt: skip
+}
 NOT_WHOLE = {
-    "True": True, "bool_": np.bool_(True), "tensor of truth": torch.tensor(True), "text": "3", "bytes": b"3",
-    "float": 3.0, "float64": np.float64(3), "float tensor": torch.tensor(3.0), "decimal": Decimal(3),
-    "fraction": Fraction(3), "list": [3], "arrays": np.array([3, 4]), "span": np.timedelta64(3, "s"),
-    "date": np.datetime64(3, "ns"), "pandas' span": pd.Timedelta("3s"), "none": None, "nan": float("nan"),
-}  # fmt: skip
+    "True": True,
+    "bool_": np.bool_(True),
+    "tensor of truth": torch.tensor(True),
+    "text": "3",
+    "bytes": b"3",
+    "float": 3.0,
+    "float64": np.float64(3),
+    "float tensor": torch.tensor(3.0),
+    "decimal": Decimal(3),
+    "fraction": Fraction(3),
+    "list": [3],
+    "arrays": np.array([3, 4]),
+    "span": np.timedelta64(3, "s"),
+    "date": np.datetime64(3, "ns"),
+    "pandas' span": pd.Timedelta("3s"),
+    "none": None,
+    "nan": float("nan"),
+}
 """What is refused: a truth value counts nothing, and a number with a point may have been rounded."""
 
 

@@ -96,7 +96,7 @@ def test_one_number_is_the_same_as_that_number_for_each_member(name: str) -> Non
     each = {label: torch.full((BATCH,), value, dtype=torch.float64) for label, value in values.items()}
     torch.testing.assert_close(
         observed(replace(effect, **values)), observed(replace(effect, **each)), rtol=0, atol=1e-13
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("name", NAMES)

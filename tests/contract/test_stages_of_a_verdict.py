@@ -8,9 +8,18 @@ from collections.abc import Iterable
 from tests.contract.imports import ROOT, imported_from, imported_names, modules, tree
 
 STAGES = (
-    "observe", "verdict", "forecasting", "probes", "inference", "nulls", "loop", "report", "closing", "propose",
+    "observe",
+    "verdict",
+    "forecasting",
+    "probes",
+    "inference",
+    "nulls",
+    "loop",
+    "report",
+    "closing",
+    "propose",
     "challenge",
-)  # fmt: skip
+)
 """Each may import those before it."""
 BARE = {"verdict": set[str](), "observe": set[str]()}
 """Stages that import no other one."""

@@ -41,8 +41,9 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
         (source / "models" / "trained" / name).write_bytes(b"")
     subprocess.run(
         (sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", made, source),
-        check=True, capture_output=True,
-    )  # fmt: skip
+        check=True,
+        capture_output=True,
+    )
     return zipfile.ZipFile(next(made.glob("flagdata-*.whl")))
 
 
@@ -138,9 +139,13 @@ def test_a_users_own_files_of_the_packages_names_neither_break_the_wheel_nor_are
     (home / "script.py").write_text(SCRIPT)
     (home / "own.py").write_text(OWN_EFFECT)
     done = subprocess.run(
-        [sys.executable, "script.py"], cwd=home, env={**os.environ, "PYTHONPATH": str(site)}, capture_output=True,
-        text=True, check=False,
-    )  # fmt: skip
+        [sys.executable, "script.py"],
+        cwd=home,
+        env={**os.environ, "PYTHONPATH": str(site)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout.splitlines()[-1])
     assert found["mine"] == ["mine"] * 4

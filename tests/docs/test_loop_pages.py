@@ -40,15 +40,20 @@ def arcsim_run(path: Path, speed: float) -> None:
     times = np.arange(60) / 25
     positions = flutter(mesh.rest, times)
     sequence = MeshSequence(
-        time=np.round(times * 1e9).astype(np.int64), positions=positions.astype(np.float32),
-        faces=mesh.faces.astype(np.int32), rest=mesh.rest.astype(np.float32), attributes={},
-    )  # fmt: skip
+        time=np.round(times * 1e9).astype(np.int64),
+        positions=positions.astype(np.float32),
+        faces=mesh.faces.astype(np.int32),
+        rest=mesh.rest.astype(np.float32),
+        attributes={},
+    )
     scene = {
-        "frame_time": 0.04, "frame_steps": 8, "gravity": [0, 0, -9.81],
+        "frame_time": 0.04,
+        "frame_steps": 8,
+        "gravity": [0, 0, -9.81],
         "cloths": [{"mesh": "flag.obj", "materials": [{"data": "materials/camel-ponte-roma.json"}]}],
         "handles": [{"nodes": np.flatnonzero(mesh.rest[:, 0] == 0).tolist()}],
         "wind": {"density": 1.0, "velocity": [speed, 0, 0], "drag": 0.0},
-    }  # fmt: skip
+    }
     write_folder(path, sequence, scene=scene)
 
 
@@ -130,9 +135,20 @@ class RisingLower(ForceEffect):
 
 def nothing_taken() -> Outcome:
     return Outcome(
-        decision=Decision.REJECTED, reason="no term stands out", steps=(), tried=0, ranking=(), strengths=(),
-        retest=None, level=0.03, nulls="none", proposed_from="0", tested_on="0", known=(), seed=0,
-    )  # fmt: skip
+        decision=Decision.REJECTED,
+        reason="no term stands out",
+        steps=(),
+        tried=0,
+        ranking=(),
+        strengths=(),
+        retest=None,
+        level=0.03,
+        nulls="none",
+        proposed_from="0",
+        tested_on="0",
+        known=(),
+        seed=0,
+    )
 
 
 def test_every_command_of_proposing_runs(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

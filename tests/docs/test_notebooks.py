@@ -45,8 +45,11 @@ def test_a_notebook_runs(path: Path, tmp_path: Path) -> None:
     if importlib.util.find_spec("nbclient") is None or importlib.util.find_spec("ipykernel") is None:
         pytest.skip("nbclient or ipykernel is not installed (extra dev)")
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(path)], cwd=tmp_path,
+        [sys.executable, "-c", PROGRAM, str(path)],
+        cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr

@@ -25,9 +25,15 @@ from tests.models.conftest import fill
 OF_INFERENCE = {"closing-the-loop.md", "proposals.md"}
 """Pages whose commands take minutes each; tests/docs/test_loop_pages.py runs them without the inference."""
 AFTER_START = (
-    "alignment.md", "measure.md", "anemometer.md", "versions-and-recovery.md", "object-storage.md", "exports.md",
-    "exchange.md", "looking.md",
-)  # fmt: skip
+    "alignment.md",
+    "measure.md",
+    "anemometer.md",
+    "versions-and-recovery.md",
+    "object-storage.md",
+    "exports.md",
+    "exchange.md",
+    "looking.md",
+)
 ALONE = ("sensors.md", "simulator.md", "models.md", "datasets.md")
 RECIPE = DrawnRecipe(seed=2026, duration=150)
 FLAG = DrawnFlag(width=200, height=150, length=95)

@@ -89,9 +89,16 @@ def test_every_key_of_a_recipes_match_is_on_the_page() -> None:
 
 def test_every_table_of_a_sensor_recipe_is_on_the_page() -> None:
     page = (DOCS / "wind-recipes.md").read_text(encoding="utf-8")
-    tables = {"file": "[file]", "time": "[time]", "channels": "[channels.NAME]", "sensor": "[sensor]",
-              "rows": "[rows]", "quality": "[quality]", "checks": "[[check]]",
-              "expect": "[expect]"}  # fmt: skip
+    tables = {
+        "file": "[file]",
+        "time": "[time]",
+        "channels": "[channels.NAME]",
+        "sensor": "[sensor]",
+        "rows": "[rows]",
+        "quality": "[quality]",
+        "checks": "[[check]]",
+        "expect": "[expect]",
+    }
     for field in fields(Recipe):
         shown = f"## `{tables[field.name]}`" if field.name in tables else f"| `{field.name}` |"
         assert shown in page, field.name

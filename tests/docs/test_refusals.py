@@ -33,12 +33,14 @@ CONDITIONAL = {
     "ingest": {
         "--azimuth",  # components without a heading; refused where the log has a direction already
         "--date",  # stamps without a day; refused where stamps have one
-        "--episode", "--topic", "--stream",  # where a file has several; refused of files that have none
+        "--episode",
+        "--topic",
+        "--stream",  # where a file has several; refused of files that have none
         "--sequence-fps",  # pictures without times; refused of a film that has stamps
         "--join",  # never asked for: the fix names ingesting without it
         "--unit",  # a heading without a unit; refused where the format states it
     },
-}  # fmt: skip
+}
 """Options that a refusal of one kind of source asks for, and one of another kind refuses: walked through by hand."""
 _ASKED = re.compile(r"(?:give|add|state|name|choose|use|by)\b[^;.]*?(?<!leave )(?<!leave out )(--[a-z][a-z-]+)")
 _REFUSED = re.compile(r"leave (?:out )?(--[a-z][a-z-]+)(?! or)")

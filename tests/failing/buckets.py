@@ -86,7 +86,9 @@ _LAKE = ("--lake", "{lake}")
 CORE = {
     "init": Verb(arguments=("init", "{new}"), target="{new}"),
     "clone": Verb(
-        arguments=("clone", "{folder}/ahead", "{new}"), target="{new}", one_step=False,
+        arguments=("clone", "{folder}/ahead", "{new}"),
+        target="{new}",
+        one_step=False,
         again=("push", "{new}", "--lake", "{folder}/ahead"),
     ),
     "push": Verb(arguments=("push", "{lake}", "--lake", "{folder}/ahead"), one_step=False),
@@ -117,7 +119,7 @@ CORE = {
     "gc": Verb(arguments=("gc", "--older-than", "0s", *_LAKE), one_step=False, deletes=True),
     "expire": Verb(arguments=("expire", "--keep", "1", *_LAKE), one_step=False, deletes=True),
     "simulate": Verb(arguments=("simulate", "{folder}/small.toml", "--workers", "1", *_LAKE)),
-}  # fmt: skip
+}
 
 
 def core(folder: Path) -> Scene:
@@ -138,9 +140,11 @@ def core(folder: Path) -> Scene:
 
 
 _OF_A_TRIAL = {
-    "{folder}/lake": "{lake}", "{folder}/out": "{out}", "{folder}/report": "{out}-report",
+    "{folder}/lake": "{lake}",
+    "{folder}/out": "{out}",
+    "{folder}/report": "{out}-report",
     "{folder}/answer": "{out}-answer",
-}  # fmt: skip
+}
 
 
 def _slow(make: Callable[[Path], Scene], names: Sequence[str]) -> tuple[Callable[[Path], Scene], dict[str, Verb]]:
@@ -325,9 +329,12 @@ class Trials:
         lake = f"s3://{BUCKET}/{prefix}"
         out = self.scratch / prefix.replace("/", "-") / "out"
         return {
-            "lake": f"{lake}/lake", "new": f"{lake}/new", "folder": str(self.scene.folder), "out": str(out),
+            "lake": f"{lake}/lake",
+            "new": f"{lake}/new",
+            "folder": str(self.scene.folder),
+            "out": str(out),
             **self.scene.ids,
-        }  # fmt: skip
+        }
 
     def _target(self, prefix: str) -> str:
         return self.verb.target.format(**self._places(prefix))
@@ -411,10 +418,13 @@ class Trials:
             wrong.append(f"repeat: ends otherwise: {sorted(end ^ after)[:4]} {told[-500:]}")
         wrong += [f"unhealthy: {error}" for error in found["errors"]] + [f"left: {one}" for one in found["left"]]
         return {
-            "wrong": wrong, "killed": code == _KILLED, "published": middle == after, "faults": found["faults"],
+            "wrong": wrong,
+            "killed": code == _KILLED,
+            "published": middle == after,
+            "faults": found["faults"],
             "rows": len(staying) + (len(after - before) if code == 0 and not ended else 0),
             "collected": found["collected"],
-        }  # fmt: skip
+        }
 
 
 def _reported(code: int, said: str, middle: State, before: State, after: State, *, one_step: bool) -> list[str]:
@@ -441,19 +451,28 @@ def tried(trials: Trials, *, points: int) -> dict[str, Any]:
     examples: list[str] = []
     for number, call in enumerate((total - 1) * point // max(points - 1, 1) for point in range(points)):
         found = trials.killed(number, call, before, after)
-        counts.update({
-            "killed": found["killed"], "published when killed": found.get("published", False),
-            "rows acknowledged": found.get("rows", 0), "leftovers collected": found.get("collected", 0),
-            "wrong": bool(found["wrong"]),
-        })  # fmt: skip
+        counts.update(
+            {
+                "killed": found["killed"],
+                "published when killed": found.get("published", False),
+                "rows acknowledged": found.get("rows", 0),
+                "leftovers collected": found.get("collected", 0),
+                "wrong": bool(found["wrong"]),
+            }
+        )
         faults.update(found.get("faults", {}))
         kinds.update({one.partition(":")[0] for one in found["wrong"]})
         examples += [f"point {number}, request {call} of {total}: {one}" for one in found["wrong"]]
     faults.pop("killed", None)
     return {
-        "requests": total, "points": points, **counts, "faults": dict(faults), "kinds": dict(kinds),
-        "examples": examples[:6], "seconds": round(time.monotonic() - begun),
-    }  # fmt: skip
+        "requests": total,
+        "points": points,
+        **counts,
+        "faults": dict(faults),
+        "kinds": dict(kinds),
+        "examples": examples[:6],
+        "seconds": round(time.monotonic() - begun),
+    }
 
 
 def campaign(names: Sequence[str], results: Path, *, points: int, scratch: Path) -> dict[str, Any]:
@@ -510,20 +529,44 @@ def campaign(names: Sequence[str], results: Path, *, points: int, scratch: Path)
 def page(known: Mapping[str, Any]) -> str:
     """The results as Markdown."""
     columns = (
-        "requests", "points", "killed", "published when killed", "rows acknowledged", "leftovers collected", "lost",
-        "wrong reports", "repeats that fail", "unhealthy", "left after gc", "faults",
-    )  # fmt: skip
-    shown = {"lost": "lost", "wrong reports": "report", "repeats that fail": "repeat", "unhealthy": "unhealthy",
-             "left after gc": "left"}  # fmt: skip
+        "requests",
+        "points",
+        "killed",
+        "published when killed",
+        "rows acknowledged",
+        "leftovers collected",
+        "lost",
+        "wrong reports",
+        "repeats that fail",
+        "unhealthy",
+        "left after gc",
+        "faults",
+    )
+    shown = {
+        "lost": "lost",
+        "wrong reports": "report",
+        "repeats that fail": "repeat",
+        "unhealthy": "unhealthy",
+        "left after gc": "left",
+    }
     about = " ".join((__doc__ or "").split("\n\n")[1].split())
-    lines = ["# Commands on a bucket that are killed, beside faults", "", about, "",
-             f"| verb | {' | '.join(columns)} | code |", f"|---{'|---:' * len(columns)}|---|"]  # fmt: skip
+    lines = [
+        "# Commands on a bucket that are killed, beside faults",
+        "",
+        about,
+        "",
+        f"| verb | {' | '.join(columns)} | code |",
+        f"|---{'|---:' * len(columns)}|---|",
+    ]
     for name, found in known.items():
         cells = [
-            sum(found["faults"].values()) if column == "faults"
-            else found["kinds"].get(shown[column], 0) if column in shown else found.get(column, 0)
+            sum(found["faults"].values())
+            if column == "faults"
+            else found["kinds"].get(shown[column], 0)
+            if column in shown
+            else found.get(column, 0)
             for column in columns
-        ]  # fmt: skip
+        ]
         lines.append(f"| {name} | {' | '.join(map(str, cells))} | {found['circumstances']['code_version']} |")
     faults: Counter[str] = Counter()
     for found in known.values():

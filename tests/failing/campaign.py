@@ -44,15 +44,24 @@ _KINDS = ("unhealthy", "unforeseen")
 REPEATED = 4
 """Of so many commands that failed one is given once more, without the fault."""
 SCENES: Mapping[str, tuple[Callable[[Path], Scene], Mapping[str, Command]]] = {
-    "core": (made_scene, COMMANDS), **slow.SCENES,
-}  # fmt: skip
+    "core": (made_scene, COMMANDS),
+    **slow.SCENES,
+}
 """Scenes, each with its commands."""
 
 
 def tried(
-    command: Command, scene: Scene, injector: Injector, scratch: Path, *, every: int, stays: bool, first: int = 0,
-    at_most: int | None = None, seed: int = 0,
-) -> dict[str, Any]:  # fmt: skip
+    command: Command,
+    scene: Scene,
+    injector: Injector,
+    scratch: Path,
+    *,
+    every: int,
+    stays: bool,
+    first: int = 0,
+    at_most: int | None = None,
+    seed: int = 0,
+) -> dict[str, Any]:
     """Faults of a command, and what was wrong with any.
 
     Args:
@@ -78,15 +87,21 @@ def tried(
             wrong.append(found)
             print(json.dumps(found, indent=1), flush=True)  # noqa: T201
     return {
-        "calls": total, "after_publication": total - 1 - published, "trials": len(faults), "every": every,
-        "alike": len(groups), "untried": len(groups.keys() - trials.failed.keys()), "wrong": len(wrong),
-        "kinds": _counted(wrong), "seconds": round(time.monotonic() - begun),
+        "calls": total,
+        "after_publication": total - 1 - published,
+        "trials": len(faults),
+        "every": every,
+        "alike": len(groups),
+        "untried": len(groups.keys() - trials.failed.keys()),
+        "wrong": len(wrong),
+        "kinds": _counted(wrong),
+        "seconds": round(time.monotonic() - begun),
         **({"drawn_of": planned} if planned > len(faults) else {}),
         "groups": {
             kind: [len(groups[kind].calls) if kind in groups else 0, trials.failed[kind]]
             for kind in (*groups, *(trials.failed.keys() - groups.keys()))
         },
-    }  # fmt: skip
+    }
 
 
 def killed(command: Command, scene: Scene, injector: Injector, scratch: Path, *, points: int) -> dict[str, Any]:
@@ -100,9 +115,12 @@ def killed(command: Command, scene: Scene, injector: Injector, scratch: Path, *,
             wrong.append(found)
             print(json.dumps(found, indent=1), flush=True)  # noqa: T201
     return {
-        "calls": total, "points": points, "wrong": len(wrong), "kinds": _counted(wrong),
+        "calls": total,
+        "points": points,
+        "wrong": len(wrong),
+        "kinds": _counted(wrong),
         "seconds": round(time.monotonic() - begun),
-    }  # fmt: skip
+    }
 
 
 def _counted(wrong: Sequence[Mapping[str, Any]]) -> dict[str, int]:
@@ -111,9 +129,18 @@ def _counted(wrong: Sequence[Mapping[str, Any]]) -> dict[str, int]:
 
 
 def campaign(
-    names: Sequence[str], results: Path, *, seed: int, scenes: Path | None = None, every: int = 1,
-    stays: bool = True, first: int = 0, at_most: int | None = None, kills: int | None = None, real: bool = False,
-) -> dict[str, Any]:  # fmt: skip
+    names: Sequence[str],
+    results: Path,
+    *,
+    seed: int,
+    scenes: Path | None = None,
+    every: int = 1,
+    stays: bool = True,
+    first: int = 0,
+    at_most: int | None = None,
+    kills: int | None = None,
+    real: bool = False,
+) -> dict[str, Any]:
     """Try commands, note the results of each in a JSON file, and return all that the file holds.
 
     Args:
@@ -143,9 +170,16 @@ def campaign(
                 else:
                     title = f"{name}, alone" if not stays else name
                     found = tried(
-                        command, scene, injector, place,
-                        every=every, stays=stays, first=first, at_most=at_most, seed=seed,
-                    )  # fmt: skip
+                        command,
+                        scene,
+                        injector,
+                        place,
+                        every=every,
+                        stays=stays,
+                        first=first,
+                        at_most=at_most,
+                        seed=seed,
+                    )
                 title = f"computing all: {title}" if real and commands[name].stand_in else title
                 known[title] = {**found, "circumstances": circumstances(seed)}
                 print(title, {name: value for name, value in found.items() if name != "groups"}, flush=True)  # noqa: T201
@@ -173,9 +207,10 @@ def page(known: Mapping[str, Any]) -> str:
         "Commands that are killed": ("calls", "points", "wrong", "unhealthy", "code"),
     }
     lines = [
-        "# Calls that fail and commands that are killed", "",
+        "# Calls that fail and commands that are killed",
+        "",
         _ABOUT,
-    ]  # fmt: skip
+    ]
     for title, columns in tables.items():
         found = {name: result for name, result in known.items() if name.endswith(", killed") == ("points" in columns)}
         lines += ["", f"## {title}", "", f"| command | {' | '.join(columns)} |", f"|---{'|---:' * len(columns)}|"]
@@ -215,6 +250,14 @@ if __name__ == "__main__":
     parser.add_argument("--real", action="store_true", help="let nothing stand in for computing")
     given = parser.parse_args()
     campaign(
-        given.names, given.out, seed=0, scenes=given.scenes, every=given.every, stays=not given.alone,
-        first=given.first, at_most=given.at_most, kills=given.kill, real=given.real,
-    )  # fmt: skip
+        given.names,
+        given.out,
+        seed=0,
+        scenes=given.scenes,
+        every=given.every,
+        stays=not given.alone,
+        first=given.first,
+        at_most=given.at_most,
+        kills=given.kill,
+        real=given.real,
+    )

@@ -117,8 +117,9 @@ def files(*places: str) -> Callable[[Path], frozenset[object]]:
         every = [entry for place in places for entry in ((folder / place), *(folder / place).rglob("*"))]
         return frozenset(
             (str(path.relative_to(folder)), path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest())
-            for path in every if path.exists() and not path.name.startswith(".")
-        )  # fmt: skip
+            for path in every
+            if path.exists() and not path.name.startswith(".")
+        )
 
     return found
 

@@ -79,15 +79,24 @@ class Injector:
         assert json.loads(self._answers.readline()) == {}
 
     def run(
-        self, folder: Path, arguments: Sequence[str], fault: Fault | None = None, *, kinds: Kinds = Kinds.ALL,
+        self,
+        folder: Path,
+        arguments: Sequence[str],
+        fault: Fault | None = None,
+        *,
+        kinds: Kinds = Kinds.ALL,
         traced: bool = False,
-    ) -> Done:  # fmt: skip
+    ) -> Done:
         """Run a command; calls on files in `folder` count, all that the command reads and writes should lie there."""
         task = {
-            "arguments": list(arguments), "folder": str(folder), "kinds": int(kinds), "traced": traced,
-            "call": -1 if fault is None else fault.call, "stays": fault is not None and fault.stays,
+            "arguments": list(arguments),
+            "folder": str(folder),
+            "kinds": int(kinds),
+            "traced": traced,
+            "call": -1 if fault is None else fault.call,
+            "stays": fault is not None and fault.stays,
             "error": 0 if fault is None else fault.error,
-        }  # fmt: skip
+        }
         self._tasks.write(json.dumps(task) + "\n")
         self._tasks.flush()
         answer = json.loads(self._answers.readline())
@@ -110,13 +119,20 @@ def injecting(scratch: Path) -> Iterator[Injector | None]:
     state.write_bytes(bytes(_STATE_SIZE))
     Path(f"{state}.trace").touch()
     environment = {
-        **os.environ, "LD_PRELOAD": str(library), "FAILING_CALLS": str(state), "OMP_NUM_THREADS": "1",
+        **os.environ,
+        "LD_PRELOAD": str(library),
+        "FAILING_CALLS": str(state),
+        "OMP_NUM_THREADS": "1",
         "PYTHONDONTWRITEBYTECODE": "1",
-    }  # fmt: skip
+    }
     with subprocess.Popen(
-        [sys.executable, "-m", "tests.failing.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-        env=environment, cwd=HERE.parents[1],
-    ) as server:  # fmt: skip
+        [sys.executable, "-m", "tests.failing.worker"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=environment,
+        cwd=HERE.parents[1],
+    ) as server:
         assert server.stdin is not None
         assert server.stdout is not None
         yield Injector(server.stdin, server.stdout)

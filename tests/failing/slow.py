@@ -78,14 +78,22 @@ def loop_scene(folder: Path) -> Scene:
     started(folder)
     mesh = grid(width=WIDTH, height=HEIGHT, columns=8, rows=6)
     cloth = Specimen(
-        mesh=mesh, material=named("camel-ponte-roma"), held=handles.corners(mesh.rest),
+        mesh=mesh,
+        material=named("camel-ponte-roma"),
+        held=handles.corners(mesh.rest),
         anchors=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, HEIGHT]]),
-    )  # fmt: skip
+    )
     recordings = NullBatch(
-        specimen=cloth, markers=mesh.rest, rate=RATE, duration=SECONDS, noise=NOISE, speeds=SPEEDS, seed=77,
+        specimen=cloth,
+        markers=mesh.rest,
+        rate=RATE,
+        duration=SECONDS,
+        noise=NOISE,
+        speeds=SPEEDS,
+        seed=77,
         calibrations=(Calibration(density=1.1, bending=0.7, damping=1e-3),) * len(SPEEDS),
         effects=(EFFECTS["lift"](coefficient=0.6),),
-    ).simulate()  # fmt: skip
+    ).simulate()
     _tracks(folder / "tracks.csv", mesh.rest, [recording.positions for recording in recordings])
     parts = [RECORDING.format(number=n, noise=NOISE, speed=speed) for n, speed in enumerate(SPEEDS)]
     text = EXPERIMENT.format(width=WIDTH, height=HEIGHT) + "".join(parts)
@@ -252,26 +260,50 @@ def proposal(folder: Path) -> frozenset[object]:
 LOOP = {
     "close-loop": Command(
         arguments=(
-            "close-loop", "--recipe", "{folder}/tracks.toml", "--bank", "{folder}/bank", "--level", str(LEVEL),
-            "--workers", "1", "--out", "{folder}/out", *_LAKE,
+            "close-loop",
+            "--recipe",
+            "{folder}/tracks.toml",
+            "--bank",
+            "{folder}/bank",
+            "--level",
+            str(LEVEL),
+            "--workers",
+            "1",
+            "--out",
+            "{folder}/out",
+            *_LAKE,
         ),
-        state=lambda folder: rows(folder) | files("out")(folder), stand_in="tests.failing.slow:kept_verdict",
+        state=lambda folder: rows(folder) | files("out")(folder),
+        stand_in="tests.failing.slow:kept_verdict",
         one_step=False,
     ),
     "propose": Command(
         arguments=(
-            "propose", "{folder}/tracks.toml", "--bank", "{folder}/bank", "--level", str(LEVEL), "--workers", "1",
-            "--out", "{folder}/out", *_LAKE,
+            "propose",
+            "{folder}/tracks.toml",
+            "--bank",
+            "{folder}/bank",
+            "--level",
+            str(LEVEL),
+            "--workers",
+            "1",
+            "--out",
+            "{folder}/out",
+            *_LAKE,
         ),
-        state=proposal, stand_in="tests.failing.slow:kept_outcome", one_step=False,
+        state=proposal,
+        stand_in="tests.failing.slow:kept_outcome",
+        one_step=False,
     ),
-}  # fmt: skip
+}
 BUILD = {
     "build": Command(
-        arguments=("build", "{folder}/tiny.toml", "--workers", "1", *_LAKE), state=rows,
-        stand_in="tests.failing.slow:kept_jobs", one_step=False,
+        arguments=("build", "{folder}/tiny.toml", "--workers", "1", *_LAKE),
+        state=rows,
+        stand_in="tests.failing.slow:kept_jobs",
+        one_step=False,
     ),
-}  # fmt: skip
+}
 TRAIN = {
     "train": Command(arguments=("train", "{folder}/small.toml", "--workers", "1", *_LAKE), state=artifacts),
 }
@@ -307,7 +339,10 @@ WEIGH = {
     ),
 }
 SCENES = {
-    "train": (train_scene, TRAIN), "measure": (measure_scene, MEASURE), "build": (build_scene, BUILD),
-    "loop": (loop_scene, LOOP), "weigh": (weigh_scene, WEIGH),
-}  # fmt: skip
+    "train": (train_scene, TRAIN),
+    "measure": (measure_scene, MEASURE),
+    "build": (build_scene, BUILD),
+    "loop": (loop_scene, LOOP),
+    "weigh": (weigh_scene, WEIGH),
+}
 """Scenes, each with its commands."""

@@ -108,9 +108,15 @@ class Trials:
         if not problems:
             return None
         return {
-            "call": fault.call, "of": self.whole.done.calls, "stays": fault.stays, "was": met, "code": done.code,
-            "after_publication": fault.call > self.whole.published, "problems": problems, "stderr": done.stderr,
-        }  # fmt: skip
+            "call": fault.call,
+            "of": self.whole.done.calls,
+            "stays": fault.stays,
+            "was": met,
+            "code": done.code,
+            "after_publication": fault.call > self.whole.published,
+            "problems": problems,
+            "stderr": done.stderr,
+        }
 
     def _report_against(self, done: Done, state: object) -> list[str]:
         problems: list[str] = []
@@ -155,8 +161,10 @@ def _health(path: Path, *, unfinished: str = "") -> list[str]:
     lake = Lake.open(path)
     refs = read_refs(lake)
     found = (
-        *doctor(lake, grace=timedelta(0)), *verify_catalog(lake, refs), *verify(lake, object_names(lake, refs)),
-    )  # fmt: skip
+        *doctor(lake, grace=timedelta(0)),
+        *verify_catalog(lake, refs),
+        *verify(lake, object_names(lake, refs)),
+    )
     return [
         f"unhealthy: {finding.kind}: {finding.what}"
         for finding in found

@@ -24,9 +24,25 @@ from flagdata.cli import main
 _STATE = struct.Struct("@qqiiii1024s")  # as calls.c has it
 _LONGEST = 900.0  # s, of a command
 SHARED = {
-    "flagdata", "sim", "models", "measure", "torch", "zarr", "scipy", "av", "jinja2", "duckdb", "safetensors", "PIL",
-    "matplotlib", "pandas", "pyarrow", "deltalake", "numcodecs", "obstore",
-}  # fmt: skip
+    "flagdata",
+    "sim",
+    "models",
+    "measure",
+    "torch",
+    "zarr",
+    "scipy",
+    "av",
+    "jinja2",
+    "duckdb",
+    "safetensors",
+    "PIL",
+    "matplotlib",
+    "pandas",
+    "pyarrow",
+    "deltalake",
+    "numcodecs",
+    "obstore",
+}
 """Packages whose modules, once a child has imported them, are imported before later forks."""
 
 

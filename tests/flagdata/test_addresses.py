@@ -47,13 +47,21 @@ def test_what_is_no_address_stays_the_path_it_is() -> None:
 
 
 ADDRESSED = [
-    "init gs://bucket/lake", "init --lake gs://bucket/lake", "ls --lake gs://bucket/lake",
-    "ingest rtsp://127.0.0.1:9/x --lake lake", "ingest a.csv --sensor https://example.org/a.toml --lake lake",
-    "export csv --to s3://bucket/out --lake lake", "recover http://example.org/a.mcap b.mcap --lake lake",
-    "simulate https://example.org/flag --lake lake", "build flagsim-small --lake abfss://bucket/lake",
-    "build s3://bucket/recipe.toml --lake lake", "train sdn --lake gs://bucket/lake", "measure rtsp://127.0.0.1:9/x",
-    "measure film.mp4 --report s3://bucket/page.html", "close-loop s3://bucket/tracks.csv",
-]  # fmt: skip
+    "init gs://bucket/lake",
+    "init --lake gs://bucket/lake",
+    "ls --lake gs://bucket/lake",
+    "ingest rtsp://127.0.0.1:9/x --lake lake",
+    "ingest a.csv --sensor https://example.org/a.toml --lake lake",
+    "export csv --to s3://bucket/out --lake lake",
+    "recover http://example.org/a.mcap b.mcap --lake lake",
+    "simulate https://example.org/flag --lake lake",
+    "build flagsim-small --lake abfss://bucket/lake",
+    "build s3://bucket/recipe.toml --lake lake",
+    "train sdn --lake gs://bucket/lake",
+    "measure rtsp://127.0.0.1:9/x",
+    "measure film.mp4 --report s3://bucket/page.html",
+    "close-loop s3://bucket/tracks.csv",
+]
 
 
 def test_commands_refuse_addresses_of_lakes_sources_and_outputs_and_make_nothing(

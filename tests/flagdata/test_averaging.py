@@ -129,9 +129,11 @@ def test_any_period_can_be_averaged_over() -> None:
 
 def test_a_series_without_wind_speed_is_refused_with_what_it_has() -> None:
     log = WindSeries(
-        time=np.array([T0]), channels={"apparent_wind_speed": np.array([3.0])}, flags=np.zeros(1, dtype=np.uint16),
+        time=np.array([T0]),
+        channels={"apparent_wind_speed": np.array([3.0])},
+        flags=np.zeros(1, dtype=np.uint16),
         sensor=Sensor(name="boat"),
-    )  # fmt: skip
+    )
     with pytest.raises(InputError, match="apparent_wind_speed"):
         average(log)
     assert average(log, channel="apparent_wind_speed").speed.tolist() == [3.0]

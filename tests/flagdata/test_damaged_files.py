@@ -43,9 +43,11 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> bytes:
             time = START + k * 40_000_000
             writer.frame(log_time=time, publish_time=time, timestamp=time, image=image)
         series = WindSeries(
-            time=START + np.arange(20, dtype=np.int64) * 10**9, channels={"wind_speed": np.linspace(1, 5, 20)},
-            flags=np.zeros(20, dtype=np.uint16), sensor=Sensor(name="cup"),
-        )  # fmt: skip
+            time=START + np.arange(20, dtype=np.int64) * 10**9,
+            channels={"wind_speed": np.linspace(1, 5, 20)},
+            flags=np.zeros(20, dtype=np.uint16),
+            sensor=Sensor(name="cup"),
+        )
         writer.wind(series)
         writer.truth({"density": 0.2}, log_time=START)
         writer.attach("log.csv", b"time,speed\n" * 9000, media_type="text/csv", log_time=START)
@@ -106,9 +108,12 @@ def write_marker_store(path: Path) -> None:
     write_markers(
         path,
         MarkerSequence(
-            time=np.arange(4, dtype=np.int64), positions=positions, rest=GRID, names=tuple("abcdefghi"),
+            time=np.arange(4, dtype=np.int64),
+            positions=positions,
+            rest=GRID,
+            names=tuple("abcdefghi"),
         ),
-    )  # fmt: skip
+    )
 
 
 STORES: dict[str, tuple[Callable[[Path], None], Callable[[Path], object]]] = {
@@ -163,10 +168,12 @@ def test_a_zarr_store_made_by_hand_is_read_or_refused(kind: str, tmp_path: Path)
 @pytest.mark.parametrize(
     ("keys", "value"),
     [
-        (("shape",), [10**9, 9, 3]), (("shape",), [10**18, 9, 3]), (("shape",), [4, 10**12, 3]),
+        (("shape",), [10**9, 9, 3]),
+        (("shape",), [10**18, 9, 3]),
+        (("shape",), [4, 10**12, 3]),
         (("chunk_grid", "configuration", "chunk_shape"), [10**12, 9, 3]),
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize("kind", ["meshes", "markers"])
 def test_a_store_that_claims_a_huge_shape_is_refused_before_memory_is_taken(
     kind: str, keys: tuple[str, ...], value: list[int], tmp_path: Path

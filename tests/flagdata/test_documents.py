@@ -18,11 +18,15 @@ MANY = 200_000
 
 
 DEEP = [
-    "a = " + "[" * MANY + "]" * MANY, "a = " + "{a = " * MANY + "1" + "}" * MANY, "[" + ".".join(["a"] * MANY) + "]",
-    "[[" + " . ".join(["a"] * MANY) + "]]", ".".join(["a"] * MANY) + " = 1",
-    ".".join(['"a.b"', "'c'"] * MANY) + " = 1", "a = {" + ".".join(["a"] * MANY) + " = 1}",
+    "a = " + "[" * MANY + "]" * MANY,
+    "a = " + "{a = " * MANY + "1" + "}" * MANY,
+    "[" + ".".join(["a"] * MANY) + "]",
+    "[[" + " . ".join(["a"] * MANY) + "]]",
+    ".".join(["a"] * MANY) + " = 1",
+    ".".join(['"a.b"', "'c'"] * MANY) + " = 1",
+    "a = {" + ".".join(["a"] * MANY) + " = 1}",
     "a = 1\n" + ".".join(["a"] * (NESTING_LIMIT + 1)) + " = 1",
-]  # fmt: skip
+]
 DEEP_JSON = ["[" * MANY + "]" * MANY, '{"a":' * MANY + "1" + "}" * MANY, "[" * 101 + "]" * 101]
 
 

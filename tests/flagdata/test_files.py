@@ -50,12 +50,17 @@ def film_of_a_table(film: Path, folder: Path) -> object:
 
 
 READERS: dict[str, Callable[[Path, Path], object]] = {
-    "source": lambda path, _: Source.of(path), "classify": lambda path, _: guesses(path),
-    "camera": lambda path, _: open_camera(path), "log": lambda path, _: first_bytes(path),
-    "cloths": lambda path, _: read_cloths(path), "film of cloths": film_of_a_table,
-    "markers": lambda path, _: read_table(path), "mesh": lambda path, _: read_obj(path),
-    "scene": lambda path, _: read_json(path), "recipe": lambda path, _: read_recipe(path),
-}  # fmt: skip
+    "source": lambda path, _: Source.of(path),
+    "classify": lambda path, _: guesses(path),
+    "camera": lambda path, _: open_camera(path),
+    "log": lambda path, _: first_bytes(path),
+    "cloths": lambda path, _: read_cloths(path),
+    "film of cloths": film_of_a_table,
+    "markers": lambda path, _: read_table(path),
+    "mesh": lambda path, _: read_obj(path),
+    "scene": lambda path, _: read_json(path),
+    "recipe": lambda path, _: read_recipe(path),
+}
 
 
 @pytest.mark.parametrize("reader", READERS)

@@ -247,10 +247,15 @@ def manifest_of_another_kind(folder: Path) -> str:
 @pytest.mark.parametrize(
     "disturb",
     [
-        add_a_file, change_a_file, add_a_link, replace_by_a_link, lose_the_manifest, damage_the_manifest,
+        add_a_file,
+        change_a_file,
+        add_a_link,
+        replace_by_a_link,
+        lose_the_manifest,
+        damage_the_manifest,
         manifest_of_another_kind,
     ],
-)  # fmt: skip
+)
 def test_a_folder_with_anything_else_in_it_is_refused_by_name_and_left_as_it_is(
     disturb: Callable[[Path], str], tmp_path: Path
 ) -> None:

@@ -43,8 +43,9 @@ TABLES: dict[str, Bytes] = {
 CLOTHS = "film,fabric,area_weight,bending_stiffness,wind_speed,wind_sigma\nfilm.mp4,felt,0.24,3.5e-5,2.4,0.3\n"
 MARKERS = "marker,u,v,x,y,z,time\n" + "".join(
     f"m{marker},{marker / 2},0.25,{marker / 10 + frame / 100:.2f},0.5,1.5,{frame * 0.04:.2f}\n"
-    for frame in range(3) for marker in range(2)
-)  # fmt: skip
+    for frame in range(3)
+    for marker in range(2)
+)
 
 
 @pytest.mark.parametrize("saved", SAVED)

@@ -54,17 +54,32 @@ def of_another(folder: Path) -> tuple[Lake, str]:
         name: text for name, text in texts.items() if name not in json_columns
     }
     row |= {
-        "artifact": identity, "kind": "wind", "branch": "main", "object": None, "source_hash": "0" * 64, "parents": [],
-        "quality": [EVIL], "format_version": 1, "created": 1, "dataset": None, "side": None, "recording": None,
-        "recipe": json.dumps({"name": EVIL}), "recipe_hash": "0" * 64,
+        "artifact": identity,
+        "kind": "wind",
+        "branch": "main",
+        "object": None,
+        "source_hash": "0" * 64,
+        "parents": [],
+        "quality": [EVIL],
+        "format_version": 1,
+        "created": 1,
+        "dataset": None,
+        "side": None,
+        "recording": None,
+        "recipe": json.dumps({"name": EVIL}),
+        "recipe_hash": "0" * 64,
         "report": json.dumps({"findings": [{"severity": EVIL, "kind": EVIL, "what": EVIL}]}),
-    }  # fmt: skip
+    }
     good = {**row, "artifact": secrets.token_hex(16), "name": "good", "created": 2}
     table = pa.Table.from_pylist([row, good], schema=catalog_schema())
     info = {
-        "commit": "c" + secrets.token_hex(8), "message": EVIL, "branch": "main", "rows": "2", "code_version": EVIL,
+        "commit": "c" + secrets.token_hex(8),
+        "message": EVIL,
+        "branch": "main",
+        "rows": "2",
+        "code_version": EVIL,
         "labels": json.dumps({identity: {"who": EVIL}, good["artifact"]: {"who": EVIL}}),
-    }  # fmt: skip
+    }
     lake.catalog.append(table, base=lake.catalog.head(), info=info)
     return lake, good["artifact"]
 
@@ -103,7 +118,9 @@ def calls(folder: Path, identity: str) -> dict[tuple[str, ...], list[list[str]]]
         ("lineage",): [[identity, "--details", *lake], [EVIL, *lake]],
         ("view",): [[EVIL]],
         ("query",): [
-            [*lake], ["--where", "true", "--columns", "name,session,quality", *lake], ["--where", EVIL, *lake],
+            [*lake],
+            ["--where", "true", "--columns", "name,session,quality", *lake],
+            ["--where", EVIL, *lake],
             ["--sql", f"select name as '{EVIL}', * from catalog", *lake],
             ["--sql", "select cast(name as int) from catalog", *lake],
         ],
@@ -142,7 +159,7 @@ def calls(folder: Path, identity: str) -> dict[tuple[str, ...], list[list[str]]]
         ("blender-setup",): [["--python", EVIL]],
         ("completion",): [["bash"], [EVIL]],
         ("help",): [[], [EVIL]],
-    }  # fmt: skip
+    }
 
 
 def obeyed(text: str) -> set[str]:

@@ -44,13 +44,31 @@ def test_what_no_key_states_is_the_classes_default() -> None:
 
 def test_every_type_of_field_is_read() -> None:
     content = {
-        "frame-rate": 50, "count": 7, "open": True, "kind": "large", "sign": "to", "speed": {"low": 1, "high": 2},
-        "damping": 3, "height": 2, "rates": [1, 2.5], "words": ["x"],
-    }  # fmt: skip
+        "frame-rate": 50,
+        "count": 7,
+        "open": True,
+        "kind": "large",
+        "sign": "to",
+        "speed": {"low": 1, "high": 2},
+        "damping": 3,
+        "height": 2,
+        "rates": [1, 2.5],
+        "words": ["x"],
+    }
     assert spec(**content) == Spec(
-        name="a", frame_rate=50.0, count=7, open=True, kind=Kind.LARGE, sign="to", speed=Range(low=1.0, high=2.0),
-        damping=Range(low=3.0, high=3.0), height=2.0, rates=(1.0, 2.5), words=("x",), own="mine",
-    )  # fmt: skip
+        name="a",
+        frame_rate=50.0,
+        count=7,
+        open=True,
+        kind=Kind.LARGE,
+        sign="to",
+        speed=Range(low=1.0, high=2.0),
+        damping=Range(low=3.0, high=3.0),
+        height=2.0,
+        rates=(1.0, 2.5),
+        words=("x",),
+        own="mine",
+    )
 
 
 @pytest.mark.parametrize(

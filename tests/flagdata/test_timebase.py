@@ -71,13 +71,25 @@ def test_fixed_offsets_and_misspelt_zones() -> None:
 
 
 ABBREVIATIONS = {
-    "CEST": ("+02:00", "Europe/Amsterdam"), "CET": ("+01:00", "Europe/Amsterdam"), "MESZ": ("+02:00", "Europe/Berlin"),
-    "BST": ("+01:00", "Europe/London"), "WEST": ("+01:00", "Europe/Lisbon"), "EEST": ("+03:00", "Europe/Athens"),
-    "EDT": ("-04:00", "America/New_York"), "EST": ("-05:00", "America/New_York"), "MST": ("-07:00", "America/Denver"),
-    "PST": ("-08:00", "America/Los_Angeles"), "IST": ("+05:30", "Asia/Kolkata"), "JST": ("+09:00", "Asia/Tokyo"),
-    "AEDT": ("+11:00", "Australia/Sydney"), "NZST": ("+12:00", "Pacific/Auckland"), "BRT": ("-03:00", "Sao_Paulo"),
-    "SGT": ("+08:00", "Asia/Singapore"), "PT": ("-07:00", "America/Los_Angeles"), "cest": ("+02:00", "Amsterdam"),
-}  # fmt: skip
+    "CEST": ("+02:00", "Europe/Amsterdam"),
+    "CET": ("+01:00", "Europe/Amsterdam"),
+    "MESZ": ("+02:00", "Europe/Berlin"),
+    "BST": ("+01:00", "Europe/London"),
+    "WEST": ("+01:00", "Europe/Lisbon"),
+    "EEST": ("+03:00", "Europe/Athens"),
+    "EDT": ("-04:00", "America/New_York"),
+    "EST": ("-05:00", "America/New_York"),
+    "MST": ("-07:00", "America/Denver"),
+    "PST": ("-08:00", "America/Los_Angeles"),
+    "IST": ("+05:30", "Asia/Kolkata"),
+    "JST": ("+09:00", "Asia/Tokyo"),
+    "AEDT": ("+11:00", "Australia/Sydney"),
+    "NZST": ("+12:00", "Pacific/Auckland"),
+    "BRT": ("-03:00", "Sao_Paulo"),
+    "SGT": ("+08:00", "Asia/Singapore"),
+    "PT": ("-07:00", "America/Los_Angeles"),
+    "cest": ("+02:00", "Amsterdam"),
+}
 
 
 @pytest.mark.parametrize("name", ABBREVIATIONS)

@@ -12,8 +12,11 @@ from pathlib import Path
 from tests.hostile import KINDS
 from tests.hostile.campaign import run
 
-PACKAGES = {"recipes": ("flagdata", "sim", "models", "measure"), "models": ("flagdata", "models", "measure"),
-            "bombs": ("flagdata", "sim", "models")}  # fmt: skip
+PACKAGES = {
+    "recipes": ("flagdata", "sim", "models", "measure"),
+    "models": ("flagdata", "models", "measure"),
+    "bombs": ("flagdata", "sim", "models"),
+}
 """Packages whose modules a class uses, where it uses others than flagdata's."""
 
 

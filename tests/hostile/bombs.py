@@ -232,12 +232,19 @@ def _conf(path: Path) -> None:
 def _lerobot(path: Path) -> None:
     (path / "meta").mkdir(parents=True)
     (path / "meta" / "info.json").write_text(
-        json.dumps({
-            "codebase_version": "v3.0", "fps": 10**30, "total_episodes": 10**18, "total_frames": 10**18,
-            "chunks_size": 10**18, "features": {"observation.images.a": {"dtype": "video", "shape": [10**9] * 3}},
-            "data_path": "data/{chunk_index:03d}.parquet", "video_path": "videos/{chunk_index:0999999999d}.mp4",
-        })
-    )  # fmt: skip
+        json.dumps(
+            {
+                "codebase_version": "v3.0",
+                "fps": 10**30,
+                "total_episodes": 10**18,
+                "total_frames": 10**18,
+                "chunks_size": 10**18,
+                "features": {"observation.images.a": {"dtype": "video", "shape": [10**9] * 3}},
+                "data_path": "data/{chunk_index:03d}.parquet",
+                "video_path": "videos/{chunk_index:0999999999d}.mp4",
+            }
+        )
+    )
 
 
 def _beside(name: str, write: Callable[[Path], object], *options: str, doctor: bool = False) -> Subject:
@@ -249,8 +256,9 @@ def _beside(name: str, write: Callable[[Path], object], *options: str, doctor: b
         path = sound(plain, write)
         Lake.create(folder / "lake")
         verbs: list[list[object]] = [
-            ["ingest", path, "--sniff", "--json"], ["ingest", path, "--lake", folder / "lake", *options, "--json"],
-        ]  # fmt: skip
+            ["ingest", path, "--sniff", "--json"],
+            ["ingest", path, "--lake", folder / "lake", *options, "--json"],
+        ]
         if doctor:
             verbs += [["doctor", path], ["recover", path, folder / "new.mcap", "--lake", folder / "lake"]]
         errors: list[Exception] = []
@@ -376,4 +384,4 @@ def subjects() -> list[Subject]:
         _in_lake("versions of refs", _versions),
         _in_lake("sizes in the log", _sizes),
         *_recipes(),
-    ]  # fmt: skip
+    ]

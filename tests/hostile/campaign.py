@@ -101,13 +101,22 @@ def campaign(kind: str, *, count: int, start: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "outcome.json"
         environment = {
-            **os.environ, "MALLOC_ARENA_MAX": "2", "ARROW_DEFAULT_MEMORY_POOL": "system", "TMPDIR": folder,
-            "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
-        }  # fmt: skip
+            **os.environ,
+            "MALLOC_ARENA_MAX": "2",
+            "ARROW_DEFAULT_MEMORY_POOL": "system",
+            "TMPDIR": folder,
+            "OMP_NUM_THREADS": "1",
+            "OPENBLAS_NUM_THREADS": "1",
+        }
         done = subprocess.run(
             [sys.executable, "-m", "tests.hostile", kind, "--count", str(count), "--seed", str(start), "--out", out],
-            cwd=REPOSITORY, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
-        )  # fmt: skip
+            cwd=REPOSITORY,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         if not out.exists():
             raise RuntimeError(f"the campaign did not begin: {done.stderr[-2000:]}")
         if done.returncode:
@@ -119,8 +128,12 @@ def campaign(kind: str, *, count: int, start: int) -> dict[str, Any]:
 def run(subjects: Sequence[Subject], *, count: int, start: int, out: Path) -> None:
     """Draw the examples of a class, read each and keep the outcome in the file `out`, also while it goes on."""
     outcome: dict[str, Any] = {
-        "examples": {subject.name: 0 for subject in subjects}, "refused": 0, "slowest": 0.0, "peak": 0, "failures": [],
-    }  # fmt: skip
+        "examples": {subject.name: 0 for subject in subjects},
+        "refused": 0,
+        "slowest": 0.0,
+        "peak": 0,
+        "failures": [],
+    }
     for number, subject in enumerate(subjects):
         prepare(subject)
         share = (number + 1) * count // len(subjects) - number * count // len(subjects)
@@ -237,9 +250,12 @@ def _drawn(subject: Subject, *, count: int, start: int) -> list[Any]:
 
     @seed(f"{start} {subject.name}")
     @settings(
-        max_examples=count + 1, database=None, deadline=None, phases=[Phase.generate],
+        max_examples=count + 1,
+        database=None,
+        deadline=None,
+        phases=[Phase.generate],
         suppress_health_check=list(HealthCheck),
-    )  # fmt: skip
+    )
     @given(example=subject.examples)
     def draw(example: Any) -> None:
         drawn.append(example)

@@ -34,9 +34,15 @@ _NOON = 1_777_636_800_000_000_000  # 2026-05-01T12:00:00Z
 _FRAME = Fraction(1, 25)
 _ROS2 = Path(__file__).parents[1] / "flagdata" / "ingest" / "mcap" / "ros2.mcap"
 _FILMS = {
-    "film.mp4": "libx264", "film.mov": "mjpeg", "film.mkv": "ffv1", "film.avi": "mjpeg", "film.ts": "libx264",
-    "film.webm": "libvpx", "film.mpg": "mpeg2video", "film.m4v": "mpeg4",
-}  # fmt: skip
+    "film.mp4": "libx264",
+    "film.mov": "mjpeg",
+    "film.mkv": "ffv1",
+    "film.avi": "mjpeg",
+    "film.ts": "libx264",
+    "film.webm": "libvpx",
+    "film.mpg": "mpeg2video",
+    "film.m4v": "mpeg4",
+}
 _STILLS = {"png": "PNG", "jpg": "JPEG", "tiff": "TIFF", "webp": "WEBP", "bmp": "BMP"}
 _ROWS = [[f"2026-05-01 12:00:{k:02d}", 5 + k % 7 / 10, 200 + k % 9] for k in range(60)]
 _CSV = "time,wind_speed (m/s),wind_direction (deg)\n" + "".join(f"{t}Z,{v},{d}\n" for t, v, d in _ROWS)
@@ -130,11 +136,12 @@ def _mcap(packing: CompressionType, *, chunked: bool = True) -> Callable[[Path],
             writer.start()
             channels = {
                 name: writer.register_channel(
-                    topic=topic, message_encoding="json",
+                    topic=topic,
+                    message_encoding="json",
                     schema_id=writer.register_schema(name=name, encoding="jsonschema", data=b"{}"),
                 )
                 for topic, name in (("/camera", "foxglove.CompressedImage"), ("/wind", "own.Wind"))
-            }  # fmt: skip
+            }
             for k, gray in enumerate(_grays()):
                 at = _NOON + k * 40_000_000
                 coded = io.BytesIO()
@@ -142,8 +149,9 @@ def _mcap(packing: CompressionType, *, chunked: bool = True) -> Callable[[Path],
                 stamp = {"sec": at // 10**9, "nsec": at % 10**9}
                 picture = {"timestamp": stamp, "format": "png", "data": base64.b64encode(coded.getvalue()).decode()}
                 for name, message in (
-                    ("foxglove.CompressedImage", picture), ("own.Wind", {"timestamp": stamp, "speed": 5.0 + k})
-                ):  # fmt: skip
+                    ("foxglove.CompressedImage", picture),
+                    ("own.Wind", {"timestamp": stamp, "speed": 5.0 + k}),
+                ):
                     writer.add_message(channels[name], at, json.dumps(message).encode(), at)
             writer.finish()
 
@@ -207,9 +215,11 @@ def _subject(
             raise max(errors, key=lambda error: getattr(error, "kind", "unforeseen") == "unforeseen")
 
     return Subject(
-        name=title or name, examples=st.tuples(places, st.booleans(), mutations), act=act,
+        name=title or name,
+        examples=st.tuples(places, st.booleans(), mutations),
+        act=act,
         prepare=lambda: sound(name, write),
-    )  # fmt: skip
+    )
 
 
 def subjects() -> list[Subject]:
@@ -221,14 +231,19 @@ def subjects() -> list[Subject]:
     folder = [sniffed, [*ingested, "--start", START, "--sequence-fps", "25"]]
     chosen = [*ingested, "--topic"]
     topics = [
-        sniffed, [*chosen, "/camera"], [*chosen, "/wind", "--unit", "m/s"], ["doctor", "FILE"],
+        sniffed,
+        [*chosen, "/camera"],
+        [*chosen, "/wind", "--unit", "m/s"],
+        ["doctor", "FILE"],
         ["recover", "FILE", "NEW", "--lake", "LAKE"],
-    ]  # fmt: skip
+    ]
     logs: dict[str, Callable[[Path], object]] = {
-        "log.xlsx": _workbook, "log.ods": _opendocument, "log.nc": _netcdf,
+        "log.xlsx": _workbook,
+        "log.ods": _opendocument,
+        "log.nc": _netcdf,
         "log.csv.gz": lambda path: path.write_bytes(gzip.compress(_CSV.encode())),
         "wide.csv": lambda path: path.write_text(_CSV, encoding="utf-16"),
-    }  # fmt: skip
+    }
     return [
         *(_subject(name, _film, film) for name in _FILMS),
         _subject("fragmented.mp4", _fragmented, film),
@@ -247,11 +262,12 @@ def subjects() -> list[Subject]:
         _subject("plain.mcap", _mcap(CompressionType.NONE), topics),
         _subject("loose.mcap", _mcap(CompressionType.NONE, chunked=False), topics),
         _subject(
-            "ros2.mcap", lambda path: shutil.copy(_ROS2, path),
+            "ros2.mcap",
+            lambda path: shutil.copy(_ROS2, path),
             [sniffed, [*chosen, "/compressed"], ["doctor", "FILE"], ["recover", "FILE", "NEW", "--lake", "LAKE"]],
         ),
         _subject("bag", _bag, [sniffed, [*chosen, "/camera"], ["doctor", "FILE"]]),
         _subject("meshes", _meshes, [sniffed, ingested]),
         _subject("lerobot", _exported("lerobot"), [sniffed, ingested, ["doctor", "FILE"]]),
         _subject("exported.mcap", _exported("mcap"), [sniffed, ingested, ["doctor", "FILE"]], title="exported MCAP"),
-    ]  # fmt: skip
+    ]

@@ -144,9 +144,10 @@ def of_evaluations(folder: Path) -> Kept:
     path = folder / "evaluated.npz"
     draw = np.random.default_rng(3)
     found = evaluator.Evaluated(
-        embedding=draw.normal(size=(1, 32)), frame=draw.integers(0, 255, (9, 9), np.uint8),
+        embedding=draw.normal(size=(1, 32)),
+        frame=draw.integers(0, 255, (9, 9), np.uint8),
         seconds=dict.fromkeys(evaluator.STAGES, 0.5),
-    )  # fmt: skip
+    )
     evaluator._write(path, found)
 
     def read() -> Any:

@@ -54,25 +54,62 @@ _CLOTHS = (
 )
 ABOUT: dict[str, Any] = {
     "flag": {
-        "width": 1.5, "height": 1.0, "material": "camel-ponte-roma", "pins": [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
-        "pin_stiffness": 1e4, "gravity": [0.0, 0.0, -9.81],
+        "width": 1.5,
+        "height": 1.0,
+        "material": "camel-ponte-roma",
+        "pins": [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+        "pin_stiffness": 1e4,
+        "gravity": [0.0, 0.0, -9.81],
     },
-    "rate": 25.0, "noise": 0.001,
+    "rate": 25.0,
+    "noise": 0.001,
     "recordings": [{"name": "a", "wind": {"times": [0.0, 0.4], "velocity": [[4.0, 0.0, 0.0], [4.0, 0.0, 0.0]]}}],
-}  # fmt: skip
+}
 
 _ARRAYS = ["markers.npy", "a.npy"]
 _NAMES = ["film.mp4", "log.csv", "cloths.csv", "markers.csv", "scene.toml", "record.mcap"]
 WORDS = st.sampled_from(
-    ["", "nan", "inf", "-inf", "1e308", "-1e400", "9" * 400, "-0.0", "\x00", "\ufeff", "\u202e", '"', "'", '""', "\r",
-     ";", ",,,,", "\t", "<", "&amp;", "]", "}", "0001-01-01T00:00:00Z", "9999-12-31T23:59:59Z", "2026-02-30",
-     "x" * 70_000, "1" + "0" * 30, "٣", "½", "=cmd|' /C calc'!A0", "1,5", "$"],
-)  # fmt: skip
+    [
+        "",
+        "nan",
+        "inf",
+        "-inf",
+        "1e308",
+        "-1e400",
+        "9" * 400,
+        "-0.0",
+        "\x00",
+        "\ufeff",
+        "\u202e",
+        '"',
+        "'",
+        '""',
+        "\r",
+        ";",
+        ",,,,",
+        "\t",
+        "<",
+        "&amp;",
+        "]",
+        "}",
+        "0001-01-01T00:00:00Z",
+        "9999-12-31T23:59:59Z",
+        "2026-02-30",
+        "x" * 70_000,
+        "1" + "0" * 30,
+        "٣",
+        "½",
+        "=cmd|' /C calc'!A0",
+        "1,5",
+        "$",
+    ],
+)
 PLACES = st.floats(0, 1, exclude_max=True)
 rewordings = st.lists(
     st.tuples(st.sampled_from(("word", "line", "doubled", "before", "swapped")), PLACES, PLACES, WORDS),
-    min_size=1, max_size=4,
-)  # fmt: skip
+    min_size=1,
+    max_size=4,
+)
 """What is done to a text, one after another: a word or a line replaced, lines doubled, put before or swapped."""
 
 
@@ -304,9 +341,7 @@ def subjects() -> list[Subject]:
         *(_file(f"film.{kind}") for kind in _CODECS),
         Subject(name="folder of pictures", examples=st.tuples(PLACES, damages), act=_pictures),
         *(_text(name, text) for name, text in _LOGS.items()),
-        Subject(
-            name="folder of meshes", examples=st.tuples(PLACES, texts, st.one_of(st.none(), edits)), act=_meshes
-        ),
+        Subject(name="folder of meshes", examples=st.tuples(PLACES, texts, st.one_of(st.none(), edits)), act=_meshes),
         _text("markers.csv", _MARKERS, "--rate", "25"),
         _file("markers.parquet", "--rate", "25"),
         _file("record.mcap"),
@@ -315,15 +350,17 @@ def subjects() -> list[Subject]:
         Subject(name="set of a challenge", examples=st.tuples(st.one_of(st.none(), edits), members, damages), act=_set),
         Subject(name="set of a challenge, other values", examples=st.tuples(edits, st.none(), st.none()), act=_set),
         Subject(
-            name="folder of a challenge", act=_challenge,
+            name="folder of a challenge",
+            act=_challenge,
             examples=st.tuples(st.sampled_from(["challenge.json", "opened.json", "verdicts/set-001.json"]), edits),
         ),
         Subject(name="header of NumPy", examples=st.tuples(HEADERS, st.sampled_from(_ARRAYS)), act=_npy),
         *(
             Subject(
-                name=f"{kind} in place of a file", act=_replaced(kind),
+                name=f"{kind} in place of a file",
+                act=_replaced(kind),
                 examples=st.sampled_from(_NAMES),
             )
             for kind in ("folder", "pipe", "device")
         ),
-    ]  # fmt: skip
+    ]

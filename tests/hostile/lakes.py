@@ -41,18 +41,34 @@ harms = st.lists(
 """Which file of a part, each by its place among them, and what is done to it."""
 _TO = ["--to", "out", "--where"]
 READERS: list[list[object]] = [
-    ["ls", "--json"], ["ls", "--at", "v1"], ["log"], ["doctor"], ["doctor", "--deep", "--json"], ["verify", "--json"],
-    ["show", "field", "--json"], ["query", "--where", "wind > 1", "--json"],
-    ["query", "--sql", "select kind, count(*) from catalog group by kind"], ["diff", "v1", "main"], ["branch"],
+    ["ls", "--json"],
+    ["ls", "--at", "v1"],
+    ["log"],
+    ["doctor"],
+    ["doctor", "--deep", "--json"],
+    ["verify", "--json"],
+    ["show", "field", "--json"],
+    ["query", "--where", "wind > 1", "--json"],
+    ["query", "--sql", "select kind, count(*) from catalog group by kind"],
+    ["diff", "v1", "main"],
+    ["branch"],
     ["gc", "--dry-run", "--older-than", "0s"],
-    ["export", "csv", *_TO, "kind = 'recording'"], ["export", "parquet", "--to", "out"],
-    ["export", "webdataset", *_TO, "kind = 'clip'"], ["export", "mcap", *_TO, "kind = 'recording'"],
-    ["export", "mp4", *_TO, "kind = 'recording'"], ["export", "obj", "--at", "simulated", *_TO, "kind = 'meshes'"],
-]  # fmt: skip
+    ["export", "csv", *_TO, "kind = 'recording'"],
+    ["export", "parquet", "--to", "out"],
+    ["export", "webdataset", *_TO, "kind = 'clip'"],
+    ["export", "mcap", *_TO, "kind = 'recording'"],
+    ["export", "mp4", *_TO, "kind = 'recording'"],
+    ["export", "obj", "--at", "simulated", *_TO, "kind = 'meshes'"],
+]
 WRITERS: list[list[object]] = [
-    ["tag", "v2"], ["branch", "more"], ["merge", "simulated"], ["withdraw", "field", "-m", "wrong"],
-    ["gc", "--older-than", "0s"], ["ingest", "log.csv"], ["init"],
-]  # fmt: skip
+    ["tag", "v2"],
+    ["branch", "more"],
+    ["merge", "simulated"],
+    ["withdraw", "field", "-m", "wrong"],
+    ["gc", "--older-than", "0s"],
+    ["ingest", "log.csv"],
+    ["init"],
+]
 
 
 def made() -> Path:
@@ -62,10 +78,11 @@ def made() -> Path:
 
 def _files(lake: Path, part: str) -> list[Path]:
     return sorted(
-        path for name in PARTS[part]
+        path
+        for name in PARTS[part]
         for path in ([lake / name] if (lake / name).is_file() else (lake / name).rglob("*"))
         if path.is_file() and not path.is_symlink()
-    )  # fmt: skip
+    )
 
 
 def harm(lake: Path, part: str, changes: list[Any]) -> None:
@@ -145,9 +162,10 @@ def subjects() -> list[Subject]:
     """Every part of a lake, by readers and by writers."""
     return [
         Subject(
-            name=f"{part}, {how}", act=_act(part),
+            name=f"{part}, {how}",
+            act=_act(part),
             examples=st.tuples(harms, st.lists(st.sampled_from(commands), min_size=1, max_size=3)),
         )
         for part in PARTS
         for how, commands in (("read", READERS), ("written", WRITERS))
-    ]  # fmt: skip
+    ]

@@ -30,7 +30,10 @@ from tests.hostile.campaign import Subject
 
 OPTIONS = {"dimension": 4, "widths": [4, 4, 4]}
 WORDS: Any = {
-    "name": "small", "seed": 1, "members": 1, "widening": [1.0],
+    "name": "small",
+    "seed": 1,
+    "members": 1,
+    "widening": [1.0],
     "front_end": asdict(FrontEnd(maps="wave-maps", size=24, frames=12)),
     "cropping": asdict(Cropping(frames=12, size=24)),
     "recipe": {
@@ -38,7 +41,7 @@ WORDS: Any = {
         "loss": {"name": "posterior", "targets": ["wind_speed"], "components": 2, "margin": 1.0},
         "data": {"dataset": "made", "sequences": None},
     },
-}  # fmt: skip
+}
 IDENTITY = {"recipe": "small"}
 
 
@@ -76,10 +79,15 @@ def arrays() -> dict[str, np.ndarray]:
     """The arrays of a batch of two segments, by their names; of other columns than this version's."""
     rows = np.zeros((2, 3))
     return {
-        **dict.fromkeys(bank._SEGMENTS, rows), "recording": np.arange(2), "columns": np.array(["a", "b"]),
-        "cloth": np.array(["x", "y"]), "duration": np.array(1.0), "anchors_told": np.array(True),
-        "carried": np.array(False), "version": np.array(bank._VERSION),
-    }  # fmt: skip
+        **dict.fromkeys(bank._SEGMENTS, rows),
+        "recording": np.arange(2),
+        "columns": np.array(["a", "b"]),
+        "cloth": np.array(["x", "y"]),
+        "duration": np.array(1.0),
+        "anchors_told": np.array(True),
+        "carried": np.array(False),
+        "version": np.array(bank._VERSION),
+    }
 
 
 SHAPES = st.sampled_from([(), (0,), (1,), (4,), (4, 4), (1, 0), (2, 2, 2), (4096,)])
@@ -87,8 +95,9 @@ TYPES = st.sampled_from([torch.float16, torch.float64, torch.int64, torch.bool, 
 FILLS = st.sampled_from([0.0, -1.0, 1e30, float("nan")])
 retensored = st.lists(
     st.tuples(st.floats(0, 1, exclude_max=True), st.sampled_from(("put", "drop", "add")), SHAPES, TYPES, FILLS),
-    min_size=1, max_size=3,
-)  # fmt: skip
+    min_size=1,
+    max_size=3,
+)
 """Tensors of a file, each by its place, of another shape and type."""
 
 

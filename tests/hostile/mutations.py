@@ -22,9 +22,24 @@ places = st.floats(0, 1, exclude_max=True)
 lengths = st.sampled_from([0, 1, 255, 65_535, 2**31 - 1, 2**31, 2**32 - 1, 2**33, 2**40, 2**62, 2**63, 2**64 - 1])
 """Put in place of a length, an offset or a count."""
 numbers = st.sampled_from(
-    [b"0", b"-1", b"1e308", b"-1e400", b"nan", b"1000000000", b"99999999999999999999", b"9" * 400, b"4294967296",
-     b"0.000000001", b"1e-320", b"2147483648", b"20000000", b"1048576", b"65536"]
-)  # fmt: skip
+    [
+        b"0",
+        b"-1",
+        b"1e308",
+        b"-1e400",
+        b"nan",
+        b"1000000000",
+        b"99999999999999999999",
+        b"9" * 400,
+        b"4294967296",
+        b"0.000000001",
+        b"1e-320",
+        b"2147483648",
+        b"20000000",
+        b"1048576",
+        b"65536",
+    ]
+)
 """Put in place of a number in text."""
 mutations = st.lists(
     st.one_of(
@@ -106,9 +121,15 @@ def _drop(data: bytes, place: float, size: int) -> bytes:
 
 
 _KINDS: dict[str, Callable[[bytes, float, Any], bytes]] = {
-    "bit": _bit, "cut": _cut, "length": _length, "head": _head, "number": _number, "double": _double, "swap": _swap,
+    "bit": _bit,
+    "cut": _cut,
+    "length": _length,
+    "head": _head,
+    "number": _number,
+    "double": _double,
+    "swap": _swap,
     "drop": _drop,
-}  # fmt: skip
+}
 
 
 def _in_gzip(data: bytes, changes: list[Any]) -> bytes:

@@ -29,18 +29,24 @@ from tests.small import EXPERIMENT, SCENE, TRAINING
 CATALOGS = Path(__file__).parents[2] / "catalogs"
 
 SCENE_FILE = {
-    "frame_time": 0.04, "frame_steps": 8, "end_time": 1, "cloths": [{"mesh": "m.obj", "materials": [{}]}],
-    "gravity": [0, 0, -9.8], "wind": {"velocity": [1, 0, 0]}, "magic": {"repulsion_thickness": 5e-3},
-}  # fmt: skip
+    "frame_time": 0.04,
+    "frame_steps": 8,
+    "end_time": 1,
+    "cloths": [{"mesh": "m.obj", "materials": [{}]}],
+    "gravity": [0, 0, -9.8],
+    "wind": {"velocity": [1, 0, 0]},
+    "magic": {"repulsion_thickness": 5e-3},
+}
 MATERIAL_FILE = {"density": 0.2, "stretching": [[1, 0, 1, 1]] * 6, "bending": [[1e-5] * 5] * 3}
 SQUARE = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nv 0 0 0\nv 0 1 0\nv 0 1 1\nv 0 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
 
 
 LEARNED = {
-    'dataset = "made"': 'dataset = ["made", "other"]\nsequences = 4', "variants = 2": "variants = 2\nmirror = true",
+    'dataset = "made"': 'dataset = ["made", "other"]\nsequences = 4',
+    "variants = 2": "variants = 2\nmirror = true",
     "widths = [6, 6, 6]": "widths = [6, 6, 6]\nstrides = [2, 2, 2]",
     "batch = 4": "batch = 4\nclip-norm = 5.0",
-}  # fmt: skip
+}
 """What the form of a training recipe has beyond `TRAINING`."""
 
 
@@ -70,21 +76,21 @@ def ready(text: str, folder: Path) -> None:
 
 FORMS: dict[str, tuple[str, Callable[[str, Path], object]]] = {
     "sensor": (first("sensors"), lambda text, _: parse_sensor(text, where="recipe")),
-    "scene": (
-        first("scenes"), lambda text, folder: parse_scene(text, name="recipe", folder=folder, where="recipe")
-    ),
+    "scene": (first("scenes"), lambda text, folder: parse_scene(text, name="recipe", folder=folder, where="recipe")),
     "data set": (
-        first("datasets"), lambda text, folder: parse_dataset(text, name="recipe", folder=folder, where="recipe")
+        first("datasets"),
+        lambda text, folder: parse_dataset(text, name="recipe", folder=folder, where="recipe"),
     ),
     "challenge": (first("challenges"), lambda text, _: parse_challenge(text, where="recipe")),
     "material": (
-        first("materials"), lambda text, _: Material.from_mapping(parsed(text, where="recipe"), name="recipe")
+        first("materials"),
+        lambda text, _: Material.from_mapping(parsed(text, where="recipe"), name="recipe"),
     ),
     "render prior": (first("renders"), lambda text, _: read_prior(parsed(text, where="recipe"), name="recipe")),
     "scene made ready": (SCENE, ready),
     "experiment": (EXPERIMENT, experiment),
     "training": (training(), lambda text, _: parse_training(text, name="recipe", where="recipe").check()),
-}  # fmt: skip
+}
 
 
 def _toml(form: str) -> Subject:

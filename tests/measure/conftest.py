@@ -25,9 +25,11 @@ def specimen() -> Specimen:
     """0.75 m × 0.5 m of a knit on 9 × 7 vertices, held at the corners of its hoist."""
     mesh = grid(width=0.75, height=0.5, columns=8, rows=6)
     return Specimen(
-        mesh=mesh, material=named("camel-ponte-roma"), held=handles.corners(mesh.rest),
+        mesh=mesh,
+        material=named("camel-ponte-roma"),
+        held=handles.corners(mesh.rest),
         anchors=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]]),
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="session")
@@ -39,9 +41,12 @@ def forecaster(specimen: Specimen) -> Forecaster:
 def own_recording(specimen: Specimen, forecaster: Forecaster) -> Trajectory:
     """2.6 s at 4 m/s of the fit's own model, mesh and steps, after 2 s."""
     still = Trajectory(
-        name="still", markers=specimen.mesh.rest, positions=np.zeros((60, specimen.mesh.vertex_count, 3)), rate=RATE,
+        name="still",
+        markers=specimen.mesh.rest,
+        positions=np.zeros((60, specimen.mesh.vertex_count, 3)),
+        rate=RATE,
         wind=WindTrack.constant((4.0, 0.0, 0.0)),
-    )  # fmt: skip
+    )
     system, state = forecaster.system(Segments.of([still]).select([0]), [Calibration()])
     bulge = 0.02 * np.sin(7 * specimen.mesh.rest[:, 0]) * np.cos(5 * specimen.mesh.rest[:, 1])
     bent = state.position.clone()

@@ -102,10 +102,16 @@ USUAL = {"count": 4, "batch": 4, "columns": 30, "width": 1.5, "settle": 4.0, "fr
 @pytest.mark.parametrize(
     "asked",
     [
-        {"columns": 10**9}, {"frames": 10**9}, {"count": 10**29}, {"batch": 10**9}, {"settle": 1e12},
-        {"width": "1e-9\nheight = 1.0"}, {"columns": 900, "frames": 100_000}, {"columns": 1300},
+        {"columns": 10**9},
+        {"frames": 10**9},
+        {"count": 10**29},
+        {"batch": 10**9},
+        {"settle": 1e12},
+        {"width": "1e-9\nheight = 1.0"},
+        {"columns": 900, "frames": 100_000},
+        {"columns": 1300},
     ],
-)  # fmt: skip
+)
 def test_what_no_machine_can_simulate_is_refused_with_the_limit_that_was_passed(
     asked: dict[str, Any], tmp_path: Path
 ) -> None:
@@ -119,11 +125,13 @@ def test_what_no_machine_can_simulate_is_refused_with_the_limit_that_was_passed(
 @pytest.mark.parametrize(
     ("line", "error"),
     [
-        ("density-factor = 1e29", InputError), ("stretching-factor = 1e300", InputError),
+        ("density-factor = 1e29", InputError),
+        ("stretching-factor = 1e300", InputError),
         ("damping = 1e300", InputError),
-        ("density-factor = 1e-8", LimitError), ("stretching-factor = 1e9", LimitError),
+        ("density-factor = 1e-8", LimitError),
+        ("stretching-factor = 1e9", LimitError),
     ],
-)  # fmt: skip
+)
 def test_a_material_that_no_number_of_steps_can_simulate_is_refused_before_the_first(
     line: str, error: type[FlagdataError], tmp_path: Path
 ) -> None:

@@ -41,10 +41,12 @@ def write_film(path: Path, wind: float, look: int, *, period: int = PERIOD) -> N
         seconds = START + np.arange(-70, 2, dtype=np.int64) * 1_000_000_000
         record.wind(
             WindSeries(
-                time=seconds, channels={"wind_speed": np.full(len(seconds), wind)},
-                flags=np.zeros(len(seconds), dtype=np.uint16), sensor=Sensor(name="cup"),
+                time=seconds,
+                channels={"wind_speed": np.full(len(seconds), wind)},
+                flags=np.zeros(len(seconds), dtype=np.uint16),
+                sensor=Sensor(name="cup"),
             )
-        )  # fmt: skip
+        )
         bending = {f"bending.{index}": 3e-5 * 1.1**look for index in range(15)}
         truth = {"wind_speed": wind, "density": 0.1 + 0.007 * (look % 10), **bending}
         record.truth(truth, log_time=START)
@@ -63,10 +65,18 @@ def fill(lake: Lake, name: str = "made", *, period: int = PERIOD, strongest: flo
                 stored = transaction.put(staged)
                 record = Record.open(lake.object_path(stored))
                 recording = Artifact(
-                    kind=Kind.RECORDING, name=f"{name}-{side}-{index:05d}", dataset=name, side=side, seed=seed,
-                    object=stored, recipe={"film": index, "side": side}, start=START,
-                    end=START + (FILM_FRAMES - 1) * period, frame_count=FILM_FRAMES, rate=1e9 / period,
-                )  # fmt: skip
+                    kind=Kind.RECORDING,
+                    name=f"{name}-{side}-{index:05d}",
+                    dataset=name,
+                    side=side,
+                    seed=seed,
+                    object=stored,
+                    recipe={"film": index, "side": side},
+                    start=START,
+                    end=START + (FILM_FRAMES - 1) * period,
+                    frame_count=FILM_FRAMES,
+                    rate=1e9 / period,
+                )
                 transaction.add(recording)
                 for clip in clip_rows(record, recording, frames=12):
                     transaction.add(clip)

@@ -69,29 +69,41 @@ def test_a_card_with_another_value_is_read_or_refused(
 
 def test_absurd_numbers_of_a_training_recipe_are_refused_before_any_work() -> None:
     cases = [
-        ("dimension = 4", "dimension = 1000000000000", LimitError), ("dimension = 4", "dimension = 0", InputError),
-        ("dimension = 4", "dimension = true", InputError), ("dimension = 4", 'dimension = "4"', InputError),
+        ("dimension = 4", "dimension = 1000000000000", LimitError),
+        ("dimension = 4", "dimension = 0", InputError),
+        ("dimension = 4", "dimension = true", InputError),
+        ("dimension = 4", 'dimension = "4"', InputError),
         ("widths = [6, 6, 6]", "widths = [6, 6, 100000]", LimitError),
         ("widths = [6, 6, 6]", f"widths = {[6] * 1000}", LimitError),
-        ("widths = [6, 6, 6]", "widths = [6, -6, 6]", InputError), ("rate = 1e-2", "rate = 1e300", InputError),
-        ("decay = 1e-4", "decay = 1e300", InputError), ("size = 24", "size = 100000", LimitError),
-        ("frames = 12", "frames = 100000", LimitError), ("variants = 2", "variants = 1000000", LimitError),
+        ("widths = [6, 6, 6]", "widths = [6, -6, 6]", InputError),
+        ("rate = 1e-2", "rate = 1e300", InputError),
+        ("decay = 1e-4", "decay = 1e300", InputError),
+        ("size = 24", "size = 100000", LimitError),
+        ("frames = 12", "frames = 100000", LimitError),
+        ("variants = 2", "variants = 1000000", LimitError),
         ("components = 2", "components = 1000000000000", LimitError),
         ("scales = [1.0, 0.9]", "scales = [1e-300]", InputError),
         ("seed = 1", "seed = " + "[" * 200_000 + "]" * 200_000, LimitError),
-    ]  # fmt: skip
+    ]
     assert not unrefused(lambda old, new: read(TRAINING.replace(old, new)), cases)
 
 
 @pytest.mark.parametrize(
     ("path", "value"),
     [
-        (("recipe", "network", "options", "dimension"), 10**12), (("recipe", "loss", "components"), 10**12),
-        (("front_end", "temporal_sigma"), 1e308), (("front_end", "spatial_sigma"), 1e308),
-        (("front_end", "frames"), 10**12), (("front_end", "rate"), 1e300), (("cropping", "size"), 10**12),
-        (("widening",), [1e999]), (("widening",), [0.0]), (("widening",), [1.0, 1.0]), (("name",), None),
+        (("recipe", "network", "options", "dimension"), 10**12),
+        (("recipe", "loss", "components"), 10**12),
+        (("front_end", "temporal_sigma"), 1e308),
+        (("front_end", "spatial_sigma"), 1e308),
+        (("front_end", "frames"), 10**12),
+        (("front_end", "rate"), 1e300),
+        (("cropping", "size"), 10**12),
+        (("widening",), [1e999]),
+        (("widening",), [0.0]),
+        (("widening",), [1.0, 1.0]),
+        (("name",), None),
     ],
-)  # fmt: skip
+)
 def test_absurd_numbers_of_a_card_are_refused(folder: Path, tmp_path: Path, path: tuple[Any, ...], value: Any) -> None:
     copy = Path(shutil.copytree(folder, tmp_path / "small"))
     content = changed(WORDS, path, value)
@@ -142,11 +154,16 @@ def test_the_checkpoint_is_whole(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("path", "value"),
     [
-        (("identity",), ["small"]), (("running",), "aa"), (("running",), []), (("batches",), 3), (("course",), [1]),
-        (("course",), [{**EPOCH, "validation": "low"}]), (("course",), [{**EPOCH, "train": 10**400}]),
+        (("identity",), ["small"]),
+        (("running",), "aa"),
+        (("running",), []),
+        (("batches",), 3),
+        (("course",), [1]),
+        (("course",), [{**EPOCH, "validation": "low"}]),
+        (("course",), [{**EPOCH, "train": 10**400}]),
         (("course",), [{**EPOCH, "more": 1}]),
     ],
-)  # fmt: skip
+)
 def test_absurd_values_of_a_checkpoint_are_refused(tmp_path: Path, path: tuple[Any, ...], value: Any) -> None:
     run = checkpoint_with(tmp_path, path, value)
     with pytest.raises(CorruptError):

@@ -67,11 +67,13 @@ def test_frames_that_cannot_be_pooled_are_refused() -> None:
     cases = [(30, 33, 48), (30, 48, 33), (1, 30, 48, 48)]
     assert (
         unrefused(
-            lambda shape: pooled_derivatives(torch.zeros(shape), sigma=2.0), zip(cases), InputError,
+            lambda shape: pooled_derivatives(torch.zeros(shape), sigma=2.0),
+            zip(cases),
+            InputError,
             "even height and width",
         )
         == []
-    )  # fmt: skip
+    )
 
 
 def test_smoothing_in_time_is_scipys() -> None:
@@ -136,8 +138,13 @@ def test_a_clip_without_contrast_is_still_finite() -> None:
 
 
 def test_front_ends_are_distinguished_by_all_that_shapes_them() -> None:
-    ends = [FrontEnd(maps="wave-maps"), FrontEnd(maps="spectral-maps"), FrontEnd(maps="wave-maps", size=112),
-            FrontEnd(maps="wave-maps", rate=30.0), FrontEnd(maps="wave-maps", temporal_sigma=1.5)]  # fmt: skip
+    ends = [
+        FrontEnd(maps="wave-maps"),
+        FrontEnd(maps="spectral-maps"),
+        FrontEnd(maps="wave-maps", size=112),
+        FrontEnd(maps="wave-maps", rate=30.0),
+        FrontEnd(maps="wave-maps", temporal_sigma=1.5),
+    ]
     assert len({end.hash for end in ends}) == len(ends)
     assert FrontEnd(maps="wave-maps").hash == ends[0].hash
 

@@ -16,9 +16,11 @@ T, SIDE = 30, 112
 
 def grid() -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     return torch.meshgrid(
-        torch.arange(T, dtype=torch.float32), torch.arange(SIDE, dtype=torch.float32),
-        torch.arange(SIDE, dtype=torch.float32), indexing="ij",
-    )  # fmt: skip
+        torch.arange(T, dtype=torch.float32),
+        torch.arange(SIDE, dtype=torch.float32),
+        torch.arange(SIDE, dtype=torch.float32),
+        indexing="ij",
+    )
 
 
 def measured(clip: torch.Tensor) -> dict[str, float]:

@@ -20,11 +20,14 @@ from models.sdn import SpectralNetwork
 from tests.refusals import unrefused
 
 SMALL: dict[str, dict[str, Any]] = {
-    "sdn": {"widths": (8, 8, 16), "dimension": 12}, "resnet18": {"frames": 3, "width": 4},
-    "cardona": {"frames": 4, "width": 4, "hidden": 8}, "wave": {"widths": (6, 8, 8), "dimension": 5},
-    "flow": {"widths": (6, 8, 8), "dimension": 5}, "flow-3": {"widths": (6, 8, 8), "dimension": 5},
+    "sdn": {"widths": (8, 8, 16), "dimension": 12},
+    "resnet18": {"frames": 3, "width": 4},
+    "cardona": {"frames": 4, "width": 4, "hidden": 8},
+    "wave": {"widths": (6, 8, 8), "dimension": 5},
+    "flow": {"widths": (6, 8, 8), "dimension": 5},
+    "flow-3": {"widths": (6, 8, 8), "dimension": 5},
     "yang": {"frames": 4, "hidden": 8, "grid": 2, "features": 16},
-}  # fmt: skip
+}
 """Arguments that make each network of the table small enough for a test."""
 
 
@@ -92,8 +95,14 @@ def test_equal_seeds_give_equal_networks(name: str) -> None:
 
 def test_recurrent_networks_say_so() -> None:
     assert {name: NETWORKS[name].recurrent for name in SMALL} == {
-        "sdn": False, "resnet18": False, "cardona": True, "wave": False, "flow": False, "flow-3": False, "yang": True,
-    }  # fmt: skip
+        "sdn": False,
+        "resnet18": False,
+        "cardona": True,
+        "wave": False,
+        "flow": False,
+        "flow-3": False,
+        "yang": True,
+    }
 
 
 def test_sizes_are_the_published_ones_or_as_stated() -> None:
@@ -184,7 +193,12 @@ def test_unfit_input_is_an_error_with_its_fix() -> None:
 
 def test_unfit_arguments_are_errors() -> None:
     cases = [
-        ("sdn", {"channels": 3}), ("sdn", {"widths": (8, 8)}), ("sdn", {"floor": 0.0}), ("resnet18", {"frames": 0}),
-        ("resnet18", {"width": 0}), ("cardona", {"hidden": 0}), ("yang", {"grid": 0}),
-    ]  # fmt: skip
+        ("sdn", {"channels": 3}),
+        ("sdn", {"widths": (8, 8)}),
+        ("sdn", {"floor": 0.0}),
+        ("resnet18", {"frames": 0}),
+        ("resnet18", {"width": 0}),
+        ("cardona", {"hidden": 0}),
+        ("yang", {"grid": 0}),
+    ]
     assert not unrefused(lambda name, arguments: NETWORKS[name](**arguments), cases, InputError)

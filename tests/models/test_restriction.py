@@ -98,9 +98,10 @@ def test_components_are_as_probable_as_the_value_makes_them() -> None:
     wind = torch.tensor([_logit(2.0, 0), _logit(8.0, 0)], dtype=torch.float64)
     location = torch.stack([wind, torch.tensor([-3.0, 3.0], dtype=torch.float64), torch.zeros(2).double()], dim=1)
     mixture = Mixture(
-        log_weight=torch.tensor([[0.9, 0.1]]).double().log(), location=location[None],
+        log_weight=torch.tensor([[0.9, 0.1]]).double().log(),
+        location=location[None],
         factor=0.3 * torch.eye(3, dtype=torch.float64).expand(1, 2, 3, 3),
-    )  # fmt: skip
+    )
     light, _ = _given(mixture, _weighed("0.07", clips=1))
     heavy, _ = _given(mixture, _weighed("0.37", clips=1))
     assert light[..., 0].mean() == pytest.approx(2.0, abs=0.05)
@@ -155,9 +156,10 @@ def test_of_a_flag_that_was_measured_and_weighed_both_restrict_the_wind() -> Non
     scaling = Scaling(names=("outdoor_wind", "fabric_density", "log_aspect"))
     covariance = torch.tensor([[1.0, 0.7, 0.6], [0.7, 1.0, 0.1], [0.6, 0.1, 1.0]], dtype=torch.float64)
     mixture = Mixture(
-        log_weight=torch.zeros((1, 1), dtype=torch.float64), location=torch.zeros((1, 1, 3), dtype=torch.float64),
+        log_weight=torch.zeros((1, 1), dtype=torch.float64),
+        location=torch.zeros((1, 1, 3), dtype=torch.float64),
         factor=torch.linalg.cholesky(covariance)[None, None],
-    )  # fmt: skip
+    )
     weighed, measured = _weighed("0.2", clips=1), Known.of_aspect(3.0, 2.0, count=1)
     both = restricted(mixture, scaling, [weighed, measured], draws=DRAWS, generator=torch.Generator().manual_seed(1))
     values = scaling.values(both.logits)[0].numpy()

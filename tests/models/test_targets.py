@@ -94,8 +94,10 @@ def test_the_ranges_of_hanging_cloth_hold_all_that_its_scene_can_draw() -> None:
     own = [float(np.log10(base.bending).mean()) for base in spec.bases]
     bending = [scale + math.log10(factor) for scale in own for factor in ends(spec.bending)]
     for name, drawn in (
-        ("cloth_wind", ends(scene.wind.speed)), ("cloth_density", density), ("cloth_bending", bending),
-    ):  # fmt: skip
+        ("cloth_wind", ends(scene.wind.speed)),
+        ("cloth_density", density),
+        ("cloth_bending", bending),
+    ):
         target = TARGETS[name]
         assert target.low <= min(drawn)
         assert max(drawn) <= target.high

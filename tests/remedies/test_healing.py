@@ -36,9 +36,12 @@ def keep_measurement(lake: Lake) -> Artifact:
         staged.mkdir()
         (staged / "zarr.json").write_text("{}")
         row = Artifact(
-            kind=Kind.MEASUREMENT, name="wave", object=transaction.put(staged), recipe={"measure": 1},
+            kind=Kind.MEASUREMENT,
+            name="wave",
+            object=transaction.put(staged),
+            recipe={"measure": 1},
             code_version="1.0",
-        )  # fmt: skip
+        )
         transaction.add(row)
     return row
 

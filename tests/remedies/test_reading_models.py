@@ -41,17 +41,25 @@ def film(name: str, kind: Kind) -> None:
             if kind is Kind.RECORDING:
                 writer.wind(
                     WindSeries(
-                        time=START + samples * NANOSECONDS, flags=np.zeros(len(samples), dtype=np.uint16),
-                        channels={"wind_speed": np.interp(samples, *wind)}, sensor=Sensor(name="cup"),
+                        time=START + samples * NANOSECONDS,
+                        flags=np.zeros(len(samples), dtype=np.uint16),
+                        channels={"wind_speed": np.interp(samples, *wind)},
+                        sensor=Sensor(name="cup"),
                     )
-                )  # fmt: skip
+                )
         end = START + SECONDS * NANOSECONDS
         transaction.add(
             Artifact(
-                kind=kind, name=name, object=transaction.put(staged), start=START, end=end, rate=1.0,
-                frame_count=SECONDS + 1, recipe={"film": name},
+                kind=kind,
+                name=name,
+                object=transaction.put(staged),
+                start=START,
+                end=end,
+                rate=1.0,
+                frame_count=SECONDS + 1,
+                recipe={"film": name},
             )
-        )  # fmt: skip
+        )
 
 
 @pytest.fixture

@@ -67,10 +67,19 @@ def add_clip(user: User) -> None:
         transaction.hold(str(film.object))
         transaction.add(
             Artifact(
-                kind=Kind.CLIP, name="one", object=film.object, parents=[film.id], recording=film.id, frame_first=0,
-                frame_count=3, start=film.start, end=film.end, recipe={"clip": 1}, parameters="{}",
+                kind=Kind.CLIP,
+                name="one",
+                object=film.object,
+                parents=[film.id],
+                recording=film.id,
+                frame_first=0,
+                frame_count=3,
+                start=film.start,
+                end=film.end,
+                recipe={"clip": 1},
+                parameters="{}",
             )
-        )  # fmt: skip
+        )
 
 
 MADE = {

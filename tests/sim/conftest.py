@@ -59,10 +59,14 @@ def make_system() -> MakeSystem:
         position = torch.tensor(upright(mesh), dtype=dtype).unsqueeze(-1).repeat(1, 1, batch)
         vertices = torch.tensor(held.vertices, dtype=torch.int64)
         system = System(
-            cloth=cloth, gravity=torch.tensor(gravity, dtype=dtype)[:, None].repeat(1, batch),
+            cloth=cloth,
+            gravity=torch.tensor(gravity, dtype=dtype)[:, None].repeat(1, batch),
             wind=UniformWind(constant=torch.tensor(wind, dtype=dtype)[:, None].repeat(1, batch)),
-            air=air or QuadraticNormal(), handles=held, held=vertices, anchors=position[vertices].clone(),
-        )  # fmt: skip
+            air=air or QuadraticNormal(),
+            handles=held,
+            held=vertices,
+            anchors=position[vertices].clone(),
+        )
         return system, State(position=position, velocity=torch.zeros_like(position))
 
     return make

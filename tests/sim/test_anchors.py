@@ -32,9 +32,11 @@ INTEGRATORS = (BackwardEuler(tolerance=1e-10), Symplectic(), SplitEuler(base=Bac
 def _hung(*, stiffness: float = 1e3, offsets: float = 0.0) -> tuple[System, State]:
     """A cloth held at its two upper corners; with handles that move along x by so much in a tenth of a second."""
     held = Handles(
-        vertices=handles.top_corners(MESH.rest), stiffness=stiffness, times=(0.0, STEP),
+        vertices=handles.top_corners(MESH.rest),
+        stiffness=stiffness,
+        times=(0.0, STEP),
         offsets=((0.0, 0.0, 0.0), (offsets, 0.0, 0.0)),
-    )  # fmt: skip
+    )
     scene = Scene(mesh=MESH, position=upright(MESH), material=named("camel-ponte-roma"), handles=held)
     return assemble([scene], dtype=torch.float64)
 

@@ -33,10 +33,15 @@ from tests.refusals import unrefused
 MATERIAL = {"density": 0.284, "stretching": [[50, 1, 60, 40]] * 6, "bending": [[1e-5] * 5] * 3}
 SQUARE = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
 SCENE: dict[str, Any] = {
-    "frame_time": 0.04, "frame_steps": 8, "duration": 2,
-    "cloths": [{"mesh": "square.obj", "materials": [{"data": "m.json"}]}], "handles": [{"nodes": [0, 3]}],
-    "gravity": [0, 0, -9.8], "wind": {"velocity": [4, 1, 0]}, "disable": list(STAGES),
-}  # fmt: skip
+    "frame_time": 0.04,
+    "frame_steps": 8,
+    "duration": 2,
+    "cloths": [{"mesh": "square.obj", "materials": [{"data": "m.json"}]}],
+    "handles": [{"nodes": [0, 3]}],
+    "gravity": [0, 0, -9.8],
+    "wind": {"velocity": [4, 1, 0]},
+    "disable": list(STAGES),
+}
 Write = Callable[[dict[str, Any]], Path]
 
 
@@ -102,8 +107,11 @@ def test_everything_unsupported_is_reported_at_once(write: Write) -> None:
     entry = {"data": "m.json", "sheen": 1, "strain_limits": [0.95, 1.05]}
     changes = {
         **cloth(materials=[entry], texture="a.png", remeshing={"size": [0.02, 0.5]}),
-        "wind": {"velocity": [1, 0, 0], "gusts": 2}, "obstacles": [{"mesh": "pole.obj"}], "camera": {}, "disable": [],
-    }  # fmt: skip
+        "wind": {"velocity": [1, 0, 0], "gusts": 2},
+        "obstacles": [{"mesh": "pole.obj"}],
+        "camera": {},
+        "disable": [],
+    }
     with pytest.raises(InputError) as caught:
         read_scene(write(changes), accept=["collision"])
     what = caught.value.what
@@ -161,9 +169,13 @@ def test_a_scene_that_is_written_comes_back(
 ) -> None:
     scene = flag(material=replace(named("gray-interlock"), damping=1e-3), wind_speed=4.5, columns=6)
     scene = replace(
-        scene, air=QuadraticNormal(density=1.2, drag=0.1), gravity=(0.0, 0.1, -9.7), contact=contact, limits=limits,
+        scene,
+        air=QuadraticNormal(density=1.2, drag=0.1),
+        gravity=(0.0, 0.1, -9.7),
+        contact=contact,
+        limits=limits,
         handles=Handles(vertices=(0, 3, 34), stiffness=500.0),
-    )  # fmt: skip
+    )
     file = ArcsimScene(scene=scene, frame_time=0.04, frame_steps=8, frames=12)
     read = read_scene(write_scene(file, tmp_path / "run"))
     assert (read.frame_time, read.frame_steps, read.frames, read.left_out) == (0.04, 8, 12, ())

@@ -171,11 +171,13 @@ def test_negative_parameters_of_the_air_are_refused() -> None:
     cases = [QuadraticNormal, Stokes]
     assert (
         unrefused(
-            lambda air: air(**{"density" if air is QuadraticNormal else "viscosity": -1.0}), zip(cases), InputError,
+            lambda air: air(**{"density" if air is QuadraticNormal else "viscosity": -1.0}),
+            zip(cases),
+            InputError,
             "wind force",
         )
         == []
-    )  # fmt: skip
+    )
 
 
 def test_linearised_stiffness_is_the_derivative_of_the_force_at_small_strain(make_system, plain, distorted) -> None:

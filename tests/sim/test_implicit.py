@@ -113,9 +113,14 @@ def test_kernel_and_torch_take_the_same_step(stiffness, shape, dtype, tolerance,
     handles = Handles(vertices=(0, 4), stiffness=stiffness, times=(0.0, 0.1), offsets=((0, 0, 0), (0.02, 0.0, 0.01)))
     materials = [named(name) for name in ("camel-ponte-roma", "11oz-black-denim", "gray-interlock")]
     system, state = make_system(
-        distorted, materials, handles=handles, gravity=(0.0, 0.0, -9.81), wind=(5.0, 1.0, 0.0),
-        air=QuadraticNormal(density=1.2, drag=0.4), dtype=dtype,
-    )  # fmt: skip
+        distorted,
+        materials,
+        handles=handles,
+        gravity=(0.0, 0.0, -9.81),
+        wind=(5.0, 1.0, 0.0),
+        air=QuadraticNormal(density=1.2, drag=0.4),
+        dtype=dtype,
+    )
     bump = 0.02 * torch.sin(23 * state.position[:, 1])
     start = State(position=state.position + bump.unsqueeze(1), velocity=torch.cos(11 * state.position.roll(1, 1)))
     results = [

@@ -43,9 +43,15 @@ def test_kernel_and_torch_agree_to_rounding(
 ) -> None:
     handles = Handles(vertices=(0, 4), stiffness=stiffness, times=(0.0, 0.1), offsets=((0, 0, 0), (0.02, 0.0, 0.01)))
     system, state = make_system(
-        distorted, materials, handles=handles, gravity=(0.0, 0.0, -9.81), wind=(5.0, 1.0, 0.0),
-        air=QuadraticNormal(density=1.2, drag=0.4), evaluation=evaluation, dtype=dtype,
-    )  # fmt: skip
+        distorted,
+        materials,
+        handles=handles,
+        gravity=(0.0, 0.0, -9.81),
+        wind=(5.0, 1.0, 0.0),
+        air=QuadraticNormal(density=1.2, drag=0.4),
+        evaluation=evaluation,
+        dtype=dtype,
+    )
     start = stirred(state)
     # Forces: relative to the largest. Float32 loses digits in G = (C − 1)/2, which the stiffest table entry amplifies.
     drive = system.drive(0.0, 0.04)
@@ -152,8 +158,11 @@ def test_processes_that_build_at_once_all_get_a_kernel(tmp_path) -> None:
     quick.write_text(f'#!/bin/sh\nexec "{build.compiler()}" "$@" -O0\n')
     quick.chmod(0o755)
     environment = {
-        "FLAGDATA_CACHE": str(cache), "PATH": "/usr/bin:/bin", "OMP_NUM_THREADS": "1", "CXX": str(quick),
-    }  # fmt: skip
+        "FLAGDATA_CACHE": str(cache),
+        "PATH": "/usr/bin:/bin",
+        "OMP_NUM_THREADS": "1",
+        "CXX": str(quick),
+    }
     running = [subprocess.Popen([sys.executable, "-c", code], env=environment) for _ in range(2)]
     assert [process.wait(timeout=500) for process in running] == [0, 0]
     assert len(list(cache.glob("kernel-*.so"))) == 1

@@ -36,9 +36,13 @@ FABRICS = ("camel-ponte-roma", "white-swim-solid", "royal-target")
 def flapping(make_system, distorted):
     """Three fabrics in a breeze, held by springs at two corners: a system and its start."""
     return make_system(
-        distorted, [named(name) for name in FABRICS], handles=Handles(vertices=(0, 28)), gravity=(0.0, 0.0, -9.81),
-        wind=(3.0, 0.5, 0.0), dtype=torch.float32,
-    )  # fmt: skip
+        distorted,
+        [named(name) for name in FABRICS],
+        handles=Handles(vertices=(0, 28)),
+        gravity=(0.0, 0.0, -9.81),
+        wind=(3.0, 0.5, 0.0),
+        dtype=torch.float32,
+    )
 
 
 def test_a_second_of_flags_is_the_compiled_kernels_to_a_tenth_of_a_millimetre() -> None:
@@ -62,9 +66,15 @@ def test_a_second_of_flags_is_the_compiled_kernels_to_a_tenth_of_a_millimetre() 
 def test_twenty_steps_agree_with_torch_to_rounding(evaluation, stiffness, make_system, distorted) -> None:
     handles = Handles(vertices=(0, 4), stiffness=stiffness, times=(0.0, 0.1), offsets=((0, 0, 0), (0.02, 0.0, 0.01)))
     system, state = make_system(
-        distorted, [named(name) for name in FABRICS], handles=handles, gravity=(0.0, 0.0, -9.81), wind=(5.0, 1.0, 0.0),
-        air=QuadraticNormal(density=1.2, drag=0.4), evaluation=evaluation, dtype=torch.float32,
-    )  # fmt: skip
+        distorted,
+        [named(name) for name in FABRICS],
+        handles=handles,
+        gravity=(0.0, 0.0, -9.81),
+        wind=(5.0, 1.0, 0.0),
+        air=QuadraticNormal(density=1.2, drag=0.4),
+        evaluation=evaluation,
+        dtype=torch.float32,
+    )
     x = state.position
     bump = 0.05 * torch.sin(23 * x[:, 1]) * torch.cos(17 * x[:, 2])
     folded = x * 1.02 + torch.stack([bump, 0.1 * bump, torch.zeros_like(bump)], dim=1)

@@ -115,9 +115,12 @@ def test_what_handles_hold_is_not_moved_by_the_limits(backend, stiffness, make_s
 def test_kernel_and_torch_limit_alike(dtype, tolerance, sweeps, stiffness, make_system, distorted) -> None:
     handles = Handles(vertices=(0, 4), stiffness=stiffness)
     system, state = make_system(
-        distorted, [named("camel-ponte-roma"), named("gray-interlock")], handles=handles, wind=(5.0, 0.0, 0.0),
+        distorted,
+        [named("camel-ponte-roma"), named("gray-interlock")],
+        handles=handles,
+        wind=(5.0, 0.0, 0.0),
         dtype=dtype,
-    )  # fmt: skip
+    )
     system = replace(system, limits=StrainLimits(sweeps=sweeps))
     start = State(position=state.position * 1.1, velocity=torch.cos(9 * state.position.roll(1, 1)))
     results = [advance(system, start, 2e-3, steps=20, backend=b) for b in (Backend.TORCH, Backend.KERNEL)]

@@ -52,9 +52,12 @@ def test_a_fingerprint_depends_on_mass_and_stiffness_alone() -> None:
     assert len({cloth.fingerprint, *(other.fingerprint for other in others)}) == 4
     # Of the numbers, not of the object: as after a trip through a file.
     again = Material(
-        name="again", source="", density=float(str(cloth.density)), stretching=cloth.stretching.copy(),
+        name="again",
+        source="",
+        density=float(str(cloth.density)),
+        stretching=cloth.stretching.copy(),
         bending=cloth.bending.copy(),
-    )  # fmt: skip
+    )
     assert again.fingerprint == cloth.fingerprint
 
 
@@ -69,11 +72,15 @@ def test_thicker_cloth_is_heavier_and_stiffer_by_the_same_factor() -> None:
 
 def test_impossible_materials_are_refused_with_the_reason() -> None:
     cases = [
-        ({"density": -0.1}, "density"), ({"density": float("nan")}, "density"), ({"damping": -1.0}, "damping"),
-        ({"stretching": np.zeros((5, 4))}, "stretching"), ({"bending": -np.ones((3, 5))}, "bending"),
-        ({"bending": np.full((3, 5), np.inf)}, "bending"), ({"stretching": -np.ones((6, 4))}, "stiffness"),
+        ({"density": -0.1}, "density"),
+        ({"density": float("nan")}, "density"),
+        ({"damping": -1.0}, "damping"),
+        ({"stretching": np.zeros((5, 4))}, "stretching"),
+        ({"bending": -np.ones((3, 5))}, "bending"),
+        ({"bending": np.full((3, 5), np.inf)}, "bending"),
+        ({"stretching": -np.ones((6, 4))}, "stiffness"),
         ({"stretching": [["a"] * 4] * 6}, "numbers"),
-    ]  # fmt: skip
+    ]
     assert not unrefused(lambda change: replace(material.named("paper"), **change), cases, InputError)
 
 

@@ -56,9 +56,13 @@ def test_friction_slows_a_sliding_sheet_exponentially_and_at_second_order_of_the
 def test_the_error_falls_with_the_square_of_the_outer_step(make_system, plain, distorted) -> None:
     # Neither damping nor air in the base model, whose own error would depend on how often it starts afresh.
     system, state = make_system(
-        distorted, [plain], handles=Handles(vertices=(0, 4)), gravity=(0.0, 0.0, -9.81), wind=(5.0, 1.0, 0.0),
+        distorted,
+        [plain],
+        handles=Handles(vertices=(0, 4)),
+        gravity=(0.0, 0.0, -9.81),
+        wind=(5.0, 1.0, 0.0),
         air=NO_AIR,
-    )  # fmt: skip
+    )
     system, state = apply([Lift(coefficient=1.0)], system, state)
     fine = advance(system, state, 0.064, steps=1280, outer=1280)
     errors = []

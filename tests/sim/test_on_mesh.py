@@ -95,9 +95,11 @@ def test_folds_are_those_of_torch(cloth: Cloth) -> None:
 @pytest.mark.parametrize(
     "air",
     [
-        QuadraticNormal(density=1.2, drag=0.1), NO_AIR, Stokes(),
+        QuadraticNormal(density=1.2, drag=0.1),
+        NO_AIR,
+        Stokes(),
     ],
-)  # fmt: skip
+)
 def test_a_force_of_the_air_is_its_plain_one_and_what_is_beyond(cloth: Cloth, air) -> None:
     given = position(cloth), field(cloth, 2), field(cloth, 3, size=5.0)
     whole = air.plain.force(cloth, *given) + air.beyond(cloth, *given)

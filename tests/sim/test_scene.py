@@ -45,10 +45,13 @@ def test_members_differ_in_material_and_wind_but_not_in_mesh() -> None:
 
 def test_impossible_scenes_are_refused_with_the_reason() -> None:
     cases = [
-        ({"wind": (float("nan"), 0, 0)}, "wind"), ({"gravity": (0, 0)}, "gravity"),
-        ({"position": np.zeros((3, 3))}, "positions have shape"), ({"position": np.full((35, 3), np.inf)}, "finite"),
-        ({"handles": Handles(vertices=())}, "not held"), ({"handles": Handles(vertices=(35,))}, "held vertex 35"),
-    ]  # fmt: skip
+        ({"wind": (float("nan"), 0, 0)}, "wind"),
+        ({"gravity": (0, 0)}, "gravity"),
+        ({"position": np.zeros((3, 3))}, "positions have shape"),
+        ({"position": np.full((35, 3), np.inf)}, "finite"),
+        ({"handles": Handles(vertices=())}, "not held"),
+        ({"handles": Handles(vertices=(35,))}, "held vertex 35"),
+    ]
     assert (
         unrefused(lambda change: replace(flag(material=CAMEL, wind_speed=4, columns=6), **change), cases, InputError)
         == []

@@ -133,9 +133,13 @@ def _recording(lake: Lake, seen: Seen) -> Recording:
     if wind is None or subject.artifact is None or subject.film.start is None:
         raise ValueError("a film of the data set has a log")
     return Recording(
-        name=FIRST, identity=subject.artifact.id, features=seen.features, sensor=wind.sensor, findings=seen.findings,
+        name=FIRST,
+        identity=subject.artifact.id,
+        features=seen.features,
+        sensor=wind.sensor,
+        findings=seen.findings,
         log=Log.of(wind, start=subject.film.start).unlagged(),
-    )  # fmt: skip
+    )
 
 
 def _air(cast: Cast, index: int) -> tuple[Floats, Floats]:
@@ -165,12 +169,16 @@ def _row(name: str, subject: Subject, seen: Seen, found: Measurement, truth: tup
         references["samples"] = series.logged
     verdict = found.verdict
     return {
-        "film": name, "windows": len(starts), "wind": [float(logged.min()), float(logged.max())],
-        "refused": verdict.refused, "reasons": [one.what for one in verdict.faults], "verdict": verdict.sentence,
+        "film": name,
+        "windows": len(starts),
+        "wind": [float(logged.min()), float(logged.max())],
+        "refused": verdict.refused,
+        "reasons": [one.what for one in verdict.faults],
+        "verdict": verdict.sentence,
         "median_p": verdict.p,
         "read": {key: _agreement(series.wind, series.low, series.high, value) for key, value in references.items()},
         "alone": {key: _error(alone - value) for key, value in references.items()},
-    }  # fmt: skip
+    }
 
 
 def _agreement(read: Floats, low: Floats, high: Floats, reference: Floats) -> dict[str, float]:
@@ -185,13 +193,15 @@ def _error(off: Floats) -> dict[str, float]:
 def page(sheet: Mapping[str, Any]) -> str:
     """The sheet in Markdown."""
     lines = [
-        "# The flag as an anemometer", "",
+        "# The flag as an anemometer",
+        "",
         f"Seed {sheet['seed']}; calibrated on the first half of the film `{FIRST}`.",
         "RMSE in m/s over windows: against the cup (its mean over the window, linear between samples), against the",
         "samples in the window, as `flagdata measure` compares, and against the true wind at the flag. Within: share",
         f"of windows whose interval of {LEVEL:.0%} contains that. Last, the network alone against the cup",
-        "(`python -m tests.validation anemometer`).", "",
-    ]  # fmt: skip
+        "(`python -m tests.validation anemometer`).",
+        "",
+    ]
     for name, found in sheet["networks"].items():
         lines += [
             f"## With the summary of `{name}`",
@@ -207,7 +217,7 @@ def _table(films: Sequence[Mapping[str, Any]]) -> list[str]:
     lines = [
         "| film | windows | wind [m/s] | refused | cup | samples | flag | within, cup | within, flag | network alone |",
         "|---|---|---|---|---|---|---|---|---|---|",
-    ]  # fmt: skip
+    ]
     for row in films:
         read = row["read"]
         samples = f"{read['samples']['rmse']:.2f}" if "samples" in read else ""

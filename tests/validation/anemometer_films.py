@@ -49,9 +49,15 @@ _ABOUT = 0.25
 """Share of the first film's mean wind within which another day's lies."""
 _DAY = 86_400 * NANOSECONDS
 _OF_LIGHT = (
-    "sun_height", "sun_radius", "sun_azimuth", "sun_strength", "sun_softness", "sky_strength", "exposure_bias",
+    "sun_height",
+    "sun_radius",
+    "sun_azimuth",
+    "sun_strength",
+    "sun_softness",
+    "sky_strength",
+    "exposure_bias",
     "exposure_time",
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,25 +91,42 @@ def shots(seed: int, *, first: float) -> Iterator[tuple[str, Shot]]:
     member = Crew(cast.simulation).member(index)
     own = next(Sequences(recipe=recipe, side="test", members=((cast, index, "0" * 32),)).films())
     day = _of(
-        cast, "day", SECONDS[DAY], child_seed(seed, "another day"),
-        material=MaterialSpec(bases=(member.scene.material,)), mean=member.wind_speed,
-    )  # fmt: skip
-    flag = _of(
-        cast, "flag", SECONDS[FLAG], child_seed(seed, "another flag"), material=cast.simulation.material,
+        cast,
+        "day",
+        SECONDS[DAY],
+        child_seed(seed, "another day"),
+        material=MaterialSpec(bases=(member.scene.material,)),
         mean=member.wind_speed,
-    )  # fmt: skip
+    )
+    flag = _of(
+        cast,
+        "flag",
+        SECONDS[FLAG],
+        child_seed(seed, "another flag"),
+        material=cast.simulation.material,
+        mean=member.wind_speed,
+    )
     lit = replace(recipe, prior=_in_other_light(recipe, child_seed(seed, "another light")))
     elsewhere = child_seed(seed, "another place")
     yield own.name, Shot(recipe=recipe, film=own, frames=time.frames)
     wanted = (
-        (DAY, lit, day, own.look, 1), (LIGHT, recipe, day, own.look, 1), (PLACE, recipe, day, elsewhere, 2),
+        (DAY, lit, day, own.look, 1),
+        (LIGHT, recipe, day, own.look, 1),
+        (PLACE, recipe, day, elsewhere, 2),
         (FLAG, lit, flag, own.look, 3),
-    )  # fmt: skip
+    )
     for name, shown, simulated, look, number in wanted:
         film = replace(
-            own, name=name, cast=simulated, index=0, sequence_seed=child_seed(simulated.simulation.seed, "member", 0),
-            begin=EPOCH + number * _DAY, look=look, seed=child_seed(seed, "film", name), filming=shown.filming(),
-        )  # fmt: skip
+            own,
+            name=name,
+            cast=simulated,
+            index=0,
+            sequence_seed=child_seed(simulated.simulation.seed, "member", 0),
+            begin=EPOCH + number * _DAY,
+            look=look,
+            seed=child_seed(seed, "film", name),
+            filming=shown.filming(),
+        )
         yield name, Shot(recipe=shown, film=film, frames=round(SECONDS[name] * rate))
 
 
@@ -111,10 +134,15 @@ def _of(cast: Cast, name: str, seconds: float, seed: int, *, material: MaterialS
     simulation = cast.simulation
     around = Range(low=mean * (1 - _ABOUT), high=mean * (1 + _ABOUT))
     own = replace(
-        simulation, name=f"{simulation.name}-{name}", seed=seed, count=1, batch=1, material=material,
+        simulation,
+        name=f"{simulation.name}-{name}",
+        seed=seed,
+        count=1,
+        batch=1,
+        material=material,
         wind=replace(simulation.wind, speed=around),
         time=replace(simulation.time, settle=_SETTLED, frames=round(seconds * simulation.time.rate)),
-    )  # fmt: skip
+    )
     return replace(cast, simulation=own)
 
 
@@ -147,8 +175,15 @@ def make(folder: Path, seed: int, *, first: float = 600.0) -> Lake:
             stored = transaction.put(staged)
             times = Record.open(lake.object_path(stored)).frame_times
             rate = (len(times) - 1) * NANOSECONDS / (done.end - done.start)
-            row = replace(film.artifact(), object=stored, start=done.start, end=done.end, rate=rate,
-                          frame_count=len(times), parameters=done.parameters)  # fmt: skip
+            row = replace(
+                film.artifact(),
+                object=stored,
+                start=done.start,
+                end=done.end,
+                rate=rate,
+                frame_count=len(times),
+                parameters=done.parameters,
+            )
             transaction.add(row)
     return lake
 

@@ -25,8 +25,13 @@ from tests.validation.flags_runs import CAMEL, one_core
 from tests.verification.motion import edge_motion
 
 RATE = 25.0
-RUNS = {("0.5 ms", 0.0): "flag_w0_dt05", ("0.5 ms", 4.0): "flag_w4_dt05", ("5 ms", 0.0): "flag_w0_dt5",
-        ("5 ms", 4.0): "flag_w4_dt5", ("5 ms", 8.0): "flag_w8_dt5"}  # fmt: skip
+RUNS = {
+    ("0.5 ms", 0.0): "flag_w0_dt05",
+    ("0.5 ms", 4.0): "flag_w4_dt05",
+    ("5 ms", 0.0): "flag_w0_dt5",
+    ("5 ms", 4.0): "flag_w4_dt5",
+    ("5 ms", 8.0): "flag_w8_dt5",
+}
 SHORT = 25
 """Frames in which vertices are compared one by one: later the motion is chaotic."""
 FIRST, LAST = 50, 151
@@ -192,16 +197,35 @@ def draw_reference(
         axes.legend(frameon=False, fontsize=6.5, loc="lower right")
     upper.axes[0].set_ylabel("mean vertex distance [mm]\n(bars: accepted)")
     panels = lower.subplots(1, 5)
-    labels = {"x": "mean x (downwind) [m]", "y": "mean y (across) [m]", "z": "mean z (up) [m]",
-              "speed": "mean |v| [m/s]", "frequency": "frequency [Hz]"}  # fmt: skip
+    labels = {
+        "x": "mean x (downwind) [m]",
+        "y": "mean y (across) [m]",
+        "z": "mean z (up) [m]",
+        "speed": "mean |v| [m/s]",
+        "frequency": "frequency [Hz]",
+    }
     for axes, (name, label) in zip(panels, labels.items(), strict=True):
         for place, rows in enumerate(compared.values()):
             values = np.array(rows[name]["runs"])
             axes.plot(np.full(len(values), place), values, ".", color="#b5541c", alpha=0.4)
-            axes.errorbar(place + 0.15, values.mean(), yerr=values.std(ddof=1), fmt="o", color="#b5541c", ms=4,
-                          capsize=3, label="replicates" if not place else None)  # fmt: skip
-            axes.plot(place - 0.15, rows[name]["reference"], "D", color="black", mfc="none",
-                      label="ArcSim, its one run" if not place else None)  # fmt: skip
+            axes.errorbar(
+                place + 0.15,
+                values.mean(),
+                yerr=values.std(ddof=1),
+                fmt="o",
+                color="#b5541c",
+                ms=4,
+                capsize=3,
+                label="replicates" if not place else None,
+            )
+            axes.plot(
+                place - 0.15,
+                rows[name]["reference"],
+                "D",
+                color="black",
+                mfc="none",
+                label="ArcSim, its one run" if not place else None,
+            )
             band = {"speed": 0.15, "frequency": 0.20}.get(name)
             half = band * rows[name]["reference"] if band else 0.05
             axes.plot(
@@ -212,8 +236,9 @@ def draw_reference(
     panels[3].legend(frameon=False, fontsize=8)
     lower.suptitle(
         f"Settled, frames {FIRST} to {LAST - 1}, {REPLICATES} starts with 0.1 mm of noise (1 nm without wind); black "
-        "bars: accepted (5 cm, 15 %, 20 %), coloured: standard deviation of one run", fontsize=9,
-    )  # fmt: skip
+        "bars: accepted (5 cm, 15 %, 20 %), coloured: standard deviation of one run",
+        fontsize=9,
+    )
     upper.suptitle("The same flag, mesh, material and wind; contact and strain limits off", fontsize=10)
     figure.savefig(path, dpi=95)
 

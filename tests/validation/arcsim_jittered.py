@@ -120,23 +120,39 @@ def _recording(path: Path, wind: int) -> Observation:
     with np.load(path) as content:
         positions, rest, faces = (content[part] for part in ("q", "rest", "faces"))
     return from_arrays(
-        name=f"{wind} m-s", positions=_UNIT * positions.astype(np.float64), rest=rest.astype(np.float64),
-        faces=faces.astype(np.int64), rate=RATE, wind=WindTrack.constant((float(wind), 0.0, 0.0)),
-    )  # fmt: skip
+        name=f"{wind} m-s",
+        positions=_UNIT * positions.astype(np.float64),
+        rest=rest.astype(np.float64),
+        faces=faces.astype(np.int64),
+        rate=RATE,
+        wind=WindTrack.constant((float(wind), 0.0, 0.0)),
+    )
 
 
 def _record(verdict: Verdict, truth: Truth) -> dict[str, Any]:
     wanted = {"density": 1.0, "bending": 1.0} | dict(truth.parameters)
     shown = {p.name: p.before if p.after is None else p.after for p in verdict.parameters}
     return {
-        "said": verdict.conclusion.value, "named": list(verdict.named), "right": _right(verdict, truth),
-        "p": verdict.test.p_value.value, "p low": verdict.test.p_value.low, "p high": verdict.test.p_value.high,
-        "statistic": verdict.test.statistic, "critical": verdict.test.critical, "kinds": verdict.test.kinds,
+        "said": verdict.conclusion.value,
+        "named": list(verdict.named),
+        "right": _right(verdict, truth),
+        "p": verdict.test.p_value.value,
+        "p low": verdict.test.p_value.low,
+        "p high": verdict.test.p_value.high,
+        "statistic": verdict.test.statistic,
+        "critical": verdict.test.critical,
+        "kinds": verdict.test.kinds,
         "parameters": {name: _interval(own, wanted.get(name)) for name, own in shown.items()},
         "candidates": [
             {
-                "effect": c.effect, "low": c.strength.low, "value": c.strength.value, "high": c.strength.high,
-                "gain": c.gain, "behind": c.behind, "leftover": c.leftover, "heterogeneity": c.heterogeneity,
+                "effect": c.effect,
+                "low": c.strength.low,
+                "value": c.strength.value,
+                "high": c.strength.high,
+                "gain": c.gain,
+                "behind": c.behind,
+                "leftover": c.leftover,
+                "heterogeneity": c.heterogeneity,
                 "why not": c.why_not,
             }
             for c in verdict.ranking[:_SHOWN]
@@ -145,8 +161,9 @@ def _record(verdict: Verdict, truth: Truth) -> dict[str, Any]:
             {"what": c.what, "before": c.before.value, "after": c.after.value, "floor": c.floor.value}
             for c in verdict.comparisons
         ],
-        "words": verdict.words, "seconds": round(verdict.seconds),
-    }  # fmt: skip
+        "words": verdict.words,
+        "seconds": round(verdict.seconds),
+    }
 
 
 def _right(verdict: Verdict, truth: Truth) -> bool:
@@ -174,10 +191,11 @@ def _page(results: Mapping[str, Any]) -> str:
 
 def _table(heading: str, verdicts: Mapping[str, Any]) -> list[str]:
     lines = [
-        f"## {heading}", "",
+        f"## {heading}",
+        "",
         "| what acted | verdict | p | density, of nominal | bending, of nominal | damping [ms] | right | s |",
         "|---|---|---|---|---|---|---|---|",
-    ]  # fmt: skip
+    ]
     for name, own in verdicts.items():
         found = own["parameters"]
         lines.append(

@@ -112,10 +112,15 @@ def tracked(folder: Path, *, until: float = np.inf) -> Tracked:
     log = np.array([[at, float(raw)] for at, raw in _lines(folder / "gt_log.csv") if at < until])
     frame = float(np.median(steps))
     return Tracked(
-        stamps=stamps, motion=rows[:, 2], frequency=rows[:, 3], estimate=rows[:, 5], sound=~recent,
-        clock=Stated(low=segment.offset, high=segment.offset, sigma=frame), rate=1 / frame,
+        stamps=stamps,
+        motion=rows[:, 2],
+        frequency=rows[:, 3],
+        estimate=rows[:, 5],
+        sound=~recent,
+        clock=Stated(low=segment.offset, high=segment.offset, sigma=frame),
+        rate=1 / frame,
         log=Readings(times=log[:, 0], speed=log[:, 1]),
-    )  # fmt: skip
+    )
 
 
 def _lines(path: Path) -> Iterable[tuple[float, str]]:
@@ -163,7 +168,7 @@ def stages(found: Tracked, rows: Rows, places: NDArray[np.int64], answer: Disagr
         "anemometer's zero": own + zero - log.means(rows.times + clock, rows.span),
         "flag's law": dead.errors(rows, log),
         "anemometer's dead zone": answer.errors(rows, log),
-    }  # fmt: skip
+    }
 
 
 def root_mean_square(errors: Floats, rows: Rows, use: Mask, *, seed: int) -> dict[str, Any]:
@@ -175,8 +180,13 @@ def root_mean_square(errors: Floats, rows: Rows, use: Mask, *, seed: int) -> dic
     resamples = Resamples.of(blocks, generator=stream(seed, "card-flag", "bootstrap"))
     sums = resamples.sums(np.stack([np.square(errors[use]), np.ones(int(use.sum()))], axis=1))
     found = estimate(np.sqrt(ratio(sums[:, 0], sums[:, 1])), clips=int(use.sum()), groups=resamples.groups)
-    return {"rmse": found.value, "interval": [found.low, found.high], "rows": found.clips, "blocks": found.groups,
-            "bias": float(errors[use].mean())}  # fmt: skip
+    return {
+        "rmse": found.value,
+        "interval": [found.low, found.high],
+        "rows": found.clips,
+        "blocks": found.groups,
+        "bias": float(errors[use].mean()),
+    }
 
 
 def long_rows(found: Tracked, rows: Rows) -> Rows:
@@ -207,8 +217,11 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     parts = {"fitted": opened, "fitted, calm": opened & ~blowing, "fitted, in wind": opened & blowing}
     parts |= {"judged": judged} if judge else {}
     sheet: dict[str, Any] = {
-        "clock": [found.clock.low, found.clock.sigma], "frame_rate": found.rate, "rest": rows.rest,
-        "fit": table, "rows": len(rows.times),
+        "clock": [found.clock.low, found.clock.sigma],
+        "frame_rate": found.rate,
+        "rest": rows.rest,
+        "fit": table,
+        "rows": len(rows.times),
         "stages": {
             name: {part: root_mean_square(own, rows, use, seed=seed) for part, use in parts.items()}
             for name, own in errors.items()
@@ -223,7 +236,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             }
             for name in EFFECTS
         },
-    }  # fmt: skip
+    }
     steady = blowing & (found.log.means(rows.times + found.clock.low, rows.span) > 8.0)
     for part, use in (("fitted", opened), *((("judged", judged),) if judge else ())):
         own = use & steady
@@ -236,7 +249,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             "scatter_of_a_second": float(np.log(rows.values[own]).std()) if own.any() else None,
             "scatter_of_2.5_s": float(np.log(long.values[wide]).std()) if wide.any() else None,
             "long_rows": int(wide.sum()),
-        }  # fmt: skip
+        }
     final = errors["anemometer's dead zone"]
     own = {"fitted": long.times + LONG / 2 < OPENED, "judged": long.times - LONG / 2 > OPENED}
     sheet["over_2.5_s"] = {

@@ -42,8 +42,9 @@ LASTING = 4.6  # s of each: two segments
 VERTICES = 36
 _MOVED = 0.05  # m, from where it hangs
 CONTROLS: dict[str, tuple[Effect, ...]] = {
-    "nothing": (), "tangential-linear-drag 0.8 kg/(m² s)": (EFFECTS["tangential-linear-drag"](coefficient=0.8),),
-}  # fmt: skip
+    "nothing": (),
+    "tangential-linear-drag 0.8 kg/(m² s)": (EFFECTS["tangential-linear-drag"](coefficient=0.8),),
+}
 """What acts in the controls."""
 
 
@@ -62,9 +63,14 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         made = recorded(seen.experiment, effects, seed=child_seed(seed, "control", acting))
         found[f"made along the same ways, acting: {acting}"] = _row(close_loop(made, options))
     settings = {
-        "recordings": list(RECORDINGS), "rate": RATE, "seconds": LASTING, "kinds": KINDS, "vertices": VERTICES,
-        "noise": [own.noise for own in seen.experiment.recordings], "findings": [one.what for one in seen.findings],
-    }  # fmt: skip
+        "recordings": list(RECORDINGS),
+        "rate": RATE,
+        "seconds": LASTING,
+        "kinds": KINDS,
+        "vertices": VERTICES,
+        "noise": [own.noise for own in seen.experiment.recordings],
+        "findings": [one.what for one in seen.findings],
+    }
     document = {**settings, "verdicts": found}
     (out / "validate-carried-cloth.md").write_text(page(document), encoding="utf-8")
     return document
@@ -73,9 +79,13 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 def setup(cloth: Cloth) -> Setup:
     """The square of nodes, held at its upper corners; the cloth's mass is not published."""
     return Setup(
-        outline=sheet(cloth.width, cloth.height), material=cloth.material, mass_known=False, pins=Hold.TOP_CORNERS,
-        carried=True, vertices=VERTICES,
-    )  # fmt: skip
+        outline=sheet(cloth.width, cloth.height),
+        material=cloth.material,
+        mass_known=False,
+        pins=Hold.TOP_CORNERS,
+        carried=True,
+        vertices=VERTICES,
+    )
 
 
 def observed(cloth: Cloth, swing: Swing) -> Observation:
@@ -102,23 +112,33 @@ def recorded(experiment: Experiment, effects: Sequence[Effect], *, seed: int) ->
     lasting = min(float(r.times[-1]) for r in aligned.recordings)
     noise = max(r.noise for r in aligned.recordings)
     batch = NullBatch(
-        specimen=specimen, markers=first.markers, rate=first.rate, duration=lasting, noise=noise,
-        calibrations=(Calibration(density=1.1, bending=1.5, damping=3e-3),) * count, speeds=(0.0,) * count, seed=seed,
+        specimen=specimen,
+        markers=first.markers,
+        rate=first.rate,
+        duration=lasting,
+        noise=noise,
+        calibrations=(Calibration(density=1.1, bending=1.5, damping=3e-3),) * count,
+        speeds=(0.0,) * count,
+        seed=seed,
         tracks=tracks.like(aligned.recordings, specimen.seats, count, duration=lasting, seed=seed),
         effects=tuple(effects),
-    )  # fmt: skip
+    )
     return replace(aligned, recordings=tuple(batch.simulate()))
 
 
 def page(document: dict[str, Any]) -> str:
     """The verdicts as a page of Markdown."""
     lines = [
-        "# A verdict on a cloth carried by a robot", "", _DATA.format(**document), "",
+        "# A verdict on a cloth carried by a robot",
+        "",
+        _DATA.format(**document),
+        "",
         "| data | conclusion | p | statistic | nulls' largest | error of forecasts [mm] | density, bending, damping |",
         "|---|---|---|---|---|---|---|",
-        *(f"| {name} | {_cells(row)} |" for name, row in document["verdicts"].items()), "",
+        *(f"| {name} | {_cells(row)} |" for name, row in document["verdicts"].items()),
+        "",
         *(f"- *{name}*: {row['words']}" for name, row in document["verdicts"].items()),
-    ]  # fmt: skip
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -141,12 +161,18 @@ def _cells(row: dict[str, Any]) -> str:
 def _row(verdict: Verdict) -> dict[str, Any]:
     squares = np.concatenate([np.square(own.in_time) for own in verdict.residuals])
     return {
-        "conclusion": verdict.conclusion.value, "named": list(verdict.named), "words": verdict.words,
-        "p": verdict.test.p_value.value, "statistic": verdict.test.statistic, "largest_null": max(verdict.test.null),
-        "kinds": verdict.test.kinds, "nulls": verdict.test.nulls, "error": float(np.sqrt(squares.mean())),
+        "conclusion": verdict.conclusion.value,
+        "named": list(verdict.named),
+        "words": verdict.words,
+        "p": verdict.test.p_value.value,
+        "statistic": verdict.test.statistic,
+        "largest_null": max(verdict.test.null),
+        "kinds": verdict.test.kinds,
+        "nulls": verdict.test.nulls,
+        "error": float(np.sqrt(squares.mean())),
         "parameters": {p.name: p.before.value for p in verdict.parameters},
         "ranking": [[c.effect, c.strength.value, c.why_not] for c in verdict.ranking[:5]],
-    }  # fmt: skip
+    }
 
 
 def _bank(experiment: Experiment, seed: int) -> Options:

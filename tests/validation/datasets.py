@@ -98,13 +98,19 @@ def evidence(unbroken: Built, killed: Built) -> dict[str, Any]:
     rows = lake.rows(columns=["kind", "object", "object_bytes"]).to_pylist()
     sizes = {row["object"]: row["object_bytes"] or 0 for row in rows}  # clips are rows of their recording's object
     return {
-        "recipe": recipe.name, "recipe_hash": recipe.hash, "workers": WORKERS,
-        "rows": dict(Counter(row["kind"] for row in rows)), "bytes": sum(sizes.values()),
-        "seconds_unbroken": unbroken.seconds, "seconds_after_last_kill": killed.seconds,
-        "artifacts_at_kills": list(killed.kills), "comparison": compare(lake, Lake.open(killed.lake)),
+        "recipe": recipe.name,
+        "recipe_hash": recipe.hash,
+        "workers": WORKERS,
+        "rows": dict(Counter(row["kind"] for row in rows)),
+        "bytes": sum(sizes.values()),
+        "seconds_unbroken": unbroken.seconds,
+        "seconds_after_last_kill": killed.seconds,
+        "artifacts_at_kills": list(killed.kills),
+        "comparison": compare(lake, Lake.open(killed.lake)),
         "problems": [finding.kind for finding in doctor(lake) if finding.severity != "note"],
-        "loading": loading(unbroken.lake, recipe), "leak": leak(lake, recipe),
-    }  # fmt: skip
+        "loading": loading(unbroken.lake, recipe),
+        "leak": leak(lake, recipe),
+    }
 
 
 def compare(one: Lake, other: Lake) -> dict[str, Any]:
@@ -115,11 +121,15 @@ def compare(one: Lake, other: Lake) -> dict[str, Any]:
     different = Counter(column for id_ in common for column in columns if first[id_][column] != second[id_][column])
     names = [sorted(object_names(lake)) for lake in (one, other)]
     return {
-        "rows": [len(first), len(second)], "rows_in_both": len(common), "columns": len(columns),
-        "columns_left_out": list(UNEQUAL), "rows_that_differ_by_column": dict(different),
-        "objects": [len(names[0]), len(names[1])], "same_objects": names[0] == names[1],
+        "rows": [len(first), len(second)],
+        "rows_in_both": len(common),
+        "columns": len(columns),
+        "columns_left_out": list(UNEQUAL),
+        "rows_that_differ_by_column": dict(different),
+        "objects": [len(names[0]), len(names[1])],
+        "same_objects": names[0] == names[1],
         "objects_missing_or_changed": [len(verify(lake, own)) for lake, own in zip((one, other), names, strict=True)],
-    }  # fmt: skip
+    }
 
 
 def loading(lake: Path, recipe: DatasetRecipe) -> dict[str, Any]:
@@ -133,9 +143,12 @@ def loading(lake: Path, recipe: DatasetRecipe) -> dict[str, Any]:
             clips += len(batch.wind)
         seconds = time.perf_counter() - begun
         found[side.name] = {
-            "pairs": len(pairs), "refused": len(pairs.refused), "clips": clips, "clips_per_second": clips / seconds,
+            "pairs": len(pairs),
+            "refused": len(pairs.refused),
+            "clips": clips,
+            "clips_per_second": clips / seconds,
             "clip": list(pairs[0].clip.shape),
-        }  # fmt: skip
+        }
     return found
 
 
@@ -156,16 +169,21 @@ def leak(lake: Lake, recipe: DatasetRecipe) -> dict[str, Any]:
         for guess, values in accuracies(around.features, deals, around.sequence).items():
             chances[guess].append(values.reshape(TOGETHER, len(targets)))
     result: dict[str, Any] = {
-        "films": len(labels), "sequences": len(np.unique(around.sequence)), "parameters": len(targets), "deals": DEALS,
-        "different_sizes": _different(around, "size"), "different_frame_lengths": _different(around, "mean frame"),
-    }  # fmt: skip
+        "films": len(labels),
+        "sequences": len(np.unique(around.sequence)),
+        "parameters": len(targets),
+        "deals": DEALS,
+        "different_sizes": _different(around, "size"),
+        "different_frame_lengths": _different(around, "mean frame"),
+    }
     for guess, values in found.items():
         chance = np.concatenate(chances[guess])
         low, high = np.quantile(chance, [0.025, 0.975], axis=0)
         best = chance.max(axis=1)
         above = [name for name, value, most in zip(targets, values, high, strict=True) if value > most]
         result[guess] = {
-            "best": float(values.max()), "best_of": targets[int(values.argmax())],
+            "best": float(values.max()),
+            "best_of": targets[int(values.argmax())],
             "best_by_chance": np.quantile(best, [0.025, 0.5, 0.975]).tolist(),
             "share_of_deals_with_a_better_best": float((best >= values.max()).mean()),
             "above_their_interval": above,
@@ -173,7 +191,7 @@ def leak(lake: Lake, recipe: DatasetRecipe) -> dict[str, Any]:
                 name: {"found": float(value), "by_chance": [float(least), float(most)]}
                 for name, value, least, most in zip(targets, values, low, high, strict=True)
             },
-        }  # fmt: skip
+        }
     return result
 
 
@@ -197,13 +215,14 @@ def surroundings(lake: Lake, recipe: DatasetRecipe) -> Surroundings:
     drawn = [json.loads(row["parameters"]) for row in rows]
     kinds = sorted({(key, _kind(value)) for film in drawn for key, value in film.items() if isinstance(value, str)})
     return Surroundings(
-        features=np.array(features), sequence=np.array([row["seed"] for row in rows]),
+        features=np.array(features),
+        sequence=np.array([row["seed"] for row in rows]),
         parameters=[
             {key: value for key, value in film.items() if not isinstance(value, str)}
             | {f"{key} {kind}": float(_kind(film[key]) == kind) for key, kind in kinds}
             for film in drawn
         ],
-    )  # fmt: skip
+    )
 
 
 def _kind(name: str) -> str:

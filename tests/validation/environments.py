@@ -70,9 +70,10 @@ class Environment:
         python = Path(os.environ[self.setting]) if self.setting in os.environ else interpreter(self.folder)
         if not python.is_file():
             raise NotFoundError(
-                f"{self.title} is not installed", where=str(python),
+                f"{self.title} is not installed",
+                where=str(python),
                 fix=f"make its environment with make {self.package}, or name the Python of one by {self.setting}",
-            )  # fmt: skip
+            )
         done = subprocess.run(
             (str(python), "-I", "-c", self.probe), capture_output=True, text=True, timeout=_TIMEOUT, check=False
         )
@@ -80,9 +81,10 @@ class Environment:
         if done.returncode or found != self.version:
             what = f"this is {self.title} {found}, not {self.version}"
             raise UnusableError(
-                done.stderr.strip()[-500:] if done.returncode else what, where=str(python),
+                done.stderr.strip()[-500:] if done.returncode else what,
+                where=str(python),
                 fix=f"delete the environment and run make {self.package}",
-            )  # fmt: skip
+            )
         return python
 
     def create(self, folder: Path) -> None:
@@ -109,33 +111,48 @@ class Environment:
             if done.returncode:
                 said = (done.stdout + done.stderr).strip()[-2000:]
                 raise UnusableError(
-                    f"{' '.join(command[1:4])} failed: {said}", where=str(folder),
+                    f"{' '.join(command[1:4])} failed: {said}",
+                    where=str(folder),
                     fix=f"read its messages: the package index must offer {wanted[0]} for this Python",
-                )  # fmt: skip
+                )
 
 
 MUJOCO = Environment(
-    title="MuJoCo", package="mujoco", version="4.0.0", probe="import mujoco; print(mujoco.__version__)",
+    title="MuJoCo",
+    package="mujoco",
+    version="4.0.0",
+    probe="import mujoco; print(mujoco.__version__)",
     others=("numpy>=2,<3",),
-)  # fmt: skip
+)
 VTK = Environment(
-    title="VTK", package="vtk", version="9.7.2",
+    title="VTK",
+    package="vtk",
+    version="9.7.2",
     probe="from vtkmodules.vtkCommonCore import vtkVersion; print(vtkVersion.GetVTKVersion())",
     others=("numpy>=2,<3",),
-)  # fmt: skip
+)
 LEROBOT = Environment(
-    title="LeRobot", package="lerobot", version="0.6.1", probe="import lerobot; print(lerobot.__version__)",
-    others=("torch==2.13.0", "lerobot[dataset]"), python="python3.12",
-)  # fmt: skip
+    title="LeRobot",
+    package="lerobot",
+    version="0.6.1",
+    probe="import lerobot; print(lerobot.__version__)",
+    others=("torch==2.13.0", "lerobot[dataset]"),
+    python="python3.12",
+)
 DATASETS = Environment(
-    title="Hugging Face datasets", package="datasets", version="5.2.0",
+    title="Hugging Face datasets",
+    package="datasets",
+    version="5.2.0",
     probe="import datasets; print(datasets.__version__)",
     others=("pillow", "xarray", "zarr", "netCDF4", "rerun-sdk", "pandas"),
-)  # fmt: skip
+)
 LANCE = Environment(
-    title="Lance", package="pylance", version="14.0.2", probe="import lance; print(lance.__version__)",
+    title="Lance",
+    package="pylance",
+    version="14.0.2",
+    probe="import lance; print(lance.__version__)",
     others=("numpy>=2,<3", "simplejpeg"),
-)  # fmt: skip
+)
 ENVIRONMENTS = {one.package: one for one in (MUJOCO, VTK, LEROBOT, DATASETS, LANCE)}
 
 if __name__ == "__main__":

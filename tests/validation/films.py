@@ -69,14 +69,20 @@ def answers(design: Design, found: Network, gate: Gate, *, seed: int) -> dict[st
     motion = read(REFERENCE, design.run)
     begun = time.perf_counter()
     size = FlagSize(length=LENGTH, height=HEIGHT)
-    asked = {name: Options(size=size, seed=seed, area_weight=weight) for name, weight in
-             (("open", None), ("stated", WEIGHT))}  # fmt: skip
+    asked = {
+        name: Options(size=size, seed=seed, area_weight=weight) for name, weight in (("open", None), ("stated", WEIGHT))
+    }
     path = path_of(design, FOLDER)
     said = {name: answer(path, found, gate, options) for name, options in asked.items()}
     return {
-        "name": design.name, "part": design.part, "wind": motion.wind, "rate": design.rate, "size": list(design.size),
-        "seconds": time.perf_counter() - begun, **said,
-    }  # fmt: skip
+        "name": design.name,
+        "part": design.part,
+        "wind": motion.wind,
+        "rate": design.rate,
+        "size": list(design.size),
+        "seconds": time.perf_counter() - begun,
+        **said,
+    }
 
 
 def answer(path: Path, found: Network, gate: Gate, options: Options) -> dict[str, Any]:
@@ -130,7 +136,7 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         },
         "rates": _rates([row for row in rows if row["part"] == "rates"]),
         "stressors": _stressed([row for row in rows if row["part"] == "stressors"]),
-    }  # fmt: skip
+    }
 
 
 def _errors(rows: Sequence[Mapping[str, Any]], name: str) -> dict[str, Any]:
@@ -141,11 +147,14 @@ def _errors(rows: Sequence[Mapping[str, Any]], name: str) -> dict[str, Any]:
     error = np.array([found["value"] - wind for wind, found in answered])
     width = [found["high"] - found["low"] for _, found in answered if None not in (found["low"], found["high"])]
     return {
-        "films": len(answered), "bias": float(error.mean()), "median_error": float(np.median(np.abs(error))),
-        "rmse": float(np.sqrt(np.square(error).mean())), "too_low": int((error < 0).sum()),
+        "films": len(answered),
+        "bias": float(error.mean()),
+        "median_error": float(np.median(np.abs(error))),
+        "rmse": float(np.sqrt(np.square(error).mean())),
+        "too_low": int((error < 0).sum()),
         "covered": Share.of(_holds(found, wind) for wind, found in answered).as_dict(),
         "width": float(np.mean(width)) if width else None,
-    }  # fmt: skip
+    }
 
 
 def _rates(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -158,9 +167,10 @@ def _rates(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             values = {rate: row[name]["wind"]["value"] for rate, row in own.items() if "wind" in row[name]}
             compared = [values[rate] for rate in COMPARED if rate in values]
             of[name] = {
-                "values": values, "refused": [rate for rate, row in own.items() if row[name]["refused"]],
+                "values": values,
+                "refused": [rate for rate, row in own.items() if row[name]["refused"]],
                 "largest_difference": max(compared) - min(compared) if compared else None,
-            }  # fmt: skip
+            }
         found[f"{wind:g}"] = of
     return found
 
@@ -174,22 +184,32 @@ def _stressed(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         said, base = row["stated"], plain[row["wind"]]["stated"]
         shift = said["wind"]["value"] - base["wind"]["value"] if "wind" in said and "wind" in base else None
         found.setdefault(stressor_of(by_name[row["name"]]), {})[f"{row['wind']:g}"] = {
-            "shift": shift, "refused": said["refused"], "reasons": said["reasons"][:3], "why": said["why"],
-        }  # fmt: skip
+            "shift": shift,
+            "refused": said["refused"],
+            "reasons": said["reasons"][:3],
+            "why": said["why"],
+        }
     return found
 
 
 def page(sheet: Mapping[str, Any]) -> str:
     """The sheet in Markdown."""
     lines = [
-        "# Films of another simulator by another renderer", "",
-        (f"Model {sheet['model']}; ArcSim's runs filmed by VTK, {len(sheet['films'])} films, each measured with the "
-        f"flag's size and once with the area weight open, once with {WEIGHT.low:g} to {WEIGHT.high:g} kg/m² (true "
-        f"{DENSITY:g}). The films were listed before the first was measured; their motion has nothing above 12.5 Hz "
-        "(`python -m tests.validation films`)."), "",
-        ("| films | weight | refused | answered | 90 % intervals contain the wind | mean width [m/s] | median "
-        "error [m/s] | bias [m/s] | read too low |"), "|---|---|---|---|---|---|---|---|---|",
-    ]  # fmt: skip
+        "# Films of another simulator by another renderer",
+        "",
+        (
+            f"Model {sheet['model']}; ArcSim's runs filmed by VTK, {len(sheet['films'])} films, each measured with the "
+            f"flag's size and once with the area weight open, once with {WEIGHT.low:g} to {WEIGHT.high:g} kg/m² (true "
+            f"{DENSITY:g}). The films were listed before the first was measured; their motion has nothing above 12.5 "
+            "Hz (`python -m tests.validation films`)."
+        ),
+        "",
+        (
+            "| films | weight | refused | answered | 90 % intervals contain the wind | mean width [m/s] | median "
+            "error [m/s] | bias [m/s] | read too low |"
+        ),
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
     for part, of in sheet["errors"].items():
         for name, own in of.items():
             count = sum(row["part"] == part for row in sheet["films"])
@@ -204,17 +224,23 @@ def page(sheet: Mapping[str, Any]) -> str:
         for name, of in sheet["stressors"].items()
     ]
     lines += [
-        "", "## All films", "",
-        ("| film | rate | true wind [m/s] | weight open: wind [m/s] | weight [kg/m²] | weight stated: wind [m/s] | "
-        "refused for |"), "|---|---|---|---|---|---|---|",
+        "",
+        "## All films",
+        "",
+        (
+            "| film | rate | true wind [m/s] | weight open: wind [m/s] | weight [kg/m²] | weight stated: wind [m/s] | "
+            "refused for |"
+        ),
+        "|---|---|---|---|---|---|---|",
         *(
             f"| {row['name']} | {row['rate']} | {row['wind']:g} | {_cell(row['open'], 'wind', row['wind'])} | "
             f"{_cell(row['open'], 'weight', DENSITY)} | {_cell(row['stated'], 'wind', row['wind'])} | "
             f"{', '.join(row['stated']['reasons'][:3])} |"
             for row in sheet["films"]
         ),
-        "", "An interval in bold does not contain the true value. Of refused films the estimate is that of `--anyway`.",
-    ]  # fmt: skip
+        "",
+        "An interval in bold does not contain the true value. Of refused films the estimate is that of `--anyway`.",
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -238,9 +264,11 @@ def _rates_table(found: Mapping[str, Any]) -> list[str]:
     for wind, of in found.items():
         for name, own in of.items():
             cells = [
-                "" if rate not in own["values"] else f"{own['values'][rate]:.2f}"
-                + (" (refused)" if rate in own["refused"] else "") for rate in rates
-            ]  # fmt: skip
+                ""
+                if rate not in own["values"]
+                else f"{own['values'][rate]:.2f}" + (" (refused)" if rate in own["refused"] else "")
+                for rate in rates
+            ]
             lines.append(f"| {wind}, {name} | " + " | ".join(cells) + f" | {_number(own['largest_difference'])} |")
     return lines
 

@@ -123,6 +123,7 @@ def draw_shapes(ensemble: Ensemble, path: Path) -> None:
         "A 1.5 × 1.0 m flag of Camel Ponte Roma (0.284 kg/m², d = 0.25 ms), self-contact on; wind towards +x (arrow, "
         "in proportion).\nHeld at two hoist corners (dots), at rest across the wind at t = 0; blue: the side "
         "that faced the wind then.\nView from −y, 22° to the lee and 16° above; axes (upper right) 0.5 m long; shading "
-        "smoothed.", fontsize=9,
-    )  # fmt: skip
+        "smoothed.",
+        fontsize=9,
+    )
     figure.savefig(path, dpi=78)

@@ -113,8 +113,9 @@ def draw_wind(flags: Ensemble, implicit: Ensemble, references: list[ReferenceMot
     _draw_map(panels[1, 2], flags)
     figure.suptitle(
         f"Free edge after {SETTLED:g} s, dots: replicates of {summary(flags)['seconds']:g} s from starts with 1 mm of "
-        "noise, velocities over 40 ms; bars: standard deviation of one replicate", fontsize=10,
-    )  # fmt: skip
+        "noise, velocities over 40 ms; bars: standard deviation of one replicate",
+        fontsize=10,
+    )
     figure.savefig(path, dpi=95)
     return peaks
 
@@ -232,6 +233,7 @@ def draw_damping(declared: Ensemble, implicit: Ensemble, references: list[Refere
     panels[0].legend(frameon=False, fontsize=8, loc="lower right")
     figure.suptitle(
         "Damping, wind 4 m/s, contact off: Kelvin–Voigt d (declared), or what backward Euler does by its step h; axis "
-        "linear below 0.05 ms", fontsize=10,
-    )  # fmt: skip
+        "linear below 0.05 ms",
+        fontsize=10,
+    )
     figure.savefig(path, dpi=95)

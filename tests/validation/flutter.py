@@ -139,9 +139,14 @@ def _amplitudes() -> dict[str, Any]:
     result: dict[str, Any] = {"shares_of_critical_speed": shares.tolist()}
     for label, strip in (("with_loading", loaded), ("without_loading", _BARE)):
         frames = deflections(
-            sweep(strip, shares * critical), columns=24, interval=0.02, samples=400, integrator=Symplectic(),
-            deflection=0.1, stretching=50.0,
-        )  # fmt: skip
+            sweep(strip, shares * critical),
+            columns=24,
+            interval=0.02,
+            samples=400,
+            integrator=Symplectic(),
+            deflection=0.1,
+            stretching=50.0,
+        )
         tip = frames[:, -1] / strip.length
         for name, part in (("2_to_4_s", tip[100:200]), ("6_to_8_s", tip[300:])):
             rms = np.sqrt(((part - part.mean(0)) ** 2).mean(0))
@@ -177,14 +182,25 @@ def _plot(result: dict[str, Any], out: Path) -> None:
         share = np.array(sweeps["speeds"]) / critical
         calculated = [leading(member).real for member in sweep(_loaded(beta), shares * critical)]
         rate.plot(shares, calculated, style, color=_THEORY, lw=1.2, label=f"calculation, {name}")
-        rate.plot(share, sweeps["simulated_growth"], "o", color=_SIMULATED, mfc="none" if style == "-" else None, ms=4,
-                  label=f"simulator, {name}")  # fmt: skip
+        rate.plot(
+            share,
+            sweeps["simulated_growth"],
+            "o",
+            color=_SIMULATED,
+            mfc="none" if style == "-" else None,
+            ms=4,
+            label=f"simulator, {name}",
+        )
         unloaded = np.array(sweeps["without_loading_speeds"]) / critical
         label = "simulator, M = 0" if style == "-" else None
         rate.plot(unloaded, sweeps["without_loading_growth"], ".", color=_WITHOUT, label=label)
     rate.axhline(0, color="#999999", lw=0.6)
-    rate.set(xlabel="speed / calculated onset", ylabel="growth rate of the leading mode [1/s]", xlim=(0.25, 2.6),
-             ylim=(-6, 16))  # fmt: skip
+    rate.set(
+        xlabel="speed / calculated onset",
+        ylabel="growth rate of the leading mode [1/s]",
+        xlim=(0.25, 2.6),
+        ylim=(-6, 16),
+    )
     strongest = max(abs(v) for sweeps in result["growth"].values() for v in sweeps["without_loading_growth"])
     rate.text(
         2.55, -0.3, f"M = 0, up to 4 times the onset: within {strongest:.1g} 1/s of 0", fontsize=7, ha="right", va="top"

@@ -94,12 +94,16 @@ def _bank(folder: Path, observed: Observed, seed: int) -> Path:
     first, segments = experiment.recordings[0], Segments.of(experiment.recordings)
     batches = [
         banks.prior_batch(
-            experiment.specimen, markers=first.markers, rate=1 / segments.period, noise=NOISE,
-            duration=segments.cut.lasting(banks.each(len(segments))), speeds=banks.around(*SPEEDS),
+            experiment.specimen,
+            markers=first.markers,
+            rate=1 / segments.period,
+            noise=NOISE,
+            duration=segments.cut.lasting(banks.each(len(segments))),
+            speeds=banks.around(*SPEEDS),
             seed=child_seed(seed, "foreign", "null", index),
         )
         for index in range(_number("KINDS", _KINDS))
-    ]  # fmt: skip
+    ]
     banks.build(folder, batches)
     return folder
 
@@ -107,11 +111,17 @@ def _bank(folder: Path, observed: Observed, seed: int) -> Path:
 def _graded(truth: Truth, observed: Observed, bank: Path, seed: int) -> dict[str, Any]:
     undeclared = truth.undeclared
     row: dict[str, Any] = {
-        "name": truth.name, "acted": undeclared.title, "effect": undeclared.effect, "strength": undeclared.strength,
-        "factors": dict(truth.factors), "damping": truth.damping, "speeds": list(truth.speeds),
-        "method": f"{truth.method.integrator}, {1e3 * truth.method.step:g} ms", "diagonals": truth.diagonals.value,
+        "name": truth.name,
+        "acted": undeclared.title,
+        "effect": undeclared.effect,
+        "strength": undeclared.strength,
+        "factors": dict(truth.factors),
+        "damping": truth.damping,
+        "speeds": list(truth.speeds),
+        "method": f"{truth.method.integrator}, {1e3 * truth.method.step:g} ms",
+        "diagonals": truth.diagonals.value,
         "findings": [found.kind for found in observed.findings],
-    }  # fmt: skip
+    }
     try:
         verdict = close_loop(observed.experiment, Options(seed=seed, bank=bank))
     except InputError as error:
@@ -124,13 +134,19 @@ def _graded(truth: Truth, observed: Observed, bank: Path, seed: int) -> dict[str
         "damping": truth.damping,
     }
     row |= {
-        "said": verdict.conclusion.value, "named": list(verdict.named), "words": verdict.words,
-        "statistic": verdict.test.statistic, "p": verdict.test.p_value.value,
-        "p_interval": [verdict.test.p_value.low, verdict.test.p_value.high], "level": verdict.test.level,
+        "said": verdict.conclusion.value,
+        "named": list(verdict.named),
+        "words": verdict.words,
+        "statistic": verdict.test.statistic,
+        "p": verdict.test.p_value.value,
+        "p_interval": [verdict.test.p_value.low, verdict.test.p_value.high],
+        "level": verdict.test.level,
         "parameters": {name: _interval(of[name], true[name]) for name in _COVERED},
-        "E_red": [comparison.share for comparison in verdict.comparisons], "seconds": round(verdict.seconds),
-        "grade": grade(truth, verdict.conclusion, verdict.named), "criteria": verdict.provenance["criteria"]["hash"],
-    }  # fmt: skip
+        "E_red": [comparison.share for comparison in verdict.comparisons],
+        "seconds": round(verdict.seconds),
+        "grade": grade(truth, verdict.conclusion, verdict.named),
+        "criteria": verdict.provenance["criteria"]["hash"],
+    }
     ours = [c for c in verdict.ranking if c.effect == undeclared.effect and c.effect in verdict.named]
     if ours:
         row["strength_found"] = _interval(ours[0].strength, undeclared.strength)
@@ -150,9 +166,14 @@ def grade(truth: Truth, said: Conclusion, named: Sequence[str]) -> str:
 
 def _interval(found: Estimate, true: float) -> dict[str, Any]:
     return {
-        "true": true, "value": found.value, "low": found.low, "high": found.high, "unit": found.unit,
-        "level": found.level, "covers": bool(found.low <= true <= found.high),
-    }  # fmt: skip
+        "true": true,
+        "value": found.value,
+        "low": found.low,
+        "high": found.high,
+        "unit": found.unit,
+        "level": found.level,
+        "covers": bool(found.low <= true <= found.high),
+    }
 
 
 def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -173,7 +194,7 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "covered_of_nulls": {
             name: Share.of(row["parameters"][name]["covers"] for row in nulls).as_dict() for name in _COVERED
         },
-    }  # fmt: skip
+    }
 
 
 def missed(row: Mapping[str, Any]) -> bool:
@@ -183,19 +204,28 @@ def missed(row: Mapping[str, Any]) -> bool:
 
 def page(found: Mapping[str, Any]) -> str:
     lines = [
-        "# Verdicts on experiments that MuJoCo simulated", "",
-        "| share | value | of | 90 % bounds |", "|---|---|---|---|",
-        *(_share(title, found[key]) for title, key in (
-            ("nulls that were rejected", "false_rejections"), ("effects named rightly", "right"),
-            ("effects named rightly, or among several", "right_or_among"), ("effects not detected", "missed"),
-            ("effects misnamed", "wrong"),
-        )),
+        "# Verdicts on experiments that MuJoCo simulated",
+        "",
+        "| share | value | of | 90 % bounds |",
+        "|---|---|---|---|",
+        *(
+            _share(title, found[key])
+            for title, key in (
+                ("nulls that were rejected", "false_rejections"),
+                ("effects named rightly", "right"),
+                ("effects named rightly, or among several", "right_or_among"),
+                ("effects not detected", "missed"),
+                ("effects misnamed", "wrong"),
+            )
+        ),
         *(_share(f"90 % intervals of {name} that cover", found["covered"][name]) for name in _COVERED),
-        "", f"{found['refused']} were refused. The bank holds {found['kinds']} kinds of numerics.", "",
+        "",
+        f"{found['refused']} were refused. The bank holds {found['kinds']} kinds of numerics.",
+        "",
         "| experiment | acted | cloth: density, stretching, bending; damping | method | said | p | grade |",
         "|---|---|---|---|---|---|---|",
         *(_line(row) for row in found["experiments"]),
-    ]  # fmt: skip
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -52,10 +52,16 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         judged = [(name, judge(clip, model, gate)) for name, clip in clips]
         real = _real(model, gate)
     result = {
-        "model": model.name, "calibration_clips": len(gate.calibration), "false_alarm": FALSE_ALARM,
-        "confidence": CONFIDENCE, "level": plain[0].level, "seconds_a_clip": seconds,
-        "plain": _alarms(plain), "clips": _refusals(judged), "real_clip": real,
-    }  # fmt: skip
+        "model": model.name,
+        "calibration_clips": len(gate.calibration),
+        "false_alarm": FALSE_ALARM,
+        "confidence": CONFIDENCE,
+        "level": plain[0].level,
+        "seconds_a_clip": seconds,
+        "plain": _alarms(plain),
+        "clips": _refusals(judged),
+        "real_clip": real,
+    }
     (out / "validate-gate.md").write_text(_page(result), encoding="utf-8")
     return result
 
@@ -75,19 +81,21 @@ def _alarms(plain: list[Judgement]) -> dict[str, Any]:
     refused = [one for one in plain if not one.familiar]
     p = np.array([one.p for one in plain])
     return {
-        "clips": len(plain), "refused": Share.of(not one.familiar for one in plain).as_dict(),
+        "clips": len(plain),
+        "refused": Share.of(not one.familiar for one in plain).as_dict(),
         "reasons": dict(Counter(one.reasons[0].kind for one in refused)),
         "p_at_most": {f"{share:g}": float((p <= share).mean()) for share in (0.05, 0.1, 0.25, 0.5, 0.75)},
-    }  # fmt: skip
+    }
 
 
 def _refusals(judged: list[tuple[str, Judgement]]) -> dict[str, Any]:
     return {
-        "clips": len(judged), "refused": Share.of(not one.familiar for _, one in judged).as_dict(),
+        "clips": len(judged),
+        "refused": Share.of(not one.familiar for _, one in judged).as_dict(),
         "right_first_reason": sum(_right(name, one) for name, one in judged),
         "right_among_reasons": sum(_right(name, one, first=False) for name, one in judged),
         "kinds": {name: _kind([one for kind, one in judged if kind == name], name) for name in KINDS},
-    }  # fmt: skip
+    }
 
 
 def _right(name: str, one: Judgement, *, first: bool = True) -> bool:
@@ -97,12 +105,13 @@ def _right(name: str, one: Judgement, *, first: bool = True) -> bool:
 
 def _kind(judged: list[Judgement], name: str) -> dict[str, Any]:
     return {
-        "clips": len(judged), "refused": sum(not one.familiar for one in judged),
+        "clips": len(judged),
+        "refused": sum(not one.familiar for one in judged),
         "right_first_reason": sum(_right(name, one) for one in judged),
         "p": [one.p for one in judged],
         "first_reasons": dict(Counter(one.reasons[0].kind if one.reasons else "familiar" for one in judged)),
         "example": next((one.reasons[0].sentence for one in judged if one.reasons), ""),
-    }  # fmt: skip
+    }
 
 
 def _real(model: Estimator, gate: Gate) -> dict[str, Any]:

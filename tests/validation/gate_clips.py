@@ -151,9 +151,12 @@ def sheet(films: Films, rng: np.random.Generator) -> Film:
     angle = rng.uniform(-1.2, 1.2)
     speed = rng.uniform(3, 9)
     held = Scene(
-        mesh=mesh, position=start, material=material("camel-ponte-roma"), handles=Handles(vertices=tuple(corners)),
+        mesh=mesh,
+        position=start,
+        material=material("camel-ponte-roma"),
+        handles=Handles(vertices=tuple(corners)),
         wind=(speed * math.cos(angle), speed * math.sin(angle), 0.0),
-    )  # fmt: skip
+    )
     system, state = assemble([held])
     method, positions = BackwardEuler(step=5e-3), []
     for frame in range(50 + FRAMES):
@@ -162,9 +165,11 @@ def sheet(films: Films, rng: np.random.Generator) -> Film:
             positions.append(state.position[..., 0].numpy().copy())
     times = (np.arange(FRAMES) * NANOSECONDS / RATE).astype(np.int64)
     sequence = MeshSequence(
-        time=times, positions=np.stack(positions).astype(np.float32), faces=np.asarray(mesh.faces, dtype=np.int32),
+        time=times,
+        positions=np.stack(positions).astype(np.float32),
+        faces=np.asarray(mesh.faces, dtype=np.int32),
         rest=np.asarray(mesh.rest, dtype=np.float32),
-    )  # fmt: skip
+    )
     assets = Assets()
     zeta = replace(prior("cloth").draw(int(rng.integers(1 << 31)), assets), camera_radius=2.5, raster_samples=4)
     shown = Raster(assets=assets).render(Meshes.hanging(sequence), zeta)

@@ -56,10 +56,15 @@ def row(kind: str, number: int, found: Network, gate: Gate, *, python: Path, see
     said = answer(path, found, gate, Options(size=FlagSize(length=LENGTH, height=HEIGHT), seed=seed))
     right = DEFECTS[kind][1]
     return {
-        "kind": kind, "number": number, "tuned": tuned(number), "refused": said["refused"],
-        "reasons": said["reasons"], "why": said["why"], "right_first": bool(set(said["reasons"][:1]) & set(right)),
+        "kind": kind,
+        "number": number,
+        "tuned": tuned(number),
+        "refused": said["refused"],
+        "reasons": said["reasons"],
+        "why": said["why"],
+        "right_first": bool(set(said["reasons"][:1]) & set(right)),
         "right": bool(set(said["reasons"]) & set(right)),
-    }  # fmt: skip
+    }
 
 
 def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -51,14 +51,19 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     train, test = (source.pairs(split=side, split_by=split) for side in ("train", "test"))
     rows = source.lake.rows({"kind": Kind.RECORDING, **spec.where("test")}, columns=["artifact", "parameters"])
     material = {row["artifact"]: json.loads(row["parameters"])["material"] for row in rows.to_pylist()}
-    found = model.estimate(torch.cat([model.inputs(test[k].clip.numpy()) for k in range(len(test))]), seed=seed,
-                           draws=DRAWS)  # fmt: skip
+    found = model.estimate(
+        torch.cat([model.inputs(test[k].clip.numpy()) for k in range(len(test))]), seed=seed, draws=DRAWS
+    )
     low, high = found.interval(LEVEL)
     of = [material[str(recording)] for recording in test.table.recording]
     result: dict[str, Any] = {
-        "model": model.name, "clips": len(test), "level": LEVEL, "paper": [list(pair) for pair in PAPER],
-        "p_unlike_below_0.05": None if found.unlike is None else float((found.unlike < 0.05).mean()), "of": {},
-    }  # fmt: skip
+        "model": model.name,
+        "clips": len(test),
+        "level": LEVEL,
+        "paper": [list(pair) for pair in PAPER],
+        "p_unlike_below_0.05": None if found.unlike is None else float((found.unlike < 0.05).mean()),
+        "of": {},
+    }
     for column, target in enumerate(found.targets):
         truth, known = (_of(pairs, target.name) for pairs in (test, train))
         result["of"][target.name] = _scores(
@@ -72,11 +77,14 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     errors = np.abs(mean - truth)[chosen]
     result["targets"] = [
         {
-            "material": of[k], "area_weight": float(truth[k]), "measured": float(mean[k]),
-            "interval": [float(low[k, weight]), float(high[k, weight])], "wind": float(test.table.wind[k]),
+            "material": of[k],
+            "area_weight": float(truth[k]),
+            "measured": float(mean[k]),
+            "interval": [float(low[k, weight]), float(high[k, weight])],
+            "wind": float(test.table.wind[k]),
         }
         for k in chosen
-    ]  # fmt: skip
+    ]
     result["targets_median_error"] = float(np.median(errors))
     trivial = np.abs(_of(train, "density").mean() - truth)[chosen]
     result["targets_always_the_mean_median_error"] = float(np.median(trivial))
@@ -100,15 +108,19 @@ def _scores(
     error, trivial = (mean - truth) ** 2, (known.mean() - truth) ** 2
     ours, theirs = np.sqrt(error[drawn].mean(axis=1)), np.sqrt(trivial[drawn].mean(axis=1))
     return {
-        "unit": unit, "rmse": float(np.sqrt(error.mean())), "rmse_interval": np.quantile(ours, [0.05, 0.95]).tolist(),
-        "median_error": float(np.median(np.sqrt(error))), "bias": float((mean - truth).mean()),
+        "unit": unit,
+        "rmse": float(np.sqrt(error.mean())),
+        "rmse_interval": np.quantile(ours, [0.05, 0.95]).tolist(),
+        "median_error": float(np.median(np.sqrt(error))),
+        "bias": float((mean - truth).mean()),
         "always_the_mean_rmse": float(np.sqrt(trivial.mean())),
         "always_the_mean_median_error": float(np.median(np.sqrt(trivial))),
         "rmse_over_always_the_mean": float(np.sqrt(error.mean() / trivial.mean())),
         "ratio_interval": np.quantile(ours / theirs, [0.05, 0.95]).tolist(),
-        "spread_of_training": float(known.std()), "covered": float(((low <= truth) & (truth <= high)).mean()),
+        "spread_of_training": float(known.std()),
+        "covered": float(((low <= truth) & (truth <= high)).mean()),
         "pearson": float(np.corrcoef(mean, truth)[0, 1]),
-    }  # fmt: skip
+    }
 
 
 def _rmse(error: Array) -> float:
@@ -138,8 +150,16 @@ def _draw(path: Path, truth: Array, mean: Array, low: Array, high: Array, chosen
     axes = figure.subplots()
     ends = [0.07, 0.46]
     axes.plot(ends, ends, color="0.6", linewidth=0.8)
-    axes.errorbar(truth, mean, yerr=[mean - low, high - mean], fmt="o", markersize=3, linewidth=0.6, color="0.45",
-                  label="test clips, 90 %")  # fmt: skip
+    axes.errorbar(
+        truth,
+        mean,
+        yerr=[mean - low, high - mean],
+        fmt="o",
+        markersize=3,
+        linewidth=0.6,
+        color="0.45",
+        label="test clips, 90 %",
+    )
     axes.plot(truth[chosen], mean[chosen], "o", color="C3", label="six materials")
     axes.plot(*zip(*PAPER, strict=True), "x", color="C0", label="Runia et al., real films")
     axes.set(xlabel="area weight [kg/m²]", ylabel="measured [kg/m²]", xlim=ends, ylim=ends)

@@ -66,6 +66,8 @@ def summary(cases: list[ET.Element]) -> dict[str, Any]:
         if case.find("failure") is not None or case.find("error") is not None
     ]
     return {
-        "tests": len(cases), "passed": len(cases) - skipped.total() - len(failed), "failed": failed,
+        "tests": len(cases),
+        "passed": len(cases) - skipped.total() - len(failed),
+        "failed": failed,
         "of a disk alone": dict(sorted(skipped.items())),
-    }  # fmt: skip
+    }

@@ -81,63 +81,96 @@ ISO = "{t:%Y-%m-%dT%H:%M:%S}Z"
 PLAIN = "{t:%Y-%m-%d %H:%M:%S}"
 TRIALS = (
     Trial(
-        title="A Kestrel export", about="The format is recognised; it states everything but the zone.",
-        name="kestrel.csv", shown=6, runs=[("", None), ("", ["+02:00"])],
+        title="A Kestrel export",
+        about="The format is recognised; it states everything but the zone.",
+        name="kestrel.csv",
+        shown=6,
+        runs=[("", None), ("", ["+02:00"])],
         text="Device Name,KESTREL - 2412345\nDevice Model,5500\nSerial Number,2412345\n"
         "FORMATTED DATE_TIME,Temperature,Relative Humidity,Wind Speed,Direction - True\n"
-        "YYYY-MM-DD HH:MM:SS,°C,%,m/s,Deg\n" + rows(PLAIN + ",21.3,48.2,{v:.1f},{d}", every=2.0)),
+        "YYYY-MM-DD HH:MM:SS,°C,%,m/s,Deg\n" + rows(PLAIN + ",21.3,48.2,{v:.1f},{d}", every=2.0),
+    ),
     Trial(
         title="A Campbell table (TOA5)",
         about="Recognised by its first line. The sonic's components need the sensor's azimuth for a direction.",
-        name="campbell.dat", shown=5, runs=[("", None), ("", ["+02:00"])],
+        name="campbell.dat",
+        shown=5,
+        runs=[("", None), ("", ["+02:00"])],
         text='"TOA5","mast","CR1000X","12345","CR1000X.Std.05.01","CPU:mast.CR1X","51234","wind"\n'
         '"TIMESTAMP","RECORD","Ux","Uy","Uz","Ts"\n"TS","RN","m/s","m/s","m/s","C"\n"","","Smp","Smp","Smp","Smp"\n'
-        + rows('"{t:%Y-%m-%d %H:%M:%S}.{t:%f}",{n},{v:.3f},{side:.3f},{w:.3f},21.0', 300, 0.1)),
+        + rows('"{t:%Y-%m-%d %H:%M:%S}.{t:%f}",{n},{v:.3f},{side:.3f},{w:.3f},21.0', 300, 0.1),
+    ),
     Trial(
         title="What an Arduino printed",
         about="Two numbers a line, without a heading: the columns have to be given, then the start of its count of "
         "milliseconds.",
-        name="arduino.txt", shown=3, text=rows("{ms} {v:.2f}"),
-        runs=[("", None), ('--columns "time[ms],wind_speed[m/s]"', ["2026-05-14T11:30:00+02:00", "yes"])]),
+        name="arduino.txt",
+        shown=3,
+        text=rows("{ms} {v:.2f}"),
+        runs=[("", None), ('--columns "time[ms],wind_speed[m/s]"', ["2026-05-14T11:30:00+02:00", "yes"])],
+    ),
     Trial(
-        title="A spreadsheet", about="The unit is in the heading, the zone is asked for, and the rest is confirmed.",
-        name="sheet.xlsx", shown=3, runs=[("", None), ("", ["Europe/Amsterdam", "yes"])],
-        text="Date,Wind (km/h),Direction,Battery (V)\n" + rows(PLAIN + ",{kmh:.1f},{d},12.6")),
+        title="A spreadsheet",
+        about="The unit is in the heading, the zone is asked for, and the rest is confirmed.",
+        name="sheet.xlsx",
+        shown=3,
+        runs=[("", None), ("", ["Europe/Amsterdam", "yes"])],
+        text="Date,Wind (km/h),Direction,Battery (V)\n" + rows(PLAIN + ",{kmh:.1f},{d},12.6"),
+    ),
     Trial(
         title="A log without a zone",
         about="Everything else is stated, so the answer completes it and there is nothing to confirm.",
-        name="zoneless.csv", shown=3, runs=[("", None), ("", ["+02:00"])],
-        text="timestamp,wind_speed (m/s),wind_direction (deg)\n" + rows(PLAIN + ",{v:.2f},{d}")),
+        name="zoneless.csv",
+        shown=3,
+        runs=[("", None), ("", ["+02:00"])],
+        text="timestamp,wind_speed (m/s),wind_direction (deg)\n" + rows(PLAIN + ",{v:.2f},{d}"),
+    ),
     Trial(
         title="Speeds in km/h, which the file does not state",
         about="The unit is asked for. The direction's unit is assumed, so one row is confirmed.",
-        name="unstated.csv", shown=3, runs=[("", None), ("", ["km/h", "yes"])],
-        text="Time,Wind speed,Wind direction\n" + rows(ISO + ",{kmh:.1f},{d}")),
+        name="unstated.csv",
+        shown=3,
+        runs=[("", None), ("", ["km/h", "yes"])],
+        text="Time,Wind speed,Wind direction\n" + rows(ISO + ",{kmh:.1f},{d}"),
+    ),
     Trial(
         title="Components",
         about="Headings of one letter are inferred. `--azimuth` gives the axes, and the preview then has a direction "
         "to check.",
-        name="components.csv", shown=3, runs=[("", None), ("--azimuth 270", ["yes"])],
-        text="time,u (m/s),v (m/s),w (m/s)\n" + rows(ISO + ",{u:.2f},{side:.2f},{w:.2f}")),
+        name="components.csv",
+        shown=3,
+        runs=[("", None), ("--azimuth 270", ["yes"])],
+        text="time,u (m/s),v (m/s),w (m/s)\n" + rows(ISO + ",{u:.2f},{side:.2f},{w:.2f}"),
+    ),
     Trial(
         title="Two heights",
         about="Each height becomes an artifact. The direction is read with the speed of its own height only.",
-        name="heights.csv", shown=3, runs=[("", None), ("", ["yes", "yes"])],
-        text="time,wind speed 2m (m/s),wind speed 10m (m/s),wind dir 10m (deg)\n" + rows(
-            ISO + ",{low:.2f},{v:.2f},{d}")),
+        name="heights.csv",
+        shown=3,
+        runs=[("", None), ("", ["yes", "yes"])],
+        text="time,wind speed 2m (m/s),wind speed 10m (m/s),wind dir 10m (deg)\n"
+        + rows(ISO + ",{low:.2f},{v:.2f},{d}"),
+    ),
     Trial(
         title="A boat's log",
         about="Apparent wind is not taken for the wind: the column and the platform are asked for.",
-        name="boat.csv", shown=3, runs=[("", None), ("", ["AWS (kn)", "moving"])],
-        text="time,AWS (kn),AWA (deg),SOG (kn),Heading (deg)\n" + rows(ISO + ",{kn:.1f},{d},5.1,187")),
+        name="boat.csv",
+        shown=3,
+        runs=[("", None), ("", ["AWS (kn)", "moving"])],
+        text="time,AWS (kn),AWA (deg),SOG (kn),Heading (deg)\n" + rows(ISO + ",{kn:.1f},{d},5.1,187"),
+    ),
     Trial(
         title="A clock that was set back",
         about="All is stated, but the time goes back by 2 min. `--clock last` says that the clock was right after it "
         "was set.",
-        name="setback.csv", shown=3, runs=[("", None), ("--clock last", ["yes"])],
-        text="time,wind_speed (m/s)\n" + rows(ISO + ",{v:.2f}", 300)
-        + rows(ISO + ",{v:.2f}", 300, start=START + dt.timedelta(seconds=180))),
-)  # fmt: skip
+        name="setback.csv",
+        shown=3,
+        runs=[("", None), ("--clock last", ["yes"])],
+        text="time,wind_speed (m/s)\n"
+        + rows(ISO + ",{v:.2f}", 300)
+        + rows(ISO + ",{v:.2f}", 300, start=START + dt.timedelta(seconds=180)),
+    ),
+)
 
 
 def written(trial: Trial) -> None:
@@ -166,9 +199,11 @@ def transcript(trial: Trial, options: str, typed: Sequence[str] | None) -> str:
     Lake.create(Path("lake"))
     arguments = ["ingest", trial.name, *shlex.split(options), "--lake", "lake"]
     with (
-        contextlib.redirect_stdout(out), contextlib.redirect_stderr(out), patch.object(click, "prompt", prompt),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(out),
+        patch.object(click, "prompt", prompt),
         patch.object(confirm, "at_terminal", lambda: typed is not None),
-    ):  # fmt: skip
+    ):
         try:
             run_flagdata(arguments)
         except SystemExit as ended:

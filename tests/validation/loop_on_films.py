@@ -119,11 +119,13 @@ def simulations(folder: Path) -> Simulations:
 
     made = [[pairs(design, effect, until=lasting(len(own))) for effect in effects()] for design in own]
     return Simulations(
-        designs=tuple(own[place] for place in chosen()), base=tuple(seen(own[place].batches()) for place in chosen()),
+        designs=tuple(own[place] for place in chosen()),
+        base=tuple(seen(own[place].batches()) for place in chosen()),
         pairs=tuple(tuple((pair, seen(pair.batches)) for pair in made[place]) for place in chosen()),
-        nulls=tuple(seen(null[place]) for place in chosen()), kinds=np.repeat(np.arange(KINDS), TOGETHER),
+        nulls=tuple(seen(null[place]) for place in chosen()),
+        kinds=np.repeat(np.arange(KINDS), TOGETHER),
         weights=np.concatenate([batch.values["area_weight"] for batch in null[0]]),
-    )  # fmt: skip
+    )
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
@@ -164,8 +166,13 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             strengths = stronger(effect, child_seed(SEED, "truths", number))[whole]
             for place, strength in enumerate(strengths.tolist()):
                 rows.append(_row(effect, strength, found(true, own, place, np.ones(len(kinds), dtype=np.bool_))))
-    return {"recordings": list(chosen()), "kinds": KINDS, "effects": [one.name for one in effects()],
-            **_summary(rows), "rows": rows}  # fmt: skip
+    return {
+        "recordings": list(chosen()),
+        "kinds": KINDS,
+        "effects": [one.name for one in effects()],
+        **_summary(rows),
+        "rows": rows,
+    }
 
 
 def rows_of(several: Experiments, which: NDArray[np.bool_] | Sequence[int]) -> Experiments:
@@ -176,14 +183,18 @@ def rows_of(several: Experiments, which: NDArray[np.bool_] | Sequence[int]) -> E
 def _row(effect: Weighable | None, strength: float, found: Judged) -> dict[str, Any]:
     names = [one.name for one in effects()]
     return {
-        "effect": None if effect is None else effect.name, "strength": strength, "p": found.p_value,
-        "conclusion": found.conclusion.value, "named": [names[place] for place in found.named],
-        "statistic": found.scored.statistic, "z": found.scored.z.tolist(), "whole": found.scored.whole,
-        "tail": found.scored.nulls.tail(found.scored.statistic), "power": found.scored.power.tolist(),
-        "probability": None if effect is None else float(
-            found.probability[names.index(effect.name)]
-        ),
-    }  # fmt: skip
+        "effect": None if effect is None else effect.name,
+        "strength": strength,
+        "p": found.p_value,
+        "conclusion": found.conclusion.value,
+        "named": [names[place] for place in found.named],
+        "statistic": found.scored.statistic,
+        "z": found.scored.z.tolist(),
+        "whole": found.scored.whole,
+        "tail": found.scored.nulls.tail(found.scored.statistic),
+        "power": found.scored.power.tolist(),
+        "probability": None if effect is None else float(found.probability[names.index(effect.name)]),
+    }
 
 
 def _summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -192,13 +203,17 @@ def _summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     rejected = [one for one in true if one["p"] <= LEVEL]
     by_tail = [one["tail"] <= LEVEL for one in without]
     return {
-        "without": {"count": len(without), "rejected": sum(one["p"] <= LEVEL for one in without),
-                    "rejected by the tail": sum(by_tail)},
+        "without": {
+            "count": len(without),
+            "rejected": sum(one["p"] <= LEVEL for one in without),
+            "rejected by the tail": sum(by_tail),
+        },
         "with": {
-            "count": len(true), "rejected": len(rejected),
+            "count": len(true),
+            "rejected": len(rejected),
             "named alone": sum(one["named"] == [one["effect"]] for one in rejected),
             "one of": sum(one["effect"] in one["named"] and len(one["named"]) > 1 for one in rejected),
             "another alone": sum(len(one["named"]) == 1 and one["named"] != [one["effect"]] for one in rejected),
             "none": sum(not one["named"] for one in rejected),
         },
-    }  # fmt: skip
+    }

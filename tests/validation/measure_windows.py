@@ -49,7 +49,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     resamples = Resamples.of(answers[1].group, generator=stream(seed, "measure-windows", "bootstrap"))
     dependence, dataset = of_model(model), np.array(datasets)
     sheet = {
-        "model": model.name, "films": len(found.known), "windows": WINDOWS,
+        "model": model.name,
+        "films": len(found.known),
+        "windows": WINDOWS,
         "dependence": {"wind": dependence.wind, "cloth": dependence.cloth, "source": dependence.source},
         "correlation_by_distance": _correlations(found),
         "one_window": {
@@ -66,7 +68,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             str(name): {str(count): _wind(answer, dataset == name) for count, answer in answers.items()}
             for name in np.unique(dataset)
         },
-    }  # fmt: skip
+    }
     (out / "validate-measure-windows.md").write_text(page(sheet), encoding="utf-8")
     return sheet
 
@@ -88,18 +90,30 @@ def _answers(model: Estimator, found: Posteriors, count: int, *, seed: int) -> P
     draws = []
     for number, logits in enumerate(found.logits[:, :count]):
         winds, cloth = combined(
-            logits, names=names, centre=learner.centre.double().numpy(), spread=learner.spread.double().numpy(),
-            dependence=of_model(model), generator=stream(seed, "combine", number),
-        )  # fmt: skip
+            logits,
+            names=names,
+            centre=learner.centre.double().numpy(),
+            spread=learner.spread.double().numpy(),
+            dependence=of_model(model),
+            generator=stream(seed, "combine", number),
+        )
         whole = np.empty((*winds.shape[:2], len(names)))
         whole[..., own] = winds
         whole[..., ~own] = cloth
         draws.append(learner.scaling.values(torch.from_numpy(whole)).numpy().mean(axis=0))
     samples = np.array(draws, dtype=np.float32)
     return Predictions(
-        label=f"{count} windows", targets=names, truth=found.known, mean=samples.mean(axis=1, dtype=np.float64),
-        samples=samples, embedding=None, group=np.arange(len(samples)), parameters=0, milliseconds=0.0, note="",
-    )  # fmt: skip
+        label=f"{count} windows",
+        targets=names,
+        truth=found.known,
+        mean=samples.mean(axis=1, dtype=np.float64),
+        samples=samples,
+        embedding=None,
+        group=np.arange(len(samples)),
+        parameters=0,
+        milliseconds=0.0,
+        note="",
+    )
 
 
 def _correlations(found: Posteriors) -> list[float]:
@@ -114,8 +128,11 @@ def _correlations(found: Posteriors) -> list[float]:
 def _ranks(answer: Predictions, name: str) -> dict[str, Any]:
     histogram = rank_histogram((answer,), name)
     return {
-        "share": list(histogram.share), "low": histogram.low, "high": histogram.high, "outside": histogram.outside,
-    }  # fmt: skip
+        "share": list(histogram.share),
+        "low": histogram.low,
+        "high": histogram.high,
+        "outside": histogram.outside,
+    }
 
 
 def _shares(found: Sequence[Coverage]) -> dict[str, Any]:
@@ -129,7 +146,7 @@ def _scores(answer: Predictions, name: str, resamples: Resamples) -> dict[str, A
         "covered": _shares(coverage((answer,), name, resamples)),
         "rmse": float(np.sqrt(np.square(answer.mean - answer.truth)[:, column].mean())),
         "width": float(_widths(answer)[:, column].mean()),
-    }  # fmt: skip
+    }
 
 
 def _widths(answer: Predictions) -> Array:
@@ -145,38 +162,49 @@ def _wind(answer: Predictions, chosen: NDArray[np.bool_]) -> dict[str, Any]:
     low, high = np.quantile(draws, [0.05, 0.95], axis=1)
     error = answer.mean[chosen, column] - known
     return {
-        "films": int(chosen.sum()), "bias": float(error.mean()), "rmse": float(np.sqrt(np.square(error).mean())),
+        "films": int(chosen.sum()),
+        "bias": float(error.mean()),
+        "rmse": float(np.sqrt(np.square(error).mean())),
         "covered_90": float(((low <= known) & (known <= high)).mean()),
-    }  # fmt: skip
+    }
 
 
 def page(found: Mapping[str, Any]) -> str:
     """The sheet in Markdown."""
     lines = [
-        "# Intervals of one window and of several", "",
-        _about(found), "",
+        "# Intervals of one window and of several",
+        "",
+        _about(found),
+        "",
         "| windows | wind: RMSE [m/s] | width of the 90 % interval [m/s] | covered at 50 % | at 80 % | at 90 % |",
         "|---|---|---|---|---|---|",
-        *(_of_wind(count, of[WIND]) for count, of in found["together"].items()), "",
-        "Expected coverage of all targets together by random points, one window: " + "; ".join(
-            f"{float(level):.0%}: {_share(share)}" for level, share in found["one_window"]["tarp"].items()
-        ) + ".", "",
+        *(_of_wind(count, of[WIND]) for count, of in found["together"].items()),
+        "",
+        "Expected coverage of all targets together by random points, one window: "
+        + "; ".join(f"{float(level):.0%}: {_share(share)}" for level, share in found["one_window"]["tarp"].items())
+        + ".",
+        "",
         "| target, one window | covered at 50 % | at 80 % | at 90 % | rank bins out of the 99 % band, of 10 |",
         "|---|---|---|---|---|",
         *(
-            f"| {name} | " + " | ".join(_share(share) for share in of["covered"].values())
+            f"| {name} | "
+            + " | ".join(_share(share) for share in of["covered"].values())
             + f" | {found['one_window']['ranks'][name]['outside']} |"
             for name, of in found["together"]["1"].items()
-        ), "",
-        "| films of | how many | windows | bias [m/s] | RMSE [m/s] | covered at 90 % |", "|---|---|---|---|---|---|",
+        ),
+        "",
+        "| films of | how many | windows | bias [m/s] | RMSE [m/s] | covered at 90 % |",
+        "|---|---|---|---|---|---|",
         *(
             f"| {name} | {of['films']} | {count} | {of['bias']:+.2f} | {of['rmse']:.2f} | {of['covered_90']:.0%} |"
-            for name, own in found["by_dataset"].items() for count, of in own.items()
-        ), "",
+            for name, own in found["by_dataset"].items()
+            for count, of in own.items()
+        ),
+        "",
         "Errors of the wind in two windows that begin 1.2, 2.4, … s apart correlate by "
         + ", ".join(f"{value:.2f}" for value in found["correlation_by_distance"])
         + f"; {found['dependence']['wind']:.2f} is assumed ({found['dependence']['source']}).",
-    ]  # fmt: skip
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -71,12 +71,13 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             if made is not None:
                 rows[kind][name] = projection.of(read([made], folder=folder)[:, 0]) - base
     sheet = {
-        "observables": list(OBSERVED), "stated": {"bias": numerics.BIAS.tolist(), "sigma": numerics.SIGMA.tolist()},
+        "observables": list(OBSERVED),
+        "stated": {"bias": numerics.BIAS.tolist(), "sigma": numerics.SIGMA.tolist()},
         "found": {
             kind: {name: _about(change) for name, change in {**of, "all": np.concatenate(list(of.values()))}.items()}
             for kind, of in rows.items()
         },
-    }  # fmt: skip
+    }
     (out / "validate-numerics.md").write_text(page(sheet), encoding="utf-8")
     return sheet
 
@@ -90,10 +91,13 @@ def _about(change: Floats) -> dict[str, Any]:
 def page(sheet: Mapping[str, Any]) -> str:
     """The sheet in Markdown."""
     lines = [
-        "# What meshes and steps do to a calibration's summaries", "",
-        (f"Other numerics less the fit's, of the same flags in the same {DURATION:g} s of wind: mean ± standard "
-        "deviation; the mean itself is known to the deviation over the root of the number of flags."),
-    ]  # fmt: skip
+        "# What meshes and steps do to a calibration's summaries",
+        "",
+        (
+            f"Other numerics less the fit's, of the same flags in the same {DURATION:g} s of wind: mean ± standard "
+            "deviation; the mean itself is known to the deviation over the root of the number of flags."
+        ),
+    ]
     for place, what in enumerate(("Means over windows", "Slopes with the logarithm of the wind")):
         lines += ["", f"## {what}", "", "| numerics | flags | n | " + " | ".join(sheet["observables"]) + " |"]
         lines.append("|---" * (3 + len(sheet["observables"])) + "|")

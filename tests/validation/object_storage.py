@@ -119,10 +119,12 @@ def examine(address: str, say: Say) -> None:
     lake = Lake.open(address)
     collect(lake, grace=timedelta(0))
     findings = [*doctor(lake, grace=timedelta(0)), *verify(lake, object_names(lake))]
-    say({
-        "rows": lake.rows()["artifact"].to_pylist(),
-        "errors": [f"{f.kind}: {f.what}" for f in findings if f.severity is not Severity.NOTE],
-    })  # fmt: skip
+    say(
+        {
+            "rows": lake.rows()["artifact"].to_pylist(),
+            "errors": [f"{f.kind}: {f.what}" for f in findings if f.severity is not Severity.NOTE],
+        }
+    )
 
 
 def killed(group: int) -> dict[str, int]:
@@ -150,10 +152,13 @@ def killed(group: int) -> dict[str, int]:
     (found,) = Child(lambda say: examine(address, say)).said()
     assert len(set(found["rows"])) == len(found["rows"])
     result = {
-        "trials": _GROUP, "killed": died, "beside, ended": survivors, "acknowledged": len(acknowledged),
+        "trials": _GROUP,
+        "killed": died,
+        "beside, ended": survivors,
+        "acknowledged": len(acknowledged),
         "acknowledged and lost": len(acknowledged - set(found["rows"])),
         "findings of doctor and verify": len(found["errors"]),
-    }  # fmt: skip
+    }
     print(group, result, found["errors"], flush=True)  # noqa: T201 — it takes long
     return result
 
@@ -240,11 +245,16 @@ def beside_faults(store: str, prefix: str) -> dict[str, Any]:
         os.environ["AWS_ENDPOINT_URL"] = store
     acknowledged = {line["id"] for line in said}
     return {
-        "share of requests": _FAULTY, "faults": dict(Faulty.faults), "acknowledged": len(acknowledged),
-        "acknowledged and lost": len(acknowledged - set(found["rows"])), "rows": len(found["rows"]),
-        "objects read wrongly": len(wrong), "ranges read": _RANGES, "ranges read wrongly": ranges,
+        "share of requests": _FAULTY,
+        "faults": dict(Faulty.faults),
+        "acknowledged": len(acknowledged),
+        "acknowledged and lost": len(acknowledged - set(found["rows"])),
+        "rows": len(found["rows"]),
+        "objects read wrongly": len(wrong),
+        "ranges read": _RANGES,
+        "ranges read wrongly": ranges,
         "findings of doctor and verify": found["errors"],
-    }  # fmt: skip
+    }
 
 
 def _ranges(address: str, say: Say) -> None:
@@ -282,8 +292,16 @@ def refused(program: str) -> bool:
 
     folder = Path(os.environ["FLAGDATA_CACHE"]) / "rclone"
     (folder / BUCKET).mkdir(parents=True)
-    command = [program, "serve", "s3", str(folder), "--addr", "127.0.0.1:8093", "--auth-key",
-               f"{SECRETS['AWS_ACCESS_KEY_ID']},{SECRETS['AWS_SECRET_ACCESS_KEY']}"]  # fmt: skip
+    command = [
+        program,
+        "serve",
+        "s3",
+        str(folder),
+        "--addr",
+        "127.0.0.1:8093",
+        "--auth-key",
+        f"{SECRETS['AWS_ACCESS_KEY_ID']},{SECRETS['AWS_SECRET_ACCESS_KEY']}",
+    ]
     with subprocess.Popen(command) as server:
         time.sleep(3)
         os.environ["AWS_ENDPOINT_URL"] = "http://127.0.0.1:8093"

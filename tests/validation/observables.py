@@ -63,9 +63,12 @@ def compared(design: Design) -> dict[str, Any]:
     motion = read(REFERENCE, design.run)
     (subject,) = subjects(str(path_of(design, FOLDER)), query=None, lake=None, at=None, reading=Reading())
     row: dict[str, Any] = {
-        "name": design.name, "wind": motion.wind, "background": design.background, "texture": design.texture,
+        "name": design.name,
+        "wind": motion.wind,
+        "background": design.background,
+        "texture": design.texture,
         "windows": [],
-    }  # fmt: skip
+    }
     try:
         found = watched(subject.film, FlagSize(length=LENGTH, height=HEIGHT), last=_LONGEST)
     except FlagdataError as error:
@@ -80,9 +83,10 @@ def compared(design: Design) -> dict[str, Any]:
             observable: Observable = OBSERVABLES[name]
             pixels, geometry = observable.of_film(window), observable.of_cloth(cloth)
             values[name] = {
-                "pixels": _plain(pixels.value + observable.bias), "geometry": _plain(geometry.value),
+                "pixels": _plain(pixels.value + observable.bias),
+                "geometry": _plain(geometry.value),
                 "reason": pixels.reason,
-            }  # fmt: skip
+            }
         row["windows"].append({"start": start, "values": values})
     return row
 
@@ -99,9 +103,14 @@ def seen(design: Design, motion: Motion, times: NDArray[np.float64]) -> ClothWin
     hoist, free = edges_of(motion.rest)
     height = float((points[:, hoist[0], 1] - points[:, hoist[-1], 1]).mean())
     return ClothWindow(
-        times=times, points=points * HEIGHT / height, faces=motion.faces, hoist=hoist, free=free, length=LENGTH,
+        times=times,
+        points=points * HEIGHT / height,
+        faces=motion.faces,
+        hoist=hoist,
+        free=free,
+        length=LENGTH,
         height=HEIGHT,
-    )  # fmt: skip
+    )
 
 
 def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -112,9 +121,7 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         for row in rows:
             own = [one["values"][name] for one in row["windows"] if one is not None]
             unseen += len(row["windows"]) - len(own)
-            both = [
-                one["pixels"] - one["geometry"] for one in own if None not in (one["pixels"], one["geometry"])
-            ]  # fmt: skip
+            both = [one["pixels"] - one["geometry"] for one in own if None not in (one["pixels"], one["geometry"])]
             unseen += sum(one["pixels"] is None for one in own)
             apart += both
             if both:
@@ -124,23 +131,32 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             continue
         middle = float(np.median(apart))
         found[name] = {
-            "films": len(films), "windows": len(apart), "unseen": unseen, "bias": float(np.mean(apart)),
-            "error": float(np.std(films, ddof=1) / math.sqrt(len(films))), "sigma": float(np.std(apart, ddof=1)),
-            "median": middle, "robust_sigma": float(1.4826 * np.median(np.abs(np.array(apart) - middle))),
-        }  # fmt: skip
+            "films": len(films),
+            "windows": len(apart),
+            "unseen": unseen,
+            "bias": float(np.mean(apart)),
+            "error": float(np.std(films, ddof=1) / math.sqrt(len(films))),
+            "sigma": float(np.std(apart, ddof=1)),
+            "median": middle,
+            "robust_sigma": float(1.4826 * np.median(np.abs(np.array(apart) - middle))),
+        }
     return found
 
 
 def page(sheet: Mapping[str, Any]) -> str:
     """The sheet in Markdown."""
     lines = [
-        "# Observables: pixels against geometry", "",
-        (f"ArcSim's runs filmed by VTK, {len(sheet['films'])} films, windows of 2.5 s; pixels less geometry, before "
-        "the bias that `flagdata observe` takes off. The error is the bias's, by films "
-        "(`python -m tests.validation observables`)."), "",
+        "# Observables: pixels against geometry",
+        "",
+        (
+            f"ArcSim's runs filmed by VTK, {len(sheet['films'])} films, windows of 2.5 s; pixels less geometry, before "
+            "the bias that `flagdata observe` takes off. The error is the bias's, by films "
+            "(`python -m tests.validation observables`)."
+        ),
+        "",
         "| observable | unit | films | windows | not shown | bias | error | sigma | median | robust sigma |",
         "|---|---|---|---|---|---|---|---|---|---|",
-    ]  # fmt: skip
+    ]
     for name, own in sheet["summary"].items():
         unit, head = OBSERVABLES[name].unit, f"| {own['films']} | {own['windows']} | {own['unseen']} |"
         if "bias" not in own:

@@ -61,10 +61,13 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         for name in (NO_EFFECT, *names)
     }
     sheet = {
-        "reference": reference(), "strengths": {name: strength(name) for name in names},
-        "map": {name: {wind: _errors(values[name][wind], values[NO_EFFECT][wind]) for wind in values[name]}
-                for name in names},
-    }  # fmt: skip
+        "reference": reference(),
+        "strengths": {name: strength(name) for name in names},
+        "map": {
+            name: {wind: _errors(values[name][wind], values[NO_EFFECT][wind]) for wind in values[name]}
+            for name in names
+        },
+    }
     (out / "validate-power.md").write_text(page(sheet), encoding="utf-8")
     return sheet
 
@@ -97,9 +100,16 @@ def _middle(one: Parameter) -> float:
 
 def readings(name: str, wind: float, seed: int) -> dict[str, list[float | None]]:
     """Observable → a value a window of all flags."""
-    effect = "" if name == NO_EFFECT else "".join(
-        [f"[effects.{name}]\n", *(f"{key.replace('_', '-')} = {value!r}\n" for key, value in strength(name).items())]
-    )  # fmt: skip
+    effect = (
+        ""
+        if name == NO_EFFECT
+        else "".join(
+            [
+                f"[effects.{name}]\n",
+                *(f"{key.replace('_', '-')} = {value!r}\n" for key, value in strength(name).items()),
+            ]
+        )
+    )
     text = (
         f"seed = {seed}\ncount = {FLAGS}\nbatch = {FLAGS}\n"
         f"[scene]\nwidth = {LENGTH}\nheight = {HEIGHT}\ncolumns = {COLUMNS}\nstart-noise = 1e-3\n"
@@ -129,9 +139,15 @@ def windows(
     frames = round(WINDOW * RATE)
     for first in range(0, len(positions) - frames + 1, frames):
         cloth = seen_from(
-            SEEN, positions[first : first + frames], times=np.arange(frames) / RATE, faces=faces, hoist=hoist,
-            free=free, length=LENGTH, height=HEIGHT,
-        )  # fmt: skip
+            SEEN,
+            positions[first : first + frames],
+            times=np.arange(frames) / RATE,
+            faces=faces,
+            hoist=hoist,
+            free=free,
+            length=LENGTH,
+            height=HEIGHT,
+        )
         for observable, values in found.items():
             value = OBSERVABLES[observable].of_cloth(cloth).value
             values.append(None if math.isnan(value) else value)
@@ -144,9 +160,7 @@ def _once(name: str, wind: float, seed: int, path: Path) -> dict[str, list[float
     return json.loads(path.read_text(encoding="utf-8"))
 
 
-def _errors(
-    own: Mapping[str, list[float | None]], base: Mapping[str, list[float | None]]
-) -> dict[str, float | None]:  # fmt: skip
+def _errors(own: Mapping[str, list[float | None]], base: Mapping[str, list[float | None]]) -> dict[str, float | None]:
     """Observable → standard errors of a minute; None where fewer than half of the windows show it."""
     found: dict[str, float | None] = {}
     for name in OBSERVABLES:
@@ -168,14 +182,19 @@ def page(sheet: Mapping[str, Any]) -> str:
     """The sheet in Markdown."""
     winds = " / ".join(f"{wind:g}" for wind in WINDS)
     lines = [
-        "# Power map: effect × observable × wind", "",
-        (f"Standard errors that a minute of film gives, at {winds} m/s: the difference that the effect makes to the "
-        f"mean of an observable, over the standard error of the mean of a minute. {FLAGS} flags of {SECONDS:g} s each, "
-        f"1.5 × 1.0 m, Camel Ponte Roma, {COLUMNS} columns, gusts of {INTENSITY:.0%}, seen from 70° to the wind; the "
-        "deviation between windows with the sigma of pixels. The difference itself is known to about "
-        f"{math.sqrt(2 * 60 / (FLAGS * SECONDS)):.1f} of these (`python -m tests.validation power`)."), "",
+        "# Power map: effect × observable × wind",
+        "",
+        (
+            f"Standard errors that a minute of film gives, at {winds} m/s: the difference that the effect makes "
+            "to the mean of an observable, over the standard error of the mean of a minute. "
+            f"{FLAGS} flags of {SECONDS:g} s each, 1.5 × 1.0 m, Camel Ponte Roma, {COLUMNS} columns, "
+            f"gusts of {INTENSITY:.0%}, seen from 70° to the wind; the "
+            "deviation between windows with the sigma of pixels. The difference itself is known to about "
+            f"{math.sqrt(2 * 60 / (FLAGS * SECONDS)):.1f} of these (`python -m tests.validation power`)."
+        ),
+        "",
         *table(sheet),
-    ]  # fmt: skip
+    ]
     if sheet["reference"]:
         lines += ["", "## The reference simulator's runs", "", "ArcSim, 10 s at 3 / 5 / 7 m/s without gusts.", ""]
         lines += reference_table(sheet)

@@ -58,7 +58,7 @@ from tests.validation.transfer import (
     other_textures,
     reference_clips,
     unseen,
-)  # fmt: skip
+)
 
 _OF = {
     "arcsim": "the reference simulator's runs, filmed by our rasteriser by cameras unknown to it",
@@ -122,9 +122,13 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     for number, as_filmed in enumerate(plain):
         target = _conditioned(as_filmed, rate=estimator.front_end.rate)
         found = refine(
-            target, estimator, scenes, space=space, cache=cache,
+            target,
+            estimator,
+            scenes,
+            space=space,
+            cache=cache,
             settings=Settings(budget=budget, level=LEVEL, seed=child_seed(seed, "refine", number), to_floor=False),
-        )  # fmt: skip
+        )
         own.append(found)
         scores += [_regression(target, estimator, space, seed), _of_own(target, found)]
         if handmade is not None:
@@ -139,13 +143,18 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             ]
     rows = _rows(scores, seed=seed)
     result = {
-        "lake": Path(lake).name, "at": at, "targets": [found.targets[0].name for found in own], "model": estimator.name,
-        "budget": budget, "level": LEVEL,
-        "density_range": space.density.high - space.density.low, "methods": rows,
+        "lake": Path(lake).name,
+        "at": at,
+        "targets": [found.targets[0].name for found in own],
+        "model": estimator.name,
+        "budget": budget,
+        "level": LEVEL,
+        "density_range": space.density.high - space.density.low,
+        "methods": rows,
         "scores": [vars(score).copy() for score in scores],
         "seconds_per_evaluation": {stage: float(np.median(values)) for stage, values in stages.items()},
         "floor_reached": [found.reached for found in own],
-    }  # fmt: skip
+    }
     (out / "refinement.md").write_text(_sheet(result), encoding="utf-8")
     return result
 
@@ -224,10 +233,14 @@ def _regression(target: Target, estimator: Estimator, space: Space, seed: int) -
     low, middle, high = np.quantile(draws, [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2], axis=0)
     wind, density = target.truth["wind_speed"], target.truth["density"]
     return Score(
-        method=_REGRESSION, wind_error=abs(middle[0] - wind), density_error=abs(middle[1] - density),
-        wind_inside=bool(low[0] <= wind <= high[0]), density_inside=bool(low[1] <= density <= high[1]),
-        evaluations=0, seconds=seconds,
-    )  # fmt: skip
+        method=_REGRESSION,
+        wind_error=abs(middle[0] - wind),
+        density_error=abs(middle[1] - density),
+        wind_inside=bool(low[0] <= wind <= high[0]),
+        density_inside=bool(low[1] <= density <= high[1]),
+        evaluations=0,
+        seconds=seconds,
+    )
 
 
 def _handmade(at: str, seed: int) -> Fitted | None:
@@ -250,11 +263,14 @@ def _boosting(target: Target, models: Fitted) -> Score:
     wind, density = (TARGETS.index(name) for name in ("wind_speed", "density"))
     true = target.truth
     return Score(
-        method="boosting on hand-made features", wind_error=abs(middle[wind] - true["wind_speed"]),
+        method="boosting on hand-made features",
+        wind_error=abs(middle[wind] - true["wind_speed"]),
         density_error=abs(middle[density] - true["density"]),
         wind_inside=bool(low[wind] <= true["wind_speed"] <= high[wind]),
-        density_inside=bool(low[density] <= true["density"] <= high[density]), evaluations=0, seconds=seconds,
-    )  # fmt: skip
+        density_inside=bool(low[density] <= true["density"] <= high[density]),
+        evaluations=0,
+        seconds=seconds,
+    )
 
 
 def _seconds(found: Refinement) -> float:
@@ -268,25 +284,38 @@ def _of_own(target: Target, found: Refinement) -> Score:
     values = found.evaluators[0].simulator.space.values(found.posterior.points)
     middle = np.median(found.posterior.winds[:, 0]), np.median(values[:, DENSITY])
     return Score(
-        method=_OWN, wind_error=float(abs(middle[0] - truth[0])), density_error=float(abs(middle[1] - truth[1])),
-        wind_inside=wind.low <= truth[0] <= wind.high, density_inside=density.low <= truth[1] <= density.high,
-        evaluations=found.evaluations, seconds=_seconds(found),
-    )  # fmt: skip
+        method=_OWN,
+        wind_error=float(abs(middle[0] - truth[0])),
+        density_error=float(abs(middle[1] - truth[1])),
+        wind_inside=wind.low <= truth[0] <= wind.high,
+        density_inside=density.low <= truth[1] <= density.high,
+        evaluations=found.evaluations,
+        seconds=_seconds(found),
+    )
 
 
 def _of_trace(
-    target: Target, trace: Trace, found: Refinement, method: str, *, evaluations: int | None = None,
+    target: Target,
+    trace: Trace,
+    found: Refinement,
+    method: str,
+    *,
+    evaluations: int | None = None,
     seconds: float | None = None,
-) -> Score:  # fmt: skip
+) -> Score:
     """The nearest point within a budget: what the paper reports."""
     place = trace.incumbent(evaluations=evaluations, seconds=seconds)
     value = found.evaluators[0].simulator.space.values(trace.points[[place]])[0]
     count = len(trace) if seconds is None else max(1, int((trace.seconds <= seconds).sum()))
     return Score(
-        method=method, wind_error=abs(value[WIND] - target.truth["wind_speed"]),
-        density_error=abs(value[DENSITY] - target.truth["density"]), wind_inside=None, density_inside=None,
-        evaluations=count, seconds=float(trace.seconds[count - 1]),
-    )  # fmt: skip
+        method=method,
+        wind_error=abs(value[WIND] - target.truth["wind_speed"]),
+        density_error=abs(value[DENSITY] - target.truth["density"]),
+        wind_inside=None,
+        density_inside=None,
+        evaluations=count,
+        seconds=float(trace.seconds[count - 1]),
+    )
 
 
 def _rows(scores: Sequence[Score], *, seed: int) -> list[dict[str, Any]]:

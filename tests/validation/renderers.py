@@ -122,9 +122,12 @@ def _misplaced(renderer: Renderer, meshes: Meshes, zeta: RenderParameters) -> li
         square = torch.stack([corner + x * right + y * down for x, y in ((-1, 1), (1, 1), (1, -1), (-1, -1))])
         patch = len(frame.positions) + torch.tensor([[0, 1, 2], [0, 2, 3]])
         alone = Meshes.fixed(  # with all vertices, since the camera aims at the middle of them
-            positions=torch.cat([frame.positions, square])[None], faces=patch, anchor=meshes.anchor,
-            uv=torch.cat([frame.uv, torch.zeros(4, 2)]), heading=meshes.heading,
-        )  # fmt: skip
+            positions=torch.cat([frame.positions, square])[None],
+            faces=patch,
+            anchor=meshes.anchor,
+            uv=torch.cat([frame.uv, torch.zeros(4, 2)]),
+            heading=meshes.heading,
+        )
         placed = stage(alone, unlit)
         place = placed.camera.project((corner + torch.tensor(placed.shift)).double())[0].numpy()
         if not (MARGIN < place[0] < zeta.width - MARGIN and MARGIN < place[1] < zeta.height - MARGIN):

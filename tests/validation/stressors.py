@@ -95,9 +95,16 @@ Stressor = Callable[[Truth, int, np.random.Generator], Recorded]
 
 
 def _recorded(
-    truth: Truth, index: int, rng: np.random.Generator, *, rate: int = 25, noise: float = NOISE, late: float = 0.0,
-    turned: float = 0.0, log: float = 0.0,
-) -> Recorded:  # fmt: skip
+    truth: Truth,
+    index: int,
+    rng: np.random.Generator,
+    *,
+    rate: int = 25,
+    noise: float = NOISE,
+    late: float = 0.0,
+    turned: float = 0.0,
+    log: float = 0.0,
+) -> Recorded:
     """One recording at a frame rate, with white noise, a log that is late [s], turned [rad] or averaged [s]."""
     seen = truth.positions[index, :: RATE // rate]
     seen = seen + noise * rng.standard_normal(seen.shape)
@@ -205,15 +212,20 @@ def _judged(truth: Truth, stressor: str, number: int, seed: int, bank: Path) -> 
     verdict = found.verdict
     test = verdict.test
     return {
-        **row, "said": verdict.conclusion.value, "named": list(verdict.named), "p": test.p_value.value,
-        "statistic": test.statistic, "rejected": test.p_value.value <= test.level, "lags": list(found.lags),
+        **row,
+        "said": verdict.conclusion.value,
+        "named": list(verdict.named),
+        "p": test.p_value.value,
+        "statistic": test.statistic,
+        "rejected": test.p_value.value <= test.level,
+        "lags": list(found.lags),
         "seconds": verdict.seconds,
         "covered": {
             p.name: _holds(p.after or p.before, truth.parameters[p.name])
             for p in verdict.parameters
             if p.name in truth.parameters
         },
-    }  # fmt: skip
+    }
 
 
 def _holds(estimate: Estimate, true: float) -> bool:
@@ -285,16 +297,23 @@ def simulated(case: str, number: int, seed: int, *, across: int = ACROSS_MARKERS
         mesh=flat, material=material, held=tuple(ends), anchors=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, HEIGHT]])
     )
     drawn = banks.prior_batch(
-        specimen, markers=markers(across), rate=RATE, duration=DURATION, noise=0.0, speeds=(SPEEDS[0], SPEEDS[-1]),
+        specimen,
+        markers=markers(across),
+        rate=RATE,
+        duration=DURATION,
+        noise=0.0,
+        speeds=(SPEEDS[0], SPEEDS[-1]),
         seed=child_seed(seed, "stressors", case, number),
-    )  # fmt: skip
+    )
     winds = np.stack([_wind(speed, rng, turbulent=case == _TURBULENT) for speed in SPEEDS])
     times = np.arange(winds.shape[1]) / LOG_RATE - _SETTLED
     batch: NullBatch = replace(
-        drawn, stiffness=StiffnessFactors(stretching=drawn.stiffness.stretching), speeds=SPEEDS,
+        drawn,
+        stiffness=StiffnessFactors(stretching=drawn.stiffness.stretching),
+        speeds=SPEEDS,
         calibrations=drawn.calibrations[: len(SPEEDS)],
         winds=tuple(WindTrack(times=times, velocity=wind) for wind in winds),
-    )  # fmt: skip
+    )
     own = batch.calibrations[0]
     parameters = {"density": own.density, "damping": own.damping}
     if case != _OTHER:
@@ -325,14 +344,17 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         covered = [held for row in judged for held in row["covered"].values()]
         share = Share.of((row["rejected"] for row in judged), level=0.9)
         results[name] = {
-            "judged": len(judged), "refused": len(own) - len(judged), "rejected": len(wrong),
+            "judged": len(judged),
+            "refused": len(own) - len(judged),
+            "rejected": len(wrong),
             "bound_95": share.high,
             "gusts": sum(row["named"] == ["gusts"] for row in wrong),
             "named": sorted({effect for row in wrong for effect in row["named"]}),
             "p": [float(v) for v in np.quantile([row["p"] for row in judged], [0.1, 0.5, 0.9])] if judged else [],
-            "covered": sum(covered), "intervals": len(covered),
+            "covered": sum(covered),
+            "intervals": len(covered),
             "seconds": float(np.median([row["seconds"] for row in judged])) if judged else None,
-        }  # fmt: skip
+        }
     return results
 
 
@@ -344,17 +366,31 @@ def page(found: Mapping[str, Any]) -> str:
         "turbulence, gusts are the right name."
     )
     heads = (
-        "what is worse", "judged", "refused", "rejected (upper bound of 95 %)", "of them gusts", "named",
-        "p, deciles 1, 5 and 9", "intervals of 90 % that cover", "s",
-    )  # fmt: skip
+        "what is worse",
+        "judged",
+        "refused",
+        "rejected (upper bound of 95 %)",
+        "of them gusts",
+        "named",
+        "p, deciles 1, 5 and 9",
+        "intervals of 90 % that cover",
+        "s",
+    )
     lines = ["# Nulls as a field brings them", "", said, "", _line(heads), _line(["---"] * len(heads))]
     for name, own in found["stressors"].items():
         p = ", ".join(f"{value:.2f}" for value in own["p"])
         seconds = "" if own["seconds"] is None else f"{own['seconds']:.0f}"
         cells = (
-            name, own["judged"], own["refused"], f"{own['rejected']} ({own['bound_95']:.2f})", own["gusts"],
-            ", ".join(own["named"]), p, f"{own['covered']} of {own['intervals']}", seconds,
-        )  # fmt: skip
+            name,
+            own["judged"],
+            own["refused"],
+            f"{own['rejected']} ({own['bound_95']:.2f})",
+            own["gusts"],
+            ", ".join(own["named"]),
+            p,
+            f"{own['covered']} of {own['intervals']}",
+            seconds,
+        )
         lines.append(_line(cells))
     return "\n".join([*lines, ""])
 

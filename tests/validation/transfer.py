@@ -107,9 +107,11 @@ def by_cycles(recipe: DatasetRecipe) -> DatasetRecipe:
 def _noisy(recipe: DatasetRecipe) -> DatasetRecipe:
     camera = recipe.camera
     worse = replace(
-        camera, rate_factor=Range(low=28.0, high=32.0), read_noise=Range(low=3.0, high=5.0),
+        camera,
+        rate_factor=Range(low=28.0, high=32.0),
+        read_noise=Range(low=3.0, high=5.0),
         shot_noise=Range(low=4.0, high=7.0),
-    )  # fmt: skip
+    )
     return replace(recipe, camera=worse)
 
 
@@ -193,14 +195,17 @@ def _sequences(folder: Path, frames: int) -> Iterator[tuple[str, float, MeshSequ
 def _sequence(positions: NDArray[Any], faces: NDArray[Any], rest: NDArray[Any]) -> MeshSequence:
     times = np.arange(len(positions), dtype=np.int64) * 40_000_000
     return MeshSequence(
-        time=times, positions=positions.astype(np.float32), faces=faces.astype(np.int32),
-        rest=rest.astype(np.float32), attributes={},
-    )  # fmt: skip
+        time=times,
+        positions=positions.astype(np.float32),
+        faces=faces.astype(np.int32),
+        rest=rest.astype(np.float32),
+        attributes={},
+    )
 
 
 def _scores(
     model: estimator.Estimator, clips: list[Clip], seed: int, *, known: tuple[float, float] | None = None
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     count = model.front_end.frames
     inputs = torch.cat([model.inputs(frames[None, :count]) for frames, _, _ in clips])
     given = [] if known is None else [Stated(low=known[0], high=known[1])]
@@ -217,9 +222,10 @@ def _scores(
         scores[name] = {
             "rmse": float(np.sqrt(np.mean(error**2))),
             "rmse_interval": np.quantile(np.sqrt(np.mean(again**2, axis=1)), [0.05, 0.95]).tolist(),
-            "bias": float(error.mean()), "median_error": float(np.median(np.abs(error))),
+            "bias": float(error.mean()),
+            "median_error": float(np.median(np.abs(error))),
             "covered": float(np.mean((low[:, column] <= true) & (true <= high[:, column]))),
-        }  # fmt: skip
+        }
     if found.unlike is not None:
         scores["told_to_be_unlike"] = float(np.mean(found.unlike <= FALSE_ALARM))
     return scores

@@ -200,19 +200,53 @@ class _Order:
 
 
 _ORDERS = {
-    "energy": _Order(place=(0, 1), order=2, xlabel="step / stability limit", ylabel="largest energy error, relative",
-                     title="1  undamped vibration, 0.5 s"),
-    "hung_strip": _Order(place=(0, 2), order=2, xlabel="cell / length", ylabel="error of the length [m]",
-                         title="2  hung strip, stretched by 4.5 %"),
-    "fall": _Order(place=(0, 4), order=1, xlabel="step [ms]", ylabel="error of the depth after 0.3 s [m]",
-                   title="5  falling sheet", scale=1e3),
-    "elastica": _Order(place=(1, 1), order=1, xlabel="cell [mm]", ylabel="error of the tip / length",
-                       title="3  elastica, k = 1 mN·m", scale=1e3),
-    "step": _Order(place=(1, 4), order=1, xlabel="step [ms]", ylabel="vertices from a step of 7.8 µs [m]",
-                   title="7  flag, 4 m/s, at 0.16 s", scale=1e3),
-    "mesh_early": _Order(place=(2, 0), order=1, xlabel="cell [mm]", ylabel="mean distance to half the cell [m]",
-                         title="7  flag, 4 m/s, at 0.16 s", scale=1e3),
-}  # fmt: skip
+    "energy": _Order(
+        place=(0, 1),
+        order=2,
+        xlabel="step / stability limit",
+        ylabel="largest energy error, relative",
+        title="1  undamped vibration, 0.5 s",
+    ),
+    "hung_strip": _Order(
+        place=(0, 2),
+        order=2,
+        xlabel="cell / length",
+        ylabel="error of the length [m]",
+        title="2  hung strip, stretched by 4.5 %",
+    ),
+    "fall": _Order(
+        place=(0, 4),
+        order=1,
+        xlabel="step [ms]",
+        ylabel="error of the depth after 0.3 s [m]",
+        title="5  falling sheet",
+        scale=1e3,
+    ),
+    "elastica": _Order(
+        place=(1, 1),
+        order=1,
+        xlabel="cell [mm]",
+        ylabel="error of the tip / length",
+        title="3  elastica, k = 1 mN·m",
+        scale=1e3,
+    ),
+    "step": _Order(
+        place=(1, 4),
+        order=1,
+        xlabel="step [ms]",
+        ylabel="vertices from a step of 7.8 µs [m]",
+        title="7  flag, 4 m/s, at 0.16 s",
+        scale=1e3,
+    ),
+    "mesh_early": _Order(
+        place=(2, 0),
+        order=1,
+        xlabel="cell [mm]",
+        ylabel="mean distance to half the cell [m]",
+        title="7  flag, 4 m/s, at 0.16 s",
+        scale=1e3,
+    ),
+}
 
 
 def _draw_order(axes: Axes, how: _Order, result: dict[str, Any]) -> None:

@@ -117,8 +117,9 @@ def draw_tables(path: Path) -> None:
         axes.legend(frameon=False, fontsize=8)
     figure.suptitle(
         "6  Camel Ponte Roma: circles the measured tables (doubled for stretching, as ArcSim applies them; it cuts "
-        "what is negative to 0),\nsolid ArcSim's evaluation, dashed the corrected one", fontsize=10,
-    )  # fmt: skip
+        "what is negative to 0),\nsolid ArcSim's evaluation, dashed the corrected one",
+        fontsize=10,
+    )
     figure.savefig(path, dpi=90)
 
 

@@ -120,9 +120,15 @@ def design() -> Design:
     azimuth = Uncertain(name="azimuth", unit="rad", prior=_AZIMUTH, source="stated")
     elevation = Uncertain(name="elevation", unit="rad", prior=_ELEVATION, source="stated")
     return Design(
-        flag=FLAG, log=log().cut(0.0, DURATION), duration=DURATION, azimuth=azimuth, elevation=elevation,
-        count=SIMULATIONS, seed=SEED, distance=DISTANCE,
-    )  # fmt: skip
+        flag=FLAG,
+        log=log().cut(0.0, DURATION),
+        duration=DURATION,
+        azimuth=azimuth,
+        elevation=elevation,
+        count=SIMULATIONS,
+        seed=SEED,
+        distance=DISTANCE,
+    )
 
 
 def truths() -> list[Mapping[str, Any]]:
@@ -133,17 +139,23 @@ def truths() -> list[Mapping[str, Any]]:
     for number, place in enumerate(order.tolist()):
         rng = stream(SEED, "weighed", "truth", number)
         (low, high), mujoco = WEIGHTS, number in MUJOCO
-        found.append({
-            "number": number, "code": "mujoco" if mujoco else "kernel",
-            "area_weight": low * (high / low) ** ((place + rng.random()) / TRUTHS),
-            "fabric": "isotropic" if mujoco else fabrics[int(rng.integers(len(fabrics)))],
-            "bending_factor": 0.3 * (4 / 0.3) ** rng.random(), "stretching_factor": 0.6 * (1.6 / 0.6) ** rng.random(),
-            "damping": 2.5e-4 * (_GENTLEST if mujoco else 80.0) ** rng.random(),
-            "gain": 1 + 0.03 * rng.standard_normal(),
-            "scale": 1 + 0.01 * rng.standard_normal(), "azimuth": float(_AZIMUTH.at(rng.random(1))[0]),
-            "elevation": float(_ELEVATION.at(rng.random(1))[0]), "distance": rng.uniform(7, 9),
-            "seed": int(rng.integers(2**31)),
-        })  # fmt: skip
+        found.append(
+            {
+                "number": number,
+                "code": "mujoco" if mujoco else "kernel",
+                "area_weight": low * (high / low) ** ((place + rng.random()) / TRUTHS),
+                "fabric": "isotropic" if mujoco else fabrics[int(rng.integers(len(fabrics)))],
+                "bending_factor": 0.3 * (4 / 0.3) ** rng.random(),
+                "stretching_factor": 0.6 * (1.6 / 0.6) ** rng.random(),
+                "damping": 2.5e-4 * (_GENTLEST if mujoco else 80.0) ** rng.random(),
+                "gain": 1 + 0.03 * rng.standard_normal(),
+                "scale": 1 + 0.01 * rng.standard_normal(),
+                "azimuth": float(_AZIMUTH.at(rng.random(1))[0]),
+                "elevation": float(_ELEVATION.at(rng.random(1))[0]),
+                "distance": rng.uniform(7, 9),
+                "seed": int(rng.integers(2**31)),
+            }
+        )
     return found
 
 
@@ -178,17 +190,28 @@ def by_mujoco(truth: Mapping[str, Any]) -> Floats:
     """(frame, vertex, 3) of one of MuJoCo's: bending and stretching are the nominal ones by its factors."""
     own = mesh("mujoco")
     sheet = Sheet(
-        mesh=own, held=handles.corners(own.rest), density=truth["area_weight"],
-        stretching=NOMINAL.stretching * truth["stretching_factor"], poisson=NOMINAL.poisson,
-        bending=NOMINAL.bending * truth["bending_factor"], damping=truth["damping"],
-    )  # fmt: skip
+        mesh=own,
+        held=handles.corners(own.rest),
+        density=truth["area_weight"],
+        stretching=NOMINAL.stretching * truth["stretching_factor"],
+        poisson=NOMINAL.poisson,
+        bending=NOMINAL.bending * truth["bending_factor"],
+        damping=truth["damping"],
+    )
     flat = np.stack([own.rest[:, 0], np.zeros(len(own.rest)), own.rest[:, 1]], axis=1)
     times, velocity = wind()
     flight = fly(
-        environments.MUJOCO.find(), sheet, start=_start(own, truth), reference=flat, air=Air(), method=Method(),
-        wind=Wind(times=times, velocity=velocity * truth["gain"]), rate=FILM_RATE,
-        frames=round(DURATION * FILM_RATE), settle=round(_SETTLE * FILM_RATE),
-    )  # fmt: skip
+        environments.MUJOCO.find(),
+        sheet,
+        start=_start(own, truth),
+        reference=flat,
+        air=Air(),
+        method=Method(),
+        wind=Wind(times=times, velocity=velocity * truth["gain"]),
+        rate=FILM_RATE,
+        frames=round(DURATION * FILM_RATE),
+        settle=round(_SETTLE * FILM_RATE),
+    )
     return flight.positions
 
 
@@ -217,9 +240,12 @@ def _start(own: Mesh, truth: Mapping[str, Any]) -> Floats:
 def _scene(own: Mesh, truth: Mapping[str, Any], *, damped: float) -> Scene:
     base = named(truth["fabric"])
     material = replace(
-        base, density=truth["area_weight"], bending=base.bending * truth["bending_factor"],
-        stretching=base.stretching * truth["stretching_factor"], damping=max(truth["damping"] - damped, 0.0),
-    )  # fmt: skip
+        base,
+        density=truth["area_weight"],
+        bending=base.bending * truth["bending_factor"],
+        stretching=base.stretching * truth["stretching_factor"],
+        damping=max(truth["damping"] - damped, 0.0),
+    )
     held = Handles(vertices=handles.corners(own.rest))
     return Scene(mesh=own, position=_start(own, truth), material=material, handles=held)
 
@@ -277,8 +303,12 @@ def finer(design: Design) -> tuple[Floats, NDArray[np.int64]]:
     seen = np.stack([values["azimuth"], values["elevation"], np.full(design.count, design.distance)], axis=1)[places]
     seeds = tuple(seed for batch in design.batches() for seed in batch.seeds)
     batch = replace(
-        first, values=shared, places=seen[:, None], seeds=tuple(seeds[place] for place in places), columns=FINER,
-    )  # fmt: skip
+        first,
+        values=shared,
+        places=seen[:, None],
+        seeds=tuple(seeds[place] for place in places),
+        columns=FINER,
+    )
     return batch.read()[:, 0], places
 
 
@@ -292,7 +322,7 @@ def options() -> Options:
 
 def weigh(
     name: str, found: Floats, base: Floats, *, sigma: Floats, truth: Mapping[str, Any], of: tuple[Design, Options]
-) -> Row:  # fmt: skip
+) -> Row:
     """What `measure.calibrate` answers to a truth's readings (window, observable).
 
     Args:
@@ -306,10 +336,17 @@ def weigh(
     (fitted,), weight = answer.recordings, answer.weight
     low, high = weight.span.ends()
     return {
-        "name": name, "truth": truth["area_weight"], "value": weight.value, "low": low, "high": high,
-        "misfit": fitted.misfit, "withheld": answer.withheld, "damping": truth["damping"], "code": truth["code"],
+        "name": name,
+        "truth": truth["area_weight"],
+        "value": weight.value,
+        "low": low,
+        "high": high,
+        "misfit": fitted.misfit,
+        "withheld": answer.withheld,
+        "damping": truth["damping"],
+        "code": truth["code"],
         "check": answer.check.as_dict(),
-    }  # fmt: skip
+    }
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
@@ -328,9 +365,12 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     change = blank.projection.of(fine) - blank.projection.of(base[places])
     sheet = {
         "mesh": {"bias": change.mean(axis=0).tolist(), "sigma": change.std(axis=0, ddof=1).tolist()},
-        "geometry": {**score(rows), "flags": rows}, "films": {**score(films), "flags": films},
-        "left_out": rows[0]["check"], "observables": list(OBSERVED), "seconds": DURATION,
-    }  # fmt: skip
+        "geometry": {**score(rows), "flags": rows},
+        "films": {**score(films), "flags": films},
+        "left_out": rows[0]["check"],
+        "observables": list(OBSERVED),
+        "seconds": DURATION,
+    }
     (out / "validate-weighed.md").write_text(page(sheet), encoding="utf-8")
     return sheet
 
@@ -340,10 +380,11 @@ def score(rows: Sequence[Row]) -> dict[str, Any]:
     given = [row for row in rows if row["value"] is not None]
     errors = [abs(row["value"] / row["truth"] - 1) for row in given]
     return {
-        "flags": len(rows), "withheld": len(rows) - len(given),
+        "flags": len(rows),
+        "withheld": len(rows) - len(given),
         "median_error": float(np.median(errors)) if errors else None,
         "held": sum(row["low"] <= row["truth"] <= row["high"] for row in given),
-    }  # fmt: skip
+    }
 
 
 def page(sheet: Mapping[str, Any]) -> str:

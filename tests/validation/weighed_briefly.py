@@ -54,15 +54,23 @@ def truths() -> list[Mapping[str, Any]]:
     low, high = large.WEIGHTS
     for number, place in enumerate(order.tolist()):
         rng = stream(SEED, "briefly", "truth", number)
-        found.append({
-            "number": number, "code": "kernel", "fabric": fabrics[int(rng.integers(len(fabrics)))],
-            "area_weight": low * (high / low) ** ((place + rng.random()) / TRUTHS),
-            "bending_factor": 0.3 * (4 / 0.3) ** rng.random(), "stretching_factor": 0.6 * (1.6 / 0.6) ** rng.random(),
-            "damping": 5e-4 * 40 ** rng.random(), "gain": 1 + 0.03 * rng.standard_normal(),
-            "scale": 1 + 0.01 * rng.standard_normal(), "azimuth": float(own.azimuth.at(rng.random(1))[0]),
-            "elevation": float(own.elevation.at(rng.random(1))[0]), "distance": rng.uniform(13, 17),
-            "seed": int(rng.integers(2**31)),
-        })  # fmt: skip
+        found.append(
+            {
+                "number": number,
+                "code": "kernel",
+                "fabric": fabrics[int(rng.integers(len(fabrics)))],
+                "area_weight": low * (high / low) ** ((place + rng.random()) / TRUTHS),
+                "bending_factor": 0.3 * (4 / 0.3) ** rng.random(),
+                "stretching_factor": 0.6 * (1.6 / 0.6) ** rng.random(),
+                "damping": 5e-4 * 40 ** rng.random(),
+                "gain": 1 + 0.03 * rng.standard_normal(),
+                "scale": 1 + 0.01 * rng.standard_normal(),
+                "azimuth": float(own.azimuth.at(rng.random(1))[0]),
+                "elevation": float(own.elevation.at(rng.random(1))[0]),
+                "distance": rng.uniform(13, 17),
+                "seed": int(rng.integers(2**31)),
+            }
+        )
     return found
 
 
@@ -72,14 +80,15 @@ def wind(number: int) -> Floats:
     count = round((loop._BEFORE + loop.DURATION + 2) * loop._RATE)
     speed = VonKarman(mean=mean, intensity=loop._INTENSITY, length=loop._LENGTH).series(
         stream(loop.SEED, "loop on films", f"{mean:g}"), duration=count / loop._RATE, rate=loop._RATE
-    )[:count]  # fmt: skip
+    )[:count]
     rng = stream(SEED, "briefly", "wind", number)
     across, up = (
         VonKarman(mean=mean, intensity=loop._INTENSITY * ratio, length=loop._LENGTH / 2).series(
             rng, duration=count / loop._RATE, rate=loop._RATE
-        )[:count] - mean
+        )[:count]
+        - mean
         for ratio in (0.78, 0.52)
-    )  # fmt: skip
+    )
     angle = np.arctan2(across, mean)
     whole = np.stack([speed * np.cos(angle), speed * np.sin(angle), up], axis=1)
     return whole[round((loop._BEFORE - _SETTLE) * loop._RATE) :]
@@ -123,10 +132,19 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     draws = weighed([sight], [observed], seed=SEED)["area_weight"]
     low, middle, high = np.quantile(draws, [0.05, 0.5, 0.95], axis=1).tolist()
     for place, truth in enumerate(some):
-        rows.append({
-            "name": f"truth-{place}", "truth": truth["area_weight"], "value": middle[place], "low": low[place],
-            "high": high[place], "misfit": None, "withheld": None, "damping": truth["damping"], "code": "kernel",
-        })  # fmt: skip
+        rows.append(
+            {
+                "name": f"truth-{place}",
+                "truth": truth["area_weight"],
+                "value": middle[place],
+                "low": low[place],
+                "high": high[place],
+                "misfit": None,
+                "withheld": None,
+                "damping": truth["damping"],
+                "code": "kernel",
+            }
+        )
     options = Options(flag=loop.FLAG, azimuth=own.azimuth, elevation=own.elevation, simulations=own.count, seed=SEED)
     filmed = []
     for number in FILMED:
@@ -143,8 +161,11 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         )
     check = filmed[-1].get("check") or {"count": 0, "held": 0, "median_error": 0.0}
     sheet = {
-        "geometry": {**large.score(rows), "flags": rows}, "films": {**large.score(filmed), "flags": filmed},
-        "left_out": check, "observables": list(OBSERVED), "seconds": loop.DURATION,
-    }  # fmt: skip
+        "geometry": {**large.score(rows), "flags": rows},
+        "films": {**large.score(filmed), "flags": filmed},
+        "left_out": check,
+        "observables": list(OBSERVED),
+        "seconds": loop.DURATION,
+    }
     (out / "validate-weighed-briefly.md").write_text(large.page(sheet), encoding="utf-8")
     return sheet

@@ -49,10 +49,12 @@ def filmed(truth: Mapping[str, Any], positions: Floats, mesh: Mesh, at: Path) ->
     (subject,) = subjects(str(path), query=None, lake=None, at=None, reading=Reading(aspect=_SIZE.aspect))
     seen = watched(subject.film, _SIZE, last=SECONDS)
     nothing = [math.nan] * len(OBSERVED)
-    return np.array([
-        nothing if window is None else [OBSERVABLES[name].of_film(window).value for name in OBSERVED]
-        for window in seen.windows
-    ])  # fmt: skip
+    return np.array(
+        [
+            nothing if window is None else [OBSERVABLES[name].of_film(window).value for name in OBSERVED]
+            for window in seen.windows
+        ]
+    )
 
 
 def pictures(truth: Mapping[str, Any], positions: Floats, mesh: Mesh) -> NDArray[np.uint8]:
@@ -64,27 +66,31 @@ def pictures(truth: Mapping[str, Any], positions: Floats, mesh: Mesh) -> NDArray
     size = mesh.rest.max(axis=0)
     uv = torch.tensor(mesh.rest / size, dtype=torch.float32)
     meshes = Meshes(
-        positions=torch.as_tensor(positions.reshape(-1, 3), dtype=torch.float32), faces=faces.repeat(count, 1),
-        uv=uv.repeat(count, 1), vertex_offset=tuple(vertices * k for k in range(count + 1)),
-        face_offset=tuple(len(faces) * k for k in range(count + 1)), anchor=tuple(positions[0, _upper(mesh)].tolist()),
+        positions=torch.as_tensor(positions.reshape(-1, 3), dtype=torch.float32),
+        faces=faces.repeat(count, 1),
+        uv=uv.repeat(count, 1),
+        vertex_offset=tuple(vertices * k for k in range(count + 1)),
+        face_offset=tuple(len(faces) * k for k in range(count + 1)),
+        anchor=tuple(positions[0, _upper(mesh)].tolist()),
         rate=RATE,
-    )  # fmt: skip
+    )
     with torch.no_grad():
         return Raster(assets=assets).render(meshes, zeta).numpy()
 
 
-def placed(
-    drawn: RenderParameters, truth: Mapping[str, Any], positions: Floats, mesh: Mesh
-) -> RenderParameters:  # fmt: skip
+def placed(drawn: RenderParameters, truth: Mapping[str, Any], positions: Floats, mesh: Mesh) -> RenderParameters:
     """A look with the camera where the truth has it: the axis goes through the middle of the flag's box."""
     box = np.stack([positions.min(axis=(0, 1)), positions.max(axis=(0, 1))]).mean(axis=0)
     below = float(positions[0, _upper(mesh), 2] - box[2])
     away, elevation = truth["distance"], truth["elevation"]
     return replace(
-        drawn, camera_angle=truth["azimuth"], camera_radius=away * math.cos(elevation),
+        drawn,
+        camera_angle=truth["azimuth"],
+        camera_radius=away * math.cos(elevation),
         camera_height=drawn.mesh_height - below - away * math.sin(elevation),
-        view_angle=2 * math.atan(_SIZE.length / _WIDE / 2 / away), raster_samples=4,
-    )  # fmt: skip
+        view_angle=2 * math.atan(_SIZE.length / _WIDE / 2 / away),
+        raster_samples=4,
+    )
 
 
 def write(path: Path, frames: NDArray[np.uint8], *, seed: int) -> None:

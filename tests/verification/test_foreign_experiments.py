@@ -113,7 +113,15 @@ def test_the_summary_counts_nulls_and_effects_apart() -> None:
 def _row(truth: Truth, p: float, *, grade: str) -> dict[str, object]:
     covered = MappingProxyType({name: {"covers": True} for name in ("density", "bending", "damping")})
     return {
-        "name": truth.name, "acted": truth.undeclared.title, "factors": dict(truth.factors), "damping": truth.damping,
-        "method": "Euler", "said": "as it may be", "named": [], "p": p, "level": 0.03, "grade": grade,
+        "name": truth.name,
+        "acted": truth.undeclared.title,
+        "factors": dict(truth.factors),
+        "damping": truth.damping,
+        "method": "Euler",
+        "said": "as it may be",
+        "named": [],
+        "p": p,
+        "level": 0.03,
+        "grade": grade,
         "parameters": covered,
-    }  # fmt: skip
+    }

@@ -48,9 +48,14 @@ def _hanging(sheet: Sheet) -> Floats:
 
 
 FREE = Sheet(
-    mesh=grid(width=0.6, height=0.4, columns=6, rows=4), held=(), density=0.284, stretching=80.0, poisson=0.2,
-    bending=2e-5, damping=1e-3,
-)  # fmt: skip
+    mesh=grid(width=0.6, height=0.4, columns=6, rows=4),
+    held=(),
+    density=0.284,
+    stretching=80.0,
+    poisson=0.2,
+    bending=2e-5,
+    damping=1e-3,
+)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -69,9 +74,16 @@ def test_a_sheet_falls_freely_as_points_do(mujoco: Path, method: Method) -> None
 def test_a_level_sheet_in_air_falls_towards_its_terminal_speed(mujoco: Path, method: Method) -> None:
     """v = v∞ tanh(g t/v∞) with v∞ = √(σ g/p): mass and wind force in one, gravity on the vertices by their mass."""
     made = fly(
-        mujoco, FREE, start=_level(FREE), air=Air(pressure=1.3), wind=CALM, method=method,
-        rate=25.0, frames=21, gravity=GRAVITY,
-    )  # fmt: skip
+        mujoco,
+        FREE,
+        start=_level(FREE),
+        air=Air(pressure=1.3),
+        wind=CALM,
+        method=method,
+        rate=25.0,
+        frames=21,
+        gravity=GRAVITY,
+    )
     terminal = math.sqrt(FREE.density * GRAVITY / 1.3)
     expected = -terminal * np.tanh(GRAVITY * np.arange(21) * 0.04 / terminal)
     # Forces are those at the start of a step: late by half a step, h g/2 at most.
@@ -93,8 +105,10 @@ def test_a_level_sheet_whose_pressure_lags_falls_as_wagners_function_has_it(mujo
         held_back = 0.165 * (load - slow) + 0.335 * (load - fast)
         tau = 2 * abs(speed) / 0.6
         return [
-            GRAVITY - (load - 0.8 * held_back) / FREE.density, tau * 0.0455 * (load - slow), tau * 0.3 * (load - fast)
-        ]  # fmt: skip
+            GRAVITY - (load - 0.8 * held_back) / FREE.density,
+            tau * 0.0455 * (load - slow),
+            tau * 0.3 * (load - fast),
+        ]
 
     times = np.arange(21) * 0.04
     expected = -solve_ivp(rates, (0.0, 0.8), [0.0, 0.0, 0.0], t_eval=times, rtol=1e-9).y[0]
@@ -107,9 +121,16 @@ def test_a_level_sheet_whose_pressure_lags_falls_as_wagners_function_has_it(mujo
 def test_air_that_is_carried_slows_the_first_fall_of_a_level_sheet(mujoco: Path) -> None:
     """v = −g t σ/(σ + m e) before the sheet has bent: m of k = π/L, and e an ellipse of mean 1 over the height."""
     made = fly(
-        mujoco, FREE, start=_level(FREE), air=Air(pressure=0.0, carried=0.9), wind=CALM, method=Method(step=1e-4),
-        rate=1e3, frames=2, gravity=GRAVITY,
-    )  # fmt: skip
+        mujoco,
+        FREE,
+        start=_level(FREE),
+        air=Air(pressure=0.0, carried=0.9),
+        wind=CALM,
+        method=Method(step=1e-4),
+        rate=1e3,
+        frames=2,
+        gravity=GRAVITY,
+    )
     mass = 0.9 / ((math.pi / 0.6 / 2) ** 1.5 + (4 / (math.pi * 0.4)) ** 1.5) ** (2 / 3)
     ellipse = np.sqrt(np.clip(1 - (FREE.mesh.rest[:, 1] / 0.2 - 1) ** 2, 0, None))
     ellipse /= (ellipse * FREE.mesh.vertex_areas).sum() / FREE.mesh.vertex_areas.sum()
@@ -120,8 +141,15 @@ def test_air_that_is_carried_slows_the_first_fall_of_a_level_sheet(mujoco: Path)
 def test_air_that_is_carried_moves_by_mujocos_explicit_steps_alone(mujoco: Path) -> None:
     with pytest.raises(UnusableError, match="needs MuJoCo's integrator Euler"):
         fly(
-            mujoco, FREE, start=_level(FREE), air=Air(carried=0.2), wind=CALM, method=METHODS[1], rate=25.0, frames=2,
-        )  # fmt: skip
+            mujoco,
+            FREE,
+            start=_level(FREE),
+            air=Air(carried=0.2),
+            wind=CALM,
+            method=METHODS[1],
+            rate=25.0,
+            frames=2,
+        )
 
 
 def test_the_inertia_of_the_air_about_a_still_wave_is_that_of_its_wavenumbers(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -154,9 +182,16 @@ def test_the_inertia_of_the_air_about_a_still_wave_is_that_of_its_wavenumbers(mo
 def test_the_wind_pushes_a_level_sheet_by_its_tangential_drag(mujoco: Path) -> None:
     """σ dv/dt = c (U − v): v = U (1 − exp(−c t/σ)) without gravity."""
     made = fly(
-        mujoco, FREE, start=_level(FREE), air=Air(linear=0.4), wind=Wind(velocity=np.array([[3.0, 0.0, 0.0]])),
-        method=Method(), rate=25.0, frames=11, gravity=0.0,
-    )  # fmt: skip
+        mujoco,
+        FREE,
+        start=_level(FREE),
+        air=Air(linear=0.4),
+        wind=Wind(velocity=np.array([[3.0, 0.0, 0.0]])),
+        method=Method(),
+        rate=25.0,
+        frames=11,
+        gravity=0.0,
+    )
     expected = 3.0 * -np.expm1(-0.4 * np.arange(11) * 0.04 / FREE.density)
     # An explicit step of h errs by h c/(2 σ) of what changes.
     np.testing.assert_allclose(made.velocities[:, :, 0].mean(axis=1), expected, atol=3.0 * 0.5e-3 * 0.4 / FREE.density)
@@ -183,9 +218,17 @@ def test_a_clamped_sheet_vibrates_as_an_elastic_beam(mujoco: Path, along: int) -
     start = _level(sheet)
     start[:, 2] = np.where(s > 1e-9, 2e-3 * mode, 0.0)
     made = fly(
-        mujoco, sheet, start=start, reference=_level(sheet), air=STILL, wind=CALM, method=Method(step=0.2e-3),
-        rate=50.0, frames=52, gravity=0.0,
-    )  # fmt: skip
+        mujoco,
+        sheet,
+        start=start,
+        reference=_level(sheet),
+        air=STILL,
+        wind=CALM,
+        method=Method(step=0.2e-3),
+        rate=50.0,
+        frames=52,
+        gravity=0.0,
+    )
     tip = made.positions[:, place > length - 1e-9, 2].mean(axis=1)
     down = np.flatnonzero((tip[:-1] > 0) & (tip[1:] <= 0))[0]
     crossing = (down + tip[down] / (tip[down] - tip[down + 1])) / 50.0
@@ -202,9 +245,17 @@ def test_a_hanging_sheet_sags_under_its_own_weight(mujoco: Path, method: Method)
     top = tuple(np.flatnonzero(mesh.rest[:, 1] > 1 - 1e-9).tolist())
     sheet = Sheet(mesh=mesh, held=top, density=0.3, stretching=20.0, bending=1e-6, damping=20e-3)
     made = fly(
-        mujoco, sheet, start=_hanging(sheet), air=STILL, wind=CALM, method=replace(method, step=method.step / 2),
-        rate=5.0, frames=1, settle=20, gravity=GRAVITY,
-    )  # fmt: skip
+        mujoco,
+        sheet,
+        start=_hanging(sheet),
+        air=STILL,
+        wind=CALM,
+        method=replace(method, step=method.step / 2),
+        rate=5.0,
+        frames=1,
+        settle=20,
+        gravity=GRAVITY,
+    )
 
     def stretch(below: float) -> float:
         tension = sheet.density * GRAVITY * below
@@ -226,9 +277,17 @@ def test_a_hanging_strip_swings_with_the_period_of_a_chain(mujoco: Path) -> None
     reference = start.copy()
     start[:, 1] = 0.01 * j0(2.40483 * np.sqrt(mesh.rest[:, 1]))
     made = fly(
-        mujoco, sheet, start=start, reference=reference, air=STILL, wind=CALM, method=Method(step=0.2e-3), rate=50.0,
-        frames=100, gravity=GRAVITY,
-    )  # fmt: skip
+        mujoco,
+        sheet,
+        start=start,
+        reference=reference,
+        air=STILL,
+        wind=CALM,
+        method=Method(step=0.2e-3),
+        rate=50.0,
+        frames=100,
+        gravity=GRAVITY,
+    )
     tip = made.positions[:, mesh.rest[:, 1] < 1e-9, 1].mean(axis=1)
     down = np.flatnonzero((tip[:-1] > 0) & (tip[1:] <= 0))[0]
     crossing = (down + tip[down] / (tip[down] - tip[down + 1])) / 50.0
@@ -243,17 +302,31 @@ def test_a_swinging_sheet_without_losses_keeps_its_energy(mujoco: Path) -> None:
     u, v = mesh.rest.T
     start = np.stack([u * math.cos(0.5), u * math.sin(0.5), v], axis=1)
     made = fly(
-        mujoco, sheet, start=start, air=STILL, wind=CALM, method=Method(step=0.2e-3), rate=25.0, frames=40,
+        mujoco,
+        sheet,
+        start=start,
+        air=STILL,
+        wind=CALM,
+        method=Method(step=0.2e-3),
+        rate=25.0,
+        frames=40,
         gravity=GRAVITY,
-    )  # fmt: skip
+    )
     total = _energy(sheet, made)
     moving = _kinetic(sheet, made).max()
     assert moving > 0.15
     assert np.abs(total - total[0]).max() < 0.01 * moving
     lossy = fly(
-        mujoco, replace(sheet, damping=5e-3), start=start, air=STILL, wind=CALM, method=Method(step=0.2e-3),
-        rate=25.0, frames=40, gravity=GRAVITY,
-    )  # fmt: skip
+        mujoco,
+        replace(sheet, damping=5e-3),
+        start=start,
+        air=STILL,
+        wind=CALM,
+        method=Method(step=0.2e-3),
+        rate=25.0,
+        frames=40,
+        gravity=GRAVITY,
+    )
     assert _energy(sheet, lossy)[-1] < total[0] - 0.05 * moving
 
 

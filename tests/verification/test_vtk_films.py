@@ -61,9 +61,15 @@ def _square(view: View, *, rate: Fraction = Fraction(25), frames: int = 3, crf: 
 
 def _view(turned: np.ndarray, side: int = -1) -> View:
     return View(
-        size=(160, 120), target=(0.0, 0.0, 0.0), yaw=0.0, elevation=0.0, side=side, distance=8.0, extent=2.4,
+        size=(160, 120),
+        target=(0.0, 0.0, 0.0),
+        yaw=0.0,
+        elevation=0.0,
+        side=side,
+        distance=8.0,
+        extent=2.4,
         turned=turned,
-    )  # fmt: skip
+    )
 
 
 def _place(picture: np.ndarray) -> tuple[float, float]:

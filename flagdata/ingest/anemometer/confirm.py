@@ -85,11 +85,13 @@ class UnconfirmedError(RefusedError):
         """The error for some drafted readings, with both ways out."""
         return cls(
             "parts of how this file is read are inferred or assumed, and nobody has confirmed them",
-            where=str(drafted.path), accept=drafted.accept, preview=drafted.preview(),
+            where=str(drafted.path),
+            accept=drafted.accept,
+            preview=drafted.preview(),
             fix=f"compare the rows above with what you know of the wind; if they are right, repeat the command with "
             f"--accept {drafted.accept}; if not, describe the file by a recipe: --sensor FILE.toml (flagdata ingest "
             "--sniff prints a recipe to begin with)",
-        )  # fmt: skip
+        )
 
     def as_dict(self) -> dict[str, str | None]:
         return {**super().as_dict(), "accept": self.accept, "preview": self.preview}

@@ -67,11 +67,15 @@ def _guesses(source: TextFile) -> tuple[Guess, ...]:
 def guess_of(draft: Draft) -> Guess:
     """What `sniff` says of a draft."""
     return Guess(
-        format=Delimited.name, score=0.3 if draft.open else 0.55, reasons=tuple(fact.line() for fact in draft.facts),
-        notes=(f"not used: {', '.join(draft.unused)}",) if draft.unused else (), draft=draft.recipe, winds=draft.winds,
+        format=Delimited.name,
+        score=0.3 if draft.open else 0.55,
+        reasons=tuple(fact.line() for fact in draft.facts),
+        notes=(f"not used: {', '.join(draft.unused)}",) if draft.unused else (),
+        draft=draft.recipe,
+        winds=draft.winds,
         doubts=tuple(f"{one.question}: {one.fix()}" for one in draft.open),
         fix="; ".join(one.fix() for one in draft.open) or None,
-    )  # fmt: skip
+    )
 
 
 def sniff(path: Path | str, *, encoding: str | None = None) -> tuple[Guess, ...]:
@@ -172,6 +176,9 @@ def _folder(path: Path) -> Guess:
         (mesh, count), *_ = foreign.most_common(1)
         return _other_mesh(f"a folder of {count} {mesh} meshes")
     return Guess(
-        format="folder", score=0.0, reasons=(f"a folder of {len(names)} files, neither meshes nor pictures",),
-        kind="other", fix="give one file, or a folder of PNG, JPEG, TIFF, BMP or WebP pictures",
-    )  # fmt: skip
+        format="folder",
+        score=0.0,
+        reasons=(f"a folder of {len(names)} files, neither meshes nor pictures",),
+        kind="other",
+        fix="give one file, or a folder of PNG, JPEG, TIFF, BMP or WebP pictures",
+    )

@@ -105,16 +105,25 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     findings = (*reading.findings, *(() if reading.drafted else doubts.reported(reading, answered)))
     findings = (*findings, *_nothing_measured(reading, where=str(path)))
     series = WindSeries(
-        time=reading.time, channels=reading.channels, flags=reading.flags, sensor=reading.sensor,
+        time=reading.time,
+        channels=reading.channels,
+        flags=reading.flags,
+        sensor=reading.sensor,
         host_time=reading.host_time,
-    )  # fmt: skip
+    )
     reasons = reading.understood or reasons
     text = reading.drafted or reading.described or (_text(options.recipe) if options.recipe is not None else None)
     rows = shown_rows(source, reading) if reading.drafted else ()
     return WindLog(
-        series=series, format=name, findings=findings, reasons=reasons, plan=understood(name, text),
-        drafted=reading.drafted, stated=reading.stated, rows=rows,
-    )  # fmt: skip
+        series=series,
+        format=name,
+        findings=findings,
+        reasons=reasons,
+        plan=understood(name, text),
+        drafted=reading.drafted,
+        stated=reading.stated,
+        rows=rows,
+    )
 
 
 def _text(recipe: str) -> str:
@@ -148,10 +157,14 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
     text = f"{what}; kept for {', '.join(others)}: no ground truth comes of it"
     return (
         Finding(
-            kind="no-usable-wind", severity=Severity.ERROR, count=len(reading.time), where=f"line {reading.line[0]}",
-            what=text, fix="check the sensor and the recipe's columns",
+            kind="no-usable-wind",
+            severity=Severity.ERROR,
+            count=len(reading.time),
+            where=f"line {reading.line[0]}",
+            what=text,
+            fix="check the sensor and the recipe's columns",
         ),
-    )  # fmt: skip
+    )
 
 
 def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, tuple[str, ...]]:

@@ -31,11 +31,13 @@ def shown_rows(source: TextFile, reading: Reading) -> tuple[LogRow, ...]:
     texts = _lines(source, {int(reading.line[row]) for row in chosen})
     return tuple(
         LogRow(
-            line=int(reading.line[row]), text=texts.get(int(reading.line[row]), ""), time=int(reading.time[row]),
+            line=int(reading.line[row]),
+            text=texts.get(int(reading.line[row]), ""),
+            time=int(reading.time[row]),
             wind=wind_of(reading, row),
         )
         for row in sorted(chosen, key=lambda row: int(reading.line[row]))
-    )  # fmt: skip
+    )
 
 
 def wind_of(reading: Reading, row: int) -> str:

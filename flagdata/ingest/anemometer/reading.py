@@ -16,10 +16,15 @@ from flagdata.signals import Instants, Sensor, Series
 
 WIND_CHANNELS = frozenset(
     {
-        "wind_speed", "wind_x", "wind_y", "wind_z", "apparent_wind_speed", "theoretical_wind_speed",
+        "wind_speed",
+        "wind_x",
+        "wind_y",
+        "wind_z",
+        "apparent_wind_speed",
+        "theoretical_wind_speed",
         "wind_speed_estimate",
     }
-)  # fmt: skip
+)
 """Channels whose defects flag the sample: a missing temperature does not make the wind unusable."""
 
 
@@ -85,9 +90,16 @@ class Reading:
         )
 
     def marked(
-        self, rows: NDArray[np.bool_], kind: str, what: str, *, flag: SampleFlag = SampleFlag.OK,
-        severity: Severity = Severity.WARNING, value: float | None = None, fix: str | None = None,
-    ) -> Reading:  # fmt: skip
+        self,
+        rows: NDArray[np.bool_],
+        kind: str,
+        what: str,
+        *,
+        flag: SampleFlag = SampleFlag.OK,
+        severity: Severity = Severity.WARNING,
+        value: float | None = None,
+        fix: str | None = None,
+    ) -> Reading:
         """The same rows with a finding about some of them, at the first of these, and a flag at each.
 
         Args:
@@ -98,15 +110,26 @@ class Reading:
             return self
         count = int(rows.sum())
         found = Finding(
-            kind=kind, severity=severity, count=count, value=value, fix=fix, where=f"line {self.line[rows][0]}",
+            kind=kind,
+            severity=severity,
+            count=count,
+            value=value,
+            fix=fix,
+            where=f"line {self.line[rows][0]}",
             what=what.replace("{n}", str(count)),
-        )  # fmt: skip
+        )
         return self.with_findings((found,), flags=np.where(rows, self.flags | flag, self.flags))
 
     def without(
-        self, rows: NDArray[np.bool_], kind: str, what: str, *, severity: Severity = Severity.WARNING,
-        value: float | None = None, fix: str | None = None,
-    ) -> Reading:  # fmt: skip
+        self,
+        rows: NDArray[np.bool_],
+        kind: str,
+        what: str,
+        *,
+        severity: Severity = Severity.WARNING,
+        value: float | None = None,
+        fix: str | None = None,
+    ) -> Reading:
         """The other rows, with a finding about those left out; see `marked`."""
         marked = self.marked(rows, kind, f"{what}; left out", severity=severity, value=value, fix=fix)
         return marked.take(~rows) if rows.any() else marked
@@ -115,9 +138,11 @@ class Reading:
 def described(by: str) -> Finding:
     """The finding that a reader follows a description and was never tested on a real file."""
     return Finding(
-        kind="read-by-description", severity=Severity.NOTE,
-        what=f"read as {by} describes it; never tested on a real file", fix="compare the first rows with the file",
-    )  # fmt: skip
+        kind="read-by-description",
+        severity=Severity.NOTE,
+        what=f"read as {by} describes it; never tested on a real file",
+        fix="compare the first rows with the file",
+    )
 
 
 def streams(channels: Mapping[str, Series]) -> tuple[tuple[tuple[str, ...], NDArray[np.int64]], ...]:
@@ -134,9 +159,10 @@ def streams(channels: Mapping[str, Series]) -> tuple[tuple[tuple[str, ...], NDAr
     """
     n = len(next(iter(channels.values()))) if channels else 0
     known = {
-        name: np.isfinite(values) for name, values in channels.items()
+        name: np.isfinite(values)
+        for name, values in channels.items()
         if name in WIND_CHANNELS or name.endswith(("wind_direction", "wind_direction_magnetic"))
-    }  # fmt: skip
+    }
     groups: list[tuple[set[str], NDArray[np.bool_]]] = []
     for name, here in known.items():
         if not here.any():

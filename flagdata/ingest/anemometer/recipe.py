@@ -230,8 +230,9 @@ class Recipe:
             if unit(layout.unit).si != CHANNELS[name].unit:
                 raise UsageError(
                     f"channel {name} is measured in {CHANNELS[name].unit}, not in {layout.unit}",
-                    where=self.name, fix="correct the unit or the channel",
-                )  # fmt: skip
+                    where=self.name,
+                    fix="correct the unit or the channel",
+                )
         named = [c.column for c in (*self.channels.values(), *self.checks)] + list(self.time.columns)
         named += [self.rows.column] if self.rows is not None else []
         if (self.file.header == 0 or self.file.host) and any(isinstance(column, str) for column in named):
@@ -359,7 +360,9 @@ def _recipe(table: Table) -> Recipe:
     confirmed = expect.texts("confirmed")
     expect.done()
     return Recipe(
-        name=text["name"], about=text["about"], source=text["source"],
+        name=text["name"],
+        about=text["about"],
+        source=text["source"],
         file=_file(table.table("file")),
         time=_time(table.table("time")),
         channels={name: _channel(channels.table(name)) for name in channels.names()},
@@ -368,7 +371,7 @@ def _recipe(table: Table) -> Recipe:
         rows=rows.record(RowsLayout, {"column": partial(_column, rows)}) if rows.names() else None,
         expect=frozenset(confirmed),
         checks=tuple(map(_check, table.tables("check"))),
-    )  # fmt: skip
+    )
 
 
 def _file(table: Table) -> FileLayout:

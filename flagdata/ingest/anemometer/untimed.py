@@ -58,9 +58,10 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
         raise UsageError("a rate without a start", where=where, fix=fix)
     if start < 0:
         raise UsageError(
-            f"a start at {iso(start)}, before 1970, which a recording cannot hold", where="--start",
+            f"a start at {iso(start)}, before 1970, which a recording cannot hold",
+            where="--start",
             fix="give one from 1970 on that stands for it",
-        )  # fmt: skip
+        )
     lines = source.head(HEAD_LINES)
     if columns is not None:
         text, found = _table(source, rate, start, where)

@@ -65,10 +65,12 @@ def chapter_of(path: Path) -> Chapter | None:
             return None
         before += found[1]
     placed = Finding(
-        kind="chapter-placed", severity=Severity.NOTE, value=float(before),
+        kind="chapter-placed",
+        severity=Severity.NOTE,
+        value=float(before),
         what=f"chapter {len(earlier) + 1} of a recording carries the creation time of the whole one; it begins "
         f"{float(before):.3f} s later, after {', '.join(earlier)}",
-    )  # fmt: skip
+    )
     return Chapter(before=float(before), finding=placed)
 
 

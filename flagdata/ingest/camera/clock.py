@@ -89,9 +89,11 @@ def restarted(*, frame: int, after: float, count: int) -> Finding:
         count: frames that are left out.
     """
     return Finding(
-        kind="clock-reset", severity=Severity.ERROR,
+        kind="clock-reset",
+        severity=Severity.ERROR,
         what=f"the camera's clock started anew after {after:.2f} s; nothing states how long it was interrupted, so "
         f"that the {count} frames after it have no known time and were left out",
-        where=f"frame {frame}", count=count,
+        where=f"frame {frame}",
+        count=count,
         fix="cut the file there and ingest the second part by itself, with the --start of its first frame",
-    )  # fmt: skip
+    )

@@ -94,8 +94,9 @@ def check_file(path: Path, limits: Limits) -> None:
 def _too_large(width: int, height: int, limits: Limits, path: Path) -> LimitError:
     return LimitError(
         f"frames of {width} × {height} px are beyond the limit of {limits.frame_pixels} px",
-        where=str(path), fix="raise the limit if the file is to be trusted",
-    )  # fmt: skip
+        where=str(path),
+        fix="raise the limit if the file is to be trusted",
+    )
 
 
 def open_container(
@@ -166,9 +167,10 @@ def _choose(container: InputContainer, path: Path, wanted: int | None) -> VideoS
             there.append(str(stream.index))
     if there:
         raise UsageError(
-            f"stream {wanted} is no video that can be decoded", where=str(path),
+            f"stream {wanted} is no video that can be decoded",
+            where=str(path),
             fix=f"give --stream {' or '.join(there)}",
-        )  # fmt: skip
+        )
     kinds = sorted({stream.type for stream in container.streams if stream.type != "video"})
     raise InputError(
         f"the file holds {', '.join(kinds)} but no video that can be decoded"
@@ -286,16 +288,18 @@ def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: L
                 raise LimitError(
                     f"{tally.frames} frames of {pixels} px and perhaps more are beyond the limit of {limits.frames} "
                     f"frames and {limits.total_pixels} px in all",
-                    where=str(path), fix="cut the file into parts, or raise the limit",
-                )  # fmt: skip
+                    where=str(path),
+                    fix="cut the file into parts, or raise the limit",
+                )
     except av.error.FFmpegError as error:
         what = f"the container cannot be read any further ({error.strerror})"
         tally.problem = cut_off(what, tally.frames, 1)
     except IndexError:
         tally.problem = Finding(
-            kind="stream-appeared", severity=Severity.WARNING,
+            kind="stream-appeared",
+            severity=Severity.WARNING,
             what="another stream appears in the middle of the file, which is damaged or was joined from several",
-        )  # fmt: skip
+        )
     return tally
 
 
@@ -323,17 +327,19 @@ def _timing(
     if container.format.name in UNTIMED:
         if options.sequence_fps is None:
             raise TimeError(
-                "a raw stream has no time stamps", where=str(path),
+                "a raw stream has no time stamps",
+                where=str(path),
                 fix="give the camera's frame rate, --sequence-fps HZ, or wrap the stream in a container with stamps",
-            )  # fmt: skip
+            )
         rate = exact(options.sequence_fps)
         places = np.arange(tally.frames, dtype=np.int64)
         return survey(places, tick=1 / rate, missing=0, fallback_rate=rate)
     if options.sequence_fps is not None:
         raise UsageError(
             "--sequence-fps is for image sequences and raw streams; this file has time stamps of its own",
-            where=str(path), fix="leave it out, or give --true-fps HZ if a high-speed camera stored a wrong rate",
-        )  # fmt: skip
+            where=str(path),
+            fix="leave it out, or give --true-fps HZ if a high-speed camera stored a wrong rate",
+        )
     rate = stream.average_rate or stream.guessed_rate
     stamps = np.frombuffer(tally.stamps, dtype=np.int64)
     return survey(stamps, tick=_tick(stream), missing=len(tally.missing), fallback_rate=rate or None, where=str(path))

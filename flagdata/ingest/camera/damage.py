@@ -37,37 +37,44 @@ class Damage:
         if self.packets:
             found.append(
                 Finding(
-                    kind="corrupt-packets", severity=Severity.ERROR,
+                    kind="corrupt-packets",
+                    severity=Severity.ERROR,
                     what=f"{self.packets} packets could not be decoded and were skipped",
-                    where=f"packet {self.first_packet}", count=self.packets,
+                    where=f"packet {self.first_packet}",
+                    count=self.packets,
                     fix="copy the file from the camera again",
                 )
-            )  # fmt: skip
+            )
         if self.corrupt:
             found.append(
                 Finding(
-                    kind="corrupt-frames", severity=Severity.ERROR,
-                    what=f"{self.corrupt} frames came out damaged and were left out", count=self.corrupt,
+                    kind="corrupt-frames",
+                    severity=Severity.ERROR,
+                    what=f"{self.corrupt} frames came out damaged and were left out",
+                    count=self.corrupt,
                     fix="copy the file from the camera again",
                 )
-            )  # fmt: skip
+            )
         if self.suspect:
             found.append(
                 Finding(
-                    kind="damaged-references", severity=Severity.WARNING,
+                    kind="damaged-references",
+                    severity=Severity.WARNING,
                     what=f"{self.suspect} frames between damage and the next key frame may show traces of it",
                     count=self.suspect,
                 )
-            )  # fmt: skip
+            )
         found += resized(self.resized, fix="bring all frames to one size: ffmpeg -i IN -vf scale=WIDTH:HEIGHT OUT")
         missing = expected - self.packets - self.shown
         if missing > 0:
             found.append(
                 Finding(
-                    kind="frames-undecoded", severity=Severity.WARNING,
-                    what=f"the file announces {expected} frames, the decoder gave {self.shown}", count=missing,
+                    kind="frames-undecoded",
+                    severity=Severity.WARNING,
+                    what=f"the file announces {expected} frames, the decoder gave {self.shown}",
+                    count=missing,
                 )
-            )  # fmt: skip
+            )
         return found
 
 
@@ -82,11 +89,14 @@ def undecoded(count: int, *, total: int, first: str | None = None) -> list[Findi
         return []
     return [
         Finding(
-            kind="corrupt-frames", severity=Severity.ERROR, count=count, where=first,
+            kind="corrupt-frames",
+            severity=Severity.ERROR,
+            count=count,
+            where=first,
             what=f"{count} of {total} frames cannot be decoded and were left out",
             fix="copy the recording from the camera again",
         )
-    ]  # fmt: skip
+    ]
 
 
 def resized(
@@ -101,8 +111,10 @@ def resized(
         return []
     return [
         Finding(
-            kind="size-changed", severity=Severity.ERROR, count=count,
+            kind="size-changed",
+            severity=Severity.ERROR,
+            count=count,
             what=f"{count} frames have another size than {than} and were left out",
             fix=fix,
         )
-    ]  # fmt: skip
+    ]

@@ -47,19 +47,21 @@ def check(path: Path, timing: Timing, *, true_fps: float | None) -> list[Finding
     stated = delays(path)
     if stated and float(np.median(stated)) < SHORTEST:
         raise TimeError(
-            f"the GIF states delays of {float(np.median(stated)):g} hundredths of a second, which stands for \"as fast "
-            'as possible": the camera\'s rate is not known',
+            f'the GIF states delays of {float(np.median(stated)):g} hundredths of a second, which stands for "as fast '
+            "as possible\": the camera's rate is not known",
             where=str(path),
             fix="give the rate at which the camera ran, --true-fps HZ, or the film that the GIF was made of",
-        )  # fmt: skip
+        )
     if timing.variable or period.denominator > 100:
         return []  # delays of 3, 3 and 4 hundredths keep a mean
     low, high = float(1 / (period + HALF)), float(1 / (period - HALF))
     return [
         Finding(
-            kind="gif-delays", severity=Severity.WARNING, value=float(1 / period),
+            kind="gif-delays",
+            severity=Severity.WARNING,
+            value=float(1 / period),
             what=f"a GIF states times in hundredths of a second: delays of {float(period):g} s say that the rate is "
             f"between {low:.3g} and {high:.3g} Hz, and {float(1 / period):.4g} Hz is assumed",
             fix="if the camera's rate is known, give it: --true-fps HZ",
         )
-    ]  # fmt: skip
+    ]

@@ -123,16 +123,18 @@ class JoinedSource:
         for path, part in zip(self._paths, self._parts, strict=True):
             if part.facts.timing.end is not None or part.facts.sequence:
                 raise InputError(
-                    "its time stamps start anew within the file, or are none", where=str(path),
+                    "its time stamps start anew within the file, or are none",
+                    where=str(path),
                     fix="ingest the files by themselves, without --join",
-                )  # fmt: skip
+                )
         return self._follow()
 
     def _apart(self, path: Path, what: str, mine: object, theirs: object) -> UsageError:
         return UsageError(
             f"the {what} differs from that of {self._paths[0].name}: {mine} and {theirs}; they are not one recording",
-            where=str(path), fix="ingest it by itself, without --join",
-        )  # fmt: skip
+            where=str(path),
+            fix="ingest it by itself, without --join",
+        )
 
     def _follow(self) -> list[Finding]:
         """Refuse chapters that do not follow one another, by their creation times.
@@ -145,17 +147,20 @@ class JoinedSource:
         names = ", ".join(path.name for path in self._paths)
         by_name = [place_by_name(path.name) for path in self._paths]
         joined = Finding(
-            kind="chapters-joined", severity=Severity.NOTE, count=len(self._paths),
+            kind="chapters-joined",
+            severity=Severity.NOTE,
+            count=len(self._paths),
             what=f"{len(self._paths)} chapters of one recording were joined: {names}",
-        )  # fmt: skip
+        )
         known = [one for one in by_name if one is not None]
         if len(known) == len(by_name) and len(set(stated)) == 1 and stated[0] is not None:
             chapters = [chapter for _, chapter in known]
             if len({recording for recording, _ in known}) > 1 or chapters != list(range(chapters[0], chapters[-1] + 1)):
                 raise UsageError(
-                    f"by their names {names} are not successive chapters of one recording", where="--join",
+                    f"by their names {names} are not successive chapters of one recording",
+                    where="--join",
                     fix="name all chapters of one recording, and no others",
-                )  # fmt: skip
+                )
             return [joined]
         for place, (before, after) in enumerate(pairwise(stated)):
             if before is None or after is None:
@@ -165,16 +170,18 @@ class JoinedSource:
                 raise UsageError(
                     f"by its creation time it begins {abs(between):.1f} s {'after' if between > 0 else 'before'} the "
                     f"end of {self._paths[place].name}",
-                    where=str(self._paths[place + 1]), fix="name chapters that follow one another, or leave out --join",
-                )  # fmt: skip
+                    where=str(self._paths[place + 1]),
+                    fix="name chapters that follow one another, or leave out --join",
+                )
         if None in stated:
             return [
                 joined,
                 Finding(
-                    kind="chapters-unproven", severity=Severity.WARNING,
+                    kind="chapters-unproven",
+                    severity=Severity.WARNING,
                     what="nothing in the files states that each begins where the one before ends; it is taken as given",
                 ),
-            ]  # fmt: skip
+            ]
         return [joined]
 
     def _describe(self, found: list[Finding]) -> SourceFacts:
@@ -186,10 +193,16 @@ class JoinedSource:
         steps = sum(timing.count - 1 for timing in timings)
         mean = sum((timing.period * (timing.count - 1) for timing in timings), Fraction(0)) / max(1, steps)
         timing = Timing(
-            tick=first.tick, origin=0, period=first.period if variable or not steps else mean, variable=variable,
-            span=span, shortest=min(one.shortest for one in timings), longest=max(one.longest for one in timings),
-            count=count, missing=sum(one.missing for one in timings),
-        )  # fmt: skip
+            tick=first.tick,
+            origin=0,
+            period=first.period if variable or not steps else mean,
+            variable=variable,
+            span=span,
+            shortest=min(one.shortest for one in timings),
+            longest=max(one.longest for one in timings),
+            count=count,
+            missing=sum(one.missing for one in timings),
+        )
         findings = [
             replace(one, where=path.name if one.where is None else f"{path.name}, {one.where}")
             for path, part in zip(self._paths, self._parts, strict=True)

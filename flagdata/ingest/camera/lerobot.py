@@ -104,9 +104,10 @@ class EpisodeSource:
         table = _table(data, columns, round(_stated(row, "episode_index", self._where)))
         if table.num_rows > options.limits.frames:
             raise LimitError(
-                f"{table.num_rows} frames are beyond the limit of {options.limits.frames}", where=self._where,
+                f"{table.num_rows} frames are beyond the limit of {options.limits.frames}",
+                where=self._where,
                 fix="raise the limit",
-            )  # fmt: skip
+            )
         self._stamped = TIME in columns
         self._stamps = stamps_of(table, str(data))
         self._limits = options.limits
@@ -134,10 +135,21 @@ class EpisodeSource:
         luma = first[0].luma()
         findings = [] if self._stamped else [_counted()]
         self.facts = SourceFacts(
-            container="lerobot", codec=self._kind, pixel_format="", width=luma.image.width, height=luma.image.height,
-            aspect=Fraction(1), orientation=Orientation(), interlaced=False, timing=timing, metadata={}, recorded=None,
-            sequence=False, findings=tuple(findings), stamped=timing.origin if self._stamped else None,
-        )  # fmt: skip
+            container="lerobot",
+            codec=self._kind,
+            pixel_format="",
+            width=luma.image.width,
+            height=luma.image.height,
+            aspect=Fraction(1),
+            orientation=Orientation(),
+            interlaced=False,
+            timing=timing,
+            metadata={},
+            recorded=None,
+            sequence=False,
+            findings=tuple(findings),
+            stamped=timing.origin if self._stamped else None,
+        )
 
     def pictures(self) -> Iterator[Picture]:
         shown = 0
@@ -281,9 +293,10 @@ def _episode(folder: Path, wanted: int | None) -> dict[str, Any]:
         rows += read(path, names).to_pylist()
     if wanted is None and len(rows) != 1:
         raise InputError(
-            f"{len(rows)} episodes, each a recording of its own", where=str(folder),
+            f"{len(rows)} episodes, each a recording of its own",
+            where=str(folder),
             fix=f"choose one: --episode 0 to {len(rows) - 1}",
-        )  # fmt: skip
+        )
     for row in rows:
         if wanted in (None, row.get("episode_index")):
             return row
@@ -325,7 +338,8 @@ def _table(path: Path, columns: list[str], episode: int) -> pa.Table:
 
 def _counted() -> Finding:
     return Finding(
-        kind="stamps-synthetic", severity=Severity.WARNING,
+        kind="stamps-synthetic",
+        severity=Severity.WARNING,
         what="LeRobot counts a frame's time as its number / fps: gaps and jitter of the camera are not in the data set",
         fix="where the original recording exists, ingest that",
-    )  # fmt: skip
+    )

@@ -16,9 +16,16 @@ _FULL = 2  # AVCOL_RANGE_JPEG
 _LIMITED = 1  # AVCOL_RANGE_MPEG
 _STILL_CODECS = frozenset({"mjpeg", "png", "apng", "gif", "bmp", "tiff", "webp", "jpeg2000", "ljpeg", "jpegls", "ffv1"})
 BROKEN = (
-    OSError, ValueError, SyntaxError, EOFError, TypeError, LookupError, ArithmeticError, struct.error,
+    OSError,
+    ValueError,
+    SyntaxError,
+    EOFError,
+    TypeError,
+    LookupError,
+    ArithmeticError,
+    struct.error,
     Image.DecompressionBombError,
-)  # fmt: skip
+)
 """What Pillow raises on a picture that is damaged."""
 DEEP = "I;16"
 """How Pillow's names of modes of 16 bits begin."""

@@ -90,12 +90,16 @@ def propose(source: Source, *, rate: float, where: str) -> CropProposal:
     if share < _LEAST_SHARE:
         raise RefusedError(
             f"motion is all over the image: its largest region carries {share:.0%} of it",
-            where=where, fix="give the crop as x,y,width,height",
-        )  # fmt: skip
+            where=where,
+            fix="give the crop as x,y,width,height",
+        )
     return CropProposal(
-        box=box, moving=_extent_box(region, wide=wide, high=high), share=share, runs=len(maps),
+        box=box,
+        moving=_extent_box(region, wide=wide, high=high),
+        share=share,
+        runs=len(maps),
         picture=_draw(shown, motion, box, wide=wide),
-    )  # fmt: skip
+    )
 
 
 def cut_off(crop: CropBox, proposal: CropProposal, *, wide: int) -> dict[str, int]:
@@ -106,10 +110,11 @@ def cut_off(crop: CropBox, proposal: CropProposal, *, wide: int) -> dict[str, in
     """
     moving = proposal.moving
     beyond = {
-        "left": crop.x - moving.x, "top": crop.y - moving.y,
+        "left": crop.x - moving.x,
+        "top": crop.y - moving.y,
         "right": moving.x + moving.width - crop.x - crop.width,
         "bottom": moving.y + moving.height - crop.y - crop.height,
-    }  # fmt: skip
+    }
     if beyond["left"] >= moving.width or beyond["right"] >= moving.width:
         return {}
     if beyond["top"] >= moving.height or beyond["bottom"] >= moving.height:
@@ -180,9 +185,10 @@ def _region(maps: NDArray[np.float32], motion: NDArray[np.float32], *, where: st
     energy = np.median(sums, axis=0)
     if energy.sum() == 0:
         raise RefusedError(
-            "motion comes and goes: no region moves in most of the recording", where=where,
+            "motion comes and goes: no region moves in most of the recording",
+            where=where,
             fix="give the crop as x,y,width,height",
-        )  # fmt: skip
+        )
     best = int(np.argmax(energy))
     region = moving & (labels == best + 1)
     return _with_tip(region, maps), float(energy[best] / energy.sum())
@@ -254,5 +260,8 @@ def _draw(shown: NDArray[np.uint8], motion: NDArray[np.floating], box: CropBox, 
 
 def _scaled(box: CropBox, scale: float) -> Sequence[float]:
     return (
-        box.x * scale, box.y * scale, (box.x + box.width) * scale - 1, (box.y + box.height) * scale - 1,
-    )  # fmt: skip
+        box.x * scale,
+        box.y * scale,
+        (box.x + box.width) * scale - 1,
+        (box.y + box.height) * scale - 1,
+    )

@@ -107,10 +107,16 @@ def probe(path: Path | str, options: CameraOptions | None = None) -> CameraProbe
         facts, timing = source.facts, source.facts.timing
         try:
             start = find_start(
-                options.start, facts.metadata, recorded=facts.recorded, place=options.zone, duration=timing.duration,
-                where=str(path), chapter=chapter_of(path), stamped=facts.stamped,
+                options.start,
+                facts.metadata,
+                recorded=facts.recorded,
+                place=options.zone,
+                duration=timing.duration,
+                where=str(path),
+                chapter=chapter_of(path),
+                stamped=facts.stamped,
                 gps=facts.gps.start(1.0) if facts.gps is not None else None,
-            )  # fmt: skip
+            )
         except TimeError:
             start = None
         width, height = upright_size(facts.width, facts.height, facts.aspect, facts.orientation)

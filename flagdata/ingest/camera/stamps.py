@@ -83,9 +83,16 @@ def survey(
         period = 1 / (fallback_rate * tick)
         origin = int(ordered[0]) if len(ordered) else 0
         return Timing(
-            tick=tick, origin=origin, period=period, variable=False, span=0, shortest=0, longest=0,
-            count=len(stamps), missing=missing,
-        )  # fmt: skip
+            tick=tick,
+            origin=origin,
+            period=period,
+            variable=False,
+            span=0,
+            shortest=0,
+            longest=0,
+            count=len(stamps),
+            missing=missing,
+        )
     median = float(np.median(steps))
     whole = np.maximum(np.rint(steps / median), 1)
     mean = Fraction(int(steps[whole == 1].sum()), int((whole == 1).sum()))
@@ -185,15 +192,18 @@ class StampRepair(Generic[T]):
                 Severity.WARNING,
                 "frames have a time stamp out of order and were left out",
             ),
-        }  # fmt: skip
+        }
         return [
             Finding(
-                kind=kind, severity=severity, what=f"{self._counts[kind]} {text}",
-                where=f"frame {self._where[kind]}", count=self._counts[kind],
+                kind=kind,
+                severity=severity,
+                what=f"{self._counts[kind]} {text}",
+                where=f"frame {self._where[kind]}",
+                count=self._counts[kind],
             )
             for kind, (severity, text) in kinds.items()
             if kind in self._counts
-        ]  # fmt: skip
+        ]
 
 
 def nanoseconds(ticks: int, *, tick: Fraction, scale: Fraction) -> int:

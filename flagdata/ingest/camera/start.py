@@ -70,10 +70,11 @@ def find_start(
     """
     if option == UNKNOWN:
         finding = Finding(
-            kind="start-unknown", severity=Severity.WARNING,
+            kind="start-unknown",
+            severity=Severity.WARNING,
             what=f"nobody knows when the recording began; it is stamped from {iso(UNKNOWN)} on",
             fix="declare its wind (flagdata declare), or give the clock's offset (flagdata align --by given)",
-        )  # fmt: skip
+        )
         return Start(instant=UNKNOWN, source="unknown", sigma=None, findings=(finding,))
     if option is not None:
         return Start(instant=option, source="option", sigma=None)

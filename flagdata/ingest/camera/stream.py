@@ -59,16 +59,23 @@ class CameraStream:
                 f"the time stamps span {duration:.0f} s, beyond the limit of {options.limits.duration:.0f} s",
                 where=str(path),
                 fix="give the rate at which they were taken, --sequence-fps HZ, or number them by frames"
-                if facts.sequence else "the stamps are damaged; repair the container, or raise the limit",
-            )  # fmt: skip
+                if facts.sequence
+                else "the stamps are damaged; repair the container, or raise the limit",
+            )
         chapter = chapter_of(path) if options.start is None else None
         if chapter is not None:
             chapter = replace(chapter, before=chapter.before * float(self._scale))
         start = find_start(
-            options.start, facts.metadata, recorded=facts.recorded, place=options.zone, duration=duration,
-            where=str(path), chapter=chapter, stamped=facts.stamped,
+            options.start,
+            facts.metadata,
+            recorded=facts.recorded,
+            place=options.zone,
+            duration=duration,
+            where=str(path),
+            chapter=chapter,
+            stamped=facts.stamped,
             gps=facts.gps.start(float(self._scale)) if facts.gps is not None else None,
-        )  # fmt: skip
+        )
         self._opening += start.findings
         width, height = upright_size(facts.width, facts.height, facts.aspect, facts.orientation)
         self.proposal: CropProposal | None = None
@@ -77,9 +84,13 @@ class CameraStream:
             self._opening.append(_proposed(self.proposal))
         crop = settle_crop(self.proposal.box if self.proposal else options.crop, width=width, height=height)
         self._geometry = Geometry(
-            width=facts.width, height=facts.height, aspect=facts.aspect, orientation=facts.orientation, crop=crop,
+            width=facts.width,
+            height=facts.height,
+            aspect=facts.aspect,
+            orientation=facts.orientation,
+            crop=crop,
             size=options.size,
-        )  # fmt: skip
+        )
         self._period = nanoseconds(1, tick=timing.tick * timing.period, scale=self._scale)
         self._check_exposure(str(path))
         self._shift = round((options.exposure or 0.0) / 2 * NANOSECONDS)
@@ -114,11 +125,13 @@ class CameraStream:
         edges = " and ".join(f"{pixels} px at the {edge}" for edge, pixels in beyond.items())
         return [
             Finding(
-                kind="crop-cuts-motion", severity=Severity.WARNING, value=float(max(beyond.values())),
+                kind="crop-cuts-motion",
+                severity=Severity.WARNING,
+                value=float(max(beyond.values())),
                 what=f"what moves reaches beyond the crop, by {edges}: a part of it is cut off",
                 fix=f"--crop {proposal.box} takes it whole",
             )
-        ]  # fmt: skip
+        ]
 
     def _check_exposure(self, where: str) -> None:
         """Refuse an exposure that no frame of this camera can have had: it ends before the next one begins.
@@ -223,41 +236,45 @@ class CameraStream:
         if enlarged > 1:
             found.append(
                 Finding(
-                    kind="enlarged", severity=Severity.WARNING if enlarged > 2 else Severity.NOTE,
+                    kind="enlarged",
+                    severity=Severity.WARNING if enlarged > 2 else Severity.NOTE,
                     what=f"the crop of {self.info.crop[2]} × {self.info.crop[3]} px is smaller than the "
                     f"{self._options.size} px that come out: it was enlarged {enlarged:.3g}-fold",
                     value=enlarged,
                 )
-            )  # fmt: skip
+            )
         if self._options.exposure is None:
             half = self._period / 2 / NANOSECONDS
             found.append(
                 Finding(
-                    kind="exposure-unknown", severity=Severity.NOTE,
+                    kind="exposure-unknown",
+                    severity=Severity.NOTE,
                     what=f"the exposure time is unknown: stamps count as mid-exposure, to within {half * 1e3:.3g} ms",
                     value=half,
                 )
-            )  # fmt: skip
+            )
         if self.info.variable_rate:
             timing = self._source.facts.timing
             tick = float(timing.tick * self._scale) * 1e3
             found.append(
                 Finding(
-                    kind="variable-rate", severity=Severity.NOTE,
+                    kind="variable-rate",
+                    severity=Severity.NOTE,
                     what=f"the frame rate varies: {timing.shortest * tick:.3g} to {timing.longest * tick:.3g} ms from "
                     "frame to frame",
                     value=float(timing.longest * timing.tick * self._scale),
                 )
-            )  # fmt: skip
+            )
         return found
 
 
 def _proposed(proposal: CropProposal) -> Finding:
     return Finding(
-        kind="crop-proposed", severity=Severity.NOTE,
+        kind="crop-proposed",
+        severity=Severity.NOTE,
         what=f"automatic crop {proposal.box}, with {proposal.share:.0%} of the motion; check it by --crop-picture",
         value=proposal.share,
-    )  # fmt: skip
+    )
 
 
 def _rescaled(variable: bool, scale: Fraction, true_fps: float, container: float) -> Finding:
@@ -266,39 +283,45 @@ def _rescaled(variable: bool, scale: Fraction, true_fps: float, container: float
     )
     if variable:
         return Finding(
-            kind="true-rate-of-variable", severity=Severity.WARNING,
-            what=f"{what}; its frame rate varies, so the mean of it was set to the true one", value=float(scale),
-        )  # fmt: skip
+            kind="true-rate-of-variable",
+            severity=Severity.WARNING,
+            what=f"{what}; its frame rate varies, so the mean of it was set to the true one",
+            value=float(scale),
+        )
     return Finding(kind="true-rate", severity=Severity.NOTE, what=what, value=float(scale))
 
 
 def _grid_findings(report: GridReport, rate: float) -> list[Finding]:
     found = [
         Finding(
-            kind="resampled", severity=Severity.NOTE,
+            kind="resampled",
+            severity=Severity.NOTE,
             what=f"{report.picks} frames at {rate:g} Hz out of {report.sources}, the nearest by time stamp; worst "
             f"stamp error {report.worst_error / 1e6:.3f} ms",
-            count=report.picks, value=report.worst_error / NANOSECONDS,
+            count=report.picks,
+            value=report.worst_error / NANOSECONDS,
         )
-    ]  # fmt: skip
+    ]
     if report.repeats:
         found.append(
             Finding(
-                kind="frames-repeated", severity=Severity.WARNING,
+                kind="frames-repeated",
+                severity=Severity.WARNING,
                 what=f"{report.repeats} frames show the same source frame as the one before: the camera is slower than "
                 f"{rate:g} Hz or its frames are uneven",
                 count=report.repeats,
             )
-        )  # fmt: skip
+        )
     if report.used and report.unused > report.sources // 2:
         found.append(
             Finding(
-                kind="frames-dropped", severity=Severity.NOTE,
+                kind="frames-dropped",
+                severity=Severity.NOTE,
                 what=f"{report.unused} of {report.sources} source frames are left out at this rate; "
                 "--rate native keeps all",
                 count=report.unused,
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -307,12 +330,15 @@ def _gap_findings(report: GridReport) -> list[Finding]:
         return []
     return [
         Finding(
-            kind="frames-missing", severity=Severity.WARNING,
+            kind="frames-missing",
+            severity=Severity.WARNING,
             what=f"{report.left_out} frames are missing, in {report.gaps} gaps of up to "
             f"{report.longest_gap / NANOSECONDS:.3f} s; none was made up",
-            where=f"frame {report.first_left_out}", count=report.left_out, value=report.longest_gap / NANOSECONDS,
+            where=f"frame {report.first_left_out}",
+            count=report.left_out,
+            value=report.longest_gap / NANOSECONDS,
         )
-    ]  # fmt: skip
+    ]
 
 
 def open_camera(path: Path | str, options: CameraOptions | None = None) -> CameraStream:

@@ -37,26 +37,32 @@ def truncation(
         return [
             cut_off(
                 f"the file states {stream.frames} frames and holds {read}: it is cut off or damaged",
-                read, stream.frames - read,
+                read,
+                stream.frames - read,
             )
-        ]  # fmt: skip
+        ]
     if 0 < stream.frames < read:
         return [
             Finding(
-                kind="index-damaged", severity=Severity.WARNING,
+                kind="index-damaged",
+                severity=Severity.WARNING,
                 what=f"the file states {stream.frames} frames and holds {read}: its index is damaged",
                 count=read - stream.frames,
             )
-        ]  # fmt: skip
+        ]
     return []
 
 
 def cut_off(what: str, read: int, lost: int) -> Finding:
     """The finding that `lost` frames, at least one, are not there after `read` of them."""
     return Finding(
-        kind="truncated", severity=Severity.ERROR, what=what, where=f"frame {read}", count=lost,
+        kind="truncated",
+        severity=Severity.ERROR,
+        what=what,
+        where=f"frame {read}",
+        count=lost,
         fix="copy it from the camera again; what was read is kept",
-    )  # fmt: skip
+    )
 
 
 def _of_mp4(path: Path, stream: VideoStream, read: int) -> list[Finding]:
@@ -67,11 +73,12 @@ def _of_mp4(path: Path, stream: VideoStream, read: int) -> list[Finding]:
     if missing > 0:
         return [
             Finding(
-                kind="frames-not-shown", severity=Severity.WARNING,
+                kind="frames-not-shown",
+                severity=Severity.WARNING,
                 what=f"the file states {stream.frames} frames; its edit list, or damage of its index, leaves {read}",
                 count=missing,
             )
-        ]  # fmt: skip
+        ]
     return []
 
 
@@ -120,7 +127,8 @@ def _of_transport_stream(path: Path) -> list[Finding]:
         return []
     return [
         Finding(
-            kind="truncated", severity=Severity.WARNING,
+            kind="truncated",
+            severity=Severity.WARNING,
             what=f"the file is not a whole number of transport packets of {length} B: it is cut off or damaged",
         )
-    ]  # fmt: skip
+    ]

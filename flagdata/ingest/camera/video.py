@@ -132,53 +132,60 @@ class VideoSource:
         if first.interlaced_frame:
             found.append(
                 Finding(
-                    kind="interlaced", severity=Severity.WARNING,
+                    kind="interlaced",
+                    severity=Severity.WARNING,
                     what="the video is interlaced: each frame mixes two instants, half a frame period apart; it was "
                     "not deinterlaced",
                 )
-            )  # fmt: skip
+            )
         if _orientation(first).mirrored:
             found.append(Finding(kind="mirrored", severity=Severity.NOTE, what="the file asks to be shown mirrored"))
         if not _orientation(first).exact:
             found.append(
                 Finding(
-                    kind="odd-rotation", severity=Severity.WARNING,
+                    kind="odd-rotation",
+                    severity=Severity.WARNING,
                     what="the file asks for a rotation that is not a multiple of 90°; the nearest one was taken",
                 )
-            )  # fmt: skip
+            )
         if int(first.color_trc) in (16, 18):
             found.append(
                 Finding(
-                    kind="hdr-transfer", severity=Severity.WARNING,
+                    kind="hdr-transfer",
+                    severity=Severity.WARNING,
                     what="the video is HDR (PQ or HLG): its grays are not those of an ordinary camera",
                 )
-            )  # fmt: skip
+            )
         if _has_alpha(first) or self._metadata().get("alpha_mode") == "1":  # VP8 and VP9 code it beside
             found.append(
                 Finding(
-                    kind="alpha-ignored", severity=Severity.WARNING,
+                    kind="alpha-ignored",
+                    severity=Severity.WARNING,
                     what="transparency was left aside: the picture below it is read",
                 )
-            )  # fmt: skip
+            )
         found += self._capture_findings()
         others = len(self._container.streams.video) - 1
         if others:
             found.append(
                 Finding(
-                    kind="more-video-streams", severity=Severity.NOTE,
-                    what=f"stream {self._stream.index} was taken, {others} other video streams were not", count=others,
+                    kind="more-video-streams",
+                    severity=Severity.NOTE,
+                    what=f"stream {self._stream.index} was taken, {others} other video streams were not",
+                    count=others,
                     fix="choose another with --stream",
                 )
-            )  # fmt: skip
+            )
         if self._options.start is None and telemetry_of(self._container) is not None and self._gps is None:
             found.append(
                 Finding(
-                    kind="telemetry-without-time", severity=Severity.NOTE,
+                    kind="telemetry-without-time",
+                    severity=Severity.NOTE,
                     what="the telemetry in the file (GPMF) states no GPS time with a fix; the start is the camera's own"
                     " clock",
                     fix="if that clock was not set, give --start",
                 )
-            )  # fmt: skip
+            )
         return found
 
     def _capture_findings(self) -> list[Finding]:
@@ -194,12 +201,14 @@ class VideoSource:
             return []
         return [
             Finding(
-                kind="capture-rate", severity=Severity.WARNING, value=taken,
+                kind="capture-rate",
+                severity=Severity.WARNING,
+                value=taken,
                 what=f"the file says that the camera took {taken:g} frames a second, its time stamps say {stated:.4g}: "
                 f"time runs {taken / stated:.3g} times too slow in it",
                 fix=f"give the camera's rate: --true-fps {taken:g}",
             )
-        ]  # fmt: skip
+        ]
 
     def pictures(self) -> Iterator[Picture]:
         codec = self.facts.codec

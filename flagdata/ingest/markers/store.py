@@ -61,11 +61,18 @@ def ingest_markers(
             with disk_errors("writing markers", staged):
                 write_markers(staged, sequence)
             artifact = Artifact(
-                kind=Kind.MARKERS, name=named[name].name or source.stem, object=transaction.put(staged),
-                source_hash=source.hash, source_name=source.name, recipe=recipe, session=labels.session,
-                frame_count=len(sequence.time), rate=report["rate"], quality=quality_flags(found),
+                kind=Kind.MARKERS,
+                name=named[name].name or source.stem,
+                object=transaction.put(staged),
+                source_hash=source.hash,
+                source_name=source.name,
+                recipe=recipe,
+                session=labels.session,
+                frame_count=len(sequence.time),
+                rate=report["rate"],
+                quality=quality_flags(found),
                 report=json.dumps(report, allow_nan=False, ensure_ascii=False),
-            )  # fmt: skip
+            )
             transaction.add(artifact)
             made[name] = (artifact, report)
     return tuple(
@@ -80,10 +87,13 @@ def _findings(sequence: MarkerSequence) -> tuple[Finding, ...]:
         return ()
     return (
         Finding(
-            kind="markers-not-tracked", severity=Severity.WARNING, count=lost, value=lost / total,
+            kind="markers-not-tracked",
+            severity=Severity.WARNING,
+            count=lost,
+            value=lost / total,
             what=f"{lost} of {total} positions were not tracked",
         ),
-    )  # fmt: skip
+    )
 
 
 def _report(sequence: MarkerSequence, found: Sequence[Finding], reasons: Sequence[str]) -> dict[str, Any]:

@@ -153,15 +153,18 @@ def _rows(path: Path, names: list[str]) -> pa.Table:
             read_options=pyarrow.csv.ReadOptions(column_names=names, skip_rows=head.line, encoding=encoding),
             parse_options=pyarrow.csv.ParseOptions(delimiter=head.delimiter),
             convert_options=pyarrow.csv.ConvertOptions(
-                column_types=wanted, strings_can_be_null=True, null_values=["", "NaN", "nan", "NA"],
+                column_types=wanted,
+                strings_can_be_null=True,
+                null_values=["", "NaN", "nan", "NA"],
                 decimal_point="," if head.decimal_commas else ".",
             ),
-        )  # fmt: skip
+        )
     except (pa.ArrowException, UnicodeError) as error:  # the second of a file in UTF-16
         raise InputError(
-            f"not a table of numbers: {str(error).splitlines()[0]}", where=str(path),
+            f"not a table of numbers: {str(error).splitlines()[0]}",
+            where=str(path),
             fix="write numbers with a decimal point, and leave cells empty that have none",
-        ) from None  # fmt: skip
+        ) from None
 
 
 def _parquet(path: Path) -> pyarrow.parquet.ParquetFile:
@@ -171,16 +174,19 @@ def _parquet(path: Path) -> pyarrow.parquet.ParquetFile:
         LimitError: it says that it unpacks to more than `SIZE_LIMIT`, or has more rows than `POSITIONS_LIMIT`.
     """
     file = pyarrow.parquet.ParquetFile(
-        path, page_checksum_verification=True, thrift_string_size_limit=_FOOTER_LIMIT,
+        path,
+        page_checksum_verification=True,
+        thrift_string_size_limit=_FOOTER_LIMIT,
         thrift_container_size_limit=_FOOTER_LIMIT,
-    )  # fmt: skip
+    )
     groups = [file.metadata.row_group(index) for index in range(file.num_row_groups)]
     rows, size = sum(group.num_rows for group in groups), sum(group.total_byte_size for group in groups)
     if rows > POSITIONS_LIMIT or size > SIZE_LIMIT:
         raise LimitError(
-            f"a table of {rows} rows and {size} bytes unpacked", where=str(path),
+            f"a table of {rows} rows and {size} bytes unpacked",
+            where=str(path),
             fix=f"at most {POSITIONS_LIMIT} rows and {SIZE_LIMIT} bytes are read",
-        )  # fmt: skip
+        )
     return file
 
 
@@ -203,18 +209,20 @@ def _sequence(table: pa.Table, options: MarkerOptions, where: str) -> MarkerSequ
     instants, frame = _frames(table, options, where)
     if len(instants) * len(names) > POSITIONS_LIMIT:
         raise LimitError(
-            f"{len(instants)} frames of {len(names)} markers", where=where,
+            f"{len(instants)} frames of {len(names)} markers",
+            where=where,
             fix=f"give recordings of at most {POSITIONS_LIMIT} positions",
-        )  # fmt: skip
+        )
     seat = frame * len(names) + marker
     order = np.argsort(seat, kind="stable")
     twice = np.flatnonzero(np.diff(seat[order]) == 0)
     if len(twice):
         row = int(order[twice[0] + 1])
         raise InputError(
-            f"marker {names[marker[row]]!r} is there twice in a frame", where=f"{where}, row {row + 1}",
+            f"marker {names[marker[row]]!r} is there twice in a frame",
+            where=f"{where}, row {row + 1}",
             fix="keep one of them; is a column recording missing?",
-        )  # fmt: skip
+        )
     length, rest_length = unit(options.unit, where=where), unit(options.rest_unit or options.unit, where=where)
     positions = np.full((len(instants) * len(names), 3), np.nan)
     positions[seat] = np.stack([length.to_si(_numbers(table, axis)) for axis in "xyz"], axis=1)
@@ -223,9 +231,12 @@ def _sequence(table: pa.Table, options: MarkerOptions, where: str) -> MarkerSequ
         raise InputError("an infinite coordinate", where=where, fix="leave positions empty that were not tracked")
     positions[~np.isfinite(positions).all(axis=1)] = np.nan
     return MarkerSequence(
-        time=instants, positions=positions.reshape(len(instants), len(names), 3), rest=rest,
-        names=tuple(str(name) for name in names), attributes={"source": "marker table"},
-    )  # fmt: skip
+        time=instants,
+        positions=positions.reshape(len(instants), len(names), 3),
+        rest=rest,
+        names=tuple(str(name) for name in names),
+        attributes={"source": "marker table"},
+    )
 
 
 def _frames(table: pa.Table, options: MarkerOptions, where: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -260,10 +271,11 @@ def _seats(
     if moved.any():
         strange = int(np.flatnonzero(moved)[0])
         raise InputError(
-            f"marker {names[strange]!r} has {axis} from {low[strange]:.6g} to {high[strange]:.6g}", where=where,
+            f"marker {names[strange]!r} has {axis} from {low[strange]:.6g} to {high[strange]:.6g}",
+            where=where,
             fix="u and v, its place on the flat cloth, are the same in all frames; several recordings need a column "
             "recording",
-        )  # fmt: skip
+        )
     return low
 
 

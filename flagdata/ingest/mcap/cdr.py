@@ -19,9 +19,21 @@ import numpy as np
 from flagdata.errors import CorruptError, InputError
 
 _NUMBERS = {
-    "bool": "?", "byte": "B", "char": "B", "octet": "B", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H",
-    "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
-}  # fmt: skip
+    "bool": "?",
+    "byte": "B",
+    "char": "B",
+    "octet": "B",
+    "int8": "b",
+    "uint8": "B",
+    "int16": "h",
+    "uint16": "H",
+    "int32": "i",
+    "uint32": "I",
+    "int64": "q",
+    "uint64": "Q",
+    "float32": "f",
+    "float64": "d",
+}
 _BYTES = frozenset({"byte", "char", "octet", "uint8"})
 _FIELD = re.compile(r"^([\w/]+)(?:<=\d+)?(\[(?:<=)?\d*\])?\s+(\w+)(?!\s*=)(?:\s+\S.*)?$")
 _NOTHING = re.compile(r"\[0+\]")  # ROS 2 knows no such list; messages of no bytes could be without end

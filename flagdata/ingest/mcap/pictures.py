@@ -49,9 +49,14 @@ from flagdata.timebase import NANOSECONDS
 _NANOSECOND = Fraction(1, 1_000_000_000)
 _VIDEO = {"h264": "h264", "h265": "hevc", "hevc": "hevc", "av1": "av1", "vp9": "vp9"}
 _PLAIN = {  # encoding → (mode for Pillow, how the bytes of a pixel lie)
-    "mono8": ("L", "L"), "8uc1": ("L", "L"), "rgb8": ("RGB", "RGB"), "8uc3": ("RGB", "BGR"), "bgr8": ("RGB", "BGR"),
-    "rgba8": ("RGB", "RGBX"), "bgra8": ("RGB", "BGRX"),
-}  # fmt: skip
+    "mono8": ("L", "L"),
+    "8uc1": ("L", "L"),
+    "rgb8": ("RGB", "RGB"),
+    "8uc3": ("RGB", "BGR"),
+    "bgr8": ("RGB", "BGR"),
+    "rgba8": ("RGB", "RGBX"),
+    "bgra8": ("RGB", "BGRX"),
+}
 _DEPTH = re.compile(r"\b(?:16UC1|16SC1|32SC1|32FC1|64FC1|compressedDepth)\b", re.IGNORECASE)
 _LOOKED = (5, 4, 1)
 """Runs of pictures, and pictures of each, that are looked at for their brightest gray; see `TopicSource.samples`."""
@@ -106,9 +111,10 @@ class TopicSource:
         first = next(decoded, None)
         if first is None:
             raise InputError(
-                f"none of {len(self._index.stamps)} pictures of {self._topic.name} can be decoded", where=where,
+                f"none of {len(self._index.stamps)} pictures of {self._topic.name} can be decoded",
+                where=where,
                 fix="choose another topic: --topic NAME",
-            )  # fmt: skip
+            )
         _, width, height, codec, pixel_format, _ = first
         self._size = (width, height)
         self._white: float | None = None
@@ -116,10 +122,21 @@ class TopicSource:
         self._pictures = decoded
         self._head = first
         self.facts = SourceFacts(
-            container=f"mcap {self._topic.schema}", codec=codec, pixel_format=pixel_format, width=width, height=height,
-            aspect=Fraction(1), orientation=Orientation(), interlaced=False, timing=timing, metadata={}, recorded=None,
-            sequence=False, findings=tuple(findings), stamped=timing.origin,
-        )  # fmt: skip
+            container=f"mcap {self._topic.schema}",
+            codec=codec,
+            pixel_format=pixel_format,
+            width=width,
+            height=height,
+            aspect=Fraction(1),
+            orientation=Orientation(),
+            interlaced=False,
+            timing=timing,
+            metadata={},
+            recorded=None,
+            sequence=False,
+            findings=tuple(findings),
+            stamped=timing.origin,
+        )
 
     def _depth(self, pixel_format: str) -> tuple[Finding, ...]:
         """Settle the white of pictures of 16 bits by the brightest gray of those looked at.
@@ -184,8 +201,9 @@ class TopicSource:
             if one[1] * one[2] > self._limits.frame_pixels:
                 raise LimitError(
                     f"a picture of {one[1]} × {one[2]} px is beyond the limit of {self._limits.frame_pixels} px",
-                    where=self._where, fix="raise the limit if the file is to be trusted",
-                )  # fmt: skip
+                    where=self._where,
+                    fix="raise the limit if the file is to be trusted",
+                )
             yield one
 
     def _stills(self, found: Iterator[Decoded]) -> Iterator[_Shown | None]:
@@ -199,9 +217,13 @@ class TopicSource:
                 yield None
                 continue
             yield (
-                one.stamp, image.width, image.height, str(image.format).lower(), image.mode,
+                one.stamp,
+                image.width,
+                image.height,
+                str(image.format).lower(),
+                image.mode,
                 partial(luma_of_image, image),
-            )  # fmt: skip
+            )
 
     def _check_no_depth(self, stated: str) -> None:
         """Refuse pictures whose format says that their values are distances, as image_transport writes it."""
@@ -218,9 +240,10 @@ class TopicSource:
             encoding = str(values.get("encoding", "")).lower()
             if encoding not in _PLAIN:
                 raise InputError(
-                    f"pixels of the encoding {encoding!r} are not read", where=f"{self._where}, {self._topic.name}",
+                    f"pixels of the encoding {encoding!r} are not read",
+                    where=f"{self._where}, {self._topic.name}",
                     fix=f"record one of {', '.join(_PLAIN)}, or compressed images",
-                )  # fmt: skip
+                )
             mode, layout = _PLAIN[encoding]
             data = _data(values)
             width, height, step = (values.get(name) or 0 for name in ("width", "height", "step"))
@@ -245,8 +268,9 @@ class TopicSource:
                 if not name:
                     raise InputError(
                         f"video of the format {one.values.get('format')!r} is not read",
-                        where=f"{self._where}, {self._topic.name}", fix=f"record one of {', '.join(_VIDEO)}",
-                    )  # fmt: skip
+                        where=f"{self._where}, {self._topic.name}",
+                        fix=f"record one of {', '.join(_VIDEO)}",
+                    )
                 context = av.CodecContext.create(name, "r")
                 context.thread_count, context.flags = 1, context.flags | 0x00080000  # low delay
                 context.options = {"max_pixels": str(2 * self._limits.frame_pixels)}
@@ -274,9 +298,13 @@ class TopicSource:
                 yield None
                 continue
             yield (
-                stamps[frame.pts], frame.width, frame.height, name, frame.format.name,
+                stamps[frame.pts],
+                frame.width,
+                frame.height,
+                name,
+                frame.format.name,
                 partial(luma_of_frame, frame, codec=name),
-            )  # fmt: skip
+            )
 
 
 _Shown = tuple[int, int, int, str, str, Callable[[], Luma]]
@@ -309,7 +337,9 @@ def _others(present: tuple[Topic, ...], chosen: Topic) -> Iterator[Finding]:
     others = [topic for topic in present if topic.name != chosen.name]
     if others:
         yield Finding(
-            kind="topics-not-read", severity=Severity.NOTE, count=len(others),
+            kind="topics-not-read",
+            severity=Severity.NOTE,
+            count=len(others),
             what=f"{chosen.name} was read, {len(others)} other topics were not: {', '.join(map(str, others[:8]))}",
             fix="ingest the file again with --topic NAME for another",
-        )  # fmt: skip
+        )

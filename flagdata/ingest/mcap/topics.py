@@ -35,10 +35,15 @@ from flagdata.timebase import NANOSECONDS
 
 STILL, MOVING, RAW = "compressed images", "compressed video", "plain pixels"
 _PICTURES = {
-    "foxglove.CompressedImage": STILL, "foxglove_msgs/CompressedImage": STILL, "sensor_msgs/CompressedImage": STILL,
-    "foxglove.CompressedVideo": MOVING, "foxglove_msgs/CompressedVideo": MOVING,
-    "foxglove.RawImage": RAW, "foxglove_msgs/RawImage": RAW, "sensor_msgs/Image": RAW,
-}  # fmt: skip
+    "foxglove.CompressedImage": STILL,
+    "foxglove_msgs/CompressedImage": STILL,
+    "sensor_msgs/CompressedImage": STILL,
+    "foxglove.CompressedVideo": MOVING,
+    "foxglove_msgs/CompressedVideo": MOVING,
+    "foxglove.RawImage": RAW,
+    "foxglove_msgs/RawImage": RAW,
+    "sensor_msgs/Image": RAW,
+}
 """Types of messages that are pictures, those of ROS 2 as ROS 1 names them → what kind."""
 _UNREADABLE = (McapError, EOFError, ValueError, protobuf.DecodeError, struct.error, KeyError, TypeError)
 """What libraries raise on damaged records and messages."""
@@ -325,8 +330,9 @@ def _check_successive(path: Path, topic: str, places: NDArray[np.int64], logged:
             raise InputError(
                 f"{topic} begins there {overlap:.1f} s before its end in {parts[before[2]].name}: not successive parts "
                 "of one recording",
-                where=str(parts[after[2]]), fix=f"ingest each by itself: flagdata ingest {path}/*.mcap",
-            )  # fmt: skip
+                where=str(parts[after[2]]),
+                fix=f"ingest each by itself: flagdata ingest {path}/*.mcap",
+            )
 
 
 def _missing(path: Path, topic: str) -> Iterator[Finding]:
@@ -337,10 +343,13 @@ def _missing(path: Path, topic: str) -> Iterator[Finding]:
     if lost:
         count = sum(layouts[part].counts.get(number, 0) for part, number in chosen)
         yield Finding(
-            kind="messages-missing", severity=Severity.ERROR, where=topic, count=lost,
+            kind="messages-missing",
+            severity=Severity.ERROR,
+            where=topic,
+            count=lost,
             what=f"the summary counts {count + lost} messages of {topic}, {count} are there: {lost} are lost",
             fix="copy the file again, or record it again",
-        )  # fmt: skip
+        )
     for layout in layouts:
         yield from layout.undefined()
 
@@ -377,9 +386,10 @@ def _decoder(schema: Schema | None, channel: Channel) -> Callable[[bytes], Mappi
         return cdr.decoder(schema.name, schema.data.decode(errors="replace"), ros1=encoding == "ros1")
     described = f" described by {schema.encoding}" if schema is not None and schema.encoding else ""
     raise InputError(
-        f"messages in {encoding}{described} are not read", where=channel.topic,
+        f"messages in {encoding}{described} are not read",
+        where=channel.topic,
         fix="record the topic in protobuf, JSON, ROS 2 (CDR with ros2msg) or ROS 1 (ros1msg)",
-    )  # fmt: skip
+    )
 
 
 def _from_json(data: bytes) -> Mapping[str, Any]:

@@ -74,12 +74,16 @@ def findings(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
     )
     odd = tuple(
         Finding(
-            kind=kind, severity=Severity.WARNING, what=f"{count} {what}", count=count, where=f"frame {first[kind]}",
+            kind=kind,
+            severity=Severity.WARNING,
+            what=f"{count} {what}",
+            count=count,
+            where=f"frame {first[kind]}",
             fix="look at the export's texture coordinates",
         )
         for kind, count, what in kinds
         if count
-    )  # fmt: skip
+    )
     return (*odd, *continuity(sequence), *in_pieces(sequence), *slits(sequence), *t_joints(sequence))
 
 

@@ -80,8 +80,9 @@ def read_folder(
         if not frame.textured:
             raise InputError(
                 "no texture coordinates (vt), so that the rest shape is not known",
-                where=str(entry), fix="export the mesh with texture coordinates in metres",
-            )  # fmt: skip
+                where=str(entry),
+                fix="export the mesh with texture coordinates in metres",
+            )
         frames.append(frame)
         if progress is not None:
             progress(1)
@@ -106,8 +107,9 @@ def frame_files(path: Path) -> list[tuple[int, Path]]:
     if cloths != {0}:
         raise InputError(
             f"{len(cloths)} cloths, numbered {', '.join(f'{c:02d}' for c in sorted(cloths))}",
-            where=str(path), fix="keep one cloth's files, NNNN_00.obj, in a folder",
-        )  # fmt: skip
+            where=str(path),
+            fix="keep one cloth's files, NNNN_00.obj, in a folder",
+        )
     frames = sorted((number, entry) for number, _, entry in found)
     numbers = [number for number, _ in frames]
     missing = sorted(set(range(numbers[0], numbers[-1] + 1)) - set(numbers))

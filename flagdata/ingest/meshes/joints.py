@@ -28,12 +28,15 @@ def t_joints(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
     first = int(joints[worst][0])
     return (
         Finding(
-            kind="t-joints", severity=Severity.WARNING, count=len(joints[worst]), where=f"frame {worst}",
+            kind="t-joints",
+            severity=Severity.WARNING,
+            count=len(joints[worst]),
+            where=f"frame {worst}",
             what=f"{len(joints[worst])} vertices lie on an edge of a face that they are no corner of (the first is "
             f"vertex {first}): the cloth is open there",
             fix="split those faces at the vertex, or subdivide both sides alike, and export it anew",
         ),
-    )  # fmt: skip
+    )
 
 
 def _joints(mesh: Mesh) -> NDArray[np.int64]:

@@ -87,9 +87,11 @@ def read_obj(path: Path) -> Obj:
     if not corners:
         raise InputError("a mesh without faces", where=str(path), fix="export triangles")
     faces = _Faces(
-        path=path, corners=np.frombuffer(corners, dtype=np.int64).reshape(-1, 2),
-        sizes=np.frombuffer(sizes, dtype=np.int64), lines=np.frombuffer(face_lines, dtype=np.int64),
-    )  # fmt: skip
+        path=path,
+        corners=np.frombuffer(corners, dtype=np.int64).reshape(-1, 2),
+        sizes=np.frombuffer(sizes, dtype=np.int64),
+        lines=np.frombuffer(face_lines, dtype=np.int64),
+    )
     return _assembled(faces, np.array(positions).reshape(-1, 3), np.array(texture).reshape(-1, 2), velocities)
 
 
@@ -165,9 +167,10 @@ class _Faces:
                     split = ears(flat[index])
                 except ValueError as error:
                     raise InputError(
-                        f"a face of {size} corners {error}", where=f"{self.path}, line {self.lines[face]}",
+                        f"a face of {size} corners {error}",
+                        where=f"{self.path}, line {self.lines[face]}",
                         fix="triangulate the mesh in the program that made it",
-                    ) from None  # fmt: skip
+                    ) from None
                 places[splits[face] - (size - 2) : splits[face]] = split + (ends[face] - size)
         return places
 

@@ -40,17 +40,21 @@ def welded(
         return sequence, ()
     number = np.cumsum(kept) - 1
     merged = replace(
-        sequence, positions=np.ascontiguousarray(sequence.positions[:, kept]), rest=sequence.rest[kept],
+        sequence,
+        positions=np.ascontiguousarray(sequence.positions[:, kept]),
+        rest=sequence.rest[kept],
         faces=number[faces].astype(np.int32),
-    )  # fmt: skip
+    )
     gone = int((~kept).sum())
     return merged, (
         Finding(
-            kind="vertices-merged", severity=Severity.NOTE, count=gone,
+            kind="vertices-merged",
+            severity=Severity.NOTE,
+            count=gone,
             what=f"{gone} of {len(kept)} vertices have the texture coordinates of another one and its place in every "
             f"frame, and were merged with it; the {int(kept.sum())} that stay are numbered anew, in their order",
         ),
-    )  # fmt: skip
+    )
 
 
 def in_pieces(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
@@ -68,11 +72,14 @@ def in_pieces(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...
     )
     return (
         Finding(
-            kind="cloth-in-pieces", severity=Severity.WARNING, count=pieces[worst], where=f"frame {worst}",
+            kind="cloth-in-pieces",
+            severity=Severity.WARNING,
+            count=pieces[worst],
+            where=f"frame {worst}",
             what=f"the cloth is in {pieces[worst]} pieces that share no vertex" + (between if touching else ""),
             fix="merge vertices by distance before the export, or export one sheet",
         ),
-    )  # fmt: skip
+    )
 
 
 def slits(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:

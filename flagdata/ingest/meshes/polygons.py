@@ -107,9 +107,11 @@ def _crosses(points: Points) -> bool:
         proper = (a * b < 0) & (c * d < 0) & ~following & ~preceding
         touching = np.zeros(len(j), dtype=bool)
         for side, point, first, second, shared in (
-            (a, start[j], start[i], end[i], following), (b, end[j], start[i], end[i], preceding),
-            (c, start[i], start[j], end[j], preceding), (d, end[i], start[j], end[j], following),
-        ):  # fmt: skip
+            (a, start[j], start[i], end[i], following),
+            (b, end[j], start[i], end[i], preceding),
+            (c, start[i], start[j], end[j], preceding),
+            (d, end[i], start[j], end[j], following),
+        ):
             between = ((point - first) * (point - second)).sum(axis=-1) <= 0
             touching |= (np.abs(side) <= flat) & between & ~shared
         if (proper | touching).any():

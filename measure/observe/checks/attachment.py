@@ -46,24 +46,32 @@ def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]
     if not seen and moved[worst] <= usual:
         return (
             Finding(
-                kind="pins-not-observed", severity=Severity.WARNING, where=where, value=away,
+                kind="pins-not-observed",
+                severity=Severity.WARNING,
+                where=where,
+                value=away,
                 what=f"the pin (u, v) = ({u:.3g}, {v:.3g}) m is {away:.3g} m beyond the outermost markers; its "
                 f"place is guessed from them and moves by {1e3 * moved[worst]:.3g} mm",
                 fix="track a point at each pin",
             ),
-        )  # fmt: skip
+        )
     if not seen or moved[worst] > max(_FREE * usual, 3 * recording.noise):
         raise InputError(
-            f"{what}, against {1e3 * usual:.3g} mm at the median marker: it is not held there", where=where,
+            f"{what}, against {1e3 * usual:.3g} mm at the median marker: it is not held there",
+            where=where,
             fix=f"name the pins where it is held; it moves least at (u, v) = {still} m",
-        )  # fmt: skip
+        )
     return (
         Finding(
-            kind="pins-move", severity=Severity.WARNING, where=where, value=float(moved[worst]), count=len(moved),
+            kind="pins-move",
+            severity=Severity.WARNING,
+            where=where,
+            value=float(moved[worst]),
+            count=len(moved),
             what=f"{what}: is it held there? It moves least at (u, v) = {still} m",
             fix="correct the pins, or look whether they have play",
         ),
-    )  # fmt: skip
+    )
 
 
 def beside_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
@@ -75,13 +83,15 @@ def beside_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...
     u, v = recording.markers[others[int(away[others].argmax())]]
     return (
         Finding(
-            kind="still-away-from-pins", severity=Severity.WARNING, where=f"recording {recording.name!r}",
+            kind="still-away-from-pins",
+            severity=Severity.WARNING,
+            where=f"recording {recording.name!r}",
             count=len(others),
             what=f"{len(others)} markers away from the pins stand as still as these, one at (u, v) = ({u:.3g}, "
             f"{v:.3g}) m",
             fix="if the cloth is held there, name it with the pins",
         ),
-    )  # fmt: skip
+    )
 
 
 def hoist_stands_still(experiment: Experiment) -> bool:
@@ -126,7 +136,7 @@ def check_places(recordings: Sequence[Trajectory], specimen: Specimen) -> None:
                 f"({x:.3g}, {y:.3g}, {z:.3g}) m",
                 where=f"recording {other.name!r}",
                 fix="bring the recordings to one frame of coordinates, the wind along with them",
-            )  # fmt: skip
+            )
 
 
 def centre_of_pins(recording: Trajectory, specimen: Specimen) -> Floats:

@@ -42,15 +42,17 @@ def even(seen: Observation) -> Observation:
     span = float(seen.times[-1] - seen.times[0]) if count else 0.0
     if count < FEWEST or span < SHORTEST * (1 - 1e-9):
         raise InputError(
-            f"{count} frames over {span:.3g} s", where=where,
+            f"{count} frames over {span:.3g} s",
+            where=where,
             fix=f"record at least {SHORTEST:g} s and {FEWEST} frames: with less, effects cannot be distinguished",
-        )  # fmt: skip
+        )
     step = float(np.median(np.diff(seen.times)))
     if not _SLOWEST <= 1 / step <= _FASTEST:
         raise InputError(
-            f"{1 / step:.4g} frames a second", where=where,
+            f"{1 / step:.4g} frames a second",
+            where=where,
             fix=f"give {_SLOWEST:g} to {_FASTEST:g} Hz: cloth moves on too far between rarer frames",
-        )  # fmt: skip
+        )
     index = np.concatenate([[0], np.cumsum(np.rint(np.diff(seen.times) / step).astype(np.int64))])
     step, first = np.polyfit(index, seen.times, 1).tolist()  # the median of rounded times is a rounded step
     off = np.abs(seen.times - first - index * step)
@@ -60,7 +62,7 @@ def even(seen: Observation) -> Observation:
             f"frames are not evenly spaced: one is {1e3 * off[frame]:.3g} ms off, at {1e3 * step:.4g} ms a frame",
             where=f"{where}, frame {frame}",
             fix="interpolate the positions to a constant rate, or track a video of constant frame rate",
-        )  # fmt: skip
+        )
     times = np.arange(index[-1] + 1) * step
     lost = len(times) - count
     if not lost:
@@ -69,15 +71,19 @@ def even(seen: Observation) -> Observation:
     gap = int(index[np.argmax(np.diff(index) > 1)]) + 1
     if longest > frames_of(LONGEST, step):
         raise InputError(
-            f"{longest} frames on end are missing, {longest * step:.2g} s", where=f"{where}, frame {gap}",
+            f"{longest} frames on end are missing, {longest * step:.2g} s",
+            where=f"{where}, frame {gap}",
             fix="cut the recording there and give its parts as recordings of their own",
-        )  # fmt: skip
+        )
     positions = np.full((len(times), *seen.positions.shape[1:]), np.nan)
     positions[index] = seen.positions
     found = Finding(
-        kind="frames-missing", severity=Severity.WARNING, where=f"{where}, frame {gap}", count=lost,
+        kind="frames-missing",
+        severity=Severity.WARNING,
+        where=f"{where}, frame {gap}",
+        count=lost,
         what=f"{lost} frames are missing between others and are interpolated",
-    )  # fmt: skip
+    )
     return replace(seen, times=times, positions=positions, findings=(*seen.findings, found))
 
 
@@ -106,16 +112,20 @@ def without_repeats(seen: Observation, sigma: float) -> Observation:
     if count >= _MANY * len(repeat):
         rate = (len(repeat) - count) / (len(repeat) - 1) / float(seen.times[1] - seen.times[0])
         raise InputError(
-            f"{count} of {len(repeat)} frames repeat the one before", where=f"{where}, frame {int(repeat.argmax())}",
+            f"{count} of {len(repeat)} frames repeat the one before",
+            where=f"{where}, frame {int(repeat.argmax())}",
             fix=f"it may have been tracked at about {rate:.4g} Hz: drop the repeats and give that rate",
-        )  # fmt: skip
+        )
     positions = np.array(seen.positions)
     positions[repeat] = np.nan
     found = Finding(
-        kind="repeated-frames", severity=Severity.WARNING, where=f"{where}, frame {int(repeat.argmax())}", count=count,
+        kind="repeated-frames",
+        severity=Severity.WARNING,
+        where=f"{where}, frame {int(repeat.argmax())}",
+        count=count,
         what=f"{count} frames repeat the one before; they are interpolated",
         fix="find out whether the camera or the tracker lost frames there",
-    )  # fmt: skip
+    )
     return replace(seen, positions=positions, findings=(*seen.findings, found))
 
 
@@ -145,11 +155,13 @@ def without_stuck_markers(seen: Observation) -> Observation:
     positions[stuck] = np.nan
     frame, marker = np.argwhere(stuck)[0]
     found = Finding(
-        kind="positions-stuck", severity=Severity.WARNING, count=count,
+        kind="positions-stuck",
+        severity=Severity.WARNING,
+        count=count,
         where=f"recording {seen.name!r}, frame {int(frame)}, marker {int(marker)}",
         what=f"{count} positions are exactly those of the frame before while the markers around move on, or are "
         "(0, 0, 0): not tracked",
-    )  # fmt: skip
+    )
     return replace(seen, positions=positions, findings=(*seen.findings, found))
 
 
@@ -171,7 +183,7 @@ def check_motion(positions: Floats, sigma: float, size: float, *, where: str) ->
             f"no motion is found: {1e3 * motion:.3g} mm on the average, with {1e3 * sigma:.3g} mm of noise",
             where=where,
             fix="record the cloth in a wind; a still cloth says nothing of damping, inertia or gusts",
-        )  # fmt: skip
+        )
 
 
 def lost_frames(positions: Floats, *, where: str) -> tuple[Finding, ...]:
@@ -193,12 +205,14 @@ def lost_frames(positions: Floats, *, where: str) -> tuple[Finding, ...]:
         return ()
     return (
         Finding(
-            kind="frames-lost", severity=Severity.WARNING, where=f"{where}, frame {int(jumps[0]) + 1}",
+            kind="frames-lost",
+            severity=Severity.WARNING,
+            where=f"{where}, frame {int(jumps[0]) + 1}",
             count=len(jumps),
             what=f"{len(jumps)} steps are about twice as long as those before and after: frames seem to be missing",
             fix="give the frames' times or numbers, so that the gap is known",
         ),
-    )  # fmt: skip
+    )
 
 
 def _steps(positions: Floats) -> Floats:

@@ -55,11 +55,12 @@ class Motion:
         step = stride / recording.rate
         at = onto(recording.markers, specimen.mesh.rest) @ recording.positions[::stride]
         return cls(
-            times=np.asarray(np.arange(1, len(at) - 1) * step, dtype=np.float64), position=at[1:-1],
+            times=np.asarray(np.arange(1, len(at) - 1) * step, dtype=np.float64),
+            position=at[1:-1],
             velocity=(at[2:] - at[:-2]) / (2 * step),
             acceleration=(at[2:] - 2 * at[1:-1] + at[:-2]) / step**2,
             mass=specimen.material.density * specimen.mesh.vertex_areas,
-        )  # fmt: skip
+        )
 
 
 def check_inertia(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
@@ -72,13 +73,16 @@ def check_inertia(recording: Trajectory, specimen: Specimen) -> tuple[Finding, .
     speed = recording.wind.speed
     return (
         Finding(
-            kind="inertia-does-not-fit", severity=Severity.WARNING, where=f"recording {recording.name!r}", value=factor,
+            kind="inertia-does-not-fit",
+            severity=Severity.WARNING,
+            where=f"recording {recording.name!r}",
+            value=factor,
             what=f"by its accelerations the cloth moves as in {factor * speed:.2g} m/s, {factor:.2g} times the wind "
             f"given, {speed:.3g} m/s",
             fix=f"check the unit of the wind (km/h are {1 / 3.6:.2g} m/s), the frame rate ({recording.rate:.4g} Hz; "
             f"{recording.rate / factor:.3g} Hz would fit) and the cloth's density",
         ),
-    )  # fmt: skip
+    )
 
 
 def wind_shown(recording: Trajectory, specimen: Specimen) -> float | None:
@@ -102,10 +106,12 @@ def wind_shown(recording: Trajectory, specimen: Specimen) -> float | None:
     own = (normal * motion.velocity[:, mesh.faces].mean(axis=2)).sum(axis=2)
     blown = (normal * recording.wind.at(motion.times)[:, None]).sum(axis=2)
     weight = lever * mesh.areas * specimen.air.plain.density
-    left = np.array([
-        ((moment - _centred((weight * np.abs(q * blown - own) * (q * blown - own)).sum(axis=1))) ** 2).sum()
-        for q in _FACTORS
-    ])  # fmt: skip
+    left = np.array(
+        [
+            ((moment - _centred((weight * np.abs(q * blown - own) * (q * blown - own)).sum(axis=1))) ** 2).sum()
+            for q in _FACTORS
+        ]
+    )
     total = float((moment**2).sum())
     best = int(left.argmin())
     if total == 0 or left[best] > (1 - _EXPLAINED) * total or best in (0, len(_FACTORS) - 1):
@@ -139,11 +145,14 @@ def _check_swing(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ..
         return ()
     return (
         Finding(
-            kind="inertia-does-not-fit", severity=Severity.WARNING, where=f"recording {recording.name!r}", value=ratio,
+            kind="inertia-does-not-fit",
+            severity=Severity.WARNING,
+            where=f"recording {recording.name!r}",
+            value=ratio,
             what=f"in calm air the swinging cloth gains {ratio:.2g} times the energy that its height loses",
             fix=f"check the frame rate ({recording.rate:.4g} Hz; {recording.rate / ratio**0.5:.3g} Hz would fit)",
         ),
-    )  # fmt: skip
+    )
 
 
 def _axis(recording: Trajectory, specimen: Specimen) -> tuple[Floats, Floats] | None:

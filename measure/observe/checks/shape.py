@@ -25,9 +25,13 @@ _UNEVEN = 0.08  # the same along u and along v differ by less than 0.05 there
 _TORN = 1.5  # a marker that is further than that from most of its neighbours is not where the file places it
 _HOLE = 0.35  # of the cloth's size: a part that is further from any marker is not observed
 _UNITS = {
-    "mm for m": 1000.0, "cm for m": 100.0, "mm for cm": 10.0, "inches for m": 39.3701, "inches for cm": 2.54,
+    "mm for m": 1000.0,
+    "cm for m": 100.0,
+    "mm for cm": 10.0,
+    "inches for m": 39.3701,
+    "inches for cm": 2.54,
     "feet for m": 3.28084,
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,9 +50,10 @@ class Edges:
         """
         if len(markers) < FEWEST:
             raise InputError(
-                f"{len(markers)} markers", where=where,
+                f"{len(markers)} markers",
+                where=where,
                 fix=f"track at least {FEWEST}, spread over the cloth: fewer do not show how it bends",
-            )  # fmt: skip
+            )
         if not np.isfinite(markers).all():
             raise InputError("a rest coordinate is not finite", where=where, fix="give u and v of every marker")
         found = KDTree(markers).query(markers, k=2)
@@ -57,9 +62,10 @@ class Edges:
         if apart[:, 1].min() <= 1e-6 * size:
             first = int(apart[:, 1].argmin())
             raise InputError(
-                "two markers in one place of the cloth", where=f"{where}, markers {first} and {int(other[first, 1])}",
+                "two markers in one place of the cloth",
+                where=f"{where}, markers {first} and {int(other[first, 1])}",
                 fix="correct their u and v, or keep one of them",
-            )  # fmt: skip
+            )
         try:
             faces = Delaunay(markers).simplices
         except QhullError:
@@ -101,18 +107,22 @@ def check_scale(seen: Observation, edges: Edges, sigma: float) -> tuple[Finding,
         u, v = (float(np.median(part)) for part in along)
         if abs(u - v) > _UNEVEN:
             raise InputError(
-                f"taut, the cloth is {u:.4g} times as long as at rest along u and {v:.4g} times along v", where=where,
+                f"taut, the cloth is {u:.4g} times as long as at rest along u and {v:.4g} times along v",
+                where=where,
                 fix="the rest shape does not fit: check its width and height, and that u and v are not exchanged",
-            )  # fmt: skip
+            )
     if whole <= _LONG:
         return ()
     return (
         Finding(
-            kind="cloth-longer-than-rest", severity=Severity.WARNING, where=where, value=whole,
+            kind="cloth-longer-than-rest",
+            severity=Severity.WARNING,
+            where=where,
+            value=whole,
             what=f"taut, the cloth is {100 * (whole - 1):.1f} % longer than at rest, more than wind stretches it",
             fix="measure its width and height again",
         ),
-    )  # fmt: skip
+    )
 
 
 def without_strays(seen: Observation, edges: Edges, sigma: float) -> Observation:
@@ -133,11 +143,13 @@ def without_strays(seen: Observation, edges: Edges, sigma: float) -> Observation
     positions[stray] = np.nan
     frame, marker = np.argwhere(stray)[0]
     found = Finding(
-        kind="markers-astray", severity=Severity.WARNING, count=count,
+        kind="markers-astray",
+        severity=Severity.WARNING,
+        count=count,
         where=f"recording {seen.name!r}, frame {int(frame)}, marker {int(marker)}",
         what=f"{count} positions are further from the markers around than cloth can stretch; they are left out",
         fix="look at the track there: was the marker exchanged with another?",
-    )  # fmt: skip
+    )
     return replace(seen, positions=positions, findings=(*seen.findings, found))
 
 
@@ -158,13 +170,14 @@ def check_cover(markers: Floats, corners: Floats, *, where: str) -> tuple[Findin
     hole = points[int(away.argmax())]
     return (
         Finding(
-            kind="cloth-not-covered", severity=Severity.WARNING,
+            kind="cloth-not-covered",
+            severity=Severity.WARNING,
             where=f"{where}, (u, v) = ({hole[0]:.3g}, {hole[1]:.3g}) m",
             value=float(away.max()),
             what=f"the nearest marker is {away.max():.3g} m away: what the cloth does there is guessed",
             fix="track markers there, or correct the outline",
         ),
-    )  # fmt: skip
+    )
 
 
 def _taut(lengths: Floats, sigma: float) -> tuple[Floats, NDArray[np.bool_]]:

@@ -39,9 +39,9 @@ def check_overlap(recording: Trajectory) -> None:
         raise InputError(
             f"the wind log spans {wind[0]:.4g} s to {wind[-1]:.4g} s after the first frame, the recording lasts "
             f"{times[-1]:.4g} s",
-            where=f"recording {recording.name!r}", fix="give the instant of the first frame on the log's clock, or "
-            "another log",
-        )  # fmt: skip
+            where=f"recording {recording.name!r}",
+            fix="give the instant of the first frame on the log's clock, or another log",
+        )
 
 
 def check_up(recording: Trajectory, specimen: Specimen) -> None:
@@ -57,9 +57,10 @@ def check_up(recording: Trajectory, specimen: Specimen) -> None:
     offset = _centre(recording) - centre_of_pins(recording, specimen)
     if offset[2] > _RISES * size:
         raise InputError(
-            f"the cloth is {offset[2]:.3g} m above its pins on the average", where=where,
+            f"the cloth is {offset[2]:.3g} m above its pins on the average",
+            where=where,
             fix=f"z must point up: {_sagging(offset, size, recording.wind)}",
-        )  # fmt: skip
+        )
     wind = recording.wind.at(recording.times).mean(axis=0)
     across = np.array([-wind[1], wind[0], 0.0]) / max(float(np.hypot(wind[0], wind[1])), 1e-9)
     sideways = float(offset @ across)
@@ -67,9 +68,10 @@ def check_up(recording: Trajectory, specimen: Specimen) -> None:
         sideways = float(np.hypot(offset[0], offset[1]))
     if offset[2] > -_RISES * size and abs(sideways) > _SAGS * size:
         raise InputError(
-            f"the cloth does not sag along −z but is {abs(sideways):.3g} m off sideways", where=where,
+            f"the cloth does not sag along −z but is {abs(sideways):.3g} m off sideways",
+            where=where,
             fix=f"z must point up, and the wind be in the same axes: {_sagging(offset, size, recording.wind)}",
-        )  # fmt: skip
+        )
 
 
 def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
@@ -92,17 +94,22 @@ def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding,
     )
     if angle > _UPWIND:
         raise InputError(
-            f"the cloth streams upwind: {what}", where=where,
+            f"the cloth streams upwind: {what}",
+            where=where,
             fix="wind velocities say where the air goes to; turn a direction it comes from, and check the axes",
-        )  # fmt: skip
+        )
     if angle <= _ASIDE:
         return ()
     return (
         Finding(
-            kind="flies-aside", severity=Severity.WARNING, where=where, value=angle, what=what,
+            kind="flies-aside",
+            severity=Severity.WARNING,
+            where=where,
+            value=angle,
+            what=what,
             fix="check the direction of the wind in the recording's axes",
         ),
-    )  # fmt: skip
+    )
 
 
 def check_strength(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
@@ -120,11 +127,14 @@ def check_strength(recording: Trajectory, specimen: Specimen) -> tuple[Finding, 
     motion = "flies nearly flat, though its wind" if calm else "hangs limp, though its wind"
     return (
         Finding(
-            kind="wind-does-not-fit", severity=Severity.WARNING, where=f"recording {recording.name!r}", value=ratio,
+            kind="wind-does-not-fit",
+            severity=Severity.WARNING,
+            where=f"recording {recording.name!r}",
+            value=ratio,
             what=f"the cloth {motion} of {recording.wind.speed:.3g} m/s has {ratio:.2g} times the force of its weight",
             fix="check the unit of the wind, and the clock of its log",
         ),
-    )  # fmt: skip
+    )
 
 
 def check_sides(recording: Trajectory) -> tuple[Finding, ...]:
@@ -135,12 +145,14 @@ def check_sides(recording: Trajectory) -> tuple[Finding, ...]:
         return ()
     return (
         Finding(
-            kind="rest-upside-down", severity=Severity.WARNING, where=f"recording {recording.name!r}",
+            kind="rest-upside-down",
+            severity=Severity.WARNING,
+            where=f"recording {recording.name!r}",
             value=float(slope[1, 2]),
             what="the markers' v runs downward as the cloth hangs: what the answer calls the top is the bottom",
             fix="let v run from the bottom to the top, and u from the hoist to the fly",
         ),
-    )  # fmt: skip
+    )
 
 
 def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
@@ -159,18 +171,20 @@ def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
     where = f"recording {recording.name!r}"
     if typical > _WILD * expected:
         raise InputError(
-            f"accelerations of {typical:.3g} m/s², where gravity and wind give about {expected:.3g}", where=where,
+            f"accelerations of {typical:.3g} m/s², where gravity and wind give about {expected:.3g}",
+            where=where,
             fix=f"is the rate of {rate:.4g} Hz too high, or the wind or the unit of the positions wrong?",
-        )  # fmt: skip
+        )
     motion = float(np.sqrt(np.median(positions.var(axis=0).sum(axis=1))))
     swing = weight * motion / float(np.ptp(specimen.mesh.rest, axis=0).max())
     blows = _ratio(specimen, recording.wind) > _BLOWS
     if typical < max(_SLOW * expected * blows, _QUASI_STATIC * swing):
         raise InputError(
-            f"accelerations of {typical:.3g} m/s², where gravity and wind give about {expected:.3g}", where=where,
+            f"accelerations of {typical:.3g} m/s², where gravity and wind give about {expected:.3g}",
+            where=where,
             fix=f"is the rate of {rate:.4g} Hz that of slow motion, or the unit of the wind another? Give the rate at "
             "which the camera ran, and the wind in m/s",
-        )  # fmt: skip
+        )
 
 
 def _centre(recording: Trajectory) -> Floats:

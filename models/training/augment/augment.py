@@ -16,21 +16,27 @@ from flagdata.rng import stream
 Film = NDArray[np.uint8]
 """(n, height, width) gray."""
 
-BEFORE = Registry("disturbance", {
-    "tree": "models.training.augment.rim:TREE",
-    "second-flag": "models.training.augment.rim:SECOND_FLAG",
-    "shake": "models.training.augment.camera:SHAKE",
-    "blur": "models.training.augment.light:BLUR",
-    "gamma": "models.training.augment.light:GAMMA",
-    "dusk": "models.training.augment.light:DUSK",
-    "noise": "models.training.augment.light:NOISE",
-    "coding": "models.training.augment.coding:CODING",
-})  # fmt: skip
+BEFORE = Registry(
+    "disturbance",
+    {
+        "tree": "models.training.augment.rim:TREE",
+        "second-flag": "models.training.augment.rim:SECOND_FLAG",
+        "shake": "models.training.augment.camera:SHAKE",
+        "blur": "models.training.augment.light:BLUR",
+        "gamma": "models.training.augment.light:GAMMA",
+        "dusk": "models.training.augment.light:DUSK",
+        "noise": "models.training.augment.light:NOISE",
+        "coding": "models.training.augment.coding:CODING",
+    },
+)
 """Of films as they were taken, in the order in which they happen: scene, camera, light, file."""
-AFTER = Registry("disturbance", {
-    "left-over-shake": "models.training.augment.motion:LEFT_OVER_SHAKE",
-    "pole-sway": "models.training.augment.motion:POLE_SWAY",
-})  # fmt: skip
+AFTER = Registry(
+    "disturbance",
+    {
+        "left-over-shake": "models.training.augment.motion:LEFT_OVER_SHAKE",
+        "pole-sway": "models.training.augment.motion:POLE_SWAY",
+    },
+)
 """Of conditioned clips."""
 DISTURBANCES = (*BEFORE, *AFTER)
 """Names of all."""
@@ -142,16 +148,25 @@ class Augment:
         return self._applied(AFTER, clip, times, (source, variant), none, weight)
 
     def _applied(
-        self, known: Registry, film: Film, times: NDArray[np.float64], source: tuple[str | int, ...],
-        other: Callable[[], Film], weight: NDArray[np.float32],
-    ) -> Film:  # fmt: skip
+        self,
+        known: Registry,
+        film: Film,
+        times: NDArray[np.float64],
+        source: tuple[str | int, ...],
+        other: Callable[[], Film],
+        weight: NDArray[np.float32],
+    ) -> Film:
         for name in known:
             if self.happens(name, *source):
                 rng, strength = self._stream(name, (*source, "drawn")), self.strengths[name]
                 drawn = Drawn(
-                    film=film, times=times, strength=rng.uniform(strength.low, strength.high), rng=rng, other=other,
+                    film=film,
+                    times=times,
+                    strength=rng.uniform(strength.low, strength.high),
+                    rng=rng,
+                    other=other,
                     weight=weight,
-                )  # fmt: skip
+                )
                 film = known[name].apply(drawn)
         return film
 

@@ -103,9 +103,13 @@ def make(
     binned = np.round(binned + scene.sensor_noise * generator.standard_normal(bins), 1)
     wind_time = START + np.round((np.arange(1, bins + 1) * scene.period) * SECOND).astype(np.int64)
     wind = WindAverage(
-        time=wind_time, speed=binned, sigma=np.full(bins, 0.1), direction=np.full(bins, np.nan),
-        count=np.ones(bins, dtype=np.int32), period=scene.period,
-    )  # fmt: skip
+        time=wind_time,
+        speed=binned,
+        sigma=np.full(bins, 0.1),
+        direction=np.full(bins, np.nan),
+        count=np.ones(bins, dtype=np.int32),
+        period=scene.period,
+    )
 
     felt = lagged(speed_there, scene.memory)
     rate = 25.0

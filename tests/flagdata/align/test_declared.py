@@ -52,9 +52,13 @@ def test_an_offset_that_is_no_number_is_refused() -> None:
 @pytest.mark.parametrize(
     ("stamps", "step"),
     [
-        ([0, 60, 120], 60.0), ([0, 1, 2, 7], 1.0), ([0, 0.1, 0.3], 0.1), ([0, 0.123], 0.001), ([0, 0.000_5], 0.0),
+        ([0, 60, 120], 60.0),
+        ([0, 1, 2, 7], 1.0),
+        ([0, 0.1, 0.3], 0.1),
+        ([0, 0.123], 0.001),
+        ([0, 0.000_5], 0.0),
     ],
-)  # fmt: skip
+)
 def test_the_step_of_stamps_is_the_coarsest_that_divides_them(stamps: list[float], step: float) -> None:
     time = np.array([round(s * SECOND) for s in stamps], dtype=np.int64)
     assert stamp_step(time) == step
@@ -68,23 +72,29 @@ def test_no_stamps_have_no_step() -> None:
 
 def test_a_model_reads_back_as_it_was_written() -> None:
     model = ClockModel(
-        device="cam", reference="mast", method="estimated", confidence=0.97,
+        device="cam",
+        reference="mast",
+        method="estimated",
+        confidence=0.97,
         segments=(
             Segment(start=0, end=10, origin=5, offset=1.5, drift=1e-5, sigma_offset=0.1, sigma_drift=1e-6),
             Segment(start=10, end=20, origin=15, offset=-2.0),
         ),
-    )  # fmt: skip
+    )
     assert ClockModel.from_json(model.to_json()) == model
 
 
 def test_segments_apply_from_their_start_and_the_nearest_beyond_all() -> None:
     model = ClockModel(
-        device="cam", reference="mast", method="given", confidence=1.0,
+        device="cam",
+        reference="mast",
+        method="given",
+        confidence=1.0,
         segments=(
             Segment(start=10 * SECOND, end=20 * SECOND, origin=15 * SECOND, offset=1.0, drift=0.01),
             Segment(start=20 * SECOND, end=30 * SECOND, origin=20 * SECOND, offset=5.0),
         ),
-    )  # fmt: skip
+    )
     times = np.array([0, 15, 20, 40], dtype=np.int64) * SECOND
     # By hand: 0 + 1 - 0.15; 15 + 1; 20 + 5; 40 + 5.
     np.testing.assert_array_equal(model.to_common(times), np.array([850, 16_000, 25_000, 45_000]) * 1_000_000)

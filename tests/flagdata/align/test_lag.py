@@ -52,12 +52,19 @@ def test_intervals_of_field_recordings_cover_the_offset_at_their_level(scene: Sc
         offset = rng.uniform(-110, 110)
         found = estimate(
             scene(
-                seed=seed, offset=offset, mean=rng.uniform(4, 10), turbulence=rng.uniform(0.10, 0.25),
-                length=rng.uniform(50, 100), response=response, memory=response, apart=rng.uniform(1, 3),
-                flag_noise=rng.uniform(0.2, 0.5), exponent=rng.uniform(1, 2),
+                seed=seed,
+                offset=offset,
+                mean=rng.uniform(4, 10),
+                turbulence=rng.uniform(0.10, 0.25),
+                length=rng.uniform(50, 100),
+                response=response,
+                memory=response,
+                apart=rng.uniform(1, 3),
+                flag_noise=rng.uniform(0.2, 0.5),
+                exponent=rng.uniform(1, 2),
             ),
             surrogates=60,
-        )  # fmt: skip
+        )
         if found.accepted:
             errors.append(found.offset - offset)
             sigmas.append(found.sigma)
@@ -107,10 +114,14 @@ def test_one_missing_minute_of_either_side_leaves_the_offset_within_its_interval
     holes = (
         MotionSeries(time=motion.time[frames], energy=motion.energy[frames]),
         replace(
-            wind, time=wind.time[bins], speed=wind.speed[bins], sigma=wind.sigma[bins],
-            direction=wind.direction[bins], count=wind.count[bins],
+            wind,
+            time=wind.time[bins],
+            speed=wind.speed[bins],
+            sigma=wind.sigma[bins],
+            direction=wind.direction[bins],
+            count=wind.count[bins],
         ),
-    )  # fmt: skip
+    )
     found = estimate(holes, surrogates=60)
     assert found.accepted, found.reasons
     assert found.interval[0] <= 5.0 <= found.interval[1]
@@ -201,10 +212,14 @@ def test_bins_off_their_grid_say_so(scene: Scenes) -> None:
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"window": 0.0}, {"window": 1e5}, {"centre": np.nan}, {"response_sigma": -1.0}, {"chance": 1.0},
+        {"window": 0.0},
+        {"window": 1e5},
+        {"centre": np.nan},
+        {"response_sigma": -1.0},
+        {"chance": 1.0},
         {"surrogates": 3},
     ],
-)  # fmt: skip
+)
 def test_searches_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError):
         LagSearch(**wrong)  # type: ignore[arg-type]
@@ -220,10 +235,15 @@ def test_a_real_sonics_gusts_tie_a_flag_to_its_clock(scene: Scenes, reference_da
     for seed, offset in enumerate((-80.3, -33.3, 0.0, 14.9, 71.7)):
         found = estimate(
             scene(
-                seed=seed, offset=offset, gust=(speed - mean) / spread, mean=mean, turbulence=spread / mean, apart=0.5,
+                seed=seed,
+                offset=offset,
+                gust=(speed - mean) / spread,
+                mean=mean,
+                turbulence=spread / mean,
+                apart=0.5,
                 flag_noise=0.3,
             )
-        )  # fmt: skip
+        )
         assert found.accepted, found.reasons
         assert found.offset == pytest.approx(offset, abs=0.5)  # the acceptance bound
         covered += bool(found.interval[0] <= offset <= found.interval[1])

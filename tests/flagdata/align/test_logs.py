@@ -82,9 +82,11 @@ def series(time: np.ndarray, speed: np.ndarray, gap: float, *, distance: float |
     keep = np.ones(len(time), dtype=bool)
     keep[round(gap * len(time)) : round((gap + 0.01) * len(time))] = False
     return WindSeries(
-        time=time[keep], channels={"wind_speed": speed[keep]}, flags=np.zeros(int(keep.sum()), dtype=np.uint16),
+        time=time[keep],
+        channels={"wind_speed": speed[keep]},
+        flags=np.zeros(int(keep.sum()), dtype=np.uint16),
         sensor=Sensor(name="made", averaging=0.0, distance_constant=distance),
-    )  # fmt: skip
+    )
 
 
 def found(reference: WindSeries, sensor: WindSeries) -> LogClock:
@@ -122,9 +124,11 @@ def test_two_logs_of_one_rate_are_aligned() -> None:
     sonic, cup = two.logs()
     slow = np.flatnonzero(sonic.time % SECOND == 0)
     sampled = WindSeries(
-        time=sonic.time[slow], channels={"wind_speed": sonic.channels["wind_speed"][slow]}, flags=sonic.flags[slow],
+        time=sonic.time[slow],
+        channels={"wind_speed": sonic.channels["wind_speed"][slow]},
+        flags=sonic.flags[slow],
         sensor=sonic.sensor,
-    )  # fmt: skip
+    )
     assert at_middle(two, found(sampled, cup).model) == pytest.approx(two.offset, abs=0.1)
 
 
@@ -172,9 +176,14 @@ def lake_of(folder: Path, two: Two) -> tuple[Lake, list[str]]:
             with RecordWriter(path, metadata={}) as record:
                 record.wind(log)
             artifact = Artifact(
-                kind=Kind.WIND, name=name, object=transaction.put(path), source_hash=name[0].encode().hex()[:1] * 64,
-                start=int(log.time[0]), end=int(log.time[-1]), session="mast",
-            )  # fmt: skip
+                kind=Kind.WIND,
+                name=name,
+                object=transaction.put(path),
+                source_hash=name[0].encode().hex()[:1] * 64,
+                start=int(log.time[0]),
+                end=int(log.time[-1]),
+                session="mast",
+            )
             transaction.add(artifact)
             artifacts.append(artifact.id)
     return lake, artifacts

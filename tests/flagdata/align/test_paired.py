@@ -124,8 +124,10 @@ def test_a_counted_clock_shows_lost_samples_as_steps() -> None:
 
 def test_stamps_that_make_no_clock_are_refused() -> None:
     cases = [
-        ([0], [0], "one sample"), ([0, 1], [0], "two stamps"), ([1, 1], [0, 1], "do not increase"),
-    ]  # fmt: skip
+        ([0], [0], "one sample"),
+        ([0, 1], [0], "two stamps"),
+        ([1, 1], [0, 1], "do not increase"),
+    ]
     assert (
         unrefused(
             lambda device, host: pair_clocks(np.array(device, dtype=np.int64), np.array(host, dtype=np.int64)),
@@ -138,9 +140,11 @@ def test_stamps_that_make_no_clock_are_refused() -> None:
 
 def test_a_log_with_one_kind_of_stamp_has_no_host_clock() -> None:
     series = WindSeries(
-        time=np.arange(3, dtype=np.int64), channels={"wind_speed": np.ones(3)}, flags=np.zeros(3, dtype=np.uint16),
+        time=np.arange(3, dtype=np.int64),
+        channels={"wind_speed": np.ones(3)},
+        flags=np.zeros(3, dtype=np.uint16),
         sensor=Sensor(name="cup"),
-    )  # fmt: skip
+    )
     assert host_clock(series) is None
 
 

@@ -55,9 +55,15 @@ def fill(lake: Lake, *, steady: bool, seconds: int = 240, camera_session: str | 
             for time, image in zip(device.tolist(), film(true), strict=True):
                 record.frame(log_time=time, publish_time=time, timestamp=time + 5_000_000, image=image)
         camera = Artifact(
-            kind=Kind.CAMERA, name="cam", object=transaction.put(path), source_hash="a" * 64, session=camera_session,
-            frame_count=len(true), start=int(device[0]), end=int(device[-1]),
-        )  # fmt: skip
+            kind=Kind.CAMERA,
+            name="cam",
+            object=transaction.put(path),
+            source_hash="a" * 64,
+            session=camera_session,
+            frame_count=len(true),
+            start=int(device[0]),
+            end=int(device[-1]),
+        )
         transaction.add(camera)
         stamps = np.arange(-100, seconds + 100)
         fine = np.arange(20)[None, :] / 20
@@ -75,9 +81,14 @@ def fill(lake: Lake, *, steady: bool, seconds: int = 240, camera_session: str | 
             record.wind(series)
             record.attach("log.csv", b"speed\n", media_type="text/csv", log_time=START)
         wind = Artifact(
-            kind=Kind.WIND, name="mast", object=transaction.put(path), source_hash="b" * 64, session="mast",
-            start=int(series.time[0]), end=int(series.time[-1]),
-        )  # fmt: skip
+            kind=Kind.WIND,
+            name="mast",
+            object=transaction.put(path),
+            source_hash="b" * 64,
+            session="mast",
+            start=int(series.time[0]),
+            end=int(series.time[-1]),
+        )
         transaction.add(wind)
     return camera.id, wind.id
 
@@ -155,10 +166,22 @@ def test_people_read_the_offset_with_its_interval(gusty: tuple[Path, str, str]) 
     folder, camera, wind = gusty
     result = CliRunner().invoke(
         root,
-        ["align", camera, wind, "--by", "given", "--offset", "-3.2", "--offset-sigma", "0.25", "--dry-run",
-         "--lake", str(folder)],
+        [
+            "align",
+            camera,
+            wind,
+            "--by",
+            "given",
+            "--offset",
+            "-3.2",
+            "--offset-sigma",
+            "0.25",
+            "--dry-run",
+            "--lake",
+            str(folder),
+        ],
         catch_exceptions=False,
-    )  # fmt: skip
+    )
     # 1.645 × 0.25 = 0.411 either side.
     assert result.stdout.strip() == "offset -3.20 s [-3.61, -2.79] 90 %, given"
 
@@ -209,15 +232,17 @@ def test_a_steady_wind_is_refused_and_nothing_is_committed(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("options", "what"),
     [
-        (["--by", "given"], "without an offset"), (["--offset", "3"], "together with an offset"),
+        (["--by", "given"], "without an offset"),
+        (["--offset", "3"], "together with an offset"),
         (["--by", "given", "--offset", "3"], "without an uncertainty"),
-        (["--by", "stamps"], "without an uncertainty"), (["--offset-sigma", "1"], "is estimated"),
+        (["--by", "stamps"], "without an uncertainty"),
+        (["--offset-sigma", "1"], "is estimated"),
         (["--by", "given", "--offset", "3", "--offset-sigma", "1", "--search", "5"], "searches nothing"),
         (["--by", "given", "--offset", "nan", "--offset-sigma", "1"], "offset of nan"),
         (["--by", "given", "--offset", "1", "--offset-sigma", "0"], "uncertainty 0"),
         (["--by", "stamps", "--offset-sigma", "1", "--plot", "x.png"], "no search to draw"),
     ],
-)  # fmt: skip
+)
 def test_options_that_a_method_cannot_use_are_refused(
     gusty: tuple[Path, str, str], options: list[str], what: str
 ) -> None:

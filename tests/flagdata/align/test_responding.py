@@ -32,10 +32,12 @@ def test_the_lag_of_simulated_flags_in_light_wind_lies_within_two_standard_error
 @pytest.mark.parametrize(
     ("stated", "expected"),
     [
-        ({}, (1.0, 0.3)), ({"response": 0.7}, (0.7, 0.15)), ({"response_sigma": 0.2}, (1.0, 0.2)),
+        ({}, (1.0, 0.3)),
+        ({"response": 0.7}, (0.7, 0.15)),
+        ({"response_sigma": 0.2}, (1.0, 0.2)),
         ({"response": 0.7, "response_sigma": 0.05}, (0.7, 0.05)),
     ],
-)  # fmt: skip
+)
 def test_what_the_user_states_counts(
     stated: dict[str, float], expected: tuple[float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -38,22 +38,34 @@ def scene(folder: Path, *, log_shift: float = 0.0) -> tuple[Lake, str, str]:
                 image = np.full((16, 16), time // SECOND % 200, dtype=np.uint8)
                 record.frame(log_time=time, publish_time=time, timestamp=time, image=image)
         camera = Artifact(
-            kind=Kind.CAMERA, name="cam", object=transaction.put(path), source_hash="a" * 64, frame_count=FRAMES,
-            start=int(times[0]), end=int(times[-1]), session="s",
-        )  # fmt: skip
+            kind=Kind.CAMERA,
+            name="cam",
+            object=transaction.put(path),
+            source_hash="a" * 64,
+            frame_count=FRAMES,
+            start=int(times[0]),
+            end=int(times[-1]),
+            session="s",
+        )
         seconds = np.arange(-1000, 60)
         log = WindSeries(
             time=START + seconds.astype(np.int64) * SECOND + round(log_shift * SECOND),
-            channels={"wind_speed": 20 + seconds / 100}, flags=np.zeros(len(seconds), dtype=np.uint16),
+            channels={"wind_speed": 20 + seconds / 100},
+            flags=np.zeros(len(seconds), dtype=np.uint16),
             sensor=Sensor(name="ramp", accuracy=0.1),
-        )  # fmt: skip
+        )
         path = transaction.staging(".mcap")
         with RecordWriter(path, metadata={}) as record:
             record.wind(log)
         wind = Artifact(
-            kind=Kind.WIND, name="mast", object=transaction.put(path), source_hash="b" * 64, session="s",
-            start=int(log.time[0]), end=int(log.time[-1]),
-        )  # fmt: skip
+            kind=Kind.WIND,
+            name="mast",
+            object=transaction.put(path),
+            source_hash="b" * 64,
+            session="s",
+            start=int(log.time[0]),
+            end=int(log.time[-1]),
+        )
         transaction.add(camera)
         transaction.add(wind)
     return lake, camera.id, wind.id

@@ -31,9 +31,11 @@ def ramp_log(
     stamp = at + jitter * stream(1, "jitter").uniform(-0.5, 0.5, count)
     speed = 1 + stamp - (averaging or 0.0) / 2
     return WindSeries(
-        time=START + np.round(stamp * SECOND).astype(np.int64), channels={"wind_speed": speed},
-        flags=np.zeros(count, dtype=np.uint16), sensor=Sensor(name="ramp", averaging=stated, distance_constant=0.0),
-    )  # fmt: skip
+        time=START + np.round(stamp * SECOND).astype(np.int64),
+        channels={"wind_speed": speed},
+        flags=np.zeros(count, dtype=np.uint16),
+        sensor=Sensor(name="ramp", averaging=stated, distance_constant=0.0),
+    )
 
 
 def error_of_instants(series: WindSeries) -> np.ndarray:

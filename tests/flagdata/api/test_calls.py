@@ -64,9 +64,14 @@ def flags() -> flagdata.simulated.Simulated:
 
 def test_a_recipe_by_keywords_is_the_recipe_as_a_dict(flags) -> None:
     recipe = {
-        "scene": SMALL, "wind": {"speed": {"low": 3.0, "high": 7.0}}, "material": {"name": "camel-ponte-roma"},
-        "time": {"settle": 0.2, "frames": 99}, "count": 3, "batch": 2, "seed": 5,
-    }  # fmt: skip
+        "scene": SMALL,
+        "wind": {"speed": {"low": 3.0, "high": 7.0}},
+        "material": {"name": "camel-ponte-roma"},
+        "time": {"settle": 0.2, "frames": 99},
+        "count": 3,
+        "batch": 2,
+        "seed": 5,
+    }
     again = flagdata.simulate(recipe, time={"frames": 6})
     np.testing.assert_array_equal(flags.positions, again.positions)
     assert flags.positions.shape == (3, 6, len(flags.rest), 3)
@@ -83,9 +88,16 @@ def test_members_are_those_that_a_lake_keeps(flags, tmp_path: Path) -> None:
 
     lake = Lake.create(tmp_path / "lake")
     recipe = recipe_of(
-        None, {"scene": SMALL, "wind": {"speed": {"low": 3.0, "high": 7.0}}, "time": SHORT, "count": 3, "batch": 2,
-               "seed": 5},
-    )  # fmt: skip
+        None,
+        {
+            "scene": SMALL,
+            "wind": {"speed": {"low": 3.0, "high": 7.0}},
+            "time": SHORT,
+            "count": 3,
+            "batch": 2,
+            "seed": 5,
+        },
+    )
     simulate(lake, recipe)
     for index, member in enumerate(flags):
         np.testing.assert_array_equal(flagdata.meshes(f"simulation-{index:05d}", lake=lake).positions, member.positions)

@@ -65,8 +65,11 @@ def test_clips_know_their_cloth_and_the_wind_where_it_is_stated(declared: Declar
     assert [one["parameters"]["density"] for one in declared.said["recordings"]] == [0.24, 0.06]
     felt, silk = clips(declared.lake)["felt"], clips(declared.lake)["silk"]
     assert json.loads(felt["parameters"]) == {
-        "fabric": "felt", "density": 0.24, "bending_stiffness": 3e-5, "wind_level": "W2",
-    }  # fmt: skip
+        "fabric": "felt",
+        "density": 0.24,
+        "bending_stiffness": 3e-5,
+        "wind_level": "W2",
+    }
     assert felt["wind"] is None
     assert felt["wind_sigma"] is None
     assert "wind-missing" in felt["quality"]

@@ -48,11 +48,13 @@ MISTAKES: list[tuple[list[str], int, str]] = [
     (["parket", "--to", "{out}"], 2, "did you mean 'parquet'"),
     (["parquet", "--to", "{out}", "--crf", "20"], 2, "takes no option 'crf'"),
     (["parquet", "--to", "{out}", "--where", "sed = 1"], 2, "did you mean 'seed'"),
-    (["mp4", "--to", "{out}"], 2, "2 of kind model"), (["parquet", "--to", "{lake}"], 1, "exists"),
-    (["parquet", "--to", "{out}", "--at", "nowhere"], 1, "nowhere"), (["parquet"], 2, "--to"),
+    (["mp4", "--to", "{out}"], 2, "2 of kind model"),
+    (["parquet", "--to", "{lake}"], 1, "exists"),
+    (["parquet", "--to", "{out}", "--at", "nowhere"], 1, "nowhere"),
+    (["parquet"], 2, "--to"),
     (["parquet", "--to", "{lake}/lake.json/out"], 1, "this is no folder"),
     (["parquet", "--to", "{out}", "--salt", "x"], 2, "--salt without --split"),
-]  # fmt: skip
+]
 
 
 def test_mistakes_end_in_a_sentence_and_write_nothing(run: Run, lake: Lake, tmp_path: Path) -> None:

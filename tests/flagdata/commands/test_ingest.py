@@ -37,9 +37,17 @@ def test_the_report_for_people_says_format_time_rate_error_and_findings(run, vid
     code, out, _ = run(video, wind_log, "--session", "field-1")
     assert code == 0
     for expected in (
-        "h264", "2026-05-01T10:00:00Z", "50 at 25 Hz", "worst stamp error 0.000 ms", "container 50 Hz",
-        "letterboxed", "missing-values", "line 32", "120, median rate 1 Hz", "wind_speed [m/s]",
-    ):  # fmt: skip
+        "h264",
+        "2026-05-01T10:00:00Z",
+        "50 at 25 Hz",
+        "worst stamp error 0.000 ms",
+        "container 50 Hz",
+        "letterboxed",
+        "missing-values",
+        "line 32",
+        "120, median rate 1 Hz",
+        "wind_speed [m/s]",
+    ):
         assert expected in out, expected
 
 
@@ -151,12 +159,14 @@ MISUSED = [
     (["{video}", "--sensor", "generic-csv"], "--sensor means nothing for a camera file"),
     (["{video}", "--start", "2026-05-01T10:00:00Z", "--zone", "UTC"], "--zone means nothing for a camera file wh"),
     (["{video}", "--start", "2026-02-30T10:00:00Z"], "no day or time of the calendar"),
-    (["{video}", "--start", "x"], "not an ISO 8601 time"), (["{video}", "--zone", "+99:00"], "beyond"),
+    (["{video}", "--start", "x"], "not an ISO 8601 time"),
+    (["{video}", "--zone", "+99:00"], "beyond"),
     (["{log}", "--zone", "Qwxzy"], "give a name such as Europe/Amsterdam"),
     (["{video}", "{video}", "--start", "2026-05-01T10:00:00Z"], "--start with 2 sources"),
     (["{video}", "{log}", "--name", "a"], "--name with 2 sources"),
     (["{video}", "--crop-picture", "{video}.png"], "--crop-picture without --crop auto"),
-    (["{video}", "--crop", "1,2,3"], "not a crop"), (["{video}", "--rate", "fast"], "not a number"),
+    (["{video}", "--crop", "1,2,3"], "not a crop"),
+    (["{video}", "--rate", "fast"], "not a number"),
     (["{video}", "--exposure", "5"], "an exposure of 5 s is longer than the 0.02 s from frame to frame"),
     (["{video}", "--exposure", "0.0021", "--true-fps", "500"], "longer than the 0.002 s"),
     (["{video}", "--as", "vidoe"], "unknown format"),
@@ -164,7 +174,7 @@ MISUSED = [
     (["{log}", "--date", "1/5/2026"], "not a date"),
     (["{video}", "--zone", "Europe/Amsterdm"], "did you mean 'Europe/Amsterdam'"),
     (["{video}", "--sniff", "--session", "a"], "--session means nothing to --sniff"),
-]  # fmt: skip
+]
 
 
 def test_options_that_do_not_apply_are_usage_errors_and_change_nothing(
@@ -207,9 +217,21 @@ def test_each_option_goes_to_the_sources_of_its_kind(
     log = tmp_path / "mast.csv"
     log.write_text(wind_log.read_text().replace(" (m/s)", "").replace(" (deg)", ""))
     code, _, err = run(
-        video, log, "--sensor", "generic-csv", "--zero-offset", "report", "--zone", "Europe/Amsterdam",
-        "--start", "2026-05-01T10:00:01Z", "--exposure", "0.01", "--archive", "h264",
-    )  # fmt: skip
+        video,
+        log,
+        "--sensor",
+        "generic-csv",
+        "--zero-offset",
+        "report",
+        "--zone",
+        "Europe/Amsterdam",
+        "--start",
+        "2026-05-01T10:00:01Z",
+        "--exposure",
+        "0.01",
+        "--archive",
+        "h264",
+    )
     assert code == 0, err
     recipes = {row["kind"]: json.loads(row["recipe"]) for row in lake.rows().to_pylist()}
     assert recipes["wind"]["wind"]["zero_offset"] == "report"
@@ -294,9 +316,14 @@ def test_what_is_neither_camera_nor_wind_says_what_to_do(run, tmp_path: Path) ->
 
 def test_a_rate_is_hertz_or_the_time_between_two() -> None:
     cases = [
-        ("20", 20.0), ("20Hz", 20.0), ("12.5 hz", 12.5), ("40ms", 25.0), ("10min", 1 / 600), ("1 h", 1 / 3600),
+        ("20", 20.0),
+        ("20Hz", 20.0),
+        ("12.5 hz", 12.5),
+        ("40ms", 25.0),
+        ("10min", 1 / 600),
+        ("1 h", 1 / 3600),
         (".5s", 2.0),
-    ]  # fmt: skip
+    ]
     assert [marker_options(rate=written, length="m").rate for written, _ in cases] == [rate for _, rate in cases]
 
 

@@ -130,8 +130,22 @@ def _mutations(text: str, rng: np.random.Generator) -> Iterator[str]:
     lines = text.splitlines()
     body = lines[1:]
     snippets = [
-        "", "NaN", "-5.0", "1e999", "--", ",", ",,,,", '"', "\0", "é", "12:61:00", "2026-05-01", "∞", "0x1F", "1,5",
-    ]  # fmt: skip
+        "",
+        "NaN",
+        "-5.0",
+        "1e999",
+        "--",
+        ",",
+        ",,,,",
+        '"',
+        "\0",
+        "é",
+        "12:61:00",
+        "2026-05-01",
+        "∞",
+        "0x1F",
+        "1,5",
+    ]
 
     def joined(rows: list[str]) -> str:
         return "\n".join([lines[0], *rows, ""])

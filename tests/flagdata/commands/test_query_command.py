@@ -35,10 +35,18 @@ def lake(tmp_path_factory: pytest.TempPathFactory) -> Lake:
 def clip(recording: str, number: int, *, wind: float | None) -> Artifact:
     start = NOON + number * SECOND
     return Artifact(
-        kind=Kind.CLIP, name=f"pier {number}", recording=recording, parents=(recording,),
-        start=start, end=start + SECOND, frame_first=30 * number, frame_count=30,
-        wind=wind, wind_sigma=0.125, quality=("wind-stale", "wind-missing") if wind is None else (),
-    )  # fmt: skip
+        kind=Kind.CLIP,
+        name=f"pier {number}",
+        recording=recording,
+        parents=(recording,),
+        start=start,
+        end=start + SECOND,
+        frame_first=30 * number,
+        frame_count=30,
+        wind=wind,
+        wind_sigma=0.125,
+        quality=("wind-stale", "wind-missing") if wind is None else (),
+    )
 
 
 @pytest.fixture
@@ -73,9 +81,12 @@ def test_json_is_one_strict_document_with_units_and_the_version(run: Run, lake: 
     assert found["version"] == lake.resolve(None)
     assert [(column["name"], column["unit"]) for column in found["columns"]][1] == ("wind", "m/s")
     assert found["rows"][2] == {
-        "name": "pier 2", "wind": None, "start": NOON + 2 * SECOND,
-        "start_time": "2026-05-01T12:00:02Z", "quality": ["wind-stale", "wind-missing"],
-    }  # fmt: skip
+        "name": "pier 2",
+        "wind": None,
+        "start": NOON + 2 * SECOND,
+        "start_time": "2026-05-01T12:00:02Z",
+        "quality": ["wind-stale", "wind-missing"],
+    }
     assert (found["count"], found["total"]) == (3, 3)
 
 

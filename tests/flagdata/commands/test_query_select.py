@@ -24,11 +24,22 @@ SECOND = 1_000_000_000
 
 def row(number: int, **values: object) -> dict[str, object]:
     blank: dict[str, object] = dict.fromkeys(CATALOG)
-    return blank | {
-        "artifact": f"{number:032x}", "kind": "clip", "name": f"clip {number}", "branch": "main", "parents": [],
-        "recipe_hash": "0" * 64, "code_version": "0.1.0", "format_version": 1,
-        "created": datetime(2026, 5, 2, tzinfo=UTC), "quality": [],
-    } | values  # fmt: skip
+    return (
+        blank
+        | {
+            "artifact": f"{number:032x}",
+            "kind": "clip",
+            "name": f"clip {number}",
+            "branch": "main",
+            "parents": [],
+            "recipe_hash": "0" * 64,
+            "code_version": "0.1.0",
+            "format_version": 1,
+            "created": datetime(2026, 5, 2, tzinfo=UTC),
+            "quality": [],
+        }
+        | values
+    )
 
 
 CATALOG_ROWS = [
@@ -146,18 +157,32 @@ def test_the_limit_cuts_rows_and_the_total_does_not_count_it() -> None:
 
 def test_sql_that_is_not_one_read_of_the_catalog_is_refused() -> None:
     cases = [
-        "create table x (a int)", "drop view catalog", "insert into stored select * from stored",
-        "select 1; select 2", "set threads = 1", "copy catalog to 'out.csv'", "attach 'other.db'", "install httpfs",
-        "select * from read_csv('/etc/passwd')", "select * from read_text('pyproject.toml')",
-        "select * from glob('*')", "select * from 'pyproject.toml'", "export database 'out'", "",
-    ]  # fmt: skip
+        "create table x (a int)",
+        "drop view catalog",
+        "insert into stored select * from stored",
+        "select 1; select 2",
+        "set threads = 1",
+        "copy catalog to 'out.csv'",
+        "attach 'other.db'",
+        "install httpfs",
+        "select * from read_csv('/etc/passwd')",
+        "select * from read_text('pyproject.toml')",
+        "select * from glob('*')",
+        "select * from 'pyproject.toml'",
+        "export database 'out'",
+        "",
+    ]
     assert not unrefused(lambda sql: select(HandWritten(), sql=sql), zip(cases), UsageError)
 
 
 def test_a_filter_cannot_be_more_than_a_condition() -> None:
     cases = [
-        "1 = 1; drop view catalog", "1 = 1) or (1 = 1", "(select count(*) from read_csv('/etc/passwd')) > 0", "", ";",
-    ]  # fmt: skip
+        "1 = 1; drop view catalog",
+        "1 = 1) or (1 = 1",
+        "(select count(*) from read_csv('/etc/passwd')) > 0",
+        "",
+        ";",
+    ]
     assert not unrefused(lambda where: select(HandWritten(), where), zip(cases), UsageError)
 
 
@@ -171,11 +196,14 @@ def test_python_variables_are_not_tables() -> None:
 @pytest.mark.parametrize(
     ("where", "fix"),
     [
-        ("winds > 3", "did you mean 'wind'?"), ("catalog.wnd > 3", "did you mean 'wind'?"),
-        ("kind = clip", "'clip' in single quotes"), ("end > 3", '"end"'),
-        ("start > '2026-05-01 12:00'", "start_time or end_time"), ("wind > 'much'", "--describe"),
+        ("winds > 3", "did you mean 'wind'?"),
+        ("catalog.wnd > 3", "did you mean 'wind'?"),
+        ("kind = clip", "'clip' in single quotes"),
+        ("end > 3", '"end"'),
+        ("start > '2026-05-01 12:00'", "start_time or end_time"),
+        ("wind > 'much'", "--describe"),
     ],
-)  # fmt: skip
+)
 def test_mistakes_are_answered_with_what_to_write(where: str, fix: str) -> None:
     with pytest.raises(UsageError) as caught:
         select(HandWritten(), where)

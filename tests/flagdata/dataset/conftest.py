@@ -30,9 +30,11 @@ def wind_series(start: int, seconds: int, *, mean: float = 5.0, missing: tuple[i
     """1 Hz wind from `start`, a gust of 12 s about `mean`; rows of the range `missing` are left out."""
     index = np.array([k for k in range(seconds) if not missing[0] <= k < missing[1]], dtype=np.int64)
     return WindSeries(
-        time=start + index * NS, channels={"wind_speed": mean + 0.5 * np.sin(2 * np.pi * index / 12)},
-        flags=np.zeros(len(index), dtype=np.uint16), sensor=Sensor(name="cup", accuracy=0.2),
-    )  # fmt: skip
+        time=start + index * NS,
+        channels={"wind_speed": mean + 0.5 * np.sin(2 * np.pi * index / 12)},
+        flags=np.zeros(len(index), dtype=np.uint16),
+        sensor=Sensor(name="cup", accuracy=0.2),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,11 +86,17 @@ def add_recording(lake: Lake, made: Made) -> str:
             source = Artifact(kind=Kind.CAMERA, name=f"camera {made.number}", source_hash=f"{made.number:064x}")
             transaction.add(source)
         recording = Artifact(
-            kind=Kind.RECORDING, name=f"recording {made.number}", object=transaction.put(path),
-            parents=(source.id,) if source else (), recipe={"number": made.number, "start": made.start},
-            session=made.session, seed=made.seed, rate=25.0, clock_sigma=None if clock else 0.0,
+            kind=Kind.RECORDING,
+            name=f"recording {made.number}",
+            object=transaction.put(path),
+            parents=(source.id,) if source else (),
+            recipe={"number": made.number, "start": made.start},
+            session=made.session,
+            seed=made.seed,
+            rate=25.0,
+            clock_sigma=None if clock else 0.0,
             clock_model=clock.to_json() if clock else None,
-        )  # fmt: skip
+        )
         record = Record.open(lake.object_path(recording.object))
         transaction.add(recording)
         for clip in clip_rows(record, recording):

@@ -36,7 +36,7 @@ def test_a_lake_says_what_it_holds_and_gives_pairs(field_lake: Lake) -> None:
 def test_wind_and_frames_of_a_recording_are_those_of_its_record(field_lake: Lake) -> None:
     (name,) = {row["name"] for row in flagdata.query(field_lake, "kind = 'recording' and session = 'site0'")} & {
         "recording 0"
-    }  # fmt: skip
+    }
     wind = flagdata.wind(name, lake=field_lake)
     seconds = np.arange(len(wind.time))
     np.testing.assert_allclose(wind.time, seconds)

@@ -127,10 +127,12 @@ def test_the_wind_of_a_moving_platform_is_no_ground_truth(tmp_path):
             writer.frame(log_time=time, publish_time=time, timestamp=time, image=np.zeros((8, 8), dtype=np.uint8))
         writer.wind(
             WindSeries(
-                time=NOON - 60 * NS + np.arange(62) * NS, channels={"apparent_wind_speed": np.full(62, 7.0)},
-                flags=np.zeros(62, dtype=np.uint16), sensor=Sensor(name="masthead"),
+                time=NOON - 60 * NS + np.arange(62) * NS,
+                channels={"apparent_wind_speed": np.full(62, 7.0)},
+                flags=np.zeros(62, dtype=np.uint16),
+                sensor=Sensor(name="masthead"),
             )
-        )  # fmt: skip
+        )
     row = clip_rows(Record.open(path), recording(clock_sigma=0.1))[0]
     assert row.wind is None
     assert "wind-missing" in row.quality

@@ -295,10 +295,16 @@ def test_worker_processes_end_with_their_loader(pairs, monkeypatch):
 
 def test_options_that_cannot_be_are_usage_errors(pairs):
     for options in (
-        {"batch_size": 0}, {"batch_size": 1, "workers": -1}, {"batch_size": 1, "order": "random"},
-        {"batch_size": 1, "last": "pad"}, {"batch_size": 1, "memory": "fast"}, {"batch_size": 1, "run_in": "fibres"},
-        {"batch_size": 49, "last": "drop"}, {"batch_size": 30, "share": (0, 3)}, {"batch_size": 1, "share": (2, 2)},
-    ):  # fmt: skip
+        {"batch_size": 0},
+        {"batch_size": 1, "workers": -1},
+        {"batch_size": 1, "order": "random"},
+        {"batch_size": 1, "last": "pad"},
+        {"batch_size": 1, "memory": "fast"},
+        {"batch_size": 1, "run_in": "fibres"},
+        {"batch_size": 49, "last": "drop"},
+        {"batch_size": 30, "share": (0, 3)},
+        {"batch_size": 1, "share": (2, 2)},
+    ):
         with pytest.raises(UsageError):
             pairs.loader(**options)
 

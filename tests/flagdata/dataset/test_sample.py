@@ -14,10 +14,21 @@ from flagdata.errors import InputError
 
 def sample(index, **changes):
     base = Sample(
-        clip=torch.full((1, 3, 4, 5), index, dtype=torch.uint8), wind=5.0 + index, wind_sigma=0.25, staleness=0.5,
-        coverage=1.0, clock_sigma=0.125, parameters={}, artifact=f"clip{index}", recording="recording",
-        session="field", day="2026-05-01", seed=None, start=10 * index, end=10 * index + 5,
-    )  # fmt: skip
+        clip=torch.full((1, 3, 4, 5), index, dtype=torch.uint8),
+        wind=5.0 + index,
+        wind_sigma=0.25,
+        staleness=0.5,
+        coverage=1.0,
+        clock_sigma=0.125,
+        parameters={},
+        artifact=f"clip{index}",
+        recording="recording",
+        session="field",
+        day="2026-05-01",
+        seed=None,
+        start=10 * index,
+        end=10 * index + 5,
+    )
     return replace(base, **changes)
 
 

@@ -38,22 +38,37 @@ def tangled(tmp_path_factory, write_record, made):
             if not simulated:
                 transaction.add(camera)
             recording = Artifact(
-                kind=Kind.RECORDING, name=f"recording {number}", object=stored,
-                parents=() if simulated else (camera.id,), recipe={"number": number},
+                kind=Kind.RECORDING,
+                name=f"recording {number}",
+                object=stored,
+                parents=() if simulated else (camera.id,),
+                recipe={"number": number},
                 session=None if simulated or number % 5 == 0 else f"site {int(generator.integers(0, 25))}",
                 seed=int(generator.integers(0, 18)) if simulated else None,
-            )  # fmt: skip
+            )
             transaction.add(recording)
             films[recording.id] = None if simulated else film
             for clip in range(3):
                 own = Artifact(
-                    kind=Kind.CLIP, name=recording.name, object=stored, parents=(recording.id,),
-                    recording=recording.id, recipe={"frames": 30, "window": 60.0}, session=recording.session,
-                    seed=recording.seed, day=None if simulated else f"2026-{day // 28 + 1:02d}-{day % 28 + 1:02d}",
-                    start=NOON + clip, end=NOON + clip + 1, frame_first=30 * clip, frame_count=30,
-                    wind=float(generator.uniform(1, 10)), wind_sigma=0.1, wind_coverage=1.0, wind_staleness=0.0,
+                    kind=Kind.CLIP,
+                    name=recording.name,
+                    object=stored,
+                    parents=(recording.id,),
+                    recording=recording.id,
+                    recipe={"frames": 30, "window": 60.0},
+                    session=recording.session,
+                    seed=recording.seed,
+                    day=None if simulated else f"2026-{day // 28 + 1:02d}-{day % 28 + 1:02d}",
+                    start=NOON + clip,
+                    end=NOON + clip + 1,
+                    frame_first=30 * clip,
+                    frame_count=30,
+                    wind=float(generator.uniform(1, 10)),
+                    wind_sigma=0.1,
+                    wind_coverage=1.0,
+                    wind_staleness=0.0,
                     clock_sigma=0.1,
-                )  # fmt: skip
+                )
                 transaction.add(own)
     return lake, films
 
@@ -70,10 +85,13 @@ def test_no_two_sides_share_anything_that_connects(tangled, salt):
         except RefusedError:
             continue
         held[side] = [
-            set(table.artifact.tolist()), set(table.recording.tolist()), set(table.session.tolist()) - {""},
-            set(table.day.tolist()) - {""}, set(table.seed[table.seeded].tolist()),
+            set(table.artifact.tolist()),
+            set(table.recording.tolist()),
+            set(table.session.tolist()) - {""},
+            set(table.day.tolist()) - {""},
+            set(table.seed[table.seeded].tolist()),
             {films[recording] for recording in table.recording.tolist()} - {None},
-        ]  # fmt: skip
+        ]
     assert len(held) >= 2
     for one, other in itertools.combinations(held.values(), 2):
         for mine, theirs in zip(one, other, strict=True):

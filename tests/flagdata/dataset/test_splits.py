@@ -19,9 +19,12 @@ real = st.builds(
     sources=st.lists(st.integers(0, 40).map(lambda n: f"camera {n}"), max_size=2, unique=True).map(tuple),
 )
 simulated = st.builds(
-    Origin, recording=st.integers(0, 10**6).map(lambda n: f"sim{n}"), session=st.none(),
-    days=st.just(("1970-01-01",)), seed=st.integers(0, 30),
-)  # fmt: skip
+    Origin,
+    recording=st.integers(0, 10**6).map(lambda n: f"sim{n}"),
+    session=st.none(),
+    days=st.just(("1970-01-01",)),
+    seed=st.integers(0, 30),
+)
 origins = st.lists(st.one_of(real, simulated), min_size=1, max_size=40, unique_by=lambda origin: origin.recording)
 
 
@@ -104,9 +107,11 @@ def test_a_side_without_a_share_gets_nothing():
 
 def test_an_explicit_split_that_leaks_is_refused_and_the_leak_is_named():
     for shared, named in (
-        ({"session": "field"}, "session field"), ({"days": ("2026-05-01",)}, "day 2026-05-01"), ({"seed": 7}, "seed 7"),
+        ({"session": "field"}, "session field"),
+        ({"days": ("2026-05-01",)}, "day 2026-05-01"),
+        ({"seed": 7}, "seed 7"),
         ({"sources": ("camera abc",)}, "camera abc"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(RefusedError, match=f"{named} is in train and in test"):
             refuse_leaks({"train": [Origin(recording="a", **shared)], "test": [Origin(recording="b", **shared)]})
     with pytest.raises(RefusedError, match="recording a is in train and in test"):  # whatever else is unknown

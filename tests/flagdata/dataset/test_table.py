@@ -16,10 +16,24 @@ from flagdata.schema import CATALOG
 
 def rows(*changes):
     base = {
-        "artifact": "a", "recording": "r", "session": None, "day": None, "seed": None, "object": "mcap/" + "0" * 64,
-        "frame_first": 0, "frame_count": 30, "start": 0, "end": 1, "wind": 5.0, "wind_sigma": 0.1, "wind_coverage": 1.0,
-        "wind_staleness": 0.5, "clock_sigma": 0.2, "parameters": None, "recipe": "{}",
-    }  # fmt: skip
+        "artifact": "a",
+        "recording": "r",
+        "session": None,
+        "day": None,
+        "seed": None,
+        "object": "mcap/" + "0" * 64,
+        "frame_first": 0,
+        "frame_count": 30,
+        "start": 0,
+        "end": 1,
+        "wind": 5.0,
+        "wind_sigma": 0.1,
+        "wind_coverage": 1.0,
+        "wind_staleness": 0.5,
+        "clock_sigma": 0.2,
+        "parameters": None,
+        "recipe": "{}",
+    }
     schema = pa.schema([(name, CATALOG[name].type) for name in COLUMNS])
     return pa.Table.from_pylist([{**base, "artifact": f"a{k}", **change} for k, change in enumerate(changes)], schema)
 

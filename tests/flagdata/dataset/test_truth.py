@@ -289,9 +289,11 @@ def test_impossible_window_or_clock_is_a_usage_error():
 
 
 @given(
-    gaps=st.lists(st.floats(0.05, 20.0), min_size=2, max_size=80), end=st.floats(0.0, 200.0),
-    window=st.floats(1.0, 120.0), speed=st.floats(0.0, 60.0),
-)  # fmt: skip
+    gaps=st.lists(st.floats(0.05, 20.0), min_size=2, max_size=80),
+    end=st.floats(0.0, 200.0),
+    window=st.floats(1.0, 120.0),
+    speed=st.floats(0.0, 60.0),
+)
 def test_any_spacing_keeps_the_mean_within_the_samples_and_coverage_within_one(gaps, end, window, speed):
     result = truth(series(np.cumsum(gaps), speed), end, window=window)
     assert 0.0 <= result.coverage <= 1.0

@@ -74,19 +74,35 @@ def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
         write_record(path, times, jpegs, wind_time, wind_speed)
         name = tx.put(path)
         recording = Artifact(
-            kind=Kind.RECORDING, name="pier", object=name, source_hash="a" * 64, session="pier", day="2026-05-01",
-            start=int(times[0]), end=int(times[-1]), frame_count=90, rate=27.3,
-            clock_method="given", clock_offset=7.0, clock_drift=0.0, clock_sigma=0.02,
-        )  # fmt: skip
+            kind=Kind.RECORDING,
+            name="pier",
+            object=name,
+            source_hash="a" * 64,
+            session="pier",
+            day="2026-05-01",
+            start=int(times[0]),
+            end=int(times[-1]),
+            frame_count=90,
+            rate=27.3,
+            clock_method="given",
+            clock_offset=7.0,
+            clock_drift=0.0,
+            clock_sigma=0.02,
+        )
         tx.add(recording)
         clips = [clip(recording, name, number, times) for number in range(3)]
         for artifact in clips:
             tx.add(artifact)
     return Known(
-        lake=lake, recording=recording.id, clips=tuple(c.id for c in clips), times=times,
-        images=images, jpegs=jpegs,
-        wind_time=wind_time, wind_speed=wind_speed,
-    )  # fmt: skip
+        lake=lake,
+        recording=recording.id,
+        clips=tuple(c.id for c in clips),
+        times=times,
+        images=images,
+        jpegs=jpegs,
+        wind_time=wind_time,
+        wind_speed=wind_speed,
+    )
 
 
 def write_record(
@@ -99,10 +115,12 @@ def write_record(
     with RecordWriter(path, metadata={"provenance": {"source_name": "pier.mp4"}}) as writer:
         writer.wind(
             WindSeries(
-                time=wind_time, channels={"wind_speed": wind_speed}, flags=np.zeros(len(wind_time), dtype=np.uint16),
+                time=wind_time,
+                channels={"wind_speed": wind_speed},
+                flags=np.zeros(len(wind_time), dtype=np.uint16),
                 sensor=Sensor(name="cup", accuracy=0.1),
             )
-        )  # fmt: skip
+        )
         writer.attach("log.csv", b"time,speed\n", media_type="text/csv", log_time=int(wind_time[0]))
         for time, data in zip(times.tolist(), jpegs, strict=True):
             writer.frame(log_time=time, publish_time=time - CAMERA_BEHIND, timestamp=time, image=data)
@@ -111,9 +129,26 @@ def write_record(
 def clip(recording: Artifact, name: str, number: int, times: NDArray[np.int64]) -> Artifact:
     first = CLIP * number
     return Artifact(
-        kind=Kind.CLIP, name=f"pier {number}", object=name, parents=(recording.id,), recording=recording.id,
-        session="pier", day="2026-05-01", start=int(times[first]), end=int(times[first + CLIP - 1]),
-        frame_first=first, frame_count=CLIP, rate=27.3, wind=3.5 + number, wind_sigma=0.125, wind_coverage=1.0,
-        wind_staleness=0.25, clock_method="given", clock_offset=7.0, clock_drift=0.0, clock_sigma=0.02,
-        parameters=('{"density":0.2}', None, '{"damping":NaN}')[number], quality=("wind-stale",) if number == 1 else (),
-    )  # fmt: skip
+        kind=Kind.CLIP,
+        name=f"pier {number}",
+        object=name,
+        parents=(recording.id,),
+        recording=recording.id,
+        session="pier",
+        day="2026-05-01",
+        start=int(times[first]),
+        end=int(times[first + CLIP - 1]),
+        frame_first=first,
+        frame_count=CLIP,
+        rate=27.3,
+        wind=3.5 + number,
+        wind_sigma=0.125,
+        wind_coverage=1.0,
+        wind_staleness=0.25,
+        clock_method="given",
+        clock_offset=7.0,
+        clock_drift=0.0,
+        clock_sigma=0.02,
+        parameters=('{"density":0.2}', None, '{"damping":NaN}')[number],
+        quality=("wind-stale",) if number == 1 else (),
+    )

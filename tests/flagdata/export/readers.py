@@ -25,8 +25,12 @@ def read_by(environment: Environment, script: str, *arguments: object, home: obj
     except NotFoundError as error:
         pytest.skip(f"{error.what}: make {environment.package}")
     done = subprocess.run(
-        [str(python), "-I", "-c", script, *map(str, arguments)], capture_output=True, text=True, timeout=300,
-        check=False, env={**_OFFLINE, "HOME": str(home), "HF_HOME": str(home)},
-    )  # fmt: skip
+        [str(python), "-I", "-c", script, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        env={**_OFFLINE, "HOME": str(home), "HF_HOME": str(home)},
+    )
     assert done.returncode == 0, done.stderr[-3000:]
     return json.loads(done.stdout.splitlines()[-1])

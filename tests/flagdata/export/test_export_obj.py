@@ -32,9 +32,14 @@ def put(lake: Lake) -> Put:
             staged = transaction.staging(".zarr")
             write_meshes(staged, sequence)
             artifact = Artifact(
-                kind=Kind.MESHES, name="m", object=transaction.put(staged), recipe=parameters, rate=50.0, seed=4,
+                kind=Kind.MESHES,
+                name="m",
+                object=transaction.put(staged),
+                recipe=parameters,
+                rate=50.0,
+                seed=4,
                 parameters=canonical(parameters),
-            )  # fmt: skip
+            )
             transaction.add(artifact)
         return artifact.id
 
@@ -74,9 +79,13 @@ def test_a_changing_topology_comes_back(lake: Lake, put: Put, tmp_path: Path) ->
     positions = np.zeros((7, 3), dtype=np.float32)
     positions[:, 1:] = np.concatenate([REST, REST, np.float32([[1, 1]])])
     sequence = RaggedMeshSequence(
-        time=np.array([0, 20_000_000]), positions=positions, faces=np.int32([[0, 1, 2], [0, 1, 2], [1, 3, 2]]),
-        rest=positions[:, 1:].copy(), vertex_offset=np.array([0, 3, 7]), face_offset=np.array([0, 1, 3]),
-    )  # fmt: skip
+        time=np.array([0, 20_000_000]),
+        positions=positions,
+        faces=np.int32([[0, 1, 2], [0, 1, 2], [1, 3, 2]]),
+        rest=positions[:, 1:].copy(),
+        vertex_offset=np.array([0, 3, 7]),
+        face_offset=np.array([0, 1, 3]),
+    )
     key = put(sequence)
     export(lake, Export(format="obj"), tmp_path / "out")
     back = read_folder(tmp_path / "out" / key)

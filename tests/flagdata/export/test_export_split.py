@@ -36,10 +36,18 @@ def lake(tmp_path_factory: pytest.TempPathFactory) -> Lake:
                 start = MAY + day * DAY + first
                 tx.add(
                     Artifact(
-                        kind=Kind.CLIP, name=f"clip {number}-{first}", parents=(recording.id,), recording=recording.id,
-                        frame_first=first, frame_count=30, start=start, end=start + 29, wind=5.0, **values,
+                        kind=Kind.CLIP,
+                        name=f"clip {number}-{first}",
+                        parents=(recording.id,),
+                        recording=recording.id,
+                        frame_first=first,
+                        frame_count=30,
+                        start=start,
+                        end=start + 29,
+                        wind=5.0,
+                        **values,
                     )
-                )  # fmt: skip
+                )
     return made
 
 

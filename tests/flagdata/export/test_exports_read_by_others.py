@@ -58,11 +58,14 @@ def test_hugging_face_loads_the_parquet_export_with_its_frames(known: Any, tmp_p
     rows = read_by(DATASETS, PARQUET, tmp_path / "out", tmp_path / "cache", home=tmp_path)
     assert rows == [
         [
-            known.clips[n], 3.5 + n, 0.125, known.times[30 * n : 30 * n + 30].tolist(),
+            known.clips[n],
+            3.5 + n,
+            0.125,
+            known.times[30 * n : 30 * n + 30].tolist(),
             [hashlib.sha256(data).hexdigest() for data in known.jpegs[30 * n : 30 * n + 30]],
         ]
         for n in range(3)
-    ]  # fmt: skip
+    ]
 
 
 def test_hugging_face_streams_the_webdataset_export(known: Any, tmp_path: Path) -> None:

@@ -204,8 +204,12 @@ def _understood(log: WindLog, **changes: object) -> WindLog:
     """A reading as another version of the readers made it."""
     factor = float(str(changes.get("factor", 1.0)))
     channels = {**log.series.channels, "wind_speed": log.series.channels["wind_speed"] * factor}
-    return replace(log, series=replace(log.series, channels=channels), drafted=str(changes["drafted"]),
-                   plan={"format": "delimited", "recipe": changes["drafted"], "reader": 0})  # fmt: skip
+    return replace(
+        log,
+        series=replace(log.series, channels=channels),
+        drafted=str(changes["drafted"]),
+        plan={"format": "delimited", "recipe": changes["drafted"], "reader": 0},
+    )
 
 
 def test_two_drafts_that_differ_are_two_artifacts_and_the_second_names_the_first(

@@ -155,8 +155,9 @@ def test_the_same_constant_log_enters_once_for_each_session(lake: Lake, tmp_path
     assert (second.artifact.session, second.artifact.name) == ("b", "second-film")
     assert not [found for found in second.report["findings"] if found["kind"] == "ingested-before"]
     assert [ingest(paths[0], "b").artifact.id, ingest(paths[1], "a").artifact.id] == [
-        second.artifact.id, first.artifact.id,
-    ]  # fmt: skip
+        second.artifact.id,
+        first.artifact.id,
+    ]
     assert ingest(paths[1], None).artifact.id == first.artifact.id
     assert len(lake.rows()) == 2
 

@@ -35,9 +35,14 @@ def run(lake: Lake, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Monk
 def rows(parents: Mapping[str, Sequence[str]], *, names: Mapping[str, str] | None = None) -> pa.Table:
     """Rows of a catalog: id → parents; of the kind "wind", named as their id."""
     values = {
-        "kind": "wind", "branch": "main", "recipe_hash": "f" * 64, "code_version": "1", "format_version": 3,
-        "created": 0, "quality": [],
-    }  # fmt: skip
+        "kind": "wind",
+        "branch": "main",
+        "recipe_hash": "f" * 64,
+        "code_version": "1",
+        "format_version": 3,
+        "created": 0,
+        "quality": [],
+    }
     return pa.Table.from_pylist(
         [{**values, "artifact": one, "name": (names or {}).get(one, one), "parents": p} for one, p in parents.items()],
         schema=catalog_schema(),
@@ -46,17 +51,33 @@ def rows(parents: Mapping[str, Sequence[str]], *, names: Mapping[str, str] | Non
 
 def test_generations_count_the_longest_way_and_leave_out_what_is_neither_above_nor_below() -> None:
     found = ancestry(
-        rows({"camera": [], "wind": [], "recording": ["camera", "wind"], "clip": ["recording"], "other": ["wind"],
-              "measure": ["camera", "recording"], "model": ["measure"]}),
+        rows(
+            {
+                "camera": [],
+                "wind": [],
+                "recording": ["camera", "wind"],
+                "clip": ["recording"],
+                "other": ["wind"],
+                "measure": ["camera", "recording"],
+                "model": ["measure"],
+            }
+        ),
         "measure",
-    )  # fmt: skip
+    )
     assert {one.artifact: one.generation for one in found.relatives.values()} == {
-        "camera": -2, "wind": -2, "recording": -1, "measure": 0, "model": 1,
-    }  # fmt: skip
+        "camera": -2,
+        "wind": -2,
+        "recording": -1,
+        "measure": 0,
+        "model": 1,
+    }
     assert set(found.edges) == {
-        ("camera", "measure"), ("recording", "measure"), ("camera", "recording"), ("wind", "recording"),
+        ("camera", "measure"),
+        ("recording", "measure"),
+        ("camera", "recording"),
+        ("wind", "recording"),
         ("measure", "model"),
-    }  # fmt: skip
+    }
 
 
 def test_a_circle_in_a_damaged_catalog_and_a_parent_that_is_not_there_end_the_search() -> None:
@@ -94,9 +115,12 @@ def test_many_of_a_kind_are_counted_and_their_own_parents_still_shown() -> None:
     many = {f"film{number}": ["mast"] for number in range(9)}
     found = ancestry(rows({"mast": [], **many, "network": list(many)}), "network")
     assert list(_lines(found, details=False, most=8)) == [
-        "network wind network", "made from", "└─ 9 × wind (--all lists them)", "   └─ mast wind mast",
+        "network wind network",
+        "made from",
+        "└─ 9 × wind (--all lists them)",
+        "   └─ mast wind mast",
         "made into no other artifact",
-    ]  # fmt: skip
+    ]
     assert len(list(_lines(found, details=False, most=None))) == 3 + 9 * 2
     drawn = picture(found)
     assert "9 × wind" in drawn

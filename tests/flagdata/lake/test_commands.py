@@ -87,9 +87,13 @@ def test_ls_counts_clips_and_lists_them_on_request(run: Run, lake: Lake, put_tex
     with lake.transaction("clips") as tx:
         for first in (0, 30):
             clip = Artifact(
-                kind="clip", name="clip", object=recording.object, parents=(recording.id,), frame_first=first,
+                kind="clip",
+                name="clip",
+                object=recording.object,
+                parents=(recording.id,),
+                frame_first=first,
                 frame_count=30,
-            )  # fmt: skip
+            )
             tx.add(clip)
     listed = run("ls")
     assert [line.split()[2] for line in listed.out.splitlines()[1:]] == ["recording"]
@@ -106,8 +110,10 @@ def test_log_lists_each_commit_and_a_commit_names_a_version(run: Run, lake: Lake
     put_text(lake, "b")
     commits = run("log", "--json").document["commits"]
     assert [(c["version"], c["added"], c["message"]) for c in commits] == [
-        (2, 1, "ingest b"), (1, 1, "ingest a"), (0, 0, "create the lake"),
-    ]  # fmt: skip
+        (2, 1, "ingest b"),
+        (1, 1, "ingest a"),
+        (0, 0, "create the lake"),
+    ]
     at_first = run("ls", "--at", commits[1]["commit"], "--json").document["artifacts"]
     assert [artifact["name"] for artifact in at_first] == ["a"]
     assert len(run("log", "--limit", 1).out.splitlines()) == 2
@@ -141,9 +147,11 @@ def test_diff_prints_what_came_and_what_went(run: Run, lake: Lake, put_text: Put
     came = put_text(lake, "came")
     assert run("withdraw", gone.id[:10], "-m", "wrong camera").code == 0
     assert run("diff", "v1").out.splitlines() == [
-        f"+ wind        {came.id[:12]} came", f"+ object      {came.object}", f"- wind        {gone.id[:12]} gone",
+        f"+ wind        {came.id[:12]} came",
+        f"+ object      {came.object}",
+        f"- wind        {gone.id[:12]} gone",
         f"- object      {gone.object}",
-    ]  # fmt: skip
+    ]
     document = run("diff", "v1", "main", "--json").document
     assert document["schema"] == "flagdata.diff/1"
     assert [row["artifact"] for row in document["removed"]] == [gone.id]

@@ -149,9 +149,15 @@ def taken(error: type[FlagdataError], *uses: Callable[[str], object], names: Seq
 
 def test_object_names_cannot_reach_out_of_the_stores(lake: Lake) -> None:
     names = [
-        "../lake.json", "mcap/../lake.json", "/etc/passwd", "mcap/" + "0" * 63, "mcap/" + "G" * 64,
-        "mcap/" + "0" * 64 + "\n", "blob/" + "0" * 64, "",
-    ]  # fmt: skip
+        "../lake.json",
+        "mcap/../lake.json",
+        "/etc/passwd",
+        "mcap/" + "0" * 63,
+        "mcap/" + "G" * 64,
+        "mcap/" + "0" * 64 + "\n",
+        "blob/" + "0" * 64,
+        "",
+    ]
     made = partial(Artifact, kind=Kind.WIND, name="x")
     assert taken(InputError, lake.object_path, lambda name: made(object=name), names=names) == []
 
@@ -224,11 +230,22 @@ def test_a_child_without_its_parent_is_refused(lake: Lake) -> None:
 
 
 MALFORMED: list[tuple[str, object]] = [
-    ("kind", "flag"), ("name", " "), ("parents", ("abc",)), ("source_hash", "abc"), ("frame_count", -1),
-    ("frame_count", 1.5), ("wind", float("nan")), ("wind", "4"), ("seed", 2**63), ("name", "two\nlines"),
-    ("name", "not unicode \udce9"), ("source_name", "not unicode \udce9"), ("session", 7), ("parameters", "{"),
+    ("kind", "flag"),
+    ("name", " "),
+    ("parents", ("abc",)),
+    ("source_hash", "abc"),
+    ("frame_count", -1),
+    ("frame_count", 1.5),
+    ("wind", float("nan")),
+    ("wind", "4"),
+    ("seed", 2**63),
+    ("name", "two\nlines"),
+    ("name", "not unicode \udce9"),
+    ("source_name", "not unicode \udce9"),
+    ("session", 7),
+    ("parameters", "{"),
     ("report", "not json"),
-]  # fmt: skip
+]
 
 
 def test_a_malformed_value_is_refused_by_its_column() -> None:

@@ -141,9 +141,11 @@ def test_the_error_of_a_damaged_log_entry_names_it(lake: Lake, put_text: Put) ->
     with pytest.raises(CorruptError) as caught:
         fresh.rows()
     assert caught.value.as_dict() == {
-        "kind": "corrupt", "what": f"the log entry {entry.name} is damaged", "where": str(entry),
+        "kind": "corrupt",
+        "what": f"the log entry {entry.name} is damaged",
+        "where": str(entry),
         "fix": "restore it from a copy",
-    }  # fmt: skip
+    }
     findings = doctor(fresh)
     assert not any("\n" in f.what for f in findings)
     assert {f.kind for f in findings} == {"log-damaged"}

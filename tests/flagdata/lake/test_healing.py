@@ -215,10 +215,15 @@ def put_bytes(lake: Lake, text: str, *, branch: str = "main") -> dict[str, objec
         transaction.add(row)
         transaction.add(
             Artifact(
-                kind=Kind.CLIP, name="film 0", object=row.object, parents=[row.id], recording=row.id, frame_first=0,
+                kind=Kind.CLIP,
+                name="film 0",
+                object=row.object,
+                parents=[row.id],
+                recording=row.id,
+                frame_first=0,
                 frame_count=3,
             )
-        )  # fmt: skip
+        )
     return dict(transaction.result.healed)
 
 

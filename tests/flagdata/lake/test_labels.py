@@ -27,8 +27,14 @@ Put = Callable[..., Artifact]
 
 def test_a_value_is_a_number_a_truth_value_or_a_text() -> None:
     assert [given(text)[1] for text in ("a=4", "a=-0.5", "a=true", "a=red", 'a="5"', "a=", "a=2026-05-01")] == [
-        4, -0.5, True, "red", "5", None, "2026-05-01",
-    ]  # fmt: skip
+        4,
+        -0.5,
+        True,
+        "red",
+        "5",
+        None,
+        "2026-05-01",
+    ]
     for wrong in ("a", "=1", "1a=1", "a-b=1", "a=1e999", f"a={'9' * 400}"):
         with pytest.raises(UsageError):
             given(wrong)
@@ -73,8 +79,9 @@ def test_no_name_hides_another_or_leaves_its_column(lake: Lake, put_text: Put) -
         with pytest.raises(UsageError):
             lake.label([one.id], wrong, "of a program")
     assert select(lake, columns=["label_Cloth"], order="name").to_pylist() == [
-        {"label_Cloth": 1.0}, {"label_Cloth": None}
-    ]  # fmt: skip
+        {"label_Cloth": 1.0},
+        {"label_Cloth": None},
+    ]
 
 
 def test_labels_of_a_branch_stay_there_until_it_is_merged(lake: Lake, put_text: Put) -> None:

@@ -72,10 +72,14 @@ def test_a_folder_that_is_a_link_is_refused_by_all_that_writes_and_named_by_doct
     folder.symlink_to(victim.path / name)
     before = tree(victim.path), tree(lake.path)
     writes: list[Callable[[], object]] = [
-        lambda: collect(lake, grace=NOW), lambda: garbage(lake, grace=NOW), lambda: put_text(lake, "more"),
-        lambda: lake.tag("v2"), lambda: lake.branch("b"), lambda: lake.withdraw([artifact.id], "no"),
+        lambda: collect(lake, grace=NOW),
+        lambda: garbage(lake, grace=NOW),
+        lambda: put_text(lake, "more"),
+        lambda: lake.tag("v2"),
+        lambda: lake.branch("b"),
+        lambda: lake.withdraw([artifact.id], "no"),
         lambda: lake.merge("try", "no"),
-    ]  # fmt: skip
+    ]
     for write in writes:
         with pytest.raises(LinkError) as refused:
             write()
@@ -192,9 +196,11 @@ def test_what_is_left_of_the_shared_locks_is_nobodys_leftover(lake: Lake) -> Non
 
 
 _MAKE: dict[str, Callable[[Path], object]] = {
-    "folder": Path.mkdir, "pipe": os.mkfifo, "link to nothing": lambda path: path.symlink_to("/nonexistent"),
+    "folder": Path.mkdir,
+    "pipe": os.mkfifo,
+    "link to nothing": lambda path: path.symlink_to("/nonexistent"),
     "no UTF-8": lambda path: path.write_bytes(b"\xff\xfe"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(
@@ -274,12 +280,21 @@ def test_a_marker_that_is_a_pipe_is_refused_at_once(lake: Lake) -> None:
 
 
 VERBS = [
-    ["ingest", "no-such-film.mp4"], ["align", "camera", "wind"], ["realign", "recording"],
-    ["declare", "camera", "--speed", "5", "--sigma", "0.1"], ["declare-cloths", "no-such-table.csv"],
-    ["simulate", "flag-search-space", "--count", "1"], ["build", "flagsim-small"], ["train", "sdn"],
-    ["measure", "no-such-film.mp4"], ["close-loop", "no-such-tracks.csv"], ["tag", "v1"], ["branch", "try"],
-    ["merge", "try"], ["gc"],
-]  # fmt: skip
+    ["ingest", "no-such-film.mp4"],
+    ["align", "camera", "wind"],
+    ["realign", "recording"],
+    ["declare", "camera", "--speed", "5", "--sigma", "0.1"],
+    ["declare-cloths", "no-such-table.csv"],
+    ["simulate", "flag-search-space", "--count", "1"],
+    ["build", "flagsim-small"],
+    ["train", "sdn"],
+    ["measure", "no-such-film.mp4"],
+    ["close-loop", "no-such-tracks.csv"],
+    ["tag", "v1"],
+    ["branch", "try"],
+    ["merge", "try"],
+    ["gc"],
+]
 
 
 def test_each_verb_that_writes_refuses_a_lake_that_can_only_be_read_before_it_works(

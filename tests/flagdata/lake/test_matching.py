@@ -27,10 +27,14 @@ def test_a_name_finds_its_own_row_whatever_is_in_it() -> None:
 
 def test_rows_have_all_of_the_values_and_one_of_several() -> None:
     wanted: list[tuple[dict[str, object], tuple[str, ...]]] = [
-        ({}, NAMES), ({"kind": Kind.CLIP}, NAMES[1::2]), ({"kind": [Kind.CLIP, Kind.WIND]}, NAMES),
-        ({"kind": (Kind.CLIP,), "seed": 1}, NAMES[1:2]), ({"seed": None}, NAMES[3:]),
-        ({"seed": {None, 0}}, (NAMES[0], *NAMES[3:])), ({"name": []}, ()),
-    ]  # fmt: skip
+        ({}, NAMES),
+        ({"kind": Kind.CLIP}, NAMES[1::2]),
+        ({"kind": [Kind.CLIP, Kind.WIND]}, NAMES),
+        ({"kind": (Kind.CLIP,), "seed": 1}, NAMES[1:2]),
+        ({"seed": None}, NAMES[3:]),
+        ({"seed": {None, 0}}, (NAMES[0], *NAMES[3:])),
+        ({"name": []}, ()),
+    ]
     assert [tuple(matching(TABLE, values)["name"].to_pylist()) for values, _ in wanted] == [rows for _, rows in wanted]
 
 

@@ -33,9 +33,12 @@ def flag(frames: int = 60, rows: int = 21, columns: int = 31) -> MeshSequence:
     lower = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:]], axis=-1).reshape(-1, 3)
     upper = np.stack([corner[:-1, :-1], corner[1:, 1:], corner[1:, :-1]], axis=-1).reshape(-1, 3)
     return MeshSequence(
-        time=time, positions=positions.astype(np.float32), faces=np.concatenate([lower, upper]).astype(np.int32),
-        rest=rest, attributes={"wind": 4.0, "material": {"name": "ponte", "density": 0.284}},
-    )  # fmt: skip
+        time=time,
+        positions=positions.astype(np.float32),
+        faces=np.concatenate([lower, upper]).astype(np.int32),
+        rest=rest,
+        attributes={"wind": 4.0, "material": {"name": "ponte", "density": 0.284}},
+    )
 
 
 def ragged() -> RaggedMeshSequence:
@@ -44,10 +47,13 @@ def ragged() -> RaggedMeshSequence:
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=np.float32)
     positions = np.concatenate([triangle, square, triangle + 1])
     return RaggedMeshSequence(
-        time=np.array([0, 40_000_000, 80_000_000], dtype=np.int64), positions=positions,
-        faces=np.array([[0, 1, 2], [0, 1, 2], [0, 2, 3], [0, 1, 2]], dtype=np.int32), rest=positions[:, :2].copy(),
-        vertex_offset=np.array([0, 3, 7, 10], dtype=np.int64), face_offset=np.array([0, 1, 3, 4], dtype=np.int64),
-    )  # fmt: skip
+        time=np.array([0, 40_000_000, 80_000_000], dtype=np.int64),
+        positions=positions,
+        faces=np.array([[0, 1, 2], [0, 1, 2], [0, 2, 3], [0, 1, 2]], dtype=np.int32),
+        rest=positions[:, :2].copy(),
+        vertex_offset=np.array([0, 3, 7, 10], dtype=np.int64),
+        face_offset=np.array([0, 1, 3, 4], dtype=np.int64),
+    )
 
 
 def same(one: MeshSequence | RaggedMeshSequence, other: MeshSequence | RaggedMeshSequence) -> bool:
@@ -122,10 +128,13 @@ def test_a_sequence_and_its_copy_are_one_object_of_the_lake(lake: Lake) -> None:
 
 MISFITS: list[tuple[dict[str, object], str]] = [
     ({"positions": np.full((60, 651, 3), np.nan, dtype=np.float32)}, "not finite"),
-    ({"positions": flag().positions.astype(np.float64)}, "float64"), ({"positions": flag().positions[:30]}, "30"),
-    ({"time": flag().time[::-1].copy()}, "does not increase"), ({"faces": flag().faces + 1}, "outside 0 to 650"),
-    ({"rest": flag().rest[:-1]}, "rest has shape"), ({"attributes": {"wind": float("nan")}}, "not JSON"),
-]  # fmt: skip
+    ({"positions": flag().positions.astype(np.float64)}, "float64"),
+    ({"positions": flag().positions[:30]}, "30"),
+    ({"time": flag().time[::-1].copy()}, "does not increase"),
+    ({"faces": flag().faces + 1}, "outside 0 to 650"),
+    ({"rest": flag().rest[:-1]}, "rest has shape"),
+    ({"attributes": {"wind": float("nan")}}, "not JSON"),
+]
 
 
 def test_arrays_that_do_not_fit_are_refused_by_name() -> None:
@@ -196,9 +205,11 @@ def test_reference_sequences_survive_storage(reference_data: Path, tmp_path: Pat
     source = np.load(reference_data / "arcsim" / "flag_w4_dt05.npz")
     frames = len(source["positions"])
     sequence = MeshSequence(
-        time=np.arange(frames, dtype=np.int64) * 40_000_000, positions=source["positions"].astype(np.float32),
-        faces=source["faces"].astype(np.int32), rest=source["rest"].astype(np.float32),
+        time=np.arange(frames, dtype=np.int64) * 40_000_000,
+        positions=source["positions"].astype(np.float32),
+        faces=source["faces"].astype(np.int32),
+        rest=source["rest"].astype(np.float32),
         attributes=json.loads(str(source["scene"])),
-    )  # fmt: skip
+    )
     write_meshes(tmp_path / "a.zarr", sequence)
     assert same(read_meshes(tmp_path / "a.zarr"), sequence)

@@ -42,9 +42,13 @@ def test_a_nested_row_is_refused_by_its_name(column: str) -> None:
 def test_older_films_pairs_and_labels_name_the_row() -> None:
     film = row(Kind.RECORDING, "recipe")
     clip = {
-        **row(Kind.CLIP, "parameters"), "object": f"mcap/{'0' * 64}.mcap", "frame_first": 0, "frame_count": 1,
-        "start": 0, "end": 1,
-    }  # fmt: skip
+        **row(Kind.CLIP, "parameters"),
+        "object": f"mcap/{'0' * 64}.mcap",
+        "frame_first": 0,
+        "frame_count": 1,
+        "start": 0,
+        "end": 1,
+    }
     readers = [
         lambda: with_data_sets(pa.Table.from_pylist([film], schema=catalog_schema())),
         lambda: PairTable.of(pa.Table.from_pylist([clip], schema=catalog_schema()).select(COLUMNS)),

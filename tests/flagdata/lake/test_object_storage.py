@@ -121,9 +121,12 @@ def test_a_store_that_ignores_conditions_is_refused_before_anything_is_written(u
 
 
 def test_credentials_show_nowhere(
-    remote_lake: Lake, put_text: Put, use_store: Use, capsys: pytest.CaptureFixture[str],
+    remote_lake: Lake,
+    put_text: Put,
+    use_store: Use,
+    capsys: pytest.CaptureFixture[str],
     caplog: pytest.LogCaptureFixture,
-) -> None:  # fmt: skip
+) -> None:
     with caplog.at_level(logging.DEBUG):
         put_text(remote_lake, "gusts")
         shown = [invoke(capsys, command, "--lake", remote_lake.path, "--json").out for command in ("ls", "log")]
@@ -265,8 +268,9 @@ def test_a_lease_of_another_machine_counts_until_it_was_not_renewed_for_its_life
     for life, folder in ((60.0, "0" * 32), (-60.0, "1" * 32)):
         (staging / folder / "lease").write_bytes(json.dumps({**owner, "life": life}).encode() + b"\nmcap/x\n")
     assert [(state.alive, state.objects) for state in leases(staging)] == [
-        (True, frozenset({"mcap/x"})), (False, frozenset({"mcap/x"})),
-    ]  # fmt: skip
+        (True, frozenset({"mcap/x"})),
+        (False, frozenset({"mcap/x"})),
+    ]
 
 
 def test_a_collection_leaves_what_a_running_transaction_has_put(remote_lake: Lake) -> None:
@@ -462,9 +466,13 @@ def test_an_exclusive_lock_whose_renewal_was_answered_to_nobody_is_still_its_hol
 
 
 def test_a_film_and_a_log_are_ingested_aligned_exported_and_loaded(
-    remote_lake: Lake, write_video: Callable[..., Path], wind_log: Path, confirmed_drafts: None, tmp_path: Path,
+    remote_lake: Lake,
+    write_video: Callable[..., Path],
+    wind_log: Path,
+    confirmed_drafts: None,
+    tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+) -> None:
     film = write_video(tmp_path / "field.mp4", frames=130, creation_time="2026-05-01T10:01:10Z")
     place = ("--lake", remote_lake.path)
     came = invoke(capsys, "ingest", film, wind_log, "--session", "field-1", "--json", *place).document
@@ -485,19 +493,36 @@ def test_a_film_and_a_log_are_ingested_aligned_exported_and_loaded(
 
 
 READING = (
-    ("ls",), ("ls", "--at", "v1"), ("log",), ("query", "--where", "kind = 'wind'"), ("show", "gusts"),
+    ("ls",),
+    ("ls", "--at", "v1"),
+    ("log",),
+    ("query", "--where", "kind = 'wind'"),
+    ("show", "gusts"),
     ("lineage", "gusts"),
-    ("diff", "v1", "main"), ("tag",), ("branch",), ("du",), ("verify",), ("doctor",), ("doctor", "--deep"),
-    ("doctor", "--older-than", "0s"), ("gc", "--dry-run"), ("gc", "--dry-run", "--older-than", "0s"),
-    ("expire", "--keep", "1", "--dry-run"), ("expire", "--keep", "1", "--dry-run", "--json"),
-)  # fmt: skip
+    ("diff", "v1", "main"),
+    ("tag",),
+    ("branch",),
+    ("du",),
+    ("verify",),
+    ("doctor",),
+    ("doctor", "--deep"),
+    ("doctor", "--older-than", "0s"),
+    ("gc", "--dry-run"),
+    ("gc", "--dry-run", "--older-than", "0s"),
+    ("expire", "--keep", "1", "--dry-run"),
+    ("expire", "--keep", "1", "--dry-run", "--json"),
+)
 """Commands that commit nothing."""
 
 
 def test_with_keys_that_only_read_every_command_that_commits_nothing_works_and_asks_for_no_write(
-    remote_lake: Lake, put_text: Put, use_store: Use, s3_server: str, tmp_path: Path,
+    remote_lake: Lake,
+    put_text: Put,
+    use_store: Use,
+    s3_server: str,
+    tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+) -> None:
     put_text(remote_lake, "gusts")
     remote_lake.tag("v1")
     put_text(remote_lake, "more")
@@ -561,9 +586,11 @@ def test_without_permission_to_list_or_to_delete_a_command_says_which_is_missing
     Forbidding.store = s3_server.removeprefix("http://")
     with serving(Forbidding) as address:
         for forbidden, command, action in (
-            ("list", ("ls",), "s3:ListBucket"), ("list", ("tag", "v1"), "s3:ListBucket"),
-            ("delete", ("tag", "v1"), "s3:DeleteObject"), ("delete", ("gc",), "s3:DeleteObject"),
-        ):  # fmt: skip
+            ("list", ("ls",), "s3:ListBucket"),
+            ("list", ("tag", "v1"), "s3:ListBucket"),
+            ("delete", ("tag", "v1"), "s3:DeleteObject"),
+            ("delete", ("gc",), "s3:DeleteObject"),
+        ):
             use_store(address)
             Forbidding.forbidden = forbidden
             ended = invoke(capsys, *command, "--lake", remote_lake.path)

@@ -28,10 +28,12 @@ def sides(table: pa.Table) -> list[tuple[str | None, str | None]]:
 
 
 CALLED = {
-    "X-train-00000": ("X", "train"), "X-train-train-00012": ("X-train", "train"),
-    "X-train-test-00003": ("X-train", "test"), "o'brien-validation-100000": ("o'brien", "validation"),
+    "X-train-00000": ("X", "train"),
+    "X-train-train-00012": ("X-train", "train"),
+    "X-train-test-00003": ("X-train", "test"),
+    "o'brien-validation-100000": ("o'brien", "validation"),
     "100%-test-00000": ("100%", "test"),
-}  # fmt: skip
+}
 
 
 def test_a_film_and_its_clips_are_of_what_it_is_called_after() -> None:

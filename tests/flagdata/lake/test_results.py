@@ -22,16 +22,25 @@ OLD, NEW, NEWEST = "0.1.0+aaaaaaa", "0.1.0+bbbbbbb", "0.1.0+ccccccc"
 
 def verdict(recording: Artifact, code: str, *, says: str = "none", level: float = 0.05) -> Artifact:
     return Artifact(
-        kind=Kind.MEASUREMENT, name="flag", parents=[recording.id], recipe={"level": level}, seed=3, code_version=code,
+        kind=Kind.MEASUREMENT,
+        name="flag",
+        parents=[recording.id],
+        recipe={"level": level},
+        seed=3,
+        code_version=code,
         report=f'{{"words": "{says}"}}',
-    )  # fmt: skip
+    )
 
 
 def kept(lake: Lake, row: Artifact, *, branch: str = "main") -> Placed:
     return keep(
-        lake, row, lambda staged: (staged.mkdir(), (staged / "x").write_text(str(row.report))), "infer", branch=branch,
+        lake,
+        row,
+        lambda staged: (staged.mkdir(), (staged / "x").write_text(str(row.report))),
+        "infer",
+        branch=branch,
         left=lambda one: [replace(one, kind=Kind.MODEL, name="flag-base", object=None, parents=[one.id])],
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture
@@ -64,12 +73,14 @@ def test_the_same_code_again_adds_nothing(lake: Lake, recording: Artifact) -> No
     head = lake.resolve(None)
     again = [kept(lake, verdict(recording, code)) for code in (OLD, NEW)]
     assert [(one.new, one.version, one.artifact.id) for one in again] == [
-        (False, 1, first.artifact.id), (False, 2, second.artifact.id),
-    ]  # fmt: skip
+        (False, 1, first.artifact.id),
+        (False, 2, second.artifact.id),
+    ]
     assert lake.resolve(None) == head
     assert [one.sentence for one in again] == [
-        f"there already as version 1 of 'flag'; version 2, {second.artifact.id[:12]}, is by code {NEW}", "there already"
-    ]  # fmt: skip
+        f"there already as version 1 of 'flag'; version 2, {second.artifact.id[:12]}, is by code {NEW}",
+        "there already",
+    ]
 
 
 def test_other_options_are_another_result_and_no_version(lake: Lake, recording: Artifact) -> None:

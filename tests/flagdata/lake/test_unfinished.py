@@ -105,9 +105,7 @@ def test_a_folder_that_was_half_deleted_is_found_and_deleted(
 ) -> None:
     sheet = put_folder(place, "sheet")
     path = place.objects.path(str(sheet.object))
-    assert stopped(
-        monkeypatch, type(place.objects), "delete", lambda: place.erase([sheet.id], "asked"), at=0
-    )  # fmt: skip
+    assert stopped(monkeypatch, type(place.objects), "delete", lambda: place.erase([sheet.id], "asked"), at=0)
     if (path / ".sums").exists():
         (path / ".sums").unlink()
     (path / "c" / "1").unlink()

@@ -363,11 +363,15 @@ def test_withdrawal_spares_what_others_were_made_from_and_what_other_branches_sh
 def clips(lake: Lake, recording: Artifact, count: int) -> list[Artifact]:
     made = [
         Artifact(
-            kind=Kind.CLIP, name=f"clip {i}", object=recording.object, parents=(recording.id,), frame_first=30 * i,
+            kind=Kind.CLIP,
+            name=f"clip {i}",
+            object=recording.object,
+            parents=(recording.id,),
+            frame_first=30 * i,
             frame_count=30,
         )
         for i in range(count)
-    ]  # fmt: skip
+    ]
     with lake.transaction("clips") as tx:
         for clip in made:
             tx.add(clip)
@@ -480,9 +484,14 @@ def test_values_in_the_log_that_no_writer_writes_are_refused(lake: Lake, put_tex
     sound = entry.read_bytes().decode()
     assert Lake.open(lake.path).catalog.history()
     for key, value in (
-        ("timestamp", "now"), ("timestamp", 10**18), ("timestamp", -1), ("timestamp", None), ("operation", 3),
-        ("flagdata.branch", None), ("flagdata.message", [1]),
-    ):  # fmt: skip
+        ("timestamp", "now"),
+        ("timestamp", 10**18),
+        ("timestamp", -1),
+        ("timestamp", None),
+        ("operation", 3),
+        ("flagdata.branch", None),
+        ("flagdata.message", [1]),
+    ):
         lines = [json.loads(line) for line in sound.splitlines()]
         (holder,) = (line["commitInfo"] for line in lines if "commitInfo" in line)
         assert key in holder

@@ -30,8 +30,13 @@ def test_every_file_counts_once_also_where_rows_of_two_kinds_share_it(lake: Lake
         tx.add(Artifact(kind=Kind.MEASUREMENT, name="number"))
     found = usage(lake, grace=AT_ONCE)
     assert {name: (share.artifacts, share.objects) for name, share in found.kinds.items()} == {
-        "wind": (1, 1), "measurement": (1, 0), "clip": (1, 0), UNSHOWN: (0, 0), CATALOG: (0, 0), OTHER: (0, 0),
-    }  # fmt: skip
+        "wind": (1, 1),
+        "measurement": (1, 0),
+        "clip": (1, 0),
+        UNSHOWN: (0, 0),
+        CATALOG: (0, 0),
+        OTHER: (0, 0),
+    }
     assert found.kinds["wind"].size == len("film")
     assert found.total == sum(share.size for share in found.kinds.values())
     if isinstance(lake.path, Path):

@@ -36,10 +36,12 @@ def series() -> WindSeries:
     flags[17] = 8
     flags[150] = 1
     return WindSeries(
-        time=time, channels={"wind_speed": speed, "wind_direction": np.mod(np.arange(n) / 30, 2 * np.pi)},
-        flags=flags, sensor=Sensor(name="cup", height=2.5, accuracy=0.1, accuracy_relative=0.02),
+        time=time,
+        channels={"wind_speed": speed, "wind_direction": np.mod(np.arange(n) / 30, 2 * np.pi)},
+        flags=flags,
+        sensor=Sensor(name="cup", height=2.5, accuracy=0.1, accuracy_relative=0.02),
         host_time=time + 80_000_000,
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="session")

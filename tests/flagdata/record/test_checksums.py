@@ -20,8 +20,10 @@ from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 
 OLD = Path(__file__).parents[2] / "compat" / "record-v1.mcap"
 READERS: dict[str, Callable[[Record], object]] = {
-    TOPIC_WIND: Record.wind, TOPIC_WIND_1HZ: Record.wind_1hz, TOPIC_TRUTH: lambda record: record.truth,
-}  # fmt: skip
+    TOPIC_WIND: Record.wind,
+    TOPIC_WIND_1HZ: Record.wind_1hz,
+    TOPIC_TRUTH: lambda record: record.truth,
+}
 
 
 def flip(path: Path, place: int, target: Path) -> Path:

@@ -31,10 +31,12 @@ def wind(n: int) -> WindSeries:
     speed[::7] = np.nan
     speed[3] = -0.0
     return WindSeries(
-        time=time, channels={"wind_speed": speed, "sonic_temperature": rng.normal(290, 1, n), "wind_x": np.zeros(n)},
-        flags=rng.choice([0, 1, 127, 128, 0xFFFF], n).astype(np.uint16), sensor=Sensor(name="a made one"),
+        time=time,
+        channels={"wind_speed": speed, "sonic_temperature": rng.normal(290, 1, n), "wind_x": np.zeros(n)},
+        flags=rng.choice([0, 1, 127, 128, 0xFFFF], n).astype(np.uint16),
+        sensor=Sensor(name="a made one"),
         host_time=time + 700_000_001,
-    )  # fmt: skip
+    )
 
 
 def one_by_one(series: WindSeries) -> list[bytes]:
@@ -64,24 +66,33 @@ def test_a_host_clock_before_1970_is_protobufs_bytes() -> None:
     series = wind(40)
     assert series.host_time is not None
     early = WindSeries(
-        time=series.time, channels=series.channels, flags=series.flags, sensor=series.sensor,
+        time=series.time,
+        channels=series.channels,
+        flags=series.flags,
+        sensor=series.sensor,
         host_time=series.host_time - 2 * START,
-    )  # fmt: skip
+    )
     assert rows_of(wind_messages.samples(early, early.time, slice(0, 40))) == one_by_one(early)
 
 
 def test_means_in_bulk_are_protobufs_bytes() -> None:
     means = WindAverage(
-        time=START + np.arange(5) * 1_000_000_000, speed=np.array([0.0, -0.0, 3.5, math.nan, 1e-300]),
-        sigma=np.array([0.1, 0.0, 2.0, math.inf, 0.3]), direction=np.full(5, math.nan),
-        count=np.array([1, 0, 127, 128, 40_000], dtype=np.int32), period=1.0,
-    )  # fmt: skip
+        time=START + np.arange(5) * 1_000_000_000,
+        speed=np.array([0.0, -0.0, 3.5, math.nan, 1e-300]),
+        sigma=np.array([0.1, 0.0, 2.0, math.inf, 0.3]),
+        direction=np.full(5, math.nan),
+        count=np.array([1, 0, 127, 128, 40_000], dtype=np.int32),
+        period=1.0,
+    )
     expected = []
     for i in range(5):
         mean = messages.WindMean(
-            speed=means.speed[i], sigma=means.sigma[i], direction=means.direction[i], count=int(means.count[i]),
+            speed=means.speed[i],
+            sigma=means.sigma[i],
+            direction=means.direction[i],
+            count=int(means.count[i]),
             period=1.0,
-        )  # fmt: skip
+        )
         messages.set_timestamp(mean.timestamp, int(means.time[i]))
         expected.append(mean.SerializeToString(deterministic=True))
     assert rows_of(wind_messages.means(means)) == expected
@@ -109,9 +120,11 @@ def test_a_file_in_bulk_is_the_mcap_librarys() -> None:
         library.add_message(channel_id=1, log_time=time, publish_time=time + 5, sequence=i, data=data)
     for rows in (slice(0, 150), slice(150, 151), slice(151, 400)):
         block = MessageBlock(
-            log_time=series.time[rows], publish_time=series.time[rows] + 5, payload=payloads.data[rows],
+            log_time=series.time[rows],
+            publish_time=series.time[rows] + 5,
+            payload=payloads.data[rows],
             used=payloads.used[rows],
-        )  # fmt: skip
+        )
         file.add_messages(block, channel_id=1, sequence=rows.start)
     library.add_attachment(create_time=0, log_time=START, name="log", media_type="text/plain", data=b"abcdef")
     file.add_attachment(log_time=START, name="log", media_type="text/plain", data=[b"abc", b"def"], size=6)

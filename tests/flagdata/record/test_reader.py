@@ -107,20 +107,44 @@ def test_every_channel_of_one_dimension_has_a_field() -> None:
 def test_field_numbers_of_released_files_have_not_changed() -> None:
     """Format version 1. A change here makes files written before unreadable."""
     assert [(f.name, f.number) for f in messages.WindSample.DESCRIPTOR.fields] == [
-        ("timestamp", 1), ("speed", 2), ("direction", 3), ("direction_magnetic", 4), ("apparent_speed", 5),
-        ("apparent_direction", 6), ("wind_x", 7), ("wind_y", 8), ("wind_z", 9), ("air_temperature", 10),
-        ("air_pressure", 11), ("relative_humidity", 12), ("platform_speed", 13), ("platform_heading", 14),
-        ("theoretical_speed", 15), ("theoretical_direction", 16), ("speed_estimate", 17), ("tracked_rms", 18),
-        ("tracked_points", 19), ("tracking_quality", 20), ("flutter_frequency", 21), ("deflection_angle", 22),
+        ("timestamp", 1),
+        ("speed", 2),
+        ("direction", 3),
+        ("direction_magnetic", 4),
+        ("apparent_speed", 5),
+        ("apparent_direction", 6),
+        ("wind_x", 7),
+        ("wind_y", 8),
+        ("wind_z", 9),
+        ("air_temperature", 10),
+        ("air_pressure", 11),
+        ("relative_humidity", 12),
+        ("platform_speed", 13),
+        ("platform_heading", 14),
+        ("theoretical_speed", 15),
+        ("theoretical_direction", 16),
+        ("speed_estimate", 17),
+        ("tracked_rms", 18),
+        ("tracked_points", 19),
+        ("tracking_quality", 20),
+        ("flutter_frequency", 21),
+        ("deflection_angle", 22),
         ("sonic_temperature", 23),
-        ("flags", 100), ("host_time", 101),
-    ]  # fmt: skip
+        ("flags", 100),
+        ("host_time", 101),
+    ]
     assert [(f.name, f.number) for f in messages.WindMean.DESCRIPTOR.fields] == [
-        ("timestamp", 1), ("speed", 2), ("sigma", 3), ("direction", 4), ("count", 5), ("period", 6),
-    ]  # fmt: skip
+        ("timestamp", 1),
+        ("speed", 2),
+        ("sigma", 3),
+        ("direction", 4),
+        ("count", 5),
+        ("period", 6),
+    ]
     assert [(f.name, f.number) for f in messages.TruthParameters.DESCRIPTOR.fields] == [
-        ("timestamp", 1), ("parameters", 2),
-    ]  # fmt: skip
+        ("timestamp", 1),
+        ("parameters", 2),
+    ]
 
 
 def _fork_reads(record: Record, first: int, out: multiprocessing.Queue) -> None:

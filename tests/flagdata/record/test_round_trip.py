@@ -35,12 +35,17 @@ def _series(draw: st.DrawFn) -> WindSeries:
         channels={name: draw(values) for name in names},
         flags=draw(arrays.arrays(np.uint16, len(time))),
         sensor=Sensor(
-            name=draw(_TEXT), height=draw(_OPTIONAL), distance_constant=draw(_OPTIONAL), averaging=draw(_OPTIONAL),
-            threshold=draw(_OPTIONAL), resolution=draw(_OPTIONAL), accuracy=draw(_OPTIONAL),
+            name=draw(_TEXT),
+            height=draw(_OPTIONAL),
+            distance_constant=draw(_OPTIONAL),
+            averaging=draw(_OPTIONAL),
+            threshold=draw(_OPTIONAL),
+            resolution=draw(_OPTIONAL),
+            accuracy=draw(_OPTIONAL),
             accuracy_relative=draw(_OPTIONAL),
         ),
         host_time=draw(st.none() | hosts),
-    )  # fmt: skip
+    )
 
 
 def _same(found: WindSeries | None, series: WindSeries) -> None:

@@ -40,9 +40,13 @@ def _peak(act: Callable[[], object]) -> int:
 
 def _chunk(compression: str, data: bytes, stated: int, crc: int = 0) -> Chunk:
     return Chunk(
-        compression=compression, data=data, message_start_time=0, message_end_time=0, uncompressed_crc=crc,
+        compression=compression,
+        data=data,
+        message_start_time=0,
+        message_end_time=0,
+        uncompressed_crc=crc,
         uncompressed_size=stated,
-    )  # fmt: skip
+    )
 
 
 def _lying(path: Path, packing: str, *, stated: int) -> Path:

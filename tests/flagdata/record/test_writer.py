@@ -47,8 +47,10 @@ def test_frames_are_foxglove_images_to_the_mcap_package(sample: Path, pictures: 
     assert len(found) == len(pictures)
     for k, (schema, channel, message, image) in enumerate(found):
         assert (schema.name, schema.encoding, channel.message_encoding) == (
-            "foxglove.CompressedImage", "protobuf", "protobuf",
-        )  # fmt: skip
+            "foxglove.CompressedImage",
+            "protobuf",
+            "protobuf",
+        )
         assert image.format == "jpeg"
         assert message.log_time == START + k * PERIOD
         assert message.publish_time == message.log_time - DEVICE_LAG
@@ -90,9 +92,12 @@ def test_video_gives_same_bytes_twice(tmp_path: Path, write: Callable[..., Path]
 def test_a_clock_model_moves_log_time_and_leaves_publish_time(tmp_path: Path, series: WindSeries) -> None:
     end = int(series.time[-1]) + 1
     clock = ClockModel(
-        device="cup", reference="camera", method="given", confidence=1.0,
+        device="cup",
+        reference="camera",
+        method="given",
+        confidence=1.0,
         segments=(Segment(start=START, end=end, origin=START, offset=-1.5, drift=1e-3),),
-    )  # fmt: skip
+    )
     with RecordWriter(tmp_path / "a.mcap", metadata={}) as record:
         record.wind(series, clock=clock)
     found = _decoded(tmp_path / "a.mcap", "/wind/samples")

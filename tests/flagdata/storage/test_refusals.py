@@ -32,23 +32,27 @@ REQUESTS: dict[str, Callable[[RemotePath], object]] = {
     "folder": lambda place: list(place.iterdir()),
     "delete": RemotePath.unlink,
     "range": lambda place: place.read_range(0, 1),
-}  # fmt: skip
+}
 """All that the client asks a store for."""
 ABROAD = {"x-amz-bucket-region": "eu-west-1"}
 NAMED = {
     "another region, by the code": (
         refusing(400, "AuthorizationHeaderMalformed", "expecting 'us-west-2'", rest="<Region>us-west-2</Region>"),
-        "us-west-2", "AWS_REGION=us-west-2",
+        "us-west-2",
+        "AWS_REGION=us-west-2",
     ),
     "another region, by the end point": (
         refusing(301, "PermanentRedirect", rest="<Endpoint>case.s3-us-west-2.amazonaws.com</Endpoint>"),
-        "another region", "AWS_REGION",
+        "another region",
+        "AWS_REGION",
     ),
     "another region, without a body": ((301, ABROAD, b""), "eu-west-1", "AWS_REGION=eu-west-1"),
     "another region, as a denial": ((403, ABROAD, b""), "eu-west-1", "AWS_REGION=eu-west-1"),
     "a clock that is off": (refusing(403, "RequestTimeTooSkewed"), "clock", "clock"),
     "a clock that is off, without a code": (
-        (403, {"Date": formatdate(time.time() - 1500, usegmt=True)}, b""), "min ahead of the store", "clock",
+        (403, {"Date": formatdate(time.time() - 1500, usegmt=True)}, b""),
+        "min ahead of the store",
+        "clock",
     ),
     "expired credentials": (refusing(400, "ExpiredToken"), "expired", "AWS_SESSION_TOKEN"),
     "another's token": (refusing(400, "InvalidToken"), "token", "AWS_SESSION_TOKEN"),
@@ -56,7 +60,8 @@ NAMED = {
     "a wrong secret": (refusing(403, "SignatureDoesNotMatch"), "secret key", "AWS_SECRET_ACCESS_KEY"),
     "a key service that does not permit it": (
         refusing(403, "AccessDenied", "User: me is not authorized to perform: kms:Decrypt on resource: key"),
-        "key service", "kms:Decrypt",
+        "key service",
+        "kms:Decrypt",
     ),
     "a disabled key of the key service": (refusing(400, "KMS.DisabledException"), "key service", "key"),
     "too many requests": (refusing(503, "SlowDown"), "request rate", "fewer"),
@@ -68,7 +73,7 @@ NAMED = {
     "names in hosts": (refusing(403, "SecondLevelDomainForbidden"), "host", "AWS_VIRTUAL_HOSTED_STYLE_REQUEST"),
     "an archive": (refusing(403, "InvalidObjectState"), "archive", "storage class"),
     "a full store": (refusing(507, "XMinioStorageFull"), "no room", "space"),
-}  # fmt: skip
+}
 
 
 UNTRUSTED = ssl.SSLCertVerificationError(1, "self-signed certificate")
@@ -104,9 +109,16 @@ def test_the_catalogs_library_is_refused_for_the_same_causes(answering: Answerin
 
 @pytest.mark.parametrize(
     ("name", "action"),
-    [("get", "s3:GetObject"), ("head", "s3:ListBucket"), ("create", "s3:PutObject"), ("put", "s3:PutObject"),
-     ("list", "s3:ListBucket"), ("folder", "s3:ListBucket"), ("delete", "s3:DeleteObject")],
-)  # fmt: skip
+    [
+        ("get", "s3:GetObject"),
+        ("head", "s3:ListBucket"),
+        ("create", "s3:PutObject"),
+        ("put", "s3:PutObject"),
+        ("list", "s3:ListBucket"),
+        ("folder", "s3:ListBucket"),
+        ("delete", "s3:DeleteObject"),
+    ],
+)
 def test_what_is_not_permitted_is_named_by_its_action(answering: Answering, name: str, action: str) -> None:
     with pytest.raises(DeniedError) as caught:
         REQUESTS[name](answering(refusing(403, "AccessDenied")))

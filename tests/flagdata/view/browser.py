@@ -99,11 +99,22 @@ def asked(
         threading.Thread(target=served.serve_forever, daemon=True).start()
         kept = f"--screenshot={screenshot}" if screenshot is not None else "--dump-dom"
         subprocess.run(
-            [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--timeout=60000",
-             f"--window-size={width},{height}", f"--user-data-dir={folder / 'profile'}", kept,
-             served.address + (path if width >= _NARROWEST else "framed")],
-            capture_output=True, check=True, timeout=300,
-        )  # fmt: skip
+            [
+                BROWSER,
+                "--headless",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--hide-scrollbars",
+                "--timeout=60000",
+                f"--window-size={width},{height}",
+                f"--user-data-dir={folder / 'profile'}",
+                kept,
+                served.address + (path if width >= _NARROWEST else "framed"),
+            ],
+            capture_output=True,
+            check=True,
+            timeout=300,
+        )
         served.shutdown()
     assert answers, "the page did not answer"
     return answers[0]

@@ -24,9 +24,12 @@ FRAMES = 150
 PERIOD = 40_000_000
 NAME = "flag <b>&amp;</b> 旗"
 CURVE = {
-    "schema": "flagdata.lag-curve/1", "offset": [-2.0, -1.0, 0.0, 1.0, 2.0], "score": [0.0, 1.0, 9.0, 1.0, None],
-    "evidence": [0.5, -0.5, 20.0, 0.5, 0.0], "chance_score": 5.0,
-}  # fmt: skip
+    "schema": "flagdata.lag-curve/1",
+    "offset": [-2.0, -1.0, 0.0, 1.0, 2.0],
+    "score": [0.0, 1.0, 9.0, 1.0, None],
+    "evidence": [0.5, -0.5, 20.0, 0.5, 0.0],
+    "chance_score": 5.0,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,9 +60,11 @@ def shown(lake: Lake) -> Shown:
     times = START + PERIOD * np.arange(FRAMES)
     speed = 4.0 + np.arange(90) / 100
     wind = WindSeries(
-        time=START + SECOND * (np.arange(90) - 60), channels={"wind_speed": speed},
-        flags=np.zeros(90, dtype=np.uint16), sensor=Sensor(name="cup", accuracy=0.1),
-    )  # fmt: skip
+        time=START + SECOND * (np.arange(90) - 60),
+        channels={"wind_speed": speed},
+        flags=np.zeros(90, dtype=np.uint16),
+        sensor=Sensor(name="cup", accuracy=0.1),
+    )
     with lake.transaction("all sorts") as tx:
         path = tx.staging(".mcap")
         with RecordWriter(path, metadata={}) as writer:
@@ -70,14 +75,31 @@ def shown(lake: Lake) -> Shown:
         finding = {"kind": "gaps", "severity": "warning", "what": "<i>two</i>"}
         report = {"offset": 0.0, "sigma": 0.2, "findings": [finding]}
         recording = Artifact(
-            kind=Kind.RECORDING, name=NAME, object=tx.put(path), start=int(times[0]), end=int(times[-1]),
-            frame_count=FRAMES, rate=25.0, clock_method="estimated", clock_offset=0.0, clock_sigma=0.2,
+            kind=Kind.RECORDING,
+            name=NAME,
+            object=tx.put(path),
+            start=int(times[0]),
+            end=int(times[-1]),
+            frame_count=FRAMES,
+            rate=25.0,
+            clock_method="estimated",
+            clock_offset=0.0,
+            clock_sigma=0.2,
             report=json.dumps(report),
-        )  # fmt: skip
+        )
         clip = Artifact(
-            kind=Kind.CLIP, name="clip", object=recording.object, parents=(recording.id,), recording=recording.id,
-            start=int(times[30]), end=int(times[59]), frame_first=30, frame_count=30, wind=4.5, wind_sigma=0.1,
-        )  # fmt: skip
+            kind=Kind.CLIP,
+            name="clip",
+            object=recording.object,
+            parents=(recording.id,),
+            recording=recording.id,
+            start=int(times[30]),
+            end=int(times[59]),
+            frame_first=30,
+            frame_count=30,
+            wind=4.5,
+            wind_sigma=0.1,
+        )
         folder = tx.staging(".zarr")
         write_meshes(folder, _cloth())
         meshes = Artifact(kind=Kind.MESHES, name="cloth", object=tx.put(folder), frame_count=3, seed=1)
@@ -94,6 +116,8 @@ def _cloth() -> MeshSequence:
     rest = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], dtype=np.float32)
     turned = [[[u * np.cos(a), u * np.sin(a), v] for u, v in rest.tolist()] for a in (0.0, 0.4, 0.8)]
     return MeshSequence(
-        time=np.arange(3) * PERIOD, positions=np.array(turned, dtype=np.float32),
-        faces=np.array([[0, 1, 2], [1, 3, 2]], dtype=np.int32), rest=rest,
-    )  # fmt: skip
+        time=np.arange(3) * PERIOD,
+        positions=np.array(turned, dtype=np.float32),
+        faces=np.array([[0, 1, 2], [1, 3, 2]], dtype=np.int32),
+        rest=rest,
+    )

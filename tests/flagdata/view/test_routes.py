@@ -93,11 +93,18 @@ def test_the_page_of_an_artifact_shows_film_clips_alignment_findings_and_lineage
 @pytest.mark.parametrize(
     ("address", "status"),
     [
-        ("artifact/" + "0" * 32, 404), ("artifact/../../etc/passwd", 404), ("artifact/%2e%2e%2flake.json", 404),
-        ("mcap/x.mcap", 404), ("thumbnail/xyz", 404), ("?at=nothing", 404), ("?at=99", 404),
-        ("?a=1&b=1&c=1&d=1&e=1&f=1&g=1&h=1&i=1", 400), ("?name=%ff", 400), ("query?sql=drop+table+catalog", 400),
+        ("artifact/" + "0" * 32, 404),
+        ("artifact/../../etc/passwd", 404),
+        ("artifact/%2e%2e%2flake.json", 404),
+        ("mcap/x.mcap", 404),
+        ("thumbnail/xyz", 404),
+        ("?at=nothing", 404),
+        ("?at=99", 404),
+        ("?a=1&b=1&c=1&d=1&e=1&f=1&g=1&h=1&i=1", 400),
+        ("?name=%ff", 400),
+        ("query?sql=drop+table+catalog", 400),
     ],
-)  # fmt: skip
+)
 def test_what_is_not_there_or_cannot_be_asked_is_refused_with_what_to_do(
     shown: Shown, address: str, status: int
 ) -> None:

@@ -68,10 +68,16 @@ def features(
     values[:, 5] += other
     layout = Layout(frames=30, spacings=(0.04,), step=STEP, period=0.04, first=0.0, last=count * STEP)
     return Features(
-        film="made", starts=starts, layout=layout, values=values, names=tuple("abcdef"),
-        summaries=values.astype(np.float32), winds=means * 1.1 + 0.3, clip=np.zeros((30, 8, 8), np.uint8),
+        film="made",
+        starts=starts,
+        layout=layout,
+        values=values,
+        names=tuple("abcdef"),
+        summaries=values.astype(np.float32),
+        winds=means * 1.1 + 0.3,
+        clip=np.zeros((30, 8, 8), np.uint8),
         place=where if where is not None else place(),
-    )  # fmt: skip
+    )
 
 
 def recording(
@@ -83,9 +89,12 @@ def recording(
     read = np.interp(samples, *wind) + 0.05 * stream(seed, "made", "log").standard_normal(len(samples))
     log = Log(times=samples - late, speed=read, clock=clock)
     return Recording(
-        name="made", identity="a" * 32, features=features(wind, seed=seed), log=log,
+        name="made",
+        identity="a" * 32,
+        features=features(wind, seed=seed),
+        log=log,
         sensor=Sensor(name="cup", accuracy=0.2),
-    )  # fmt: skip
+    )
 
 
 def model(*recordings: Recording) -> Calibrated:

@@ -40,10 +40,12 @@ def lake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
                 writer.frame(log_time=time, publish_time=time, timestamp=time, image=picture)
             writer.wind(
                 WindSeries(
-                    time=_START + samples * NANOSECONDS, flags=np.zeros(len(samples), dtype=np.uint16),
-                    channels={"wind_speed": np.interp(samples, *wind)}, sensor=Sensor(name="cup"),
+                    time=_START + samples * NANOSECONDS,
+                    flags=np.zeros(len(samples), dtype=np.uint16),
+                    channels={"wind_speed": np.interp(samples, *wind)},
+                    sensor=Sensor(name="cup"),
                 )
-            )  # fmt: skip
+            )
         transaction.add(
             Artifact(kind=Kind.RECORDING, name="monday", object=transaction.put(staged), start=_START, rate=1.0)
         )

@@ -17,9 +17,12 @@ from measure.estimate.similarity import FlagSize
 from tests.measure.calibrate.conftest import readings
 
 COLUMNS = {
-    "time": 100.0 + 0.5 * np.arange(80), "wind": 4.0 + np.sin(np.arange(80) / 9), "droop": 0.3 + 0.01 * np.arange(80),
-    "amplitude_up": np.full(80, 0.2), "droop_sigma": np.full(80, 0.05),
-}  # fmt: skip
+    "time": 100.0 + 0.5 * np.arange(80),
+    "wind": 4.0 + np.sin(np.arange(80) / 9),
+    "droop": 0.3 + 0.01 * np.arange(80),
+    "amplitude_up": np.full(80, 0.2),
+    "droop_sigma": np.full(80, 0.05),
+}
 
 
 def test_arrays_are_the_table_of_the_same_numbers(tmp_path: Path) -> None:
@@ -60,9 +63,11 @@ def test_a_flag_is_weighed_from_arrays(tmp_path: Path) -> None:
     """Windows of a flag of 0.17 kg/m² whose law is known."""
     wind = 5.0 + 1.5 * np.sin(np.arange(48) / 3)
     values = {
-        "area_weight": np.array([0.17]), "gain": np.array([1.0]), "damping": np.array([0.01]),
+        "area_weight": np.array([0.17]),
+        "gain": np.array([1.0]),
+        "damping": np.array([0.01]),
         "azimuth": np.array([math.radians(70)]),
-    }  # fmt: skip
+    }
     seen = readings(values, wind, seed=9)[0]
     table = {"time": 1.25 + 2.5 * np.arange(48), "wind": wind, **dict(zip(OBSERVED, seen.T, strict=True))}
     found = flagdata.calibrate(table, flag_size=(1.5, 1.0), azimuth_deg="70±7", seed=4, cache=tmp_path)

@@ -35,9 +35,11 @@ def _observed(weight: float, *, gain: float = 1.0, speed: Floats = _GUSTY, seed:
     log = Log(times=np.arange(-60.0, 130.0), speed=speed).cut(0.0, 120.0)
     starts = np.arange(48) * 2.5
     values = {
-        "area_weight": np.array([weight]), "gain": np.array([gain]), "damping": np.array([0.01]),
+        "area_weight": np.array([weight]),
+        "gain": np.array([gain]),
+        "damping": np.array([0.01]),
         "azimuth": np.array([math.radians(70)]),
-    }  # fmt: skip
+    }
     own = readings(values, log.mean_speed(starts, starts + 2.5), seed=seed)[0]
     return Observed(name=f"flag {weight}", source=f"{weight}, {seed}", readings=own, log=log)
 

@@ -25,14 +25,14 @@ from measure.estimate.similarity import FlagSize
 from tests.measure.calibrate.conftest import readings
 
 
-def _table(
-    path: Path, *, windows: int = 48, heading: str | None = None, weight: float = 0.2, seed: int = 3
-) -> Path:  # fmt: skip
+def _table(path: Path, *, windows: int = 48, heading: str | None = None, weight: float = 0.2, seed: int = 3) -> Path:
     speed = 5.0 + 1.5 * np.sin(np.arange(windows) / 1.7)
     values = {
-        "area_weight": np.array([weight]), "gain": np.array([1.0]), "damping": np.array([0.01]),
+        "area_weight": np.array([weight]),
+        "gain": np.array([1.0]),
+        "damping": np.array([0.01]),
         "azimuth": np.array([math.radians(70)]),
-    }  # fmt: skip
+    }
     own = readings(values, speed, seed=seed)[0, :, :3]
     names = heading or "time,wind,droop,extension,middle-speed"
     rows = [
@@ -213,9 +213,11 @@ def test_options_that_a_table_has_no_use_for_are_refused(tmp_path: Path, argumen
 def test_a_table_beside_a_log_of_the_lake_is_weighed_and_the_log_is_its_parent(tmp_path: Path) -> None:
     seconds = np.arange(-30, 160, dtype=np.int64)
     series = WindSeries(
-        time=(1_780_000_000 + seconds) * NANOSECONDS, flags=np.zeros(len(seconds), dtype=np.uint16),
-        channels={"wind_speed": 5.0 + 1.5 * np.sin(seconds / 4.0)}, sensor=Sensor(name="cup", distance_constant=0.0),
-    )  # fmt: skip
+        time=(1_780_000_000 + seconds) * NANOSECONDS,
+        flags=np.zeros(len(seconds), dtype=np.uint16),
+        channels={"wind_speed": 5.0 + 1.5 * np.sin(seconds / 4.0)},
+        sensor=Sensor(name="cup", distance_constant=0.0),
+    )
     lake = Lake.create(tmp_path / "lake")
     with lake.transaction("a log") as transaction:
         staged = transaction.staging(".mcap")

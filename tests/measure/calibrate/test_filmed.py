@@ -24,14 +24,19 @@ _START = 1_700_000_000_000_000_000
 def _subject(*, logged: float = 200.0, findings: tuple[Finding, ...] = ()) -> Any:
     time = _START + np.round((np.arange(0.0, logged) - 60.0) * 1e9).astype(np.int64)
     wind = WindSeries(
-        time=time, channels={"wind_speed": np.linspace(4.0, 6.0, len(time))}, flags=np.zeros(len(time), np.uint16),
+        time=time,
+        channels={"wind_speed": np.linspace(4.0, 6.0, len(time))},
+        flags=np.zeros(len(time), np.uint16),
         sensor=Sensor(name="cup", distance_constant=2.5),
-    )  # fmt: skip
+    )
     film = SimpleNamespace(name="film", start=_START, duration=300.0, findings=lambda: findings)
     artifact = SimpleNamespace(id="0123abcd", clock_sigma=0.3)
     return SimpleNamespace(
-        film=film, artifact=artifact, record=SimpleNamespace(wind=lambda: wind), identity="0123abcd",
-    )  # fmt: skip
+        film=film,
+        artifact=artifact,
+        record=SimpleNamespace(wind=lambda: wind),
+        identity="0123abcd",
+    )
 
 
 @pytest.fixture
@@ -106,9 +111,7 @@ def test_films_that_are_together_too_short_are_refused_before_a_picture_is_read(
 ) -> None:
     _named(monkeypatch, {"monday": 15.0, "tuesday": 4.0})
     with pytest.raises(InputError, match=r"15 s of film with a log beside them; tuesday is left out: 4 s of film"):
-        filmed.Sources.open(
-            ("monday", "tuesday"), _SIZE, Pictures(), lake=None, at="main", first=0.0, last=None
-        )  # fmt: skip
+        filmed.Sources.open(("monday", "tuesday"), _SIZE, Pictures(), lake=None, at="main", first=0.0, last=None)
 
 
 def test_a_film_whose_length_is_enough_is_opened_and_not_read(monkeypatch: pytest.MonkeyPatch) -> None:

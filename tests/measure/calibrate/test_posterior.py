@@ -46,10 +46,12 @@ def _sights(seed: int) -> list[Sight]:
     return [
         Sight(
             emulator=Emulator.fit(design.values(), own, np.ones(1, dtype=np.bool_), name=design.recording),
-            azimuth=AZIMUTH, elevation=ELEVATION, place=design.place,
+            azimuth=AZIMUTH,
+            elevation=ELEVATION,
+            place=design.place,
         )
         for design, own in zip(_designs(seed), shown, strict=True)
-    ]  # fmt: skip
+    ]
 
 
 def test_what_recordings_have_in_common_does_not_average_out(monkeypatch: pytest.MonkeyPatch) -> None:

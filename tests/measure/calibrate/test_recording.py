@@ -41,14 +41,20 @@ def lake(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 writer.frame(log_time=time, publish_time=time, timestamp=time, image=frame)
             writer.wind(
                 WindSeries(
-                    time=_START + seconds * NANOSECONDS, flags=np.zeros(len(seconds), dtype=np.uint16),
-                    channels={"wind_speed": 5.0 + np.sin(seconds / 4.0)}, sensor=Sensor(name="cup"),
+                    time=_START + seconds * NANOSECONDS,
+                    flags=np.zeros(len(seconds), dtype=np.uint16),
+                    channels={"wind_speed": 5.0 + np.sin(seconds / 4.0)},
+                    sensor=Sensor(name="cup"),
                 )
-            )  # fmt: skip
+            )
         stored = transaction.put(staged)
         shared: dict[str, Any] = {
-            "name": "monday", "object": stored, "start": _START, "frame_count": len(times), "rate": RATE,
-        }  # fmt: skip
+            "name": "monday",
+            "object": stored,
+            "start": _START,
+            "frame_count": len(times),
+            "rate": RATE,
+        }
         camera = Artifact(kind=Kind.CAMERA, recipe={"of": "camera"}, **shared)
         transaction.add(camera)
         transaction.add(Artifact(kind=Kind.RECORDING, recipe={"of": "recording"}, parents=[camera.id], **shared))

@@ -24,14 +24,24 @@ _LOG = Log(times=np.arange(-10.0, 20.0), speed=np.full(30, 5.0), distance=0.0)
 def _batch(weights: list[float]) -> Batch:
     count = len(weights)
     fixed = {
-        "bending": 4e-5, "damping": 8e-3, "stretching": 1.0, "gain": 1.0, "scale": 1.0, "eddies": 60.0,
-        "distance_constant": 0.0, "fabric": 0.5,
-    }  # fmt: skip
+        "bending": 4e-5,
+        "damping": 8e-3,
+        "stretching": 1.0,
+        "gain": 1.0,
+        "scale": 1.0,
+        "eddies": 60.0,
+        "distance_constant": 0.0,
+        "fabric": 0.5,
+    }
     return Batch(
-        flag=Flag(length=1.5, height=1.0), log=_LOG, duration=5.0, columns=8, seeds=tuple(range(count)),
+        flag=Flag(length=1.5, height=1.0),
+        log=_LOG,
+        duration=5.0,
+        columns=8,
+        seeds=tuple(range(count)),
         values={"area_weight": np.array(weights), **{name: np.full(count, value) for name, value in fixed.items()}},
         places=np.tile([math.radians(80), 0.0, 15.0], (count, 1, 1)),
-    )  # fmt: skip
+    )
 
 
 def test_a_heavier_flag_droops_more_and_repeats() -> None:

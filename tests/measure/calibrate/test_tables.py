@@ -69,11 +69,16 @@ def test_a_window_that_rows_hardly_cover_has_no_value_and_the_others_are_where_t
 @pytest.mark.parametrize(
     ("heading", "factor"),
     [
-        ("droop [deg]", math.pi / 180), ("droop (°)", math.pi / 180), ("Droop", 1.0),
-        ("amplitude_up [cm]", 0.01 / 0.5), ("middle speed [km/h]", 1 / 3.6 / 2.0), ("extension [%]", 0.01),
-        ("frequency / Hz", 1.0), ("extension [m]", 1 / 2.0),
+        ("droop [deg]", math.pi / 180),
+        ("droop (°)", math.pi / 180),
+        ("Droop", 1.0),
+        ("amplitude_up [cm]", 0.01 / 0.5),
+        ("middle speed [km/h]", 1 / 3.6 / 2.0),
+        ("extension [%]", 0.01),
+        ("frequency / Hz", 1.0),
+        ("extension [m]", 1 / 2.0),
     ],
-)  # fmt: skip
+)
 def test_a_unit_in_a_heading_is_converted(tmp_path: Path, heading: str, factor: float) -> None:
     """Of a flag of 2 m by 0.5 m: amplitudes are counted in heights, speeds and extensions in lengths."""
     rows: list[list[float | str]] = [[2500.0 * n, 18.0, 3.0] for n in range(12)]
@@ -131,7 +136,7 @@ _TEN = [[2.5 * n, 5.0, 0.3] for n in range(10)]
         ("wind,duration,droop", [[5.0, 7.5, 0.3]], "a row of 7.5 s in a wind of 5 m/s"),
         ("wind,duration,droop", [[0.0, 60.0, 0.3]], "a row of 60 s in a wind of 0 m/s"),
     ],
-)  # fmt: skip
+)
 def test_what_does_not_say_what_its_rows_are_of_is_refused(
     tmp_path: Path, heading: str, rows: list[list[float | str]], said: str
 ) -> None:
@@ -150,9 +155,11 @@ def _gusts(seconds: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _series(times: np.ndarray, speed: np.ndarray) -> WindSeries:
     return WindSeries(
-        time=np.round((START + times) * NANOSECONDS).astype(np.int64), channels={"wind_speed": speed},
-        flags=np.zeros(len(times), dtype=np.uint16), sensor=Sensor(name="sonic", averaging=0.0, distance_constant=0.0),
-    )  # fmt: skip
+        time=np.round((START + times) * NANOSECONDS).astype(np.int64),
+        channels={"wind_speed": speed},
+        flags=np.zeros(len(times), dtype=np.uint16),
+        sensor=Sensor(name="sonic", averaging=0.0, distance_constant=0.0),
+    )
 
 
 @pytest.mark.parametrize("spacing", [0.2, 2.5])

@@ -24,12 +24,20 @@ def test_the_set_is_whole(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("path", "value"),
     [
-        (("flag",), 3), (("flag",), [1]), (("flag", "width"), [1.5, 1.5]), (("flag", "width"), 10**400),
-        (("flag", "pins"), "x"), (("flag", "gravity"), 3), (("recordings",), {"a": 1}), (("recordings",), ["a"]),
-        (("rate",), "fast"), (("recordings", 0, "wind", "times"), [[0.0], [0.4, 1.0]]),
-        (("recordings", 0, "name"), "../elsewhere"), (("recordings", 0, "name"), "b"),
+        (("flag",), 3),
+        (("flag",), [1]),
+        (("flag", "width"), [1.5, 1.5]),
+        (("flag", "width"), 10**400),
+        (("flag", "pins"), "x"),
+        (("flag", "gravity"), 3),
+        (("recordings",), {"a": 1}),
+        (("recordings",), ["a"]),
+        (("rate",), "fast"),
+        (("recordings", 0, "wind", "times"), [[0.0], [0.4, 1.0]]),
+        (("recordings", 0, "name"), "../elsewhere"),
+        (("recordings", 0, "name"), "b"),
     ],
-)  # fmt: skip
+)
 def test_values_that_do_not_fit_are_refused(tmp_path: Path, path: tuple[Any, ...], value: Any) -> None:
     write_small_set(tmp_path / "set")
     np.save(tmp_path / "elsewhere.npy", np.zeros((10, 6, 3)))
@@ -50,10 +58,15 @@ def test_a_header_that_states_more_than_the_file_holds_is_refused(tmp_path: Path
 
 @pytest.mark.parametrize(
     "content",
-    [{}, {"title": "t"}, {"title": "t", "sets": []}, {"title": "t", "sets": {"set-001": {"data": "x"}}},
-     {"title": "t", "sets": {"../x": {"data": "x", "commitment": "y"}}},
-     {"title": "t", "sets": {"\0": {"data": "x", "commitment": "y"}}}],
-)  # fmt: skip
+    [
+        {},
+        {"title": "t"},
+        {"title": "t", "sets": []},
+        {"title": "t", "sets": {"set-001": {"data": "x"}}},
+        {"title": "t", "sets": {"../x": {"data": "x", "commitment": "y"}}},
+        {"title": "t", "sets": {"\0": {"data": "x", "commitment": "y"}}},
+    ],
+)
 def test_a_challenge_that_does_not_state_its_sets_is_refused(tmp_path: Path, content: dict[str, Any]) -> None:
     (tmp_path / "challenge.json").write_text(json.dumps(content))
     with pytest.raises(CorruptError, match="title and its sets"):

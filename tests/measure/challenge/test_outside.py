@@ -53,10 +53,15 @@ def flag(turn: np.ndarray | None = None, shift: tuple[float, float, float] = (0.
     u, v = mesh.rest.T
     start = np.stack([0.98 * u, 0.15 * u + 0.03 * np.sin(9 * u) * np.cos(7 * v), v - 0.1 * u], axis=1)
     scenes = [
-        Scene(mesh=mesh, position=start @ turn.T + shift, material=named("camel-ponte-roma"),
-              handles=Handles(vertices=(0, 3)), wind=tuple(turn @ wind))
+        Scene(
+            mesh=mesh,
+            position=start @ turn.T + shift,
+            material=named("camel-ponte-roma"),
+            handles=Handles(vertices=(0, 3)),
+            wind=tuple(turn @ wind),
+        )
         for wind in np.array([(5.0, 1.0, 0.2), (4.0, -2.0, 0.0)])
-    ]  # fmt: skip
+    ]
     system, state = assemble(scenes, dtype=torch.float64)
     speed = np.stack([np.cos(11 * v), 2 * np.sin(7 * u + 1), np.cos(5 * u) * v], axis=1) @ turn.T
     velocity = torch.tensor(speed).unsqueeze(-1).repeat(1, 1, BATCH)
@@ -121,8 +126,13 @@ def test_turning_and_moving_everything_turns_and_moves_the_outcome(name: str) ->
 def sheet_across(cells: int = 4) -> tuple[System, State]:
     """One square metre across a wind of 5 m/s in +x, at rest, its lower left corner at the origin."""
     mesh = grid(width=1.0, height=1.0, columns=cells, rows=cells)
-    scene = Scene(mesh=mesh, position=upright(mesh), material=named("camel-ponte-roma"),
-                  handles=Handles(vertices=(0, cells)), wind=(5.0, 0.0, 0.0))  # fmt: skip
+    scene = Scene(
+        mesh=mesh,
+        position=upright(mesh),
+        material=named("camel-ponte-roma"),
+        handles=Handles(vertices=(0, cells)),
+        wind=(5.0, 0.0, 0.0),
+    )
     return assemble([scene], dtype=torch.float64)
 
 

@@ -102,8 +102,9 @@ def test_a_warning_that_may_explain_the_verdict_is_reported_with_it() -> None:
     remark = "The data themselves may be wrong, which would look like an effect: flag: it moves as in 8 m/s."
     assert changed.words == f"{whole.words} {remark}"
     assert changed.findings == (
-        ("inertia-does-not-fit", "flag: it moves as in 8 m/s"), ("cloth-not-covered", "flag: no marker near"),
-    )  # fmt: skip
+        ("inertia-does-not-fit", "flag: it moves as in 8 m/s"),
+        ("cloth-not-covered", "flag: no marker near"),
+    )
     assert with_warnings(whole, (other,)).words == whole.words
 
 
@@ -145,9 +146,21 @@ def test_a_recipe_says_what_the_test_is_and_no_more(
 def test_data_that_are_no_cloth_end_it_with_the_reason(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Markers in millimetres that are taken for metres."""
     code, error = said(
-        [str(table), "--rate", str(RATE), "--wind", "4", "--size", f"{1e3 * WIDTH}x{1e3 * HEIGHT}", "--pins", "hoist",
-         "--material", "camel-ponte-roma"], capsys,
-    )  # fmt: skip
+        [
+            str(table),
+            "--rate",
+            str(RATE),
+            "--wind",
+            "4",
+            "--size",
+            f"{1e3 * WIDTH}x{1e3 * HEIGHT}",
+            "--pins",
+            "hoist",
+            "--material",
+            "camel-ponte-roma",
+        ],
+        capsys,
+    )
     assert (code, error["kind"]) == (1, "bad-input")
 
 

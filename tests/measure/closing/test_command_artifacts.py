@@ -42,11 +42,13 @@ def concluded(conclusion: Conclusion) -> Verdict:
     made = verdict(conclusion, Size(across=3, up=3, frames=20, stretch=2))
     parameters = tuple(
         Parameter(
-            name=name, before=_about(before), shift=1.0 if made.named else None,
+            name=name,
+            before=_about(before),
+            shift=1.0 if made.named else None,
             after=_about(after) if made.named else None,
         )
         for name, (before, after) in FITTED.items()
-    )  # fmt: skip
+    )
     return replace(made, parameters=parameters)
 
 
@@ -54,18 +56,26 @@ def experiment(specimen: Specimen, *, source: str = "", name: str = "a", speed: 
     rest = specimen.mesh.rest
     positions = np.tile(np.stack([rest[:, 0], 0 * rest[:, 0], rest[:, 1]], axis=1), (50, 1, 1))
     recording = Trajectory(
-        name=name, markers=rest, positions=positions, rate=25.0, wind=WindTrack.constant((speed, 0.0, 0.0)),
+        name=name,
+        markers=rest,
+        positions=positions,
+        rate=25.0,
+        wind=WindTrack.constant((speed, 0.0, 0.0)),
         source=source,
-    )  # fmt: skip
+    )
     return Experiment(specimen=specimen, recordings=(recording,))
 
 
 def closed(observed: Experiment, conclusion: Conclusion = Conclusion.EFFECT) -> Answer:
     found = concluded(conclusion)
     return answer_of(
-        found, observed, Options(seed=3), name="tracks", findings=(),
+        found,
+        observed,
+        Options(seed=3),
+        name="tracks",
+        findings=(),
         models=models(found, observed, name="tracks", seed=3),
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture
@@ -155,10 +165,13 @@ def test_the_identity_is_that_of_all_that_was_known(specimen: Specimen) -> None:
     heavier = replace(specimen, material=specimen.material.scaled(density=1.01))
     moved = replace(specimen, anchors=specimen.anchors + 1e-3)
     others = [
-        experiment(specimen, speed=4.1), experiment(heavier), experiment(moved),
-        experiment(replace(specimen, stiffness=math.inf)), experiment(replace(specimen, density_uncertainty=0.02)),
+        experiment(specimen, speed=4.1),
+        experiment(heavier),
+        experiment(moved),
+        experiment(replace(specimen, stiffness=math.inf)),
+        experiment(replace(specimen, density_uncertainty=0.02)),
         experiment(replace(specimen, mass_known=False)),
-    ]  # fmt: skip
+    ]
     (seen,) = experiment(specimen).recordings
     otherwise = (
         replace(seen, wind=replace(seen.wind, clock=1.0)),
@@ -213,8 +226,10 @@ def test_a_turned_wind_turns_before_a_run_begins(specimen: Specimen) -> None:
     whole = replace(found, named=("direction-change",), ranking=(turned, *found.ranking[1:]))
     larger = models(whole, experiment(specimen), name="x", seed=0)[1]
     assert larger.content["effects"]["direction-change"] == {
-        "angle": pytest.approx(found.ranking[0].strength.value), "start": -1.0, "duration": 1e-3
-    }  # fmt: skip
+        "angle": pytest.approx(found.ranking[0].strength.value),
+        "start": -1.0,
+        "duration": 1e-3,
+    }
 
 
 def test_a_cloth_of_any_outline_held_anywhere_keeps_its_mesh_and_pins(specimen: Specimen) -> None:
@@ -223,9 +238,13 @@ def test_a_cloth_of_any_outline_held_anywhere_keeps_its_mesh_and_pins(specimen: 
     held = (0, 40)
     anchors = np.array([[0.0, 0.0, 0.0], [0.4, 0.1, 0.2]])
     odd = replace(
-        specimen, mesh=Mesh(rest=rest, faces=specimen.mesh.faces), held=held, anchors=anchors, stiffness=math.inf,
+        specimen,
+        mesh=Mesh(rest=rest, faces=specimen.mesh.faces),
+        held=held,
+        anchors=anchors,
+        stiffness=math.inf,
         material=replace(specimen.material, name="of a mill", bending=1.5 * specimen.material.bending),
-    )  # fmt: skip
+    )
     (model,) = models(concluded(Conclusion.SUFFICIENT), experiment(odd), name="odd", seed=0)
     crew = Crew(of_content(tomllib.loads(toml.dumps(model.content)), name="odd", folder=Path(), where="odd"))
     scene = crew.member(0).scene
@@ -266,9 +285,14 @@ def test_a_name_that_is_neither_a_recipe_nor_a_model_is_refused_with_the_nearest
 
 def test_toml_reads_back_as_it_was_written() -> None:
     content = {
-        "text": 'quotes " and \\ and\ttabs\x7f', "whole": 3, "real": 0.1, "small": 1e-17, "yes": True,
-        "list": [[1.0, 2.0], [3.0, 4.0]], "table": {"inner": {"odd key": "ü", "n": -1}, "empty": {}},
-    }  # fmt: skip
+        "text": 'quotes " and \\ and\ttabs\x7f',
+        "whole": 3,
+        "real": 0.1,
+        "small": 1e-17,
+        "yes": True,
+        "list": [[1.0, 2.0], [3.0, 4.0]],
+        "table": {"inner": {"odd key": "ü", "n": -1}, "empty": {}},
+    }
     assert tomllib.loads(toml.dumps(content)) == content
 
 

@@ -120,11 +120,13 @@ def test_the_cloth_of_markers_is_brought_to_the_films_units_and_the_page_has_bot
         judged(Conclusion.EFFECT, 0.01),
         parameters=(
             Parameter(
-                name="area_weight", before=interval(0.1, 0.1, unit="kg/m²"), after=interval(0.2, 0.1, unit="kg/m²"),
+                name="area_weight",
+                before=interval(0.1, 0.1, unit="kg/m²"),
+                after=interval(0.2, 0.1, unit="kg/m²"),
                 shift=None,
             ),
         ),
-    )  # fmt: skip
+    )
     found = both(markers, films)
     base, with_lift = found.cloth
     assert base.markers is not None

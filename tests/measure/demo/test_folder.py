@@ -122,9 +122,13 @@ def test_one_that_fails_leaves_the_earlier_one(quick: None, tmp_path: Path, monk
     ],
 )
 def test_each_story_has_its_pages_and_says_beforehand_how_long_it_takes(
-    quick: None, tmp_path: Path, capsys: pytest.CaptureFixture[str], given: tuple[str, ...], story: Story,
+    quick: None,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    given: tuple[str, ...],
+    story: Story,
     pages: list[str],
-) -> None:  # fmt: skip
+) -> None:
     out = tmp_path / "demo"
     assert demo(out, *given) == 0
     assert [name for name in names(out) if name.endswith(".html") and name != "index.html"] == pages

@@ -56,14 +56,20 @@ def written(folder: Path, targets: tuple[str, ...]) -> Path:
         learner = Learner(WaveNetwork(**options), loss=Loss.POSTERIOR, targets=targets, components=2).eval()  # type: ignore[arg-type]
     front_end = FrontEnd(maps="wave-maps", size=SIZE, frames=FRAMES, rate=RATE)
     cropping = Cropping(frames=FRAMES, size=SIZE)
-    write_card(folder, {
-        "name": folder.name, "seed": 1, "front_end": asdict(front_end), "cropping": asdict(cropping),
-        "recipe": {
-            "network": {"name": "wave", "options": options},
-            "loss": {"name": "posterior", "targets": list(targets), "components": 2, "margin": 1.0},
-            "data": {"dataset": "made", "sequences": None},
+    write_card(
+        folder,
+        {
+            "name": folder.name,
+            "seed": 1,
+            "front_end": asdict(front_end),
+            "cropping": asdict(cropping),
+            "recipe": {
+                "network": {"name": "wave", "options": options},
+                "loss": {"name": "posterior", "targets": list(targets), "components": 2, "margin": 1.0},
+                "data": {"dataset": "made", "sequences": None},
+            },
         },
-    })  # fmt: skip
+    )
     write_tensors(folder / WEIGHTS, learner.state_dict())
     write_sums(folder)
     bare = estimator.load(folder)

@@ -30,13 +30,23 @@ UNCONSTRAINED = Quantity(
     name="density", unit="kg/m²", value=0.135, sigma=0.02, span=whole(0.1, 0.17), assumed=(0.1, 0.17), information=0.001
 )
 STRONG = Quantity(
-    name="wind_speed", unit="m/s", value=None, sigma=None, assumed=(0.0, 10.0), information=3.0,
+    name="wind_speed",
+    unit="m/s",
+    value=None,
+    sigma=None,
+    assumed=(0.0, 10.0),
+    information=3.0,
     span=Span(low=9.4, high=math.inf, level=0.95, bound=Bound.LEAST, estimated=False),
-)  # fmt: skip
+)
 CALM = Quantity(
-    name="wind_speed", unit="m/s", value=0.2, sigma=0.1, assumed=(0.0, 10.0), information=3.0,
+    name="wind_speed",
+    unit="m/s",
+    value=0.2,
+    sigma=0.1,
+    assumed=(0.0, 10.0),
+    information=3.0,
     span=Span(low=0.0, high=0.5, level=0.95, bound=Bound.MOST, estimated=True),
-)  # fmt: skip
+)
 
 
 def test_the_answer_is_one_line() -> None:
@@ -52,9 +62,8 @@ def test_a_quantity_without_information_is_reported_with_its_prior_range() -> No
 
 def test_a_wind_at_the_end_of_what_the_model_knows_is_bounded_on_one_side_with_the_reason() -> None:
     assert sentence([STRONG, WEIGHT]) == (
-        "wind at least 9.4 m/s, 95 % (the network's range ends at 10.0 m/s), "
-        "area weight 0.13 kg/m² [0.11, 0.16] 90 %"
-    )  # fmt: skip
+        "wind at least 9.4 m/s, 95 % (the network's range ends at 10.0 m/s), area weight 0.13 kg/m² [0.11, 0.16] 90 %"
+    )
     assert sentence([CALM, UNCONSTRAINED]).startswith("wind at most 0.5 m/s, 95 %; area weight: not constrained")
     finding = STRONG.finding()
     assert finding is not None
@@ -77,9 +86,14 @@ def test_draws_at_both_ends_of_the_range_give_no_value() -> None:
 
 def test_the_weight_of_a_small_flag_is_given_to_a_gram() -> None:
     small = Quantity(
-        name="density", unit="kg/m²", value=0.0325, sigma=0.003, span=whole(0.028, 0.038), assumed=(0.025, 0.0425),
+        name="density",
+        unit="kg/m²",
+        value=0.0325,
+        sigma=0.003,
+        span=whole(0.028, 0.038),
+        assumed=(0.025, 0.0425),
         information=0.4,
-    )  # fmt: skip
+    )
     assert small.phrase(first=False) == "area weight 0.033 kg/m² [0.028, 0.038]"
 
 

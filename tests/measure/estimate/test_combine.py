@@ -24,17 +24,25 @@ def cloth_of(logits: NDArray[np.float64], correlation: float, seed: int = 0) -> 
     dependence = Dependence(wind=correlation, cloth=correlation, source="given")
     size = logits.shape[2]
     return combined(
-        logits, names=CLOTH[:size], centre=np.zeros(size), spread=np.ones(size), dependence=dependence,
+        logits,
+        names=CLOTH[:size],
+        centre=np.zeros(size),
+        spread=np.ones(size),
+        dependence=dependence,
         generator=stream(seed, "combine"),
-    )[1]  # fmt: skip
+    )[1]
 
 
 def test_one_window_is_left_as_it_is() -> None:
     draws = stream(1, "one").normal(size=(1, 50, 2))
     wind, cloth = combined(
-        draws, names=BOTH, centre=np.zeros(2), spread=np.ones(2),
-        dependence=Dependence(wind=0.3, cloth=0.3, source="given"), generator=stream(0, "combine"),
-    )  # fmt: skip
+        draws,
+        names=BOTH,
+        centre=np.zeros(2),
+        spread=np.ones(2),
+        dependence=Dependence(wind=0.3, cloth=0.3, source="given"),
+        generator=stream(0, "combine"),
+    )
     np.testing.assert_array_equal(wind[0, :, 0], draws[0, :, 0])
     np.testing.assert_array_equal(cloth[:, 0], draws[0, :, 1])
 
@@ -99,9 +107,13 @@ def test_the_mean_of_winds_has_the_variance_of_correlated_estimates(correlation:
     rng = stream(6, "winds")
     draws = rng.normal(3.0, 1.0, size=(8, 20_000, 1))
     wind, cloth = combined(
-        draws, names=("wind_speed",), centre=np.zeros(1), spread=np.ones(1),
-        dependence=Dependence(wind=correlation, cloth=0.0, source="given"), generator=stream(0, "combine"),
-    )  # fmt: skip
+        draws,
+        names=("wind_speed",),
+        centre=np.zeros(1),
+        spread=np.ones(1),
+        dependence=Dependence(wind=correlation, cloth=0.0, source="given"),
+        generator=stream(0, "combine"),
+    )
     assert cloth.shape == (20_000, 0)
     mean = wind[..., 0].mean(axis=0)
     assert mean.mean() == pytest.approx(3.0, abs=0.02)
@@ -114,9 +126,13 @@ def test_a_wind_that_trades_with_the_cloth_follows_what_all_windows_say_of_the_c
     cloth = np.stack([posterior(1.0, 0.2, 20_000, rng) for _ in range(10)])
     wind = 2 + cloth + rng.normal(0, 0.05, size=cloth.shape)
     winds, shared = combined(
-        np.concatenate([wind, cloth], axis=2), names=BOTH, centre=np.zeros(2), spread=np.ones(2),
-        dependence=Dependence(wind=0.0, cloth=0.0, source="given"), generator=stream(0, "combine"),
-    )  # fmt: skip
+        np.concatenate([wind, cloth], axis=2),
+        names=BOTH,
+        centre=np.zeros(2),
+        spread=np.ones(2),
+        dependence=Dependence(wind=0.0, cloth=0.0, source="given"),
+        generator=stream(0, "combine"),
+    )
     assert winds[0, :, 0].std() < 0.5 * wind[0].std()
     assert np.corrcoef(winds[0, :, 0], shared[:, 0])[0, 1] > 0.9
     assert winds.mean() == pytest.approx(2 + shared.mean(), abs=0.02)

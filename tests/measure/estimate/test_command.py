@@ -77,10 +77,12 @@ def record(path: Path, *, seed: int) -> None:
         seconds = START + np.arange(-70, 4, dtype=np.int64) * NANOSECONDS
         writer.wind(
             WindSeries(
-                time=seconds, channels={"wind_speed": np.full(len(seconds), 4.0)},
-                flags=np.zeros(len(seconds), dtype=np.uint16), sensor=Sensor(name="cup"),
+                time=seconds,
+                channels={"wind_speed": np.full(len(seconds), 4.0)},
+                flags=np.zeros(len(seconds), dtype=np.uint16),
+                sensor=Sensor(name="cup"),
             )
-        )  # fmt: skip
+        )
         writer.truth({"wind_speed": 4.0, "density": 0.12}, log_time=START)
 
 
@@ -94,9 +96,15 @@ def lake(tmp_path: Path) -> Path:
             record(staged, seed=seed)
             stored = transaction.put(staged)
             artifact = Artifact(
-                kind=Kind.RECORDING, name=f"made-{seed}", seed=seed, object=stored, recipe={"seed": seed},
-                start=START, frame_count=4 * FRAMES, rate=RATE,
-            )  # fmt: skip
+                kind=Kind.RECORDING,
+                name=f"made-{seed}",
+                seed=seed,
+                object=stored,
+                recipe={"seed": seed},
+                start=START,
+                frame_count=4 * FRAMES,
+                rate=RATE,
+            )
             transaction.add(artifact)
             for clip in clip_rows(Record.open(made.object_path(stored)), artifact, frames=FRAMES + 2):
                 transaction.add(clip)
@@ -116,9 +124,7 @@ def test_a_video_file_is_answered_in_one_line(film: Path, model_folder: Path) ->
 def test_python_gives_the_answer_of_the_command_as_arrays(film: Path, model_folder: Path) -> None:
     options = ("--model", model_folder, "--area-weight", "0.12:0.15", "--anyway")
     said = answer(film, *SIZED, *options)
-    found = flagdata.measure(
-        film, flag_size=(1.5, 1.0), area_weight=(0.12, 0.15), model=str(model_folder), anyway=True
-    )  # fmt: skip
+    found = flagdata.measure(film, flag_size=(1.5, 1.0), area_weight=(0.12, 0.15), model=str(model_folder), anyway=True)
     assert found.sentence == said["sentence"]
     assert found.refused == said["gate"]["refused"]  # type: ignore[index]
     assert [finding.as_dict() for finding in found.findings] == said["findings"]
@@ -348,8 +354,20 @@ def test_a_wind_series_is_a_table_and_a_data_set(lake: Path, model_folder: Path,
     import xarray
 
     target = tmp_path / "series.zarr"
-    done = run("made-1", "--lake", lake, *SIZED, "--model", model_folder, "--anyway", "--windows", "0.24s", "--csv",
-               "--zarr", target)  # fmt: skip
+    done = run(
+        "made-1",
+        "--lake",
+        lake,
+        *SIZED,
+        "--model",
+        model_folder,
+        "--anyway",
+        "--windows",
+        "0.24s",
+        "--csv",
+        "--zarr",
+        target,
+    )
     rows = list(csv.DictReader(io.StringIO(done.stdout)))
     assert len(rows) == 7
     assert {float(row["anemometer"]) for row in rows} == {4.0}

@@ -69,9 +69,7 @@ def test_a_film_that_is_refused_at_every_size_is_refused_however_its_windows_pas
 
 def test_of_a_hundred_windows_48_that_are_strange_refuse_and_few_do_not() -> None:
     def judged(strange: int) -> Verdict:
-        return verdict(
-            [[reason(0.01)]] * strange + [[reason(0.5)]] * (100 - strange), false_alarm=0.05, level=exact
-        )  # fmt: skip
+        return verdict([[reason(0.01)]] * strange + [[reason(0.5)]] * (100 - strange), false_alarm=0.05, level=exact)
 
     assert judged(48).refused
     assert judged(26).refused

@@ -310,9 +310,12 @@ def test_without_its_size_a_film_is_refused_as_it_is_with_each_size(model: Estim
 
     def judged(p: list[list[float]], size: FlagSize | None) -> Measurement:
         return measure(
-            film, model, gate=Listed(*(value for row in p for value in row)), dependence=APART,
+            film,
+            model,
+            gate=Listed(*(value for row in p for value in row)),
+            dependence=APART,
             options=Options(size=size, step=0.2),
-        )  # fmt: skip
+        )
 
     count = len(judged([[0.5] * 3] * 40, None).windows)
     strange = [[0.001, 0.5, 0.001] if k % 2 else [0.5, 0.001, 0.5] for k in range(count)]

@@ -85,9 +85,12 @@ def test_a_section_of_another_program_comes_between_the_answer_and_its_provenanc
 
 def test_simulated_neighbours_are_shown_in_motion_with_what_they_were_made_with(found: Measurement) -> None:
     neighbour = Neighbour(
-        artifact="a" * 32, name="clip", frames=pictures(FRAMES, seed=9), distance=2.5,
+        artifact="a" * 32,
+        name="clip",
+        frames=pictures(FRAMES, seed=9),
+        distance=2.5,
         known={"wind_speed": 3.25, "density": 0.12},
-    )  # fmt: skip
+    )
     context = replace(PLAIN, neighbours=(neighbour,), compared=7, known={"wind_speed": 6.0})
     text = drawn(found, context)
     assert text.count("data:image/webp") == 2

@@ -29,15 +29,31 @@ def interval(name: str, median: float, half: float) -> Interval:
 @pytest.fixture
 def found() -> Refinement:
     intervals = (
-        interval("wind_speed", 4.0, 0.5), interval("density", 0.12, 0.01), interval("bending_scale", -4.0, 0.2),
-        interval("anisotropy", 0.3, 0.1), interval("nonlinearity", -0.2, 0.1), interval("wind_speed.1", 6.0, 1.0),
-    )  # fmt: skip
+        interval("wind_speed", 4.0, 0.5),
+        interval("density", 0.12, 0.01),
+        interval("bending_scale", -4.0, 0.2),
+        interval("anisotropy", 0.3, 0.1),
+        interval("nonlinearity", -0.2, 0.1),
+        interval("wind_speed.1", 6.0, 1.0),
+    )
     step = Round(evaluations=28, distance=2.0, floor=1.0, intervals=intervals[:2], seconds=3.0)
     return Refinement(
-        targets=(), level=0.9, intervals=intervals, amortised=intervals[:4], bending=np.full((15, 3), 1e-4),
-        rounds=(step,), traces=(), floor=1.0, reached=True, stopped="", posterior=NOTHING, evaluators=(), seconds={},
-        findings=(), seed=1,
-    )  # fmt: skip
+        targets=(),
+        level=0.9,
+        intervals=intervals,
+        amortised=intervals[:4],
+        bending=np.full((15, 3), 1e-4),
+        rounds=(step,),
+        traces=(),
+        floor=1.0,
+        reached=True,
+        stopped="",
+        posterior=NOTHING,
+        evaluators=(),
+        seconds={},
+        findings=(),
+        seed=1,
+    )
 
 
 def test_a_flag_four_times_as_long_has_twice_the_wind_four_times_the_weight_and_4_to_the_4th_the_stiffness(
@@ -88,9 +104,11 @@ def test_the_view_that_a_record_states_is_that_of_the_simulated_clips_whatever_p
     monkeypatch.setattr("measure.estimate.refined.run", lambda clips, *_, **__: given.extend(clips) or found)
     recording: Any = object()
     measured: Any = SimpleNamespace(
-        film="flag", clip=np.zeros((2, 4, 4), np.uint8), options=Options(),
+        film="flag",
+        clip=np.zeros((2, 4, 4), np.uint8),
+        options=Options(),
         sizes=SimpleNamespace(scale=np.array([1.0])),
-    )  # fmt: skip
+    )
     cut: Any = SimpleNamespace(artifact=recording)
     model: Any = SimpleNamespace(cloth=Cloth.FLAG)
     refined(measured, cut, model, budget=20, cache=None)

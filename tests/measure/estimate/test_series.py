@@ -37,9 +37,11 @@ def gusts(count: int, *, correlation: float = 0.97) -> np.ndarray:
 def log(times: np.ndarray, speed: np.ndarray) -> WindSeries:
     """Stamps in seconds from the film's first frame."""
     return WindSeries(
-        time=START + np.round(times * NANOSECONDS).astype(np.int64), channels={"wind_speed": speed},
-        flags=np.zeros(len(times), dtype=np.uint16), sensor=Sensor(name="sonic", averaging=0.0, distance_constant=0.0),
-    )  # fmt: skip
+        time=START + np.round(times * NANOSECONDS).astype(np.int64),
+        channels={"wind_speed": speed},
+        flags=np.zeros(len(times), dtype=np.uint16),
+        sensor=Sensor(name="sonic", averaging=0.0, distance_constant=0.0),
+    )
 
 
 def saying(model: Estimator, wind: np.ndarray, *, step: float) -> Measurement:
@@ -52,9 +54,7 @@ def saying(model: Estimator, wind: np.ndarray, *, step: float) -> Measurement:
         if math.isnan(v):
             least = Span(low=STRONG, high=math.inf, level=0.95, bound=Bound.LEAST, estimated=False)
             return replace(quantity, value=None, sigma=None, span=least)
-        return replace(
-            quantity, value=v, span=Span(low=v - 0.5, high=v + 0.5, level=0.9, bound=None, estimated=True)
-        )  # fmt: skip
+        return replace(quantity, value=v, span=Span(low=v - 0.5, high=v + 0.5, level=0.9, bound=None, estimated=True))
 
     windows = tuple(
         replace(first, start=k * step, end=k * step + 0.44, quantities=(said(v),)) for k, v in enumerate(wind.tolist())
@@ -102,8 +102,14 @@ def test_a_series_of_bounds_alone_has_no_error_and_json_without_infinities(model
     json.dumps(series.as_dict(), allow_nan=False)
     header, first = list(series.rows())[:2]
     assert dict(zip(header, first, strict=True)) | {"time": "", "p": ""} == {
-        "time": "", "wind": "", "low": "9.4", "high": "inf", "p": "", "anemometer": "12", "anemometer_minute": "12",
-    }  # fmt: skip
+        "time": "",
+        "wind": "",
+        "low": "9.4",
+        "high": "inf",
+        "p": "",
+        "anemometer": "12",
+        "anemometer_minute": "12",
+    }
 
 
 def test_the_window_sees_its_own_wind_and_the_minute_the_mean_before_it(model: Estimator) -> None:

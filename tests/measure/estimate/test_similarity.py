@@ -42,9 +42,12 @@ def flight(scale: float, *, wind: float, material: Material, frames: int = 12) -
 def cloth(*, density: float, bending: float, scale: float = 1.0) -> Material:
     """Of constant bending stiffness; stretching and damping follow the scale."""
     return replace(
-        CAMEL, density=density, bending=np.full((3, 5), bending), stretching=CAMEL.stretching * scale**2,
+        CAMEL,
+        density=density,
+        bending=np.full((3, 5), bending),
+        stretching=CAMEL.stretching * scale**2,
         damping=CAMEL.damping * np.sqrt(scale),
-    )  # fmt: skip
+    )
 
 
 def test_values_scaled_back_make_half_a_flag_move_like_the_whole() -> None:

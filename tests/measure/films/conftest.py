@@ -51,9 +51,13 @@ def readings(batch: Batch, *, foreign: float = 0.0) -> Floats:
     out[..., 2] += np.cos(batch.places[:, 0, 0])[:, None]
     out[..., 3] += 0.1 * np.log(values["bending"] / 1e-4)[:, None]
     patterns = {
-        "lift.coefficient": (4, 0.2), "shear.exponent": (5, 0.3), "tangential-linear-drag.coefficient": (6, 0.2),
-        "hem-mass.line_density": (3, 0.0), "air-density.change": (7, 0.4), "power-law-drag.exponent": (7, 0.4),
-    }  # fmt: skip
+        "lift.coefficient": (4, 0.2),
+        "shear.exponent": (5, 0.3),
+        "tangential-linear-drag.coefficient": (6, 0.2),
+        "hem-mass.line_density": (3, 0.0),
+        "air-density.change": (7, 0.4),
+        "power-law-drag.exponent": (7, 0.4),
+    }
     most = {"lift.coefficient": 8.0, "tangential-linear-drag.coefficient": 1.5}
     for column, strength in batch.effects:
         which, size = patterns[column.name]
@@ -97,10 +101,14 @@ def recording(
     first = made.batches()[3]
     known = {one.name: one.column for one in weighable(made.flag)}
     one = Batch(
-        flag=made.flag, log=log, duration=made.duration, values={k: v[:1] for k, v in first.values.items()},
-        places=first.places[:1], seeds=(seed,),
+        flag=made.flag,
+        log=log,
+        duration=made.duration,
+        values={k: v[:1] for k, v in first.values.items()},
+        places=first.places[:1],
+        seeds=(seed,),
         effects=tuple((known[name], np.array([strength])) for name, strength in (effects or {}).items()),
-    )  # fmt: skip
+    )
     return Observed(name=f"{mean:g} m/s", source="", readings=readings(one, foreign=foreign)[0], log=log)
 
 

@@ -140,10 +140,30 @@ def test_films_and_markers_of_a_cloth_are_judged_together(
     lake, out = tmp_path / "lake", tmp_path / "out"
     Lake.create(lake)
     done = run(
-        *tables, tracks, "--rate", str(RATE), "--wind", "5", "--size", f"{WIDTH}x{HEIGHT}",
-        "--material", "white-dots-on-blk", "--pins", "hoist",
-        "--flag-size", "1.5x1.0", "--azimuth", "70±7", "--simulations", "64", "--lake", lake, "--out", out, "--json",
-    )  # fmt: skip
+        *tables,
+        tracks,
+        "--rate",
+        str(RATE),
+        "--wind",
+        "5",
+        "--size",
+        f"{WIDTH}x{HEIGHT}",
+        "--material",
+        "white-dots-on-blk",
+        "--pins",
+        "hoist",
+        "--flag-size",
+        "1.5x1.0",
+        "--azimuth",
+        "70±7",
+        "--simulations",
+        "64",
+        "--lake",
+        lake,
+        "--out",
+        out,
+        "--json",
+    )
     assert done.exit_code == 0, done.output
     joint = json.loads(done.stdout)
     assert joint["schema"] == "flagdata.joint-verdict/1"
@@ -204,5 +224,6 @@ def test_rows_against_wind_are_recordings_from_one_place(tmp_path: Path, cheap: 
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
     assert {one["what"] for one in found["comparisons"]} == {
-        "droop, recordings left out", "extension, recordings left out"
-    }  # fmt: skip
+        "droop, recordings left out",
+        "extension, recordings left out",
+    }

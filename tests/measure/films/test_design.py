@@ -29,9 +29,13 @@ def few(design: Design) -> Batch:
     """One flag of it in 5 s."""
     batch = design.batches()[-1]
     return replace(
-        batch, values={name: own[:1] for name, own in batch.values.items()}, places=batch.places[:1],
-        seeds=batch.seeds[:1], duration=5.0, columns=6,
-    )  # fmt: skip
+        batch,
+        values={name: own[:1] for name, own in batch.values.items()},
+        places=batch.places[:1],
+        seeds=batch.seeds[:1],
+        duration=5.0,
+        columns=6,
+    )
 
 
 def test_a_pair_shares_cloth_place_and_turbulence_with_a_flag_without_the_effect(design: Design) -> None:

@@ -57,9 +57,7 @@ def scene(own: Experiments, *, seed: int = 1, sigma: float = SIGMA, shift: Float
     return Scene.of(own, base, null if shift is None else moved(null, shift), KIND, CHANGES)
 
 
-def judged(
-    own: Experiments, *, seed: int = 1, along: Directions = ALONG, shift: Floats | None = None
-) -> Scored:  # fmt: skip
+def judged(own: Experiments, *, seed: int = 1, along: Directions = ALONG, shift: Floats | None = None) -> Scored:
     """One flag by base and null flags, as `scene`."""
     rng = stream(seed, "score test")
     base, null = flags(rng, BASE), flags(rng, KINDS * EACH)

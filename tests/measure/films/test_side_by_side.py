@@ -34,9 +34,16 @@ def film(*, scale: float = 40.0, side: float = 1.0) -> FilmWindow:
     for number, frame in enumerate(frames):
         frame[:, 2 * number : 2 * number + 10] = 255
     return FilmWindow(
-        times=times, frames=frames, masks=np.zeros(frames.shape, bool), shown=np.ones(len(times), bool), scale=scale,
-        hoist=np.array([[column, 60.0], [column, 60.0 + scale]]), side=side, length=1.5, height=1.0,
-    )  # fmt: skip
+        times=times,
+        frames=frames,
+        masks=np.zeros(frames.shape, bool),
+        shown=np.ones(len(times), bool),
+        scale=scale,
+        hoist=np.array([[column, 60.0], [column, 60.0 + scale]]),
+        side=side,
+        length=1.5,
+        height=1.0,
+    )
 
 
 def with_film(one: Observed) -> Observed:
@@ -68,9 +75,14 @@ def test_cloth_is_drawn_as_large_as_in_the_film_and_from_the_films_hoist(side: f
     points = np.tile(mesh.rest - [0.0, 0.5], (2, 1, 1))
     along = mesh.rest[:, 0]
     cloth = ClothWindow(
-        times=np.array([0.0, 0.1]), points=points, faces=mesh.faces, hoist=np.flatnonzero(along == 0)[::-1],
-        free=np.flatnonzero(along == 1.5)[::-1], length=1.5, height=1.0,
-    )  # fmt: skip
+        times=np.array([0.0, 0.1]),
+        points=points,
+        faces=mesh.faces,
+        hoist=np.flatnonzero(along == 0)[::-1],
+        free=np.flatnonzero(along == 1.5)[::-1],
+        length=1.5,
+        height=1.0,
+    )
     picture = drawn(cloth, np.zeros(points.shape[:2]), film(side=side), _BLUE)[0].astype(int)
     rows, columns = np.nonzero(picture[..., 2] - picture[..., 0] > 60)
     # Twice as large as the film's pixels: 1.5 m × 1 m at 80 px/m.

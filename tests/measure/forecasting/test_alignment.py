@@ -22,9 +22,12 @@ def experiment(specimen: Specimen, angle: float, shift: np.ndarray) -> Experimen
     rng = np.random.default_rng(1)
     positions = rng.normal(size=(60, len(specimen.mesh.rest), 3))
     recording = Trajectory(
-        name="a", markers=specimen.mesh.rest, positions=turned(positions, angle) + shift, rate=25.0,
+        name="a",
+        markers=specimen.mesh.rest,
+        positions=turned(positions, angle) + shift,
+        rate=25.0,
         wind=WindTrack(times=np.zeros(1), velocity=turned(np.array([[4.0, 0.0, 0.0]]), angle)),
-    )  # fmt: skip
+    )
     moved = replace(specimen, anchors=turned(specimen.anchors, angle) + shift)
     return Experiment(specimen=moved, recordings=(recording,))
 

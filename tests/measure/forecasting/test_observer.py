@@ -160,9 +160,12 @@ def test_steps_in_a_joint_batch_are_those_taken_alone(
     segments = Segments.of([own_recording])
     nominal = [Calibration(density=1.1)] * len(segments)
     columns = (
-        FieldColumn(axis=2, mode=(1, 0)), MotionColumn(derivative=1, mode=(0, 0)), FieldColumn(axis=0, mode=(0, 1)),
-        *winds(), *library(),
-    )  # fmt: skip
+        FieldColumn(axis=2, mode=(1, 0)),
+        MotionColumn(derivative=1, mode=(0, 0)),
+        FieldColumn(axis=0, mode=(0, 1)),
+        *winds(),
+        *library(),
+    )
     # Some runs, not one: columns must not be lost between them.
     monkeypatch.setattr(observer, "WIDEST", 10 * len(segments))
     base = forecaster.errors(*forecaster.system(segments, nominal), segments)

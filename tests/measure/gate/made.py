@@ -62,9 +62,14 @@ def small_model(seed: int = 0) -> Estimator:
     rng = np.random.default_rng(seed)
     cloud = Familiarity.of(rng.normal(size=(40, 4)), rng.normal(size=(19, 4)))
     return Estimator(
-        name="small", learners=(learner,), front_end=front_end,
-        cropping=Cropping(frames=12, size=32), widening=torch.ones(1), cloud=cloud, card={"name": "small"},
-    )  # fmt: skip
+        name="small",
+        learners=(learner,),
+        front_end=front_end,
+        cropping=Cropping(frames=12, size=32),
+        widening=torch.ones(1),
+        cloud=cloud,
+        card={"name": "small"},
+    )
 
 
 def plain(seed: int, count: int) -> NDArray[np.float64]:

@@ -21,9 +21,12 @@ FLAG = (70, 50, 90, 60)
 
 
 def drawn(
-    *, box: tuple[int, int, int, int] = FLAG, scenery: bool = True, shift: NDArray[np.float64] | None = None,
+    *,
+    box: tuple[int, int, int, int] = FLAG,
+    scenery: bool = True,
+    shift: NDArray[np.float64] | None = None,
     noise: float = 1.0,
-) -> Frames:  # fmt: skip
+) -> Frames:
     """(COUNT, HEIGHT, WIDTH): striped cloth whose waves grow towards its free end and never come again.
 
     Args:
@@ -47,9 +50,11 @@ def drawn(
         picture = np.where((along >= 0) & (along < 1) & (down >= 0) & (down < 1), cloth, behind)
         dx, dy = (0.0, 0.0) if shift is None else shift[k]
         moved = cv2.warpAffine(
-            picture, np.array([[1.0, 0.0, pad - dx], [0.0, 1.0, pad - dy]]), (WIDTH, HEIGHT),
+            picture,
+            np.array([[1.0, 0.0, pad - dx], [0.0, 1.0, pad - dy]]),
+            (WIDTH, HEIGHT),
             flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP,
-        )  # fmt: skip
+        )
         out.append(moved + rng.normal(0, noise, moved.shape))
     return np.clip(np.rint(out), 0, 255).astype(np.uint8)
 

@@ -22,9 +22,13 @@ def lake_of(path: Path, sides: dict[str, Artifact]) -> DataSpec:
     with lake.transaction("films") as transaction:
         for seed, (side, sequence) in enumerate(sides.items()):
             film = Artifact(
-                kind=Kind.RECORDING, name=f"o'brien-{side}-00000", parents=(sequence.id,), seed=seed, dataset="o'brien",
+                kind=Kind.RECORDING,
+                name=f"o'brien-{side}-00000",
+                parents=(sequence.id,),
+                seed=seed,
+                dataset="o'brien",
                 side=side,
-            )  # fmt: skip
+            )
             transaction.add(sequence)
             transaction.add(film)
             transaction.add(replace(film, kind=Kind.CLIP, parents=(film.id,), recording=film.id))

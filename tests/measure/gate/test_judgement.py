@@ -39,9 +39,7 @@ def model() -> Estimator:
 def gate(model: Estimator) -> Gate:
     training = [clip(seed) for seed in range(PLAIN + DISTORTED)]
     validation = [clip(1000 + seed) for seed in range(VALIDATION)]
-    return calibrated(
-        model, training, validation, seed=1, advance=lambda _: None, plain=PLAIN, distorted=DISTORTED
-    )  # fmt: skip
+    return calibrated(model, training, validation, seed=1, advance=lambda _: None, plain=PLAIN, distorted=DISTORTED)
 
 
 def test_most_films_like_the_calibration_clips_are_familiar(model: Estimator, gate: Gate) -> None:

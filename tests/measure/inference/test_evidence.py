@@ -53,11 +53,14 @@ class World:
         shift = np.repeat(self.rng.normal(size=KINDS * CLOTHS), WINDS)
         own = self.draw(delta, recordings=RECORDINGS, numerics=shift, speeds=speeds)
         return Nulls(
-            statistics=own, speeds=speeds[own.recording], calibration=offsets[own.recording],
+            statistics=own,
+            speeds=speeds[own.recording],
+            calibration=offsets[own.recording],
             numerics=kinds[own.recording],
-            noise=np.zeros(len(own.recording)), period=np.full(len(own.recording), 0.04),
+            noise=np.zeros(len(own.recording)),
+            period=np.full(len(own.recording), 0.04),
             cloth=np.full(len(own.recording), "made"),
-        )  # fmt: skip
+        )
 
     def data(self, null: NullModel, delta: Floats) -> Evidence:
         """Three recordings of one cloth in one kind of numerics."""
@@ -325,7 +328,7 @@ def test_what_is_left_beside_a_free_coefficient_is_that_of_a_coefficient_for_eve
     across = evidence.curvature[:, nuisance, 5].T
     curvature = np.block(
         [[total[np.ix_(nuisance, nuisance)], across], [across.T, np.diag(evidence.curvature[:, 5, 5])]]
-    )  # fmt: skip
+    )
     right = np.concatenate([score[nuisance], evidence.score[:, 5]])
     assert len(right) == len(nuisance) + count
     left = energy - right @ np.linalg.solve(curvature, right)
@@ -345,11 +348,14 @@ def test_beside_gusts_a_pressure_that_fluctuates_leaves_what_nulls_do() -> None:
         evidence = world.data(null, effect(0.0))
         extra = world.rng.normal(0, 1.5, len(evidence.recording))
         moved = Evidence(
-            recording=evidence.recording, curvature=evidence.curvature, columns=evidence.columns,
+            recording=evidence.recording,
+            curvature=evidence.curvature,
+            columns=evidence.columns,
             score=evidence.score + extra[:, None] * evidence.curvature[:, :, place],
-            energy=evidence.energy + 2 * extra * evidence.score[:, place]
+            energy=evidence.energy
+            + 2 * extra * evidence.score[:, place]
             + extra**2 * evidence.curvature[:, place, place],
-        )  # fmt: skip
+        )
         freed = moved.freed(place)
         before.append(reference.p_left_by(moved, columns, ()))
         after.append(reference.beside().p_left_by(freed, columns, ()))
@@ -413,9 +419,12 @@ def test_what_a_parameter_takes_in_shows_on_recordings_left_out() -> None:
     response = np.zeros((segments, count, count))
     response[:, 0, 0], response[:, 0, -1] = 1.0, speeds**2
     found = Statistics(
-        recording=recording, r=response[:, :, -1], response=response, error=np.ones(segments),
+        recording=recording,
+        r=response[:, :, -1],
+        response=response,
+        error=np.ones(segments),
         marker_error=np.ones((segments, 1)),
-    )  # fmt: skip
+    )
     evidence = Evidence.of(found, speeds, null)
     assert evidence.drops()[-1] / 2 == pytest.approx(4 * 809 / 2, rel=1e-2)
     assert best_gain(evidence) == pytest.approx(4 * 1824 / 2, rel=1e-2)

@@ -52,9 +52,13 @@ def drawn(rng: np.random.Generator, delta: Floats, numerics: Floats, speeds: Flo
     response = mixed / np.abs(EXPECTED)
     r = np.einsum("sij,sj->si", response, delta) + numerics[recording] + rng.normal(size=(len(recording), COUNT))
     return Statistics(
-        recording=recording, r=r, response=response, error=np.ones(len(r)), marker_error=np.ones((len(r), 1)),
+        recording=recording,
+        r=r,
+        response=response,
+        error=np.ones(len(r)),
+        marker_error=np.ones((len(r), 1)),
         lines=rng.exponential(size=(len(r), len(REDUCED), 3)),
-    )  # fmt: skip
+    )
 
 
 def blown(rng: np.random.Generator, segments: int, parts: Floats | float = 0.0) -> Course:
@@ -91,10 +95,14 @@ def made(seed: int, *, moments: bool = False, courses: bool = False, settled: bo
     if settled:
         own = replace(own, settled=0.1 * rng.normal(size=(recordings, 2))[own.recording])
     nulls = Nulls(
-        statistics=own, speeds=speeds[own.recording], calibration=cloths, noise=np.zeros(len(cloths)),
-        period=np.full(len(cloths), 0.04), cloth=np.full(len(cloths), "made"),
+        statistics=own,
+        speeds=speeds[own.recording],
+        calibration=cloths,
+        noise=np.zeros(len(cloths)),
+        period=np.full(len(cloths), 0.04),
+        cloth=np.full(len(cloths), "made"),
         numerics=np.repeat(np.arange(KINDS), CLOTHS * WINDS * SEGMENTS),
-    )  # fmt: skip
+    )
     return NullBank(nulls=nulls, columns=names(), duration=2.0, words="made")
 
 

@@ -34,9 +34,12 @@ LEVEL = 0.1
 """Twelve kinds can test at 1/13."""
 CLOTH = Calibration(density=1.05, bending=0.8, damping=3e-3)
 SETUP = Setup(
-    outline=sheet(SIZE, SIZE), material=named("camel-ponte-roma"), pins=Hold.TOP_CORNERS, carried=True,
+    outline=sheet(SIZE, SIZE),
+    material=named("camel-ponte-roma"),
+    pins=Hold.TOP_CORNERS,
+    carried=True,
     vertices=VERTICES,
-)  # fmt: skip
+)
 DRAG = EFFECTS["tangential-linear-drag"](coefficient=0.8)
 
 
@@ -45,9 +48,13 @@ def specimen() -> Specimen:
     seats = mesh.rest[list(held)]
     anchors = np.stack([seats[:, 0], 0 * seats[:, 0], seats[:, 1]], axis=1)
     return Specimen(
-        mesh=mesh, material=named("camel-ponte-roma"), held=held, anchors=anchors, stiffness=math.inf,
+        mesh=mesh,
+        material=named("camel-ponte-roma"),
+        held=held,
+        anchors=anchors,
+        stiffness=math.inf,
         anchors_given=False,
-    )  # fmt: skip
+    )
 
 
 def ways(anchors: np.ndarray) -> tuple[AttachmentTrack, ...]:
@@ -66,9 +73,17 @@ def observations(*effects: Effect, seed: int) -> list[Observation]:
     """Recordings of one cloth along both ways, by a mesh and steps of their own."""
     cloth = specimen()
     batch = NullBatch(
-        specimen=cloth, markers=cloth.mesh.rest, rate=RATE, duration=DURATION, noise=NOISE, calibrations=(CLOTH,) * 2,
-        speeds=(0.0, 0.0), seed=seed, tracks=ways(cloth.anchors), effects=effects,
-    )  # fmt: skip
+        specimen=cloth,
+        markers=cloth.mesh.rest,
+        rate=RATE,
+        duration=DURATION,
+        noise=NOISE,
+        calibrations=(CLOTH,) * 2,
+        speeds=(0.0, 0.0),
+        seed=seed,
+        tracks=ways(cloth.anchors),
+        effects=effects,
+    )
     calm = WindTrack.constant((0.0, 0.0, 0.0))
     return [
         from_arrays(name=f"way {k}", positions=r.positions, rest=r.markers, rate=RATE, wind=calm, noise=NOISE)
@@ -148,13 +163,24 @@ def test_close_loop_judges_a_table_of_a_carried_cloth(
     takes = "\n".join(f'[[recording]]\ntake = "way {k}"\n{source}' for k in range(2))
     recipe.write_text(
         f'[cloth]\nwidth = {SIZE}\nheight = {SIZE}\nvertices = {VERTICES}\n[material]\nname = "camel-ponte-roma"\n'
-        f'[pins]\nat = "top-corners"\ncarried = true\n{takes}\n', encoding="utf-8",
-    )  # fmt: skip
+        f'[pins]\nat = "top-corners"\ncarried = true\n{takes}\n',
+        encoding="utf-8",
+    )
     with pytest.raises(SystemExit) as ended:
         main(
-            ["close-loop", "--recipe", str(recipe), "--bank", str(bank), "--level", str(LEVEL), "--json",
-             "--out", str(tmp_path / "loop")]
-        )  # fmt: skip
+            [
+                "close-loop",
+                "--recipe",
+                str(recipe),
+                "--bank",
+                str(bank),
+                "--level",
+                str(LEVEL),
+                "--json",
+                "--out",
+                str(tmp_path / "loop"),
+            ]
+        )
     assert ended.value.code == 0
     said = json.loads(capsys.readouterr().out)
     assert said["conclusion"] == Conclusion.SUFFICIENT.value

@@ -28,9 +28,12 @@ def linearised(_: Forecaster, __: Segments, model: Model) -> Statistics:
     count, size = len(THETA) + len(model.effects), 4
     r = np.full((size, count), np.nan if model.calibration.density < 0.7 else 0.0)
     return Statistics(
-        recording=np.zeros(size, dtype=np.int64), r=r, response=np.tile(10 * np.eye(count), (size, 1, 1)),
-        error=np.ones(size), marker_error=np.ones((size, 1)),
-    )  # fmt: skip
+        recording=np.zeros(size, dtype=np.int64),
+        r=r,
+        response=np.tile(10 * np.eye(count), (size, 1, 1)),
+        error=np.ones(size),
+        marker_error=np.ones((size, 1)),
+    )
 
 
 def null(count: int) -> NullModel:

@@ -42,9 +42,10 @@ def test_what_is_named_is_the_confidence_set_less_what_fails_its_predictive_test
 ) -> None:
     data, rest = seen(null, {"lift.coefficient": 1.0}), seen(null, {}, seed=3)
     refits = {
-        LIFT: predicting(rest, 5.0, leftover=left[0]), HEM: predicting(rest, hem, leftover=left[1], seed=1),
+        LIFT: predicting(rest, 5.0, leftover=left[0]),
+        HEM: predicting(rest, hem, leftover=left[1], seed=1),
         **{column: None for column in range(len(THETA), len(THETA) + 18) if column not in (LIFT, HEM)},
-    }  # fmt: skip
+    }
     found = judge(data, reference, level=0.02, refits=refits)
     assert sorted(named(found)) == said
     assert found.conclusion is (Conclusion.ONE_OF if len(said) > 1 else Conclusion.EFFECT)

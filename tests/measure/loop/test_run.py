@@ -79,9 +79,16 @@ def batches(specimen: Specimen) -> list[NullBatch]:
 def recorded(specimen: Specimen, *effects: Effect, seed: int) -> Experiment:
     """Two winds, by a mesh and steps of their own."""
     batch = NullBatch(
-        specimen=specimen, markers=specimen.mesh.rest, rate=25.0, duration=DURATION, noise=NOISE, speeds=SPEEDS,
-        calibrations=(Calibration(density=1.1, bending=0.7, damping=2e-3),) * len(SPEEDS), seed=seed, effects=effects,
-    )  # fmt: skip
+        specimen=specimen,
+        markers=specimen.mesh.rest,
+        rate=25.0,
+        duration=DURATION,
+        noise=NOISE,
+        speeds=SPEEDS,
+        calibrations=(Calibration(density=1.1, bending=0.7, damping=2e-3),) * len(SPEEDS),
+        seed=seed,
+        effects=effects,
+    )
     return Experiment(specimen=specimen, recordings=tuple(batch.simulate()))
 
 

@@ -24,10 +24,11 @@ def waving(phase: float) -> MeshSequence:
     corner = np.arange(15)[:, None] * 11 + np.arange(10)
     a, b, c, d = (k.ravel() for k in (corner, corner + 11, corner + 12, corner + 1))
     return MeshSequence(
-        time=np.rint(time * NANOSECONDS).astype(np.int64), positions=np.stack([x, y, z], axis=-1).astype(np.float32),
+        time=np.rint(time * NANOSECONDS).astype(np.int64),
+        positions=np.stack([x, y, z], axis=-1).astype(np.float32),
         faces=np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.int32),
         rest=np.stack([u, v], axis=1).astype(np.float32),
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="module")
@@ -72,9 +73,7 @@ def test_the_same_seed_films_the_same(made: Example) -> None:
 def test_kept_examples_are_read_back(made: Example, tmp_path) -> None:
     """And a film that showed no region is passed over."""
     stills = {name: getattr(made.stills, name) for name in ("usual", "least", "greatest")}
-    np.savez_compressed(
-        tmp_path / "00000.npz", pictures=made.pictures, cloth=made.cloth, hoist=made.hoist, **stills
-    )  # fmt: skip
+    np.savez_compressed(tmp_path / "00000.npz", pictures=made.pictures, cloth=made.cloth, hoist=made.hoist, **stills)
     (tmp_path / "00001.npz").write_bytes(b"")
     (found,) = read(tmp_path)
     assert isinstance(found.stills, Stills)

@@ -27,9 +27,15 @@ def batch(specimen: Specimen) -> NullBatch:
     """Two cloths, each in two winds, on soft springs: anchors are seen some millimetres downstream of themselves."""
     soft = replace(specimen, stiffness=100.0, anchors_given=False)
     return NullBatch(
-        specimen=soft, markers=specimen.mesh.rest, rate=25.0, duration=2.4, noise=0.0, seed=4,
-        calibrations=tuple(cloth for cloth in CLOTHS for _ in range(2)), speeds=(4.0, 6.0, 4.0, 6.0),
-    )  # fmt: skip
+        specimen=soft,
+        markers=specimen.mesh.rest,
+        rate=25.0,
+        duration=2.4,
+        noise=0.0,
+        seed=4,
+        calibrations=tuple(cloth for cloth in CLOTHS for _ in range(2)),
+        speeds=(4.0, 6.0, 4.0, 6.0),
+    )
 
 
 def test_anchors_that_are_not_given_are_taken_from_the_recordings_of_each_cloth(batch: NullBatch) -> None:

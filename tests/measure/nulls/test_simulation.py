@@ -20,9 +20,16 @@ from sim.effects.vertical_wind import VerticalWind
 def batch(specimen: Specimen, *, speed: float) -> NullBatch:
     """One gently damped flag of little stretching stiffness, by explicit steps."""
     return NullBatch(
-        specimen=specimen, markers=specimen.mesh.rest, rate=25.0, duration=0.4, noise=0.0, seed=5,
-        calibrations=(Calibration(damping=0.5e-3),), speeds=(speed,), stiffness=StiffnessFactors(stretching=0.02),
-    )  # fmt: skip
+        specimen=specimen,
+        markers=specimen.mesh.rest,
+        rate=25.0,
+        duration=0.4,
+        noise=0.0,
+        seed=5,
+        calibrations=(Calibration(damping=0.5e-3),),
+        speeds=(speed,),
+        stiffness=StiffnessFactors(stretching=0.02),
+    )
 
 
 def usual(nulls: NullBatch) -> np.ndarray:
@@ -80,9 +87,12 @@ def test_a_carried_null_is_held_where_its_way_goes_at_every_frame(specimen: Spec
     moved[:, 1, 2] = 0.02 * np.sin(7 * times)
     way = AttachmentTrack(times=times, places=turned + moved)
     nulls = replace(
-        batch(specimen, speed=0.0), specimen=replace(specimen, held=held, anchors=turned, stiffness=math.inf),
-        stiffness=StiffnessFactors(), tracks=(way,), duration=1.0,
-    )  # fmt: skip
+        batch(specimen, speed=0.0),
+        specimen=replace(specimen, held=held, anchors=turned, stiffness=math.inf),
+        stiffness=StiffnessFactors(),
+        tracks=(way,),
+        duration=1.0,
+    )
     (recording,) = nulls.simulate()
     assert recording.attachments is not None
     # At up to 0.4 m/s, half a millisecond of an explicit step is 0.2 mm; a frame of 40 ms would be 16 mm.

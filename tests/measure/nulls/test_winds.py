@@ -20,9 +20,12 @@ def recording(speed: float, *, share: float, along: float = 0.0) -> Trajectory:
     times = np.arange(0.0, 14.0, 0.05)
     size = speed * (1 + share * np.sin(2 * math.pi * times / 3))
     return Trajectory(
-        name=f"{speed}", markers=np.zeros((1, 2)), positions=np.zeros((301, 1, 3)), rate=25.0,
+        name=f"{speed}",
+        markers=np.zeros((1, 2)),
+        positions=np.zeros((301, 1, 3)),
+        rate=25.0,
         wind=WindTrack(times=times, velocity=np.outer(size, [math.cos(along), math.sin(along), 0.0])),
-    )  # fmt: skip
+    )
 
 
 def test_nulls_of_steady_data_have_no_winds_of_their_own() -> None:

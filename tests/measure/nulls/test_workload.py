@@ -16,9 +16,13 @@ from measure.observe.trajectory import Trajectory, WindTrack
 def recording(seconds: float) -> Trajectory:
     frames = round(seconds * 25)
     return Trajectory(
-        name="flag", markers=np.array([[0.1, 0.1], [0.9, 0.5]]), positions=np.zeros((frames, 2, 3)), rate=25.0,
-        wind=WindTrack.constant((4.0, 0.0, 0.0)), noise=1e-3,
-    )  # fmt: skip
+        name="flag",
+        markers=np.array([[0.1, 0.1], [0.9, 0.5]]),
+        positions=np.zeros((frames, 2, 3)),
+        rate=25.0,
+        wind=WindTrack.constant((4.0, 0.0, 0.0)),
+        noise=1e-3,
+    )
 
 
 def simulated(said: str) -> float:

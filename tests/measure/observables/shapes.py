@@ -31,9 +31,7 @@ def window(motion: Motion, *, view: View = SIDE_ON, seconds: float = 2.5, rate: 
     times = np.arange(round(seconds * rate) + 1) / rate
     positions = np.stack([np.stack(motion(rest[:, 0], rest[:, 1], t), axis=1) for t in times])
     hoist, free = edges_of(rest)
-    return seen_from(
-        view, positions, times=times, faces=faces, hoist=hoist, free=free, length=LENGTH, height=HEIGHT
-    )  # fmt: skip
+    return seen_from(view, positions, times=times, faces=faces, hoist=hoist, free=free, length=LENGTH, height=HEIGHT)
 
 
 def hinged(angle: Callable[[float], float]) -> Motion:

@@ -89,9 +89,16 @@ def seen() -> Seen:
     masks, expected = outliner.masks(small)
     scale = float(outliner.hoist[1, 1] - outliner.hoist[0, 1]) / HEIGHT
     own = FilmWindow(
-        times=film.cloth.times, frames=small, masks=masks, shown=expected > 0.9, scale=scale,
-        hoist=outliner.hoist, side=outliner.side, length=LENGTH, height=HEIGHT,
-    )  # fmt: skip
+        times=film.cloth.times,
+        frames=small,
+        masks=masks,
+        shown=expected > 0.9,
+        scale=scale,
+        hoist=outliner.hoist,
+        side=outliner.side,
+        length=LENGTH,
+        height=HEIGHT,
+    )
     return Seen(painted=film, masks=masks, expected=expected, outliner=outliner, window=own)
 
 

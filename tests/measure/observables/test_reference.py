@@ -41,9 +41,15 @@ def blocks(name: str, wind: int, observable: str) -> NDArray[np.float64]:
     for first in range(0, 248, 62):
         part = slice(first, first + 63)
         cloth = seen_from(
-            View(azimuth=math.radians(70)), positions[part], times=np.arange(63) / 25, faces=faces, hoist=hoist,
-            free=free, length=1.5, height=1.0,
-        )  # fmt: skip
+            View(azimuth=math.radians(70)),
+            positions[part],
+            times=np.arange(63) / 25,
+            faces=faces,
+            hoist=hoist,
+            free=free,
+            length=1.5,
+            height=1.0,
+        )
         found.append(OBSERVABLES[observable].of_cloth(cloth).value)
     return np.array(found)
 

@@ -26,9 +26,7 @@ def unrolled(u: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.f
     step = s[1] - s[0]
     x = np.concatenate([np.zeros((len(times), 1)), np.cumsum(np.cos(middle) * step, axis=1)], axis=1)
     y = np.concatenate([np.zeros((len(times), 1)), np.cumsum(np.sin(middle) * step, axis=1)], axis=1)
-    return np.stack(
-        [np.stack([np.interp(u, s, row) for row in part]) for part in (x, y)], axis=-1
-    )  # fmt: skip
+    return np.stack([np.stack([np.interp(u, s, row) for row in part]) for part in (x, y)], axis=-1)
 
 
 def flutter(rest: NDArray[np.float64], times: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -30,7 +30,7 @@ from sim.scene import Scene, assemble, upright
 SIZE, RATE, SECONDS = 0.4, 25.0, 4.0
 SETUP = Setup(
     outline=sheet(SIZE, SIZE), material=named("camel-ponte-roma"), pins=Hold.TOP_CORNERS, carried=True, vertices=64
-)  # fmt: skip
+)
 
 
 @pytest.fixture(scope="module")
@@ -97,9 +97,11 @@ def test_what_a_carried_cloth_cannot_have_moves_no_prediction(swung: Observation
     chosen = [one for one in columns() if one.name in sought]
     moved = [bool(forecaster.sensitivity(one, segments, starts, base).any()) for one in chosen]
     assert dict(zip((one.name for one in chosen), moved, strict=True)) == {
-        "air-density.change": True, "full-hoist.stiffness": False, "tilted-pole.lean": False,
+        "air-density.change": True,
+        "full-hoist.stiffness": False,
+        "tilted-pole.lean": False,
         "tilted-pole.sway": False,
-    }  # fmt: skip
+    }
 
 
 def test_recordings_agree_on_whether_the_cloth_is_carried(swung: Observation) -> None:

@@ -19,9 +19,7 @@ def on_mesh(columns: int, rows: int, name: str, noise: float = 0.0) -> Observati
     rest, times = markers(columns, rows), np.arange(round(4 * RATE)) / RATE
     positions = flutter(rest, times)
     positions = positions + noise * np.random.default_rng(len(rest)).standard_normal(positions.shape)
-    return Observation(
-        name=name, markers=rest, positions=positions, times=times, known=Known(wind=WIND), noise=noise
-    )  # fmt: skip
+    return Observation(name=name, markers=rest, positions=positions, times=times, known=Known(wind=WIND), noise=noise)
 
 
 def test_meshes_that_differ_are_followed_at_the_same_points() -> None:

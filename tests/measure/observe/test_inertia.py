@@ -25,9 +25,13 @@ TIMES = np.arange(150) / RATE
 
 def experiment(positions: NDArray[np.float64], hold: Hold, wind: float) -> tuple[Trajectory, Specimen]:
     seen = Observation(
-        name="plate", markers=REST, positions=positions, times=TIMES, noise=0.0,
+        name="plate",
+        markers=REST,
+        positions=positions,
+        times=TIMES,
+        noise=0.0,
         known=Known(wind=WindTrack.constant((wind, 0.0, 0.0))),
-    )  # fmt: skip
+    )
     setup = Setup(
         outline=sheet(WIDTH, HEIGHT), material=CLOTH, pins=hold, air=QuadraticNormal(density=DENSITY), gravity=GRAVITY
     )

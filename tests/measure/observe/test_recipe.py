@@ -91,16 +91,22 @@ def _meshes(seconds: float = 2.2) -> MeshSequence:
     mesh = grid(width=WIDTH, height=HEIGHT, columns=9, rows=6)
     times = np.arange(round(seconds * RATE)) / RATE
     return MeshSequence(
-        time=np.rint(times * 1e9).astype(np.int64), positions=flutter(mesh.rest, times).astype(np.float32),
-        faces=mesh.faces.astype(np.int32), rest=mesh.rest.astype(np.float32),
-    )  # fmt: skip
+        time=np.rint(times * 1e9).astype(np.int64),
+        positions=flutter(mesh.rest, times).astype(np.float32),
+        faces=mesh.faces.astype(np.int32),
+        rest=mesh.rest.astype(np.float32),
+    )
 
 
 SCENE = {
-    "frame_time": 1 / RATE, "frame_steps": 4, "gravity": [0, 0, -9.81], "wind": {"velocity": [5, 0, 0], "density": 1.2},
+    "frame_time": 1 / RATE,
+    "frame_steps": 4,
+    "gravity": [0, 0, -9.81],
+    "wind": {"velocity": [5, 0, 0], "density": 1.2},
     "cloths": [{"mesh": "flag.obj", "materials": [{"data": "materials/camel-ponte-roma.json", "thicken": 2}]}],
-    "handles": [{"nodes": list(range(7))}], "magic": {"handle_stiffness": 2e3},
-}  # fmt: skip
+    "handles": [{"nodes": list(range(7))}],
+    "magic": {"handle_stiffness": 2e3},
+}
 
 
 @pytest.fixture(scope="module")
@@ -122,9 +128,7 @@ def test_an_arcsim_folder_needs_nothing_else(folder: Path, tmp_path: Path):
     assert len(specimen.held) == 7
     np.testing.assert_array_equal(recording.wind.velocity, [[5, 0, 0]])
     assert recording.rate == pytest.approx(RATE, rel=1e-6)
-    assert {f.kind for f in observed.findings} == {
-        "simulated-with-numerical-damping", "simulated-with-other-stages"
-    }  # fmt: skip
+    assert {f.kind for f in observed.findings} == {"simulated-with-numerical-damping", "simulated-with-other-stages"}
 
 
 def test_a_rate_other_than_the_folders_own_is_reported(folder: Path):

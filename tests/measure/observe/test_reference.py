@@ -24,9 +24,13 @@ def run(reference_data: Path, name: str, frames: slice = slice(50, 150)) -> Obse
     with np.load(reference_data / "arcsim" / f"flag_{name}.npz") as stored:
         known, _ = of_arcsim(json.loads(str(stored["scene"])), stored["rest"].astype(np.float64), where=name)
         return from_arrays(
-            name=name, positions=stored["positions"][frames], rest=stored["rest"], faces=stored["faces"], rate=25.0,
+            name=name,
+            positions=stored["positions"][frames],
+            rest=stored["rest"],
+            faces=stored["faces"],
+            rate=25.0,
             known=known,
-        )  # fmt: skip
+        )
 
 
 @pytest.mark.parametrize("name", ["w4_dt5", "w8_dt5", "w4_dt05"])

@@ -23,8 +23,9 @@ def series(**channels: list[float]) -> WindSeries:
     return WindSeries(
         time=BEGIN + np.arange(n, dtype=np.int64) * 1_000_000_000,
         channels={name: np.array(values) for name, values in channels.items()},
-        flags=np.zeros(n, dtype=np.uint16), sensor=Sensor(name="test"),
-    )  # fmt: skip
+        flags=np.zeros(n, dtype=np.uint16),
+        sensor=Sensor(name="test"),
+    )
 
 
 @pytest.mark.parametrize(

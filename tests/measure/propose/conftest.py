@@ -53,9 +53,13 @@ def below(rest: np.ndarray) -> Tensor:
 @pytest.fixture(scope="session")
 def columns() -> tuple[EffectColumn, ...]:
     terms = (
-        ("upward", "lower"), ("downwind", "fly"), ("leftward", "everywhere"), ("leftward", "lower"),
-        ("toward_pole", "lower_fly"), ("against_motion", "everywhere"),
-    )  # fmt: skip
+        ("upward", "lower"),
+        ("downwind", "fly"),
+        ("leftward", "everywhere"),
+        ("leftward", "lower"),
+        ("toward_pole", "lower_fly"),
+        ("against_motion", "everywhere"),
+    )
     return columns_of([Term(field=field, shape=shape) for field, shape in terms])
 
 
@@ -73,9 +77,16 @@ def simulated(
     seed: int,
 ) -> NullBatch:
     return NullBatch(
-        specimen=specimen, markers=specimen.mesh.rest, rate=RATE, duration=DURATION, noise=NOISE, seed=seed,
-        calibrations=tuple(calibrations), speeds=tuple(speeds), effects=effects,
-    )  # fmt: skip
+        specimen=specimen,
+        markers=specimen.mesh.rest,
+        rate=RATE,
+        duration=DURATION,
+        noise=NOISE,
+        seed=seed,
+        calibrations=tuple(calibrations),
+        speeds=tuple(speeds),
+        effects=effects,
+    )
 
 
 @pytest.fixture(scope="session")
@@ -88,11 +99,12 @@ def nulls(specimen: Specimen, columns: tuple[EffectColumn, ...], directions: tup
         # Damping beyond 1 ms: the implicit method, which is the cheaper one here.
         cloths = [
             Calibration(
-                density=float(rng.uniform(0.8, 1.25)), bending=float(rng.uniform(0.4, 2.5)),
+                density=float(rng.uniform(0.8, 1.25)),
+                bending=float(rng.uniform(0.4, 2.5)),
                 damping=float(rng.uniform(1.1e-3, 4e-3)),
             )
             for _ in range(CLOTHS)
-        ]  # fmt: skip
+        ]
         calibrations = [cloth for cloth in cloths for _ in range(RECORDINGS // CLOTHS)]
         speeds = [float(u) for u in rng.uniform(3.2, 6.5, RECORDINGS)]
         made, duration = evaluate(simulated(specimen, calibrations, speeds, (), seed), seed, (*directions, *columns))

@@ -28,19 +28,39 @@ ROOT = Path(__file__).resolve().parents[3]
 
 def proposal(**fitted: tuple[float, str]) -> Outcome:
     course = Course(
-        bin=0.2, times=[], amplitudes=[], by_recording=[], speeds=[], fluctuation=0.0, lines=[], words="",
-    )  # fmt: skip
+        bin=0.2,
+        times=[],
+        amplitudes=[],
+        by_recording=[],
+        speeds=[],
+        fluctuation=0.0,
+        lines=[],
+        words="",
+    )
     strengths = tuple(
         Strength(
-            name=name, words="a push", course=course,
+            name=name,
+            words="a push",
+            course=course,
             estimate=Estimate(value=value, low=value - 0.1, high=value + 0.1, unit=unit),
         )
         for name, (value, unit) in fitted.items()
-    )  # fmt: skip
+    )
     return Outcome(
-        decision=Decision.KEPT, reason="", steps=(), tried=6, ranking=(), strengths=strengths,
-        retest=None, level=0.03, nulls="", proposed_from="ab12" * 16, tested_on="cd34" * 16, known=(), seed=0,
-    )  # fmt: skip
+        decision=Decision.KEPT,
+        reason="",
+        steps=(),
+        tried=6,
+        ranking=(),
+        strengths=strengths,
+        retest=None,
+        level=0.03,
+        nulls="",
+        proposed_from="ab12" * 16,
+        tested_on="cd34" * 16,
+        known=(),
+        seed=0,
+    )
 
 
 @pytest.fixture
@@ -123,8 +143,12 @@ def test_its_own_contract_tests_and_the_librarys_pass(two: Outcome, heavy: Outco
     files = [*own_tests, ROOT / "tests/contract/test_effects.py"]
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", chosen, *map(str, files)],
-        cwd=ROOT, env=environment, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-1000:]
     passed = int(done.stdout.rsplit(" passed", 1)[0].split()[-1])
     # Of each file's own five and a gradient for each strength, and one for each law of the library's contract.

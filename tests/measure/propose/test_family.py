@@ -27,18 +27,24 @@ def drawn(rng: np.random.Generator) -> tuple[Nulls, Statistics]:
     square = np.tile(np.eye(DIRECTIONS), (count, 1, 1))
     shifts = rng.normal(size=(KINDS, DIRECTIONS)) * np.linspace(1, 0, DIRECTIONS)
     r = shifts[numerics] + rng.normal(size=(count, DIRECTIONS)) @ mixing.T
-    own = Statistics(
-        recording=recording, r=r, response=square, error=np.ones(count), marker_error=np.ones((count, 1))
-    )  # fmt: skip
+    own = Statistics(recording=recording, r=r, response=square, error=np.ones(count), marker_error=np.ones((count, 1)))
     nulls = Nulls(
-        statistics=own, speeds=rng.uniform(3, 6, count), calibration=offsets, numerics=numerics, noise=np.zeros(count),
-        period=np.full(count, 0.04), cloth=np.full(count, "made"),
-    )  # fmt: skip
+        statistics=own,
+        speeds=rng.uniform(3, 6, count),
+        calibration=offsets,
+        numerics=numerics,
+        noise=np.zeros(count),
+        period=np.full(count, 0.04),
+        cloth=np.full(count, "made"),
+    )
     terms = np.tile(rng.normal(size=(DIRECTIONS, TERMS)), (4, 1, 1))
     seen = Statistics(
-        recording=np.array([0, 0, 1, 1]), r=np.zeros((4, DIRECTIONS)), error=np.ones(4), marker_error=np.ones((4, 1)),
+        recording=np.array([0, 0, 1, 1]),
+        r=np.zeros((4, DIRECTIONS)),
+        error=np.ones(4),
+        marker_error=np.ones((4, 1)),
         response=np.concatenate([square[:4, :, :3], terms], axis=2),
-    )  # fmt: skip
+    )
     return nulls, seen
 
 

@@ -20,10 +20,12 @@ from measure.propose.terms import Term, columns_of
 
 TERMS = columns_of(
     [
-        Term(field="leftward", shape="lower"), Term(field="mass", shape="near_75_30"),
-        Term(field="leftward", shape="everywhere"), Term(field="mass", shape="band_50"),
+        Term(field="leftward", shape="lower"),
+        Term(field="mass", shape="near_75_30"),
+        Term(field="leftward", shape="everywhere"),
+        Term(field="mass", shape="band_50"),
     ]
-)  # fmt: skip
+)
 
 
 @pytest.fixture(scope="module")

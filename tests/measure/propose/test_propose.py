@@ -55,9 +55,12 @@ def test_the_effect_of_the_file_is_the_planted_field(found: Outcome, specimen: S
     assert isinstance(effect, FieldEffect)
     system, state = assemble([flag(material=specimen.material, wind_speed=4.5, columns=6)], dtype=torch.float64)
     seen = Seen(
-        cloth=system.cloth, position=state.position, offset=state.position - system.anchors.mean(0),
-        velocity=state.velocity, wind=system.wind.velocity(0.0),
-    )  # fmt: skip
+        cloth=system.cloth,
+        position=state.position,
+        offset=state.position - system.anchors.mean(0),
+        velocity=state.velocity,
+        wind=system.wind.velocity(0.0),
+    )
     field = effect.acceleration(seen).expand(state.position.shape)[..., 0].numpy()
     share = system.cloth.mesh.rest[:, 1] / system.cloth.mesh.rest[:, 1].max()
     planted = 5 / (1 + np.exp(-(0.5 - share) * 0.5 / 0.06))
@@ -88,10 +91,18 @@ def outcome_of(*, low: float, apart: tuple[float, float] | None) -> tuple[Decisi
     some = Estimate(value=0.01, low=0.009, high=0.011, unit="m")
     control = None if apart is None else Estimate(value=apart[0], low=apart[1], high=0.01, unit="1")
     return Retest(
-        what="", segments=6, before=some, after=some, reduction=some, floor=some, share=None,
+        what="",
+        segments=6,
+        before=some,
+        after=some,
+        reduction=some,
+        floor=some,
+        share=None,
         helped=replace(some, low=low),
-        control=None if apart is None else some, apart=control, control_names=("drag",),
-    ).decided  # fmt: skip
+        control=None if apart is None else some,
+        apart=control,
+        control_names=("drag",),
+    ).decided
 
 
 @pytest.mark.parametrize(
@@ -99,10 +110,11 @@ def outcome_of(*, low: float, apart: tuple[float, float] | None) -> tuple[Decisi
     [
         (-1e-4, None, Decision.REJECTED, "not significantly lower"),
         (1e-4, (-1e-4, -2e-4), Decision.REJECTED, "as much"),
-        (1e-4, (1e-4, -1e-4), Decision.KEPT, "form is open"), (1e-4, (1e-3, 5e-4), Decision.KEPT, "spent on drag"),
+        (1e-4, (1e-4, -1e-4), Decision.KEPT, "form is open"),
+        (1e-4, (1e-3, 5e-4), Decision.KEPT, "spent on drag"),
         (1e-4, None, Decision.KEPT, "no term of another direction"),
     ],
-)  # fmt: skip
+)
 def test_what_helps_no_more_than_a_wrong_term_is_rejected(
     low: float, apart: tuple[float, float] | None, decision: Decision, said: str
 ) -> None:

@@ -22,9 +22,12 @@ MARKERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
 def recording(name: str, speed: float, *, seconds: float = 8.6) -> Trajectory:
     rng = np.random.default_rng(len(name))
     return Trajectory(
-        name=name, markers=MARKERS, positions=rng.normal(size=(round(25 * seconds), 3, 3)), rate=25.0,
+        name=name,
+        markers=MARKERS,
+        positions=rng.normal(size=(round(25 * seconds), 3, 3)),
+        rate=25.0,
         wind=WindTrack.constant((speed, 0.0, 0.0)),
-    )  # fmt: skip
+    )
 
 
 def of(*speeds: float, seconds: float = 8.6) -> tuple[Segments, np.ndarray]:
@@ -61,9 +64,20 @@ def test_the_hash_is_of_positions_and_wind() -> None:
 
 def outcome(seed: int) -> Outcome:
     return Outcome(
-        decision=Decision.REJECTED, reason="nulls show as much", steps=(), tried=6, ranking=(), strengths=(),
-        retest=None, level=0.03, nulls="none", proposed_from="ab", tested_on="cd", known=(), seed=seed,
-    )  # fmt: skip
+        decision=Decision.REJECTED,
+        reason="nulls show as much",
+        steps=(),
+        tried=6,
+        ranking=(),
+        strengths=(),
+        retest=None,
+        level=0.03,
+        nulls="none",
+        proposed_from="ab",
+        tested_on="cd",
+        known=(),
+        seed=seed,
+    )
 
 
 def test_the_proposal_log_keeps_earlier_entries(tmp_path: Path) -> None:

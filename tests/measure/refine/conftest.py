@@ -54,13 +54,20 @@ def view() -> FixedView:
 def estimator() -> Estimator:
     with torch_draws(3, "network"):
         learner = Learner(
-            WaveNetwork(dimension=6, widths=(4, 6, 8)), loss=Loss.POSTERIOR, components=2,
+            WaveNetwork(dimension=6, widths=(4, 6, 8)),
+            loss=Loss.POSTERIOR,
+            components=2,
             targets=("wind_speed", "density", "bending_scale", "anisotropy"),
-        )  # fmt: skip
+        )
     return Estimator(
-        name="random", learners=(learner.eval(),), front_end=FrontEnd(maps="wave-maps", size=32, frames=FRAMES),
-        cropping=Cropping(frames=FRAMES, size=32), widening=torch.ones(4), cloud=None, card={},
-    )  # fmt: skip
+        name="random",
+        learners=(learner.eval(),),
+        front_end=FrontEnd(maps="wave-maps", size=32, frames=FRAMES),
+        cropping=Cropping(frames=FRAMES, size=32),
+        widening=torch.ones(4),
+        cloud=None,
+        card={},
+    )
 
 
 @pytest.fixture

@@ -41,9 +41,13 @@ def whole(recipe: Recipe, estimator: Estimator, target: Target, tmp_path_factory
 
 
 def test_killed_and_resumed_it_gives_the_same_result(
-    recipe: Recipe, estimator: Estimator, target: Target, whole: Refinement, tmp_path: Path,
+    recipe: Recipe,
+    estimator: Estimator,
+    target: Target,
+    whole: Refinement,
+    tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+) -> None:
     made: list[int] = []
     films = Simulator.films
 

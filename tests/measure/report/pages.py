@@ -31,9 +31,7 @@ class Page(HTMLParser):
         super().__init__(convert_charrefs=True)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        element = Element(
-            tag=tag, attributes={k: v or "" for k, v in attrs}, inside=tuple(e.tag for e in self.open)
-        )  # fmt: skip
+        element = Element(tag=tag, attributes={k: v or "" for k, v in attrs}, inside=tuple(e.tag for e in self.open))
         if len(element.attributes) != len(attrs):
             self.faults.append(f"{self.getpos()}: an attribute of <{tag}> stands twice")
         self.elements.append(element)

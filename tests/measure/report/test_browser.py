@@ -78,10 +78,24 @@ def seen(html: str, folder: Path, *options: str) -> dict[str, object]:
     file.write_text(html, encoding="utf-8")
     assert BROWSER
     done = subprocess.run(
-        [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--window-size=1280,1000", "--enable-logging=stderr",
-         "--virtual-time-budget=20000", f"--user-data-dir={folder / 'profile'}", *options, "--dump-dom", file.as_uri()],
-        capture_output=True, text=True, check=True, timeout=300,
-    )  # fmt: skip
+        [
+            BROWSER,
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--window-size=1280,1000",
+            "--enable-logging=stderr",
+            "--virtual-time-budget=20000",
+            f"--user-data-dir={folder / 'profile'}",
+            *options,
+            "--dump-dom",
+            file.as_uri(),
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=300,
+    )
     match = re.search(r'<pre id="probe">(.*?)</pre>', done.stdout, re.DOTALL)
     assert match, done.stderr
     text = match[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&")

@@ -15,9 +15,15 @@ from tests.measure.report.verdicts import about, verdict
 
 @pytest.mark.parametrize(
     ("p", "word"),
-    [(0.0004, "very strong"), (0.001, "very strong"), (0.004, "strong"), (0.024, "moderate"), (0.08, "weak"),
-     (0.4, "little or no")],
-)  # fmt: skip
+    [
+        (0.0004, "very strong"),
+        (0.001, "very strong"),
+        (0.004, "strong"),
+        (0.024, "moderate"),
+        (0.08, "weak"),
+        (0.4, "little or no"),
+    ],
+)
 def test_the_evidence_has_the_words_of_its_source(p: float, word: str) -> None:
     test = verdict(Conclusion.EFFECT).test
     assert evidence(replace(test, p_value=replace(test.p_value, value=p))) == f"{word} evidence"
@@ -50,9 +56,7 @@ def test_what_is_explained_is_pooled_over_what_lies_above_the_floor() -> None:
 
 def test_without_a_share_the_error_itself_is_compared() -> None:
     whole = verdict(Conclusion.EFFECT)
-    halved = tuple(
-        replace(c, share=None, before=about(2.0, 0.1), after=about(1.0, 0.1)) for c in whole.comparisons
-    )  # fmt: skip
+    halved = tuple(replace(c, share=None, before=about(2.0, 0.1), after=about(1.0, 0.1)) for c in whole.comparisons)
     assert explained(replace(whole, comparisons=halved)) == "75 % of the squared error"
     assert explained(replace(whole, comparisons=())) == ""
     worse = replace(whole.comparisons[0], before=about(1.0, 0.1), after=about(1.1, 0.1))

@@ -206,11 +206,23 @@ def test_markers_on_a_line_are_shown_along_it() -> None:
 
 def test_a_verdict_with_nothing_but_a_test_still_makes_a_page() -> None:
     whole = verdict(Conclusion.SUFFICIENT)
-    bare = replace(whole, parameters=(), ranking=(), comparisons=(), residuals=(), assumptions=(), findings=(),
-                   provenance={}, test=replace(
-                       whole.test, null=[], statistic=math.nan, critical=None,
-                       p_value=Estimate(value=math.nan, low=math.nan, high=math.nan, unit="1"),
-                   ))  # fmt: skip
+    bare = replace(
+        whole,
+        parameters=(),
+        ranking=(),
+        comparisons=(),
+        residuals=(),
+        assumptions=(),
+        findings=(),
+        provenance={},
+        test=replace(
+            whole.test,
+            null=[],
+            statistic=math.nan,
+            critical=None,
+            p_value=Estimate(value=math.nan, low=math.nan, high=math.nan, unit="1"),
+        ),
+    )
     assert parsed(page(bare)).faults == []
 
 

@@ -19,7 +19,7 @@ from tests.measure.report.verdicts import about, verdict
 def test_too_few_nulls_for_the_level_are_called_so() -> None:
     test = NullTest(
         statistic=5.0, null=[1.0] * 38, p_value=about(0.05, 0.01), kinds=19, level=0.01, critical=None, nulls="few"
-    )  # fmt: skip
+    )
     assert "With 19 kinds of numerics no p-value below 0.05" in sentences.test_remark(test)
     whole = replace(verdict(Conclusion.UNTESTED), test=test)
     sentence = sentences.test_sentence(whole)

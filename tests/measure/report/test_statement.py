@@ -88,18 +88,24 @@ def test_a_test_that_another_draw_could_decide_otherwise_says_so_and_what_would_
 def outcome(specimen: Specimen) -> Outcome:
     """An outcome of one recording for which the library has no answer."""
     recording = Trajectory(
-        name="first", markers=specimen.mesh.rest, positions=np.zeros((100, specimen.mesh.vertex_count, 3)), rate=25.0,
+        name="first",
+        markers=specimen.mesh.rest,
+        positions=np.zeros((100, specimen.mesh.vertex_count, 3)),
+        rate=25.0,
         wind=WindTrack.constant((4.0, 0.0, 0.0)),
-    )  # fmt: skip
+    )
     numbers = replace(
         verdict(Conclusion.OUTSIDE), words="", proposal="", separating="", assumptions=(), ranking=(), named=()
     )
     return Outcome(
-        verdict=numbers, experiment=Experiment(specimen=specimen, recordings=(recording,)), lags=(0.5,),
-        at_bounds=("damping",), field=(Mode(column=FieldColumn(axis=1, mode=(0, 0)), value=3.0, error=0.2),),
+        verdict=numbers,
+        experiment=Experiment(specimen=specimen, recordings=(recording,)),
+        lags=(0.5,),
+        at_bounds=("damping",),
+        field=(Mode(column=FieldColumn(axis=1, mode=(0, 0)), value=3.0, error=0.2),),
         line=Line(far=9.0, reduced=0.2 / 0.15, direction=1),
         course=Variation(whole=np.array([0.0169, 0.0, 0.0]), fast=np.array([0.0144, 0.0, 0.0])),
-    )  # fmt: skip
+    )
 
 
 def test_an_outcome_without_an_answer_is_stated_with_its_line_its_course_and_its_field_in_this_order(

@@ -65,9 +65,8 @@ PLAIN = {0, 1, 2, 3, -1}
 
 def numbers(node: ast.AST) -> list[float]:
     return [
-        found.value for found in ast.walk(node)
-        if isinstance(found, ast.Constant) and type(found.value) in (int, float)
-    ]  # fmt: skip
+        found.value for found in ast.walk(node) if isinstance(found, ast.Constant) and type(found.value) in (int, float)
+    ]
 
 
 def constants(path: Path) -> set[str]:
@@ -89,9 +88,11 @@ def test_no_threshold_lives_outside_the_criteria() -> None:
     assert modules.pop("verdict/criteria")
     assert len(modules) > 40
     found = {
-        (name, constant) for name, path in modules.items() for constant in constants(path) - METHOD.get(name, set())
+        (name, constant)
+        for name, path in modules.items()
+        for constant in constants(path) - METHOD.get(name, set())
         if constant not in tables and not constant.startswith("_STEPS")
-    }  # fmt: skip
+    }
     assert found == set()
 
 

@@ -60,9 +60,18 @@ def test_intervals_worked_by_hand(given: Estimate | None, text: str) -> None:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.0, "0"), (-0.0, "0"), (9.996, "10.0"), (-41.27, "−41.3"), (1234.0, "1230"), (1.5e-6, "1.50 × 10⁻⁶"),
-     (-math.inf, "−∞"), (math.nan, "—"), (None, "—")],
-)  # fmt: skip
+    [
+        (0.0, "0"),
+        (-0.0, "0"),
+        (9.996, "10.0"),
+        (-41.27, "−41.3"),
+        (1234.0, "1230"),
+        (1.5e-6, "1.50 × 10⁻⁶"),
+        (-math.inf, "−∞"),
+        (math.nan, "—"),
+        (None, "—"),
+    ],
+)
 def test_numbers_without_an_uncertainty_have_three_digits_and_a_real_minus(value: float | None, text: str) -> None:
     assert number(value) == text
 

@@ -57,9 +57,11 @@ class Drawn:
                 _cloth(picture, x + pad, y + pad, width, height, time, phase=0.7 * number)
             dx, dy = (0.0, 0.0) if self.shift is None else self.shift[k]
             seen = cv2.warpAffine(
-                picture, np.array([[1.0, 0.0, pad - dx], [0.0, 1.0, pad - dy]]), (WIDTH, HEIGHT),
+                picture,
+                np.array([[1.0, 0.0, pad - dx], [0.0, 1.0, pad - dy]]),
+                (WIDTH, HEIGHT),
                 flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP,
-            )  # fmt: skip
+            )
             out.append(seen + rng.normal(0, self.noise, seen.shape))
         return np.clip(np.rint(out), 0, 255).astype(np.uint8)
 

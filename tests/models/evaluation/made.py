@@ -13,18 +13,27 @@ def generator(seed: int) -> np.random.Generator:
 
 
 def of_wind(
-    truth: list[float] | NDArray, mean: list[float] | NDArray, *, group: list[int] | NDArray | None = None,
-    label: str = "made", embedding: NDArray | None = None, samples: NDArray | None = None,
-) -> Predictions:  # fmt: skip
+    truth: list[float] | NDArray,
+    mean: list[float] | NDArray,
+    *,
+    group: list[int] | NDArray | None = None,
+    label: str = "made",
+    embedding: NDArray | None = None,
+    samples: NDArray | None = None,
+) -> Predictions:
     """Predictions of wind speed alone; each clip is its own sequence unless `group` is given."""
     return Predictions(
-        label=label, targets=("wind_speed",), truth=np.asarray(truth, dtype=np.float64)[:, None],
+        label=label,
+        targets=("wind_speed",),
+        truth=np.asarray(truth, dtype=np.float64)[:, None],
         mean=np.asarray(mean, dtype=np.float64)[:, None],
         samples=None if samples is None else samples.astype(np.float32)[:, :, None],
         embedding=None if embedding is None else embedding.astype(np.float32),
-        group=np.arange(len(truth)) if group is None else np.asarray(group, dtype=np.int64), parameters=10,
-        milliseconds=1.5, note="made",
-    )  # fmt: skip
+        group=np.arange(len(truth)) if group is None else np.asarray(group, dtype=np.int64),
+        parameters=10,
+        milliseconds=1.5,
+        note="made",
+    )
 
 
 def posterior(
@@ -40,7 +49,14 @@ def posterior(
     mean = (truth + random.normal(size=truth.shape)) / 2 + shift * np.sqrt(0.5)
     samples = mean[:, None, :] + wide * np.sqrt(0.5) * random.normal(size=(clips, draws, targets))
     return Predictions(
-        label="posterior", targets=("wind_speed", "density", "anisotropy")[:targets], truth=truth, mean=mean,
-        samples=samples.astype(np.float32), embedding=None, group=np.arange(clips) // group, parameters=10,
-        milliseconds=1.5, note="",
-    )  # fmt: skip
+        label="posterior",
+        targets=("wind_speed", "density", "anisotropy")[:targets],
+        truth=truth,
+        mean=mean,
+        samples=samples.astype(np.float32),
+        embedding=None,
+        group=np.arange(clips) // group,
+        parameters=10,
+        milliseconds=1.5,
+        note="",
+    )

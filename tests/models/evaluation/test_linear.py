@@ -50,9 +50,12 @@ def test_a_linear_embedding_of_the_logarithms_is_read_out_with_r_of_one() -> Non
     random = generator(4)
     logs = random.normal(size=(90, 2))
     found = bouman(
-        logs @ random.normal(size=(2, 60)) + 7, {"stiffness": np.exp(logs[:, 0]), "density": np.exp(logs[:, 1])},
-        group=np.arange(90) // 3, generator=generator(5), components=2,
-    )  # fmt: skip
+        logs @ random.normal(size=(2, 60)) + 7,
+        {"stiffness": np.exp(logs[:, 0]), "density": np.exp(logs[:, 1])},
+        group=np.arange(90) // 3,
+        generator=generator(5),
+        components=2,
+    )
     assert found.targets == ("log stiffness", "log density")
     assert [r.value for r in found.pearson] == pytest.approx([1, 1], abs=1e-9)
     np.testing.assert_allclose(found.predicted, logs, atol=1e-8)
@@ -75,9 +78,11 @@ def test_fewer_components_are_kept_where_the_clips_or_dimensions_do_not_suffice_
     """Of 19 clips that train a fold the mean takes one degree of freedom, and three fifths of 18 are 10."""
     random = generator(7)
     found = bouman(
-        random.normal(size=(clips, dimension)), {"density": random.uniform(1, 2, clips)},
-        group=np.arange(clips), generator=generator(1),
-    )  # fmt: skip
+        random.normal(size=(clips, dimension)),
+        {"density": random.uniform(1, 2, clips)},
+        group=np.arange(clips),
+        generator=generator(1),
+    )
     assert found.components == kept
     (finding,) = found.findings
     assert finding.kind == "fewer-components"

@@ -46,19 +46,25 @@ def ours(seed: int) -> Predictions:
 def found() -> Evaluation:
     readout = bouman(WIND[:, None] + 1, {"density": WIND + 1}, group=GROUP, generator=generator(1), components=1)
     return evaluate(
-        [run("SDN", 0.3, 1), ours(3), run("SDN", 0.5, 2), run("ResNet-18", 1.5, 4)], data="made@v1", seed=0,
+        [run("SDN", 0.3, 1), ours(3), run("SDN", 0.5, 2), run("ResNet-18", 1.5, 4)],
+        data="made@v1",
+        seed=0,
         draws=100,
         learning=[LearningPoint(label="SDN", sequences=n, rmse=9 / n, interval=(8 / n, 10 / n)) for n in (10, 20)],
         frames=[FramesPoint(label="SDN", frames=n, accuracy=0.9, interval=(0.88, 0.93)) for n in (10, 30)],
         reads=[Read(label="SDN", data="hanging cloth", readout=readout)],
-    )  # fmt: skip
+    )
 
 
 def test_runs_of_one_model_are_pooled_as_their_mean_and_range_and_each_is_shown(found: Evaluation) -> None:
     each = [SCORES["rmse"](WIND, of.mean[:, 0]) for of in (run("SDN", 0.3, 1), run("SDN", 0.5, 2))]
     assert [(row.label, row.run) for row in found.rows] == [
-        ("SDN", None), ("SDN", 1), ("SDN", 2), ("ours <&>", None), ("ResNet-18", None),
-    ]  # fmt: skip
+        ("SDN", None),
+        ("SDN", 1),
+        ("SDN", 2),
+        ("ours <&>", None),
+        ("ResNet-18", None),
+    ]
     assert found.rows[0].scores["rmse"].value == pytest.approx(sum(each) / 2)
     assert found.rows[0].spread["rmse"] == pytest.approx((min(each), max(each)))
     assert [row.scores["rmse"].value for row in found.rows[1:3]] == pytest.approx(each)
@@ -90,8 +96,14 @@ def test_a_model_has_no_score_of_what_it_does_not_give(found: Evaluation) -> Non
     by_label = {row.label: row for row in found.rows if row.run is None}
     assert set(by_label["SDN"].scores) == {"rmse", "accuracy", "bias", "triplets"}
     assert set(by_label["ours <&>"].scores) == {
-        "rmse", "accuracy", "bias", "density_error", "covered_50", "covered_80", "covered_90",
-    }  # fmt: skip
+        "rmse",
+        "accuracy",
+        "bias",
+        "density_error",
+        "covered_50",
+        "covered_80",
+        "covered_90",
+    }
     assert by_label["SDN"].scores["triplets"].value == 1.0  # its embedding is the wind, which differs between sequences
 
 
@@ -162,8 +174,9 @@ BAD = "<img src=x onerror=alert(1)> [a](http://b) | `c` *d* &lt; $\\frac$\n# e"
 def test_names_of_models_and_data_are_text_in_markdown_and_on_the_page() -> None:
     """A name may come from anyone's recipe or card. Rendered by a parser of Markdown, it is the text that it was."""
     made = [
-        dataclasses.replace(run("B", 0.3, 1), label=BAD, note=BAD), dataclasses.replace(run("A", 0.4, 2), note=BAD),
-    ]  # fmt: skip
+        dataclasses.replace(run("B", 0.3, 1), label=BAD, note=BAD),
+        dataclasses.replace(run("A", 0.4, 2), note=BAD),
+    ]
     readout = bouman(WIND[:, None] + 1, {"density": WIND + 1}, group=GROUP, generator=generator(1))
     shown = evaluate(
         made, data=BAD, seed=0, draws=10, reference=BAD, reads=[Read(label=BAD, data=BAD, readout=readout)]

@@ -49,8 +49,11 @@ def test_four_rows_of_the_papers_table_break_the_bound() -> None:
     """By hand: 0.5 √0.42 = 0.324, 0.5 √0.225 = 0.237, 0.5 √0.187 = 0.216, 0.5 √0.162 = 0.201, all above the RMSE."""
     broken = [(row.model, row.rmse, round(row.bound, 3)) for row in paper.FLAGSIM if row.breaks_bound]
     assert broken == [
-        ("Cardona et al.", 0.271, 0.324), ("ResNet-18", 0.207, 0.237), ("SDN", 0.183, 0.216), ("SDN", 0.180, 0.201),
-    ]  # fmt: skip
+        ("Cardona et al.", 0.271, 0.324),
+        ("ResNet-18", 0.207, 0.237),
+        ("SDN", 0.183, 0.216),
+        ("SDN", 0.180, 0.201),
+    ]
 
 
 def test_an_accuracy_that_is_no_share_is_refused() -> None:

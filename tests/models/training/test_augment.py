@@ -15,9 +15,17 @@ SIDE, FRAMES = 96, 24
 TIMES = np.arange(FRAMES) / 25
 EVERYWHERE = np.ones((SIDE, SIDE), np.float32)
 TRIED = {
-    "tree": 2.0, "second-flag": 0.3, "shake": 1.5, "blur": 1.0, "gamma": 0.7, "dusk": 0.5, "noise": 3.0, "coding": 34.0,
-    "left-over-shake": 1.0, "pole-sway": 2.0,
-}  # fmt: skip
+    "tree": 2.0,
+    "second-flag": 0.3,
+    "shake": 1.5,
+    "blur": 1.0,
+    "gamma": 0.7,
+    "dusk": 0.5,
+    "noise": 3.0,
+    "coding": 34.0,
+    "left-over-shake": 1.0,
+    "pole-sway": 2.0,
+}
 """A strength of each."""
 
 
@@ -83,8 +91,9 @@ def test_a_pole_sways_to_the_sides_and_what_is_frozen_stays() -> None:
     weight[:, SIDE // 2 :] = 0.0
     film = disturbed("pole-sway", 3.0, weight=weight)
     assert (film[:, :, SIDE // 2 + 1 :] == still()[:, :, SIDE // 2 + 1 :]).all()
-    top, bottom = (float(np.abs(film[:, rows].astype(int) - still()[:, rows]).mean())
-                   for rows in (slice(0, 20), slice(76, 96)))  # fmt: skip
+    top, bottom = (
+        float(np.abs(film[:, rows].astype(int) - still()[:, rows]).mean()) for rows in (slice(0, 20), slice(76, 96))
+    )
     assert top > bottom > 0
 
 
@@ -111,8 +120,11 @@ def test_a_tree_and_a_second_flag_stay_at_the_rim() -> None:
         assert (tree[:, middle, middle] == still()[:, middle, middle]).all()
         assert (tree[1:] != tree[:-1]).any()
         flag = (disturbed("second-flag", 0.2, source=source) != still()).any(axis=0)
-        corners = [flag[rows, columns] for rows in (slice(0, 19), slice(-19, None))
-                   for columns in (slice(0, 19), slice(-19, None))]  # fmt: skip
+        corners = [
+            flag[rows, columns]
+            for rows in (slice(0, 19), slice(-19, None))
+            for columns in (slice(0, 19), slice(-19, None))
+        ]
         assert sum(corner.any() for corner in corners) == 1
         assert flag.sum() == max(corner.sum() for corner in corners)
 
@@ -121,8 +133,9 @@ def test_what_makes_no_disturbance_is_refused() -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'shake'"):
         Augment(strengths={"shaek": Strength(share=0.5, low=0.0, high=1.0)})
     for strength in (
-        Strength(share=1.5, low=0.0, high=1.0), Strength(share=0.5, low=2.0, high=1.0),
+        Strength(share=1.5, low=0.0, high=1.0),
+        Strength(share=0.5, low=2.0, high=1.0),
         Strength(share=0.5, low=0.0, high=60.0),
-    ):  # fmt: skip
+    ):
         with pytest.raises(InputError, match="coding of a share"):
             Augment(strengths={"coding": strength})

@@ -54,9 +54,10 @@ def lake(lake_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     orders = set()
     for seed in (1, 2):
         done = CliRunner().invoke(
-            root, ["train", str(recipe), "--at", "v1", "--seed", str(seed), "--lake", str(path), "--workers", "1"],
+            root,
+            ["train", str(recipe), "--at", "v1", "--seed", str(seed), "--lake", str(path), "--workers", "1"],
             catch_exceptions=False,
-        )  # fmt: skip
+        )
         orders |= set(re.findall(r"^order of the first epoch: ([0-9a-f]{64})$", done.stderr, re.MULTILINE))
     assert len(orders) == 2
     return path
@@ -137,9 +138,22 @@ def test_triplets_are_scored_on_clips_of_other_lengths_and_cloth_is_read_from_em
     lake: Path, tmp_path: Path
 ) -> None:
     found = run(
-        "evaluate", "small", "--dataset", "made", "--at", "main", "--lake", str(lake), "--out", str(tmp_path),
-        "--frames", "8", "--frames", "12", "--linear",
-    )  # fmt: skip
+        "evaluate",
+        "small",
+        "--dataset",
+        "made",
+        "--at",
+        "main",
+        "--lake",
+        str(lake),
+        "--out",
+        str(tmp_path),
+        "--frames",
+        "8",
+        "--frames",
+        "12",
+        "--linear",
+    )
     assert [(point["label"], point["frames"]) for point in found["frames"]] == [("small", 8), ("small", 12)]
     assert all(0 <= point["accuracy"] <= 1 for point in found["frames"])
     assert found["frames"][0]["accuracy"] != found["frames"][1]["accuracy"]
@@ -339,9 +353,15 @@ def test_a_part_of_the_sequences_is_the_beginning_of_one_order(lake: Path, tmp_p
 
     def sequences(count: int | None) -> set[int]:
         found = prepare_films(
-            pairs, recipe.front_end, recipe.cropping, variants=2, folder=tmp_path, workers=1,
-            advance=lambda done: None, sequences=count,
-        )  # fmt: skip
+            pairs,
+            recipe.front_end,
+            recipe.cropping,
+            variants=2,
+            folder=tmp_path,
+            workers=1,
+            advance=lambda done: None,
+            sequences=count,
+        )
         return set(found.sequence.tolist())
 
     assert len(sequences(3)) == 3
@@ -403,9 +423,10 @@ def test_a_recipe_that_does_not_fit_says_what_and_how(old: str, new: str, error:
 def test_a_network_that_is_not_there_is_an_error_with_those_that_are(lake: Path, tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="smal"):
         CliRunner().invoke(
-            root, ["evaluate", "smal", "--dataset", "made", "--lake", str(lake), "--out", str(tmp_path)],
+            root,
+            ["evaluate", "smal", "--dataset", "made", "--lake", str(lake), "--out", str(tmp_path)],
             catch_exceptions=False,
-        )  # fmt: skip
+        )
 
 
 def test_a_data_set_that_is_not_there_is_an_error(lake: Path) -> None:

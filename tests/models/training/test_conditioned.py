@@ -89,9 +89,15 @@ def fast(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def films(path: Path, folder: Path, of: TrainingRecipe) -> Prepared:
     pairs = sides_of(flagdata.open(path), of, "validation", at=None)
     return prepare_films(
-        pairs, of.front_end, of.cropping, variants=2, folder=folder, workers=1, advance=lambda count: None,
+        pairs,
+        of.front_end,
+        of.cropping,
+        variants=2,
+        folder=folder,
+        workers=1,
+        advance=lambda count: None,
         augment=of.augment,
-    )  # fmt: skip
+    )
 
 
 def test_films_of_another_rate_are_learned_from_once_they_are_conditioned(fast: Path, tmp_path: Path) -> None:

@@ -32,9 +32,14 @@ def films(dataset: str, *, seed: int, sides: dict[str, int] | None = None) -> li
             name = f"{dataset}-{side}-{index:05d}"
             sequence = Artifact(kind=Kind.MESHES, name=name, seed=seed, recipe={"of": dataset})
             film = Artifact(
-                kind=Kind.RECORDING, name=name, parents=(sequence.id,), seed=seed, dataset=dataset, side=side,
+                kind=Kind.RECORDING,
+                name=name,
+                parents=(sequence.id,),
+                seed=seed,
+                dataset=dataset,
+                side=side,
                 recipe={"film": 2, "seed": seed},
-            )  # fmt: skip
+            )
             clip = replace(film, kind=Kind.CLIP, parents=(film.id,), recording=film.id)
             rows += [sequence, film, clip]
     return rows
@@ -120,8 +125,10 @@ def test_what_no_data_set_can_be_called_is_refused() -> None:
     cases = ['""', '" "', '"a\\nb"', "3", "[]", '["a", 3]', f'"{"a" * 101}"']
     assert (
         unrefused(
-            lambda entry: parse(RECIPE.format(entry), name="r", where="r.toml"), zip(cases), InputError,
+            lambda entry: parse(RECIPE.format(entry), name="r", where="r.toml"),
+            zip(cases),
+            InputError,
             "the data set is",
         )
         == []
-    )  # fmt: skip
+    )

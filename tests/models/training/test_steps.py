@@ -49,20 +49,30 @@ def prepared(count: int, *, seed: int) -> Prepared:
     maps[:, :, 0] += wind[:, None, None, None] / 10
     parameters = {"wind_speed": wind, "density": rng.uniform(0.1, 0.17, count)}
     return Prepared(
-        maps=maps.astype(np.float16), parameters=parameters, sequence=np.repeat(np.arange(count // 2), 2),
-        fingerprint=f"made-{seed}", front_end=FRONT_END,
-    )  # fmt: skip
+        maps=maps.astype(np.float16),
+        parameters=parameters,
+        sequence=np.repeat(np.arange(count // 2), 2),
+        fingerprint=f"made-{seed}",
+        front_end=FRONT_END,
+    )
 
 
 def recipe(loss: Loss = Loss.POSTERIOR, **optimiser: object) -> TrainingRecipe:
     spec = OptimiserSpec(rate=5e-3, decay=1e-4, batch=8, epochs=4, schedule=Schedule.COSINE, patience=9)
     targets = () if loss is Loss.CONTRASTIVE else ("wind_speed",)
     return TrainingRecipe(
-        name="small", title="", seed=3, data=DataSpec(datasets=("made",)), front_end=FRONT_END,
-        cropping=Cropping(size=SIZE), variants=2, augment=Augment(),
+        name="small",
+        title="",
+        seed=3,
+        data=DataSpec(datasets=("made",)),
+        front_end=FRONT_END,
+        cropping=Cropping(size=SIZE),
+        variants=2,
+        augment=Augment(),
         network=NetworkSpec(name="wave", options={"dimension": 4, "widths": (4, 4, 4)}),
-        loss=LossSpec(name=loss, targets=targets, components=2), optimiser=replace(spec, **optimiser),  # pyright: ignore[reportArgumentType]
-    )  # fmt: skip
+        loss=LossSpec(name=loss, targets=targets, components=2),
+        optimiser=replace(spec, **optimiser),  # pyright: ignore[reportArgumentType]
+    )
 
 
 @contextmanager
@@ -89,9 +99,15 @@ def stopped_after(clips: int) -> Callable[..., object]:
 
 def training(run: Path, own: TrainingRecipe, **changes: object) -> Training:
     given = Training(
-        recipe=own, train=prepared(40, seed=1), validation=prepared(16, seed=2), run=run,
-        identity={"recipe": own.identity()}, device=torch.device("cpu"), bars=silent, checkpoint_seconds=0.0,
-    )  # fmt: skip
+        recipe=own,
+        train=prepared(40, seed=1),
+        validation=prepared(16, seed=2),
+        run=run,
+        identity={"recipe": own.identity()},
+        device=torch.device("cpu"),
+        bars=silent,
+        checkpoint_seconds=0.0,
+    )
     return replace(given, **changes)  # pyright: ignore[reportArgumentType]
 
 
@@ -197,13 +213,22 @@ def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize(
     ("name", "damage"),
-    [("card.json", "changed"), ("weights.safetensors", "changed"), ("moments.safetensors", "cut"),
-     ("best.safetensors", "changed"), ("SHA256SUMS", "cut")],
-)  # fmt: skip
+    [
+        ("card.json", "changed"),
+        ("weights.safetensors", "changed"),
+        ("moments.safetensors", "cut"),
+        ("best.safetensors", "changed"),
+        ("SHA256SUMS", "cut"),
+    ],
+)
 def test_a_damaged_checkpoint_is_passed_over_for_the_one_before_and_the_weights_stay_the_same(
-    stopped: Path, whole: Callable[[Loss], Trained], tmp_path: Path, caplog: pytest.LogCaptureFixture,
-    name: str, damage: str,
-) -> None:  # fmt: skip
+    stopped: Path,
+    whole: Callable[[Loss], Trained],
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+    name: str,
+    damage: str,
+) -> None:
     run = Path(shutil.copytree(stopped, tmp_path / "run"))
     spoil(run / "last" / name, damage)
     taken_up, unbroken = (
@@ -265,9 +290,14 @@ def test_an_evaluation_says_how_many_truths_the_network_cannot_state() -> None:
     strong.parameters["wind_speed"][7:10] = 14.0
     own = recipe()
     judged = Estimator(
-        name="small", learners=(own.learner().eval(),), front_end=own.front_end, cropping=own.cropping,
-        widening=torch.ones(1), cloud=None, card={},
-    )  # fmt: skip
+        name="small",
+        learners=(own.learner().eval(),),
+        front_end=own.front_end,
+        cropping=own.cropping,
+        widening=torch.ones(1),
+        cloud=None,
+        card={},
+    )
     found = predict(judged, strong, label="small", note="seed 3", milliseconds=1.0, seed=1)
     assert found.note.startswith("seed 3; 3 of 40 clips lie beyond the range of the target wind_speed, 0 to 10 m/s")
     strong.parameters["wind_speed"][7:10] = 10.0
@@ -328,9 +358,11 @@ class TestBatches:
         assert before == batches.order_hash(1)
         assert before == Batches(prepared=data, size=8, seed=5, share=(1, 2)).order_hash(1)
         different = [
-            before, batches.order_hash(0), Batches(prepared=data, size=8, seed=6).order_hash(1),
+            before,
+            batches.order_hash(0),
+            Batches(prepared=data, size=8, seed=6).order_hash(1),
             Batches(prepared=other, size=8, seed=5).order_hash(1),
-        ]  # fmt: skip
+        ]
         assert len(set(different)) == 4
 
     def test_sizes_that_ranks_cannot_share_are_refused(self) -> None:

@@ -60,12 +60,14 @@ def test_a_message_comes_out_as_it_went_in():
 @pytest.mark.parametrize(
     "damage",
     [
-        lambda data: b"\xff\xff\xff\xff" + data[4:], lambda data: data[:4] + b"x" + data[5:],
+        lambda data: b"\xff\xff\xff\xff" + data[4:],
+        lambda data: data[:4] + b"x" + data[5:],
         lambda data: data.replace(f'"version": {PROTOCOL_VERSION}'.encode(), b'"version": 9'),
-        lambda data: data.replace(b'"float32"', b'"complex"'), lambda data: data.replace(b"[3]", b"[-]"),
+        lambda data: data.replace(b'"float32"', b'"complex"'),
+        lambda data: data.replace(b"[3]", b"[-]"),
     ],
     ids=["length", "json", "version", "type", "shape"],
-)  # fmt: skip
+)
 def test_bytes_that_are_no_message_are_corrupt(damage):
     data = encode(Message(kind="frame", arrays={"a": np.zeros(3, dtype=np.float32)}))
     with pytest.raises(CorruptError):

@@ -35,11 +35,17 @@ def scene(*, toward=(0.0, -1.0, 0.0), irradiance=math.pi, angle=0.005, sky=0.0, 
     """Seen from 5 m in front of the origin, along +y; a pixel is 1/10 m there."""
     matrix = [[1, 0, 0, 0], [0, 0, -1, -5], [0, 1, 0, 0], [0, 0, 0, 1]]
     fields = {
-        "engine": "CYCLES", "width": SIZE, "height": SIZE, "samples": 64, "bounces": 0, "threads": 1,
+        "engine": "CYCLES",
+        "width": SIZE,
+        "height": SIZE,
+        "samples": 64,
+        "bounces": 0,
+        "threads": 1,
         "camera": {"matrix": matrix, "focal": 50.0, "centre": [SIZE / 2, SIZE / 2]},
-        "sun": {"toward": list(toward), "irradiance": irradiance, "angle": angle}, "sky": sky,
+        "sun": {"toward": list(toward), "irradiance": irradiance, "angle": angle},
+        "sky": sky,
         "objects": [{"name": "cloth", "albedo": [0.8, 0.5, 0.2], "translucency": translucency}],
-    }  # fmt: skip
+    }
     texture = other.pop("texture", None)
     return Message(kind="scene", fields=fields | other, arrays={} if texture is None else {"texture/cloth": texture})
 

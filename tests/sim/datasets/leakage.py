@@ -15,10 +15,21 @@ RIDGE = 1.0
 NEIGHBOURS = 15
 FOLDS = 40
 FEATURES = (
-    "order", "number in the name", "length of the name", "size", "mean frame", "spread of frames", "range of frames",
-    "mean of the JPEG's header", "first quantiser", "start of the scan", "frames", "start within the second",
-    "start", "wind samples",
-)  # fmt: skip
+    "order",
+    "number in the name",
+    "length of the name",
+    "size",
+    "mean frame",
+    "spread of frames",
+    "range of frames",
+    "mean of the JPEG's header",
+    "first quantiser",
+    "start of the scan",
+    "frames",
+    "start within the second",
+    "start",
+    "wind samples",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,10 +62,22 @@ def features_of(name: str, record: Record, *, order: int, size: int) -> list[flo
     return [
         float(value)
         for value in (
-            order, int(name.rpartition("-")[2]), len(name), size, lengths.mean(), lengths.std(), np.ptp(lengths),
-            header.mean(), header[5], end, len(jpegs), first % 10**9, first, 0 if series is None else len(series),
+            order,
+            int(name.rpartition("-")[2]),
+            len(name),
+            size,
+            lengths.mean(),
+            lengths.std(),
+            np.ptp(lengths),
+            header.mean(),
+            header[5],
+            end,
+            len(jpegs),
+            first % 10**9,
+            first,
+            0 if series is None else len(series),
         )
-    ]  # fmt: skip
+    ]
 
 
 def accuracies(features: Floats, labels: Floats, sequence: NDArray[np.int64]) -> dict[str, Floats]:

@@ -63,9 +63,11 @@ def test_a_plan_for_people_has_a_line_a_side(
     code, out, err = said(capsys, recipe_file, "--lake", tmp_path / "lake", "--plan", "--workers", 2)
     assert code == 0
     assert [line.split() for line in out.splitlines()] == [
-        ["side", "sequences", "films", "clips"], ["train", "3", "7", "7"], ["test", "2", "3", "3"],
+        ["side", "sequences", "films", "clips"],
+        ["train", "3", "7", "7"],
+        ["test", "2", "3", "3"],
         ["all", "5", "10", "10"],
-    ]  # fmt: skip
+    ]
     assert "5 sequences and 10 films" in err
     assert "2 workers" in err
 

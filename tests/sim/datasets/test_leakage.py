@@ -20,10 +20,18 @@ from tests.sim.datasets.leakage import FEATURES, Surroundings, accuracies, dealt
 
 SEQUENCES, FILMS = 40, 80
 TARGETS = (
-    "wind_speed", "density", "bending.0", "bending.7", "render.camera_radius", "render.camera_angle",
-    "render.camera_height", "render.sun_strength", "render.exposure_time", "render.background_scale",
+    "wind_speed",
+    "density",
+    "bending.0",
+    "bending.7",
+    "render.camera_radius",
+    "render.camera_angle",
+    "render.camera_height",
+    "render.sun_strength",
+    "render.exposure_time",
+    "render.background_scale",
     "anemometer-gain.gain",
-)  # fmt: skip
+)
 
 
 @pytest.fixture(scope="module")

@@ -78,9 +78,13 @@ def test_a_film_with_a_frame_too_long_has_the_best_quality_at_which_all_fit() ->
 
 def test_each_setting_has_a_stream_of_its_own() -> None:
     spec = CameraSpec(
-        coding=Coding.JPEG, jpeg_quality=Range(low=70, high=90), rate_factor=20.0, read_noise=Range(low=0, high=2),
-        shot_noise=1.0, frame_slot=1,
-    )  # fmt: skip
+        coding=Coding.JPEG,
+        jpeg_quality=Range(low=70, high=90),
+        rate_factor=20.0,
+        read_noise=Range(low=0, high=2),
+        shot_noise=1.0,
+        frame_slot=1,
+    )
     fixed = replace(spec, jpeg_quality=80)
     video = replace(spec, coding=Coding.H264, rate_factor=Range(low=18, high=24))
     assert settings(video, seed=5)["camera.read_noise"] == settings(spec, seed=5)["camera.read_noise"]

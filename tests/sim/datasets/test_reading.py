@@ -24,8 +24,10 @@ def test_flagsim_has_the_papers_counts_size_and_search_space() -> None:
     # Runia et al. 2020, section "FlagSim Dataset" and table of the search space.
     recipe = load("flagsim")
     assert [(s.name, s.sequences, s.renders) for s in recipe.sides] == [
-        ("train", 1000, 14000), ("validation", 150, 3800), ("test", 85, 3500),
-    ]  # fmt: skip
+        ("train", 1000, 14000),
+        ("validation", 150, 3800),
+        ("test", 85, 3500),
+    ]
     time, wind, material = recipe.simulation.time, recipe.simulation.wind, recipe.simulation.material
     assert (time.frames, time.rate) == (60, 25.0)
     assert ends(wind.speed) == (0.0, 10.0)
@@ -95,7 +97,7 @@ def test_what_makes_no_data_set_is_refused(make: Make) -> None:
         ("[camera]", '[groups]\nattachments = ["hoists"]\n[camera]', UnknownNameError, "did you mean 'hoist'"),
         ("[camera]", "[groups]\nheigth = 1.0\n[camera]", UnknownNameError, "did you mean 'height'"),
         ("[camera]", "[sessions]\n[groups]\n[camera]", UsageError, "both sessions and groups"),
-    ]  # fmt: skip
+    ]
     assert not unrefused(lambda old, new: make({old: new}), cases)
 
 

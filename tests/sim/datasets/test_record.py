@@ -111,11 +111,14 @@ def test_the_same_film_is_the_same_bytes(gusty: Shown, tmp_path: Path) -> None:
 
 
 def test_films_of_a_session_have_the_same_camera_and_anemometer(make: Callable[..., DatasetRecipe]) -> None:
-    recipe = make({
-        "[sides.train]\nsequences = 3\nrenders = 7":
-        "[sessions]\nspread = 0.25\n[sides.train]\nsequences = 2\nrenders = 2\nsessions = 1",
-        "sequences = 2\nrenders = 3": "sequences = 2\nrenders = 3\nsessions = 1",
-    })  # fmt: skip
+    recipe = make(
+        {
+            "[sides.train]\nsequences = 3\nrenders = 7": (
+                "[sessions]\nspread = 0.25\n[sides.train]\nsequences = 2\nrenders = 2\nsessions = 1"
+            ),
+            "sequences = 2\nrenders = 3": "sequences = 2\nrenders = 3\nsessions = 1",
+        }
+    )
     cast = next(casts(recipe))
     films = list(Sequences(recipe=recipe, side="train", members=((cast, 0, "0" * 32), (cast, 1, "1" * 32))).films())
     with one_thread():

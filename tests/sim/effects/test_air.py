@@ -122,9 +122,12 @@ def test_added_mass_slows_a_swing_by_the_root_of_the_mass_ratio(make_system) -> 
     sheet = isotropic(name="sheet", density=0.2, stretching=40.0, shear=30.0, bending=0.05)
     mesh = grid(width=0.3, height=0.4, columns=1, rows=2)
     system, state = make_system(
-        mesh, [sheet, sheet], gravity=(0.0, 0.0, -9.81), air=NO_AIR,
+        mesh,
+        [sheet, sheet],
+        gravity=(0.0, 0.0, -9.81),
+        air=NO_AIR,
         handles=Handles(vertices=(2, 5), stiffness=float("inf")),
-    )  # fmt: skip
+    )
     depth = 0.4 - state.position[:, 2:]
     tilted = state.position + 0.01 * torch.cat([depth, 0 * depth, 0 * depth], dim=1)
     air = AddedMass(mass=torch.tensor([0.0, 0.6], dtype=torch.float64))
@@ -177,9 +180,12 @@ def test_pressure_and_weight_are_confounded_where_stiffness_is_free() -> None:
         start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
         held = tuple(int(v) for v in np.flatnonzero(flat.rest[:, 0] == 0))
         scene = Scene(
-            mesh=flat, position=start + 1e-3 * np.sin(7 * flat.rest[:, :1] + 1), material=material,
-            wind=(4.0, 0.5, 0.0), handles=Handles(vertices=held, stiffness=math.inf),
-        )  # fmt: skip
+            mesh=flat,
+            position=start + 1e-3 * np.sin(7 * flat.rest[:, :1] + 1),
+            material=material,
+            wind=(4.0, 0.5, 0.0),
+            handles=Handles(vertices=held, stiffness=math.inf),
+        )
         system, state = assemble([scene])
         if change:
             system, state = apply([AirDensityChange(change=change)], system, state)
@@ -220,4 +226,4 @@ def test_normals_turn_at_the_rate_of_differences(make_system, plain, distorted) 
     # Central differences: errors of the order of the step squared.
     torch.testing.assert_close(
         mean_normal_rates(system.cloth, position, velocity), (above - below) / (2 * step), rtol=0, atol=1e-7
-    )  # fmt: skip
+    )

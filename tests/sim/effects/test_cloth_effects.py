@@ -91,7 +91,7 @@ def test_damping_lets_a_vibration_decay_as_stated(make_system) -> None:
     mesh = grid(width=0.2, height=0.2, columns=1, rows=1)
     system, state = make_system(
         mesh, [sheet, sheet], air=QuadraticNormal(density=0.0), handles=Handles(vertices=(0, 1), stiffness=float("inf"))
-    )  # fmt: skip
+    )
     damping = torch.tensor([0.0, 2e-3], dtype=torch.float64)
     system, state = apply([InternalDamping(time=damping)], system, state)
     pulled = state.position.clone()

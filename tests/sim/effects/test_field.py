@@ -15,10 +15,28 @@ from sim.scene import assemble, flag
 
 SHAPES = ("everywhere", "hoist", "fly", "upper", "lower", "upper_fly", "lower_fly")
 FIELDS = (
-    "downwind", "leftward", "upward", "downwind_squared", "leftward_squared", "upward_squared", "toward_pole",
-    "toward_height", "against_motion", "against_normal_motion", "across", "across_squared", "along", "along_squared",
-    "to_pole", "left_of_motion", "across_even", "rising", "crossing", "along_width", "along_height",
-)  # fmt: skip
+    "downwind",
+    "leftward",
+    "upward",
+    "downwind_squared",
+    "leftward_squared",
+    "upward_squared",
+    "toward_pole",
+    "toward_height",
+    "against_motion",
+    "against_normal_motion",
+    "across",
+    "across_squared",
+    "along",
+    "along_squared",
+    "to_pole",
+    "left_of_motion",
+    "across_even",
+    "rising",
+    "crossing",
+    "along_width",
+    "along_height",
+)
 
 
 def seen(
@@ -37,18 +55,26 @@ def seen(
     moving = (torch.tensor(velocity, dtype=torch.float64) * torch.cos(3 * rest[:, :1])) @ about.T
     air = about @ torch.tensor(wind, dtype=torch.float64)
     return Seen(
-        cloth=system.cloth, position=x[..., None], offset=x[..., None] - torch.tensor([0.0, 0.0, 0.5])[:, None],
-        velocity=moving[..., None], wind=air[:, None],
-    )  # fmt: skip
+        cloth=system.cloth,
+        position=x[..., None],
+        offset=x[..., None] - torch.tensor([0.0, 0.0, 0.5])[:, None],
+        velocity=moving[..., None],
+        wind=air[:, None],
+    )
 
 
 @pytest.mark.parametrize(
     ("name", "corners"),
     [
-        ("everywhere", (1, 1, 1, 1)), ("hoist", (1, 0, 1, 0)), ("fly", (0, 1, 0, 1)), ("upper", (0, 0, 1, 1)),
-        ("lower", (1, 1, 0, 0)), ("upper_fly", (0, 0, 0, 1)), ("lower_fly", (0, 1, 0, 0)),
+        ("everywhere", (1, 1, 1, 1)),
+        ("hoist", (1, 0, 1, 0)),
+        ("fly", (0, 1, 0, 1)),
+        ("upper", (0, 0, 1, 1)),
+        ("lower", (1, 1, 0, 0)),
+        ("upper_fly", (0, 0, 0, 1)),
+        ("lower_fly", (0, 1, 0, 0)),
     ],
-)  # fmt: skip
+)
 def test_shapes_are_0_or_1_at_the_corners(name: str, corners: tuple[int, ...]) -> None:
     own = seen(wind=(4, 0, 0))
     rest = own.cloth.mesh.rest
@@ -62,10 +88,14 @@ def test_shapes_are_0_or_1_at_the_corners(name: str, corners: tuple[int, ...]) -
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
-        ("downwind", (0.6, 0.8, 0)), ("leftward", (-0.8, 0.6, 0)), ("upward", (0, 0, 1)),
-        ("downwind_squared", (15, 20, 0)), ("leftward_squared", (-20, 15, 0)), ("upward_squared", (0, 0, 25)),
+        ("downwind", (0.6, 0.8, 0)),
+        ("leftward", (-0.8, 0.6, 0)),
+        ("upward", (0, 0, 1)),
+        ("downwind_squared", (15, 20, 0)),
+        ("leftward_squared", (-20, 15, 0)),
+        ("upward_squared", (0, 0, 25)),
     ],
-)  # fmt: skip
+)
 def test_pushes_follow_the_horizontal_wind(name: str, expected: tuple[float, ...]) -> None:
     """A wind of (3, 4, 1) m/s: 5 m/s horizontally."""
     np.testing.assert_allclose(getattr(seen(wind=(3, 4, 1)), name)[0, :, 0].numpy(), expected, atol=1e-12)
@@ -83,8 +113,11 @@ def test_across_and_along_a_flat_flag_are_the_wind_across_and_along_its_plane() 
     """In the plane of x and z, in a relative wind of (3, 2, 4) m/s."""
     own = seen(wind=(3, 2, 4), bulge=0.0)
     for name, expected in {
-        "across": (0, 2, 0), "across_squared": (0, 4, 0), "along": (3, 0, 4), "along_squared": (15, 0, 20),
-    }.items():  # fmt: skip
+        "across": (0, 2, 0),
+        "across_squared": (0, 4, 0),
+        "along": (3, 0, 4),
+        "along_squared": (15, 0, 20),
+    }.items():
         values = getattr(own, name)[:, :, 0].numpy()
         np.testing.assert_allclose(values, np.tile(expected, (len(values), 1)), atol=1e-12)
 

@@ -70,9 +70,12 @@ def test_a_log_is_read_with_its_flags_and_from_its_start() -> None:
     time = 1_700_000_000_000_000_000 + np.arange(5, dtype=np.int64) * 1_000_000_000
     flags = np.array([0, 0, SampleFlag.STALE, 0, 0], dtype=np.int32)
     series = WindSeries(
-        time=time, channels={"wind_speed": np.array([4.0, 6.0, 9.0, 4.0, 6.0])}, flags=flags, host_time=None,
+        time=time,
+        channels={"wind_speed": np.array([4.0, 6.0, 9.0, 4.0, 6.0])},
+        flags=flags,
+        host_time=None,
         sensor=Sensor(name="cup"),
-    )  # fmt: skip
+    )
     gusts = LoggedGusts.from_log(series, start=int(time[1]))
     assert gusts.times == (-1.0, 0.0, 2.0, 3.0)
     # The mean of what is there is 5 m/s, so that a wind of 5 m/s is followed as logged.
@@ -103,9 +106,7 @@ def test_a_turning_wind_keeps_its_speed_and_arrives_at_its_angle() -> None:
 def test_an_inclined_wind_keeps_its_speed() -> None:
     level = torch.tensor([3.0, 4.0, 0.0], dtype=torch.float64)[:, None]
     inclined = VerticalWind(inclination=0.2).velocity(0.0, level)[:, 0]
-    np.testing.assert_allclose(
-        inclined, [3 * math.cos(0.2), 4 * math.cos(0.2), 5 * math.sin(0.2)], rtol=1e-12
-    )  # fmt: skip
+    np.testing.assert_allclose(inclined, [3 * math.cos(0.2), 4 * math.cos(0.2), 5 * math.sin(0.2)], rtol=1e-12)
 
 
 def test_shear_is_a_power_of_height() -> None:

@@ -23,9 +23,16 @@ def look() -> Callable[..., RenderParameters]:
 
     def make(**changes: object) -> RenderParameters:
         given: dict[str, object] = {
-            "background": "black", "texture": "white", "sun_strength": 0.0, "sky_strength": 1.0, "pole_radius": 0.0,
-            "camera_height": 0.0, "mesh_height": 0.0, "camera_radius": 5.0, "view_angle": 2 * math.atan(0.5),
-        } | changes  # fmt: skip
+            "background": "black",
+            "texture": "white",
+            "sun_strength": 0.0,
+            "sky_strength": 1.0,
+            "pole_radius": 0.0,
+            "camera_height": 0.0,
+            "mesh_height": 0.0,
+            "camera_radius": 5.0,
+            "view_angle": 2 * math.atan(0.5),
+        } | changes
         return RenderParameters(**given)  # type: ignore[arg-type]
 
     return make

@@ -67,9 +67,12 @@ def meshes(
     position, faces, uv = part
     moves = np.zeros((1, 3)) if moves is None else moves
     return Meshes.fixed(
-        positions=torch.from_numpy(position + moves[:, None]).float(), faces=torch.from_numpy(faces),
-        uv=torch.from_numpy(uv), anchor=(0.0, 0.0, 0.0), rate=rate,
-    )  # fmt: skip
+        positions=torch.from_numpy(position + moves[:, None]).float(),
+        faces=torch.from_numpy(faces),
+        uv=torch.from_numpy(uv),
+        anchor=(0.0, 0.0, 0.0),
+        rate=rate,
+    )
 
 
 def linear(image: torch.Tensor) -> NDArray[np.float64]:

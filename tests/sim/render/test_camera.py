@@ -44,9 +44,13 @@ def test_the_angle_of_view_spans_the_longer_side() -> None:
 
 def test_what_it_aims_at_lies_in_the_middle_moved_by_the_offset() -> None:
     camera = Camera.looking(
-        position=(3.0, -4.0, 0.5), target=(0.2, 0.3, 4.0), view_angle=0.6, width=300, height=200,
+        position=(3.0, -4.0, 0.5),
+        target=(0.2, 0.3, 4.0),
+        view_angle=0.6,
+        width=300,
+        height=200,
         frame_offset=(0.1, -0.05),
-    )  # fmt: skip
+    )
     place, depth = camera.project(torch.tensor([0.2, 0.3, 4.0], dtype=torch.float64))
     assert place.tolist() == pytest.approx([150 + 30, 100 - 15], abs=1e-9)
     assert float(depth) == pytest.approx(math.dist((3.0, -4.0, 0.5), (0.2, 0.3, 4.0)), rel=1e-12)
@@ -55,9 +59,12 @@ def test_what_it_aims_at_lies_in_the_middle_moved_by_the_offset() -> None:
 def test_a_camera_that_looks_up_sees_the_horizon_below_the_middle() -> None:
     tilt = math.radians(20)
     camera = Camera.looking(
-        position=(0.0, 0.0, 0.0), target=(10 * math.cos(tilt), 0.0, 10 * math.sin(tilt)), view_angle=math.pi / 2,
-        width=300, height=300,
-    )  # fmt: skip
+        position=(0.0, 0.0, 0.0),
+        target=(10 * math.cos(tilt), 0.0, 10 * math.sin(tilt)),
+        view_angle=math.pi / 2,
+        width=300,
+        height=300,
+    )
     horizon, _ = camera.project(torch.tensor([[100.0, 0.0, 0.0], [100.0, 30.0, 0.0]], dtype=torch.float64))
     assert horizon[:, 1].tolist() == pytest.approx([150 + 150 * math.tan(tilt)] * 2, abs=1e-9)  # level: a level line
     assert horizon[1, 0] < horizon[0, 0]  # looking along +x, +y is to the left
@@ -76,7 +83,9 @@ def test_a_camera_straight_above_or_in_its_target_is_refused() -> None:
     assert (
         unrefused(
             lambda target: Camera.looking(position=(0.0, 0.0, 1.0), target=target, view_angle=0.5, width=30, height=30),
-            zip(cases), InputError, "level",
+            zip(cases),
+            InputError,
+            "level",
         )
         == []
-    )  # fmt: skip
+    )

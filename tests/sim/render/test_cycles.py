@@ -40,9 +40,11 @@ def flag(*, frames: int = 1, speed: float = 0.0) -> Meshes:
     positions = np.repeat(still[None], frames, axis=0)
     positions[..., 2] += rise
     return Meshes.fixed(
-        positions=torch.from_numpy(positions).float(), faces=torch.from_numpy(faces),
-        uv=torch.from_numpy(np.stack([u, v], axis=-1).reshape(-1, 2)), anchor=(0.0, 0.0, 1.0),
-    )  # fmt: skip
+        positions=torch.from_numpy(positions).float(),
+        faces=torch.from_numpy(faces),
+        uv=torch.from_numpy(np.stack([u, v], axis=-1).reshape(-1, 2)),
+        anchor=(0.0, 0.0, 1.0),
+    )
 
 
 def zeta(seed: int, **changes: object) -> RenderParameters:
@@ -91,9 +93,16 @@ def test_an_exposure_blurs_along_the_motion(cycles: Cycles) -> None:
     # spread over eight.
     meshes = flag(frames=3, speed=10.0)
     still = RenderParameters(
-        background="sky/1", texture="flag/japan", width=SIZE, height=SIZE, sun_strength=0.0, sky_strength=0.0,
-        pole_radius=0.0, cycles_samples=16, cycles_bounces=0,
-    )  # fmt: skip
+        background="sky/1",
+        texture="flag/japan",
+        width=SIZE,
+        height=SIZE,
+        sun_strength=0.0,
+        sky_strength=0.0,
+        pole_radius=0.0,
+        cycles_samples=16,
+        cycles_bounces=0,
+    )
     behind = torch.from_numpy(plate(Assets().background("sky/1"), still)).mean(-1)
     steepest = []
     for parameters in (still, replace(still, exposure_time=0.02)):

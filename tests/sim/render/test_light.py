@@ -15,8 +15,14 @@ from tests.sim.render.pieces import linear, meshes, sheet, together
 BYTE = 0.006  # linear; half a step of the bytes near white
 
 # The sun behind the camera, as high as far: its light meets a sheet that faces −y at 45°.
-SLANTED = {"sun_strength": math.pi, "sky_strength": 0.0, "sun_softness": 0.0, "sun_azimuth": -math.pi / 2,
-           "sun_height": 3.0, "sun_radius": 3.0}  # fmt: skip
+SLANTED = {
+    "sun_strength": math.pi,
+    "sky_strength": 0.0,
+    "sun_softness": 0.0,
+    "sun_azimuth": -math.pi / 2,
+    "sun_height": 3.0,
+    "sun_radius": 3.0,
+}
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.5, -0.9])

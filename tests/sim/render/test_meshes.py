@@ -22,9 +22,11 @@ def stored(frames: int = 3) -> MeshSequence:
     flat = np.stack([np.zeros(9), 5 + uv[:, 0] * 3, 1 + uv[:, 1] * 2], axis=1)
     rising = flat + np.arange(frames)[:, None, None] * [0.0, 0.0, 0.1]
     return MeshSequence(
-        time=np.arange(frames, dtype=np.int64) * STEP, positions=rising.astype(np.float32),
-        faces=faces.astype(np.int32), rest=rest.astype(np.float32),
-    )  # fmt: skip
+        time=np.arange(frames, dtype=np.int64) * STEP,
+        positions=rising.astype(np.float32),
+        faces=faces.astype(np.int32),
+        rest=rest.astype(np.float32),
+    )
 
 
 def test_a_flag_is_anchored_at_its_upper_hoist_corner() -> None:
@@ -42,9 +44,13 @@ def test_hanging_cloth_is_anchored_at_the_middle_of_its_upper_edge() -> None:
 def test_a_ragged_sequence_keeps_its_frames() -> None:
     one = stored()
     ragged = RaggedMeshSequence(
-        time=one.time, positions=one.positions.reshape(-1, 3), faces=np.tile(one.faces, (3, 1)),
-        rest=np.tile(one.rest, (3, 1)), vertex_offset=np.arange(4) * 9, face_offset=np.arange(4) * 8,
-    )  # fmt: skip
+        time=one.time,
+        positions=one.positions.reshape(-1, 3),
+        faces=np.tile(one.faces, (3, 1)),
+        rest=np.tile(one.rest, (3, 1)),
+        vertex_offset=np.arange(4) * 9,
+        face_offset=np.arange(4) * 8,
+    )
     a, b = Meshes.flag(ragged, heading=0.0), Meshes.flag(one, heading=0.0)
     assert a.one_topology
     assert a.vertex_offset == b.vertex_offset
@@ -75,9 +81,11 @@ def test_what_is_no_mesh_sequence_is_refused() -> None:
         ("faces", torch.tensor([[0, 1, -1], [0, 1, 2]]), "outside"),
         ("uv", torch.zeros(3, 2), "3 texture places for 4 vertices"),
         ("vertex_offset", (0, 3), "vertex_offset does not fit"),
-        ("face_offset", (0, 1, 2), "different numbers of frames"), ("face_offset", (0,), "face_offset does not fit"),
-        ("rate", 0.0, "rate"), ("heading", float("nan"), "heading"),
-    ]  # fmt: skip
+        ("face_offset", (0, 1, 2), "different numbers of frames"),
+        ("face_offset", (0,), "face_offset does not fit"),
+        ("rate", 0.0, "rate"),
+        ("heading", float("nan"), "heading"),
+    ]
     good = meshes(sheet())
     given = {field: getattr(good, field) for field in good.__dataclass_fields__}
     assert not unrefused(lambda name, value: Meshes(**{**given, name: value}), cases, InputError)

@@ -21,17 +21,33 @@ DRAWS = 150
 # Runia et al. 2020, appendix, "Exhaustive overview of the render parameters ζ".
 PAPER = {
     "flags": {
-        "background_scale": (0.6, 1.0), "sun_height": (4, 10), "sun_radius": (0, 5), "sun_strength": (2, 10),
-        "sun_softness": (2, 10), "camera_height": (0.2, 3), "camera_radius": (4, 6), "mesh_height": (4.6, 4.6),
-        "background_offset_x": (-20, 20), "background_offset_y": (-20, 20), "cycles_samples": (50, 50),
+        "background_scale": (0.6, 1.0),
+        "sun_height": (4, 10),
+        "sun_radius": (0, 5),
+        "sun_strength": (2, 10),
+        "sun_softness": (2, 10),
+        "camera_height": (0.2, 3),
+        "camera_radius": (4, 6),
+        "mesh_height": (4.6, 4.6),
+        "background_offset_x": (-20, 20),
+        "background_offset_y": (-20, 20),
+        "cycles_samples": (50, 50),
         "cycles_bounces": (0, 6),
     },
     "cloth": {
-        "background_scale": (0.6, 1.0), "sun_height": (4, 10), "sun_radius": (0, 5), "sun_strength": (2, 10),
-        "sun_softness": (2, 10), "camera_height": (0.5, 2), "camera_radius": (1, 2.5), "mesh_height": (2, 2),
-        "camera_angle": (-math.radians(5), math.radians(5)), "cycles_samples": (50, 50), "cycles_bounces": (0, 6),
+        "background_scale": (0.6, 1.0),
+        "sun_height": (4, 10),
+        "sun_radius": (0, 5),
+        "sun_strength": (2, 10),
+        "sun_softness": (2, 10),
+        "camera_height": (0.5, 2),
+        "camera_radius": (1, 2.5),
+        "mesh_height": (2, 2),
+        "camera_angle": (-math.radians(5), math.radians(5)),
+        "cycles_samples": (50, 50),
+        "cycles_bounces": (0, 6),
     },
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", sorted(PAPER))
@@ -79,9 +95,17 @@ def test_without_sun_and_sky_there_is_nothing_to_expose_for() -> None:
 
 def test_a_value_that_makes_no_sense_is_refused_by_name() -> None:
     cases = [
-        ("sun_height", 0.0), ("sun_height", math.nan), ("camera_radius", 0.0), ("width", 0), ("width", 30.5),
-        ("translucency", 1.2), ("raster_samples", True), ("background_scale", "1"), ("texture", ""), ("background", 3),
-    ]  # fmt: skip
+        ("sun_height", 0.0),
+        ("sun_height", math.nan),
+        ("camera_radius", 0.0),
+        ("width", 0),
+        ("width", 30.5),
+        ("translucency", 1.2),
+        ("raster_samples", True),
+        ("background_scale", "1"),
+        ("texture", ""),
+        ("background", 3),
+    ]
     good = {"background": "a", "texture": "b"}
     named = [(name, value, name) for name, value in cases]
     assert not unrefused(lambda name, value: RenderParameters(**{**good, name: value}), named, InputError)

@@ -62,8 +62,9 @@ def ragged(*, cells: list[int], moves: np.ndarray) -> Meshes:
         uv=torch.cat([torch.from_numpy(p[2]).float() for p in parts]),
         vertex_offset=tuple(np.cumsum([0, *(len(p[0]) for p in parts)]).tolist()),
         face_offset=tuple(np.cumsum([0, *(len(p[1]) for p in parts)]).tolist()),
-        anchor=(0.0, 0.0, 0.0), rate=RATE,
-    )  # fmt: skip
+        anchor=(0.0, 0.0, 0.0),
+        rate=RATE,
+    )
 
 
 @pytest.mark.parametrize("offset", [0.01, -0.015])
@@ -88,9 +89,14 @@ def test_cloth_that_the_next_frame_does_not_have_is_an_error_not_a_guess() -> No
     uv = scene.uv.clone()
     uv[16:] *= 0.5  # the second frame has a quarter of the cloth
     torn = Meshes(
-        positions=scene.positions, faces=scene.faces, uv=uv, vertex_offset=scene.vertex_offset,
-        face_offset=scene.face_offset, anchor=scene.anchor, rate=RATE,
-    )  # fmt: skip
+        positions=scene.positions,
+        faces=scene.faces,
+        uv=uv,
+        vertex_offset=scene.vertex_offset,
+        face_offset=scene.face_offset,
+        anchor=scene.anchor,
+        rate=RATE,
+    )
     with pytest.raises(InputError, match="in no face of the other"):
         moved(torn, 0.01)
 

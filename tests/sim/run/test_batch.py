@@ -35,13 +35,15 @@ def all_bits(outcomes: Sequence[Outcome]) -> list[bytes | None]:
 @pytest.mark.parametrize(
     "additions",
     [
-        {}, {"more": '[integrator]\nname = "implicit"'}, {"more": "[contact]\nthickness = 0.02"},
+        {},
+        {"more": '[integrator]\nname = "implicit"'},
+        {"more": "[contact]\nthickness = 0.02"},
         {"more": "[effects.gusts]\nintensity = 0.2\n[effects.hysteresis]\ncouple = 1e-3"},
         {"more": "[effects.finite-span-loading]\nshare = 0.2\n[effects.wagner-lag]\nshare = 0.5"},
         {"more": '[integrator]\nbackend = "warp"'},
     ],
     ids=["explicit", "implicit", "contact", "effects", "air", "warp"],
-)  # fmt: skip
+)
 def test_a_member_is_the_same_to_the_bit_whatever_it_is_simulated_with(make_recipe: Callable, additions: dict) -> None:
     crew = Crew(make_recipe(**additions))
     stepper = Stepper.of(crew)

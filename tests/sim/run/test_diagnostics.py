@@ -20,9 +20,13 @@ from sim.scene import assemble, flag
 
 PONTE_ROMA = replace(named("camel-ponte-roma"), damping=0.0)
 CONSTANT = isotropic(
-    name="constant", density=PONTE_ROMA.density, stretching=float(PONTE_ROMA.stretching.max()),
-    shear=float(PONTE_ROMA.stretching.max()), bending=float(PONTE_ROMA.bending.mean()), damping=0.0,
-)  # fmt: skip
+    name="constant",
+    density=PONTE_ROMA.density,
+    stretching=float(PONTE_ROMA.stretching.max()),
+    shear=float(PONTE_ROMA.stretching.max()),
+    bending=float(PONTE_ROMA.bending.mean()),
+    damping=0.0,
+)
 
 
 def falling(material: Material, *, finer: int) -> tuple[float, float]:

@@ -175,11 +175,16 @@ def scene_folder(tmp_path: Path) -> Path:
     """An ArcSim scene of a square metre in two triangles, that runs with contact and strain limits."""
     material = {"density": 0.2, "stretching": [[50.0, 0, 50, 40]] * 6, "bending": [[1e-5] * 5] * 3}
     scene = {
-        "frame_time": 0.04, "frame_steps": 8, "duration": 1, "gravity": [0, 0, -9.8],
+        "frame_time": 0.04,
+        "frame_steps": 8,
+        "duration": 1,
+        "gravity": [0, 0, -9.8],
         "cloths": [{"mesh": "square.obj", "materials": [{"data": "m.json", "strain_limits": [0.95, 1.05]}]}],
-        "handles": [{"nodes": [0, 3]}], "wind": {"velocity": [0, 3, 1], "density": 1.2},
-        "friction": 0.2, "disable": ["remeshing", "collision"],
-    }  # fmt: skip
+        "handles": [{"nodes": [0, 3]}],
+        "wind": {"velocity": [0, 3, 1], "density": 1.2},
+        "friction": 0.2,
+        "disable": ["remeshing", "collision"],
+    }
     (tmp_path / "square.obj").write_text(SQUARE)
     (tmp_path / "m.json").write_text(json.dumps(material))
     (tmp_path / "scene.json").write_text(json.dumps(scene))
@@ -249,10 +254,12 @@ def test_limits_may_be_given_to_any_recipe() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "word"),
     [
-        ("vt 1 1", "vt 0.5 -1", "inverted"), ("vt 1 1", "vt 0.5 0", "degenerate"),
-        ("f 1/1 3/3 4/4", "f 1/1 4/4 3/3", "inverted"), ("f 1/1 3/3 4/4\n", "", "belong to no face"),
+        ("vt 1 1", "vt 0.5 -1", "inverted"),
+        ("vt 1 1", "vt 0.5 0", "degenerate"),
+        ("f 1/1 3/3 4/4", "f 1/1 4/4 3/3", "inverted"),
+        ("f 1/1 3/3 4/4\n", "", "belong to no face"),
     ],
-)  # fmt: skip
+)
 def test_a_mesh_that_cannot_be_simulated_is_refused_with_the_reason(
     scene_folder: Path, old: str, new: str, word: str
 ) -> None:

@@ -43,9 +43,10 @@ def test_the_airs_inertia_acts_where_a_recipe_names_it(run: Run, tmp_path: Path,
         recipe.write_text(small(more=f"[effects.finite-span-loading]\nshare = {share}"))
         assert run(recipe, "--count", "1")[0] == 0
         (row,) = [
-            row for row in Lake.open(tmp_path / "lake").rows().to_pylist()
+            row
+            for row in Lake.open(tmp_path / "lake").rows().to_pylist()
             if json.loads(row["parameters"])["finite-span-loading.share"] == float(share)
-        ]  # fmt: skip
+        ]
         sequence = read_meshes(Lake.open(tmp_path / "lake").object_path(row["object"]))
         assert isinstance(sequence, MeshSequence)
         moved.append(np.asarray(sequence.positions[-1] - sequence.positions[0], dtype=np.float64))
@@ -67,11 +68,13 @@ def test_a_failed_member_makes_the_command_fail_and_is_named(run: Run, tmp_path:
 @pytest.mark.parametrize(
     ("arguments", "code", "word"),
     [
-        (["hanging-cloht"], 2, "did you mean 'hanging-cloth'"), (["nowhere.toml"], 1, "no such recipe file"),
-        (["nowhere.json"], 1, "no such file"), (["hanging-cloth", "--device", "cuda:97"], 2, "is not there"),
+        (["hanging-cloht"], 2, "did you mean 'hanging-cloth'"),
+        (["nowhere.toml"], 1, "no such recipe file"),
+        (["nowhere.json"], 1, "no such file"),
+        (["hanging-cloth", "--device", "cuda:97"], 2, "is not there"),
         (["hanging-cloth", "--branch", "trail"], 1, "trail"),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_done_is_an_error(run: Run, arguments: list[str], code: int, word: str) -> None:
     assert run(*arguments)[0] == code
     assert word in run(*arguments)[2]

@@ -160,18 +160,34 @@ def fly(
         UnusableError: the worker failed, or its cloth became unstable.
     """
     settings: dict[str, Any] = {
-        "step": method.step, "integrator": method.integrator.value, "gravity": gravity, "poisson": sheet.poisson,
-        "young": sheet.stretching / sheet.thickness, "thickness": sheet.thickness, "damping": sheet.damping,
-        "period": 1 / rate, "settle": settle, "frames": frames, "air": asdict(air),
-    }  # fmt: skip
+        "step": method.step,
+        "integrator": method.integrator.value,
+        "gravity": gravity,
+        "poisson": sheet.poisson,
+        "young": sheet.stretching / sheet.thickness,
+        "thickness": sheet.thickness,
+        "damping": sheet.damping,
+        "period": 1 / rate,
+        "settle": settle,
+        "frames": frames,
+        "air": asdict(air),
+    }
     with TemporaryDirectory(prefix="flagdata-mujoco-") as folder:
         job, made = Path(folder, "job.npz"), Path(folder, "made.npz")
         np.savez(
-            job, start=start, reference=start if reference is None else reference, faces=sheet.mesh.faces,
-            held=np.array(sheet.held, dtype=np.int64), areas=sheet.mesh.areas, mass=sheet.mass, rest=sheet.mesh.rest,
-            vertex_areas=sheet.mesh.vertex_areas, wind_times=wind.times, wind=wind.velocity,
+            job,
+            start=start,
+            reference=start if reference is None else reference,
+            faces=sheet.mesh.faces,
+            held=np.array(sheet.held, dtype=np.int64),
+            areas=sheet.mesh.areas,
+            mass=sheet.mass,
+            rest=sheet.mesh.rest,
+            vertex_areas=sheet.mesh.vertex_areas,
+            wind_times=wind.times,
+            wind=wind.velocity,
             settings=json.dumps(settings),
-        )  # fmt: skip
+        )
         _run((str(python), "-I", str(_WORKER), str(job), str(made)))
         with np.load(made) as content:
             return Flight(positions=content["positions"], velocities=content["velocities"])

@@ -34,9 +34,14 @@ _STEPS = (2e-3, 4e-3)  # s, of implicit steps
 _HEADING = 0.5  # rad: how far from downwind a flag starts
 
 NOMINAL = Sheet(
-    mesh=grid(width=WIDTH, height=HEIGHT, columns=COLUMNS, rows=ROWS), held=(), density=0.284, stretching=120.0,
-    poisson=0.2, bending=9e-6, damping=0.25e-3,
-)  # fmt: skip
+    mesh=grid(width=WIDTH, height=HEIGHT, columns=COLUMNS, rows=ROWS),
+    held=(),
+    density=0.284,
+    stretching=120.0,
+    poisson=0.2,
+    bending=9e-6,
+    damping=0.25e-3,
+)
 """About Camel Ponte Roma, isotropic: its area density, tension at small strain, and k/4 of its bending table."""
 SPREAD: Mapping[str, tuple[float, float]] = {"density": (0.85, 1.18), "stretching": (0.7, 1.5), "bending": (0.4, 2.5)}
 """Log-uniform factors on the nominal cloth."""
@@ -70,29 +75,30 @@ class Undeclared:
 
 NOTHING = Undeclared(title="nothing")
 UNDECLARED: Mapping[str, Undeclared] = {
-    "pressure": Undeclared(
-        title="pressure × 1.6", effect="air-density", strength=0.6, air=Air(pressure=1.6)
-    ),
-    "lift": Undeclared(
-        title="lift", effect="lift", strength=2.0, air=Air(lift=0.5 * AIR_DENSITY * 2.0)
-    ),
+    "pressure": Undeclared(title="pressure × 1.6", effect="air-density", strength=0.6, air=Air(pressure=1.6)),
+    "lift": Undeclared(title="lift", effect="lift", strength=2.0, air=Air(lift=0.5 * AIR_DENSITY * 2.0)),
     "linear-drag": Undeclared(
         title="linear tangential drag", effect="tangential-linear-drag", strength=0.4, air=Air(linear=0.4)
     ),
     "quadratic-drag": Undeclared(
-        title="quadratic tangential drag", effect="tangential-quadratic-drag", strength=0.05,
+        title="quadratic tangential drag",
+        effect="tangential-quadratic-drag",
+        strength=0.05,
         air=Air(quadratic=AIR_DENSITY * 0.05),
     ),
     "rising-wind": Undeclared(title="wind that rises by 0.15 rad", effect="vertical-wind", strength=0.15, rise=0.15),
     "hem": Undeclared(title="hem of 20 g/m", effect="hem-mass", strength=0.02, hem=0.02),
     "inertia": Undeclared(
-        title="inertia of the air, a share of 0.2", effect="finite-span-loading", strength=0.2,
-        air=Air(carried=AIR_DENSITY * 0.2), damping=0.5e-3,
+        title="inertia of the air, a share of 0.2",
+        effect="finite-span-loading",
+        strength=0.2,
+        air=Air(carried=AIR_DENSITY * 0.2),
+        damping=0.5e-3,
     ),
     "damping": Undeclared(title="internal damping of 20 ms", damping=20e-3),
     "magnus": Undeclared(title="force across the wind (Magnus)", air=Air(side=0.12)),
     "wake": Undeclared(title="a pressure that lags by Wagner's function", air=Air(lag=1.0)),
-}  # fmt: skip
+}
 """By name. Damping is calibrated and not an effect; the last two are none that a verdict may name. The inertia of the
 air needs MuJoCo's explicit steps, and so little damping."""
 
@@ -141,14 +147,21 @@ def draw(name: str, undeclared: Undeclared, *, seed: int) -> Truth:
     gentle = damping <= GENTLE
     mesh = grid(width=WIDTH, height=HEIGHT, columns=COLUMNS, rows=ROWS, diagonals=diagonals)
     sheet = replace(
-        NOMINAL, mesh=mesh, held=handles.corners(mesh.rest), damping=damping, added=_hem(mesh.rest, undeclared.hem),
+        NOMINAL,
+        mesh=mesh,
+        held=handles.corners(mesh.rest),
+        damping=damping,
+        added=_hem(mesh.rest, undeclared.hem),
         **{key: getattr(NOMINAL, key) * value for key, value in factor.items()},
-    )  # fmt: skip
+    )
     return Truth(
-        name=name, sheet=sheet, diagonals=diagonals, undeclared=undeclared,
+        name=name,
+        sheet=sheet,
+        diagonals=diagonals,
+        undeclared=undeclared,
         method=Method() if gentle else Method(integrator=Integrator.DISCRETE, step=step),
         speeds=tuple(float(u) for u in SPEEDS[0] + (SPEEDS[1] - SPEEDS[0]) * shares),
-    )  # fmt: skip
+    )
 
 
 def write(truth: Truth, folder: Path, *, python: Path, seed: int) -> Path:
@@ -165,10 +178,16 @@ def write(truth: Truth, folder: Path, *, python: Path, seed: int) -> Path:
     rise = truth.undeclared.rise
     for speed in truth.speeds:
         made = fly(
-            python, truth.sheet, start=start, air=truth.undeclared.air, method=truth.method, rate=RATE,
+            python,
+            truth.sheet,
+            start=start,
+            air=truth.undeclared.air,
+            method=truth.method,
+            rate=RATE,
             wind=Wind(velocity=speed * np.array([[math.cos(rise), 0.0, math.sin(rise)]])),
-            frames=round(DURATION * RATE), settle=round(SETTLE * RATE),
-        )  # fmt: skip
+            frames=round(DURATION * RATE),
+            settle=round(SETTLE * RATE),
+        )
         positions = made.positions[:, seen]
         jitter = stream(seed, "foreign", truth.name, "noise", _file(speed)).standard_normal(positions.shape)
         _table(folder / _file(speed), rest[seen], positions + NOISE * jitter)
@@ -234,8 +253,10 @@ def _hem(rest: Floats, density: float) -> Floats | None:
 def _table(path: Path, rest: Floats, positions: Floats) -> None:
     frames, markers = positions.shape[:2]
     columns = {
-        "frame": np.repeat(np.arange(frames), markers), "marker": np.tile(np.arange(markers), frames),
-        "u": np.tile(rest[:, 0], frames), "v": np.tile(rest[:, 1], frames),
+        "frame": np.repeat(np.arange(frames), markers),
+        "marker": np.tile(np.arange(markers), frames),
+        "u": np.tile(rest[:, 0], frames),
+        "v": np.tile(rest[:, 1], frames),
         **{axis: positions[:, :, place].ravel() for place, axis in enumerate("xyz")},
-    }  # fmt: skip
+    }
     csv.write_csv(pa.table(columns), path)

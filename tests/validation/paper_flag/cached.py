@@ -46,8 +46,9 @@ def cached(
                 return {name: stored[name] for name in stored.files}
         _LOG.warning(
             "flagdata: warning: an intermediate result is damaged, or of an older version; it is computed anew"
-            "\n  where: %s", target,
-        )  # fmt: skip
+            "\n  where: %s",
+            target,
+        )
     arrays = make()
     buffer = BytesIO()
     np.savez_compressed(buffer, **arrays)  # pyright: ignore[reportArgumentType]

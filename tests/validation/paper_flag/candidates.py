@@ -63,8 +63,13 @@ class Load:
     friction: float = 0.0
 
     def __str__(self) -> str:
-        units = {"reactive": "M {} ρL", "added": "M₀ {} ρL", "damping": "d {} s", "lift": "C {}",
-                 "friction": "c {} kg/(m² s)"}  # fmt: skip
+        units = {
+            "reactive": "M {} ρL",
+            "added": "M₀ {} ρL",
+            "damping": "d {} s",
+            "lift": "C {}",
+            "friction": "c {} kg/(m² s)",
+        }
         parts = [text.format(f"{value:.2g}") for name, text in units.items() if (value := getattr(self, name))]
         return ", ".join(parts) or "–"
 
@@ -93,9 +98,14 @@ def tried(candidate: Candidate) -> tuple[Load, ...]:
 def loaded(load: Load, *, bare: Sheet, length: float, density: float) -> Sheet:
     """The sheet at this length with this load."""
     return replace(
-        bare, length=length, reactive_mass=load.reactive * density * length, still_mass=load.added * density * length,
-        damping=load.damping, lift=density * load.lift / 2, friction=load.friction,
-    )  # fmt: skip
+        bare,
+        length=length,
+        reactive_mass=load.reactive * density * length,
+        still_mass=load.added * density * length,
+        damping=load.damping,
+        lift=density * load.lift / 2,
+        friction=load.friction,
+    )
 
 
 def effects(loads: Sequence[Load], *, length: float, density: float) -> list[Effect]:

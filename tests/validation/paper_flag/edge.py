@@ -91,8 +91,9 @@ class EdgeTrack:
         if not (self.height.shape == self.width.shape == self.seen.shape == frames):
             raise InputError(
                 f"times {self.time.shape}, heights {self.height.shape}, widths {self.width.shape} do not fit",
-                where="edge track", fix="give (frame,) times and (frame, column) arrays",
-            )  # fmt: skip
+                where="edge track",
+                fix="give (frame,) times and (frame, column) arrays",
+            )
 
     @property
     def rate(self) -> float:
@@ -222,9 +223,11 @@ def track_edge(
         raise InputError("a clip of fewer than two frames", where=str(path), fix="give a moving picture")
     time = np.array(times)
     return EdgeTrack(
-        time=time - time[0], height=np.stack([each[0] for each in found]), width=np.stack([each[1] for each in found]),
+        time=time - time[0],
+        height=np.stack([each[0] for each in found]),
+        width=np.stack([each[1] for each in found]),
         seen=np.stack([each[2] for each in found]),
-    )  # fmt: skip
+    )
 
 
 def _longest_side(path: Path) -> int:

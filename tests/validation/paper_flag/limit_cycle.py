@@ -94,17 +94,25 @@ def simulate(
     share = np.clip((x - cell / 2) / (length - cell / 2), 0, None)
     across = run.push * length * share**2 * (6 - 4 * share + share**2) / 3
     material = isotropic(
-        name="paper", density=mass, stretching=run.stretching, shear=run.stretching,
-        bending=_GRID_RIGIDITY * rigidity, damping=run.damping,
-    )  # fmt: skip
+        name="paper",
+        density=mass,
+        stretching=run.stretching,
+        shear=run.stretching,
+        bending=_GRID_RIGIDITY * rigidity,
+        damping=run.damping,
+    )
     scenes = [
         Scene(
-            mesh=mesh, position=np.stack([x, across, mesh.rest[:, 1]], axis=1), material=material,
-            handles=Handles(vertices=clamp, stiffness=math.inf), wind=(float(speed), 0.0, 0.0), gravity=(0.0, 0.0, 0.0),
+            mesh=mesh,
+            position=np.stack([x, across, mesh.rest[:, 1]], axis=1),
+            material=material,
+            handles=Handles(vertices=clamp, stiffness=math.inf),
+            wind=(float(speed), 0.0, 0.0),
+            gravity=(0.0, 0.0, 0.0),
             air=QuadraticNormal(density=density),
         )
         for speed in speeds
-    ]  # fmt: skip
+    ]
     system, state = apply(effects, *assemble(scenes, dtype=torch.float64))
     integrator = Symplectic()
     order = np.argsort(mesh.rest[:, 0], kind="stable").reshape(-1, 2)  # the two vertices of each cross line
@@ -120,10 +128,11 @@ def simulate(
     track = np.stack(frames)
     track[~np.isfinite(track)] = np.nan
     return StripMotion(
-        time=np.asarray((np.arange(kept) + 1) * interval, dtype=np.float64), along=track[:, :, 0],
+        time=np.asarray((np.arange(kept) + 1) * interval, dtype=np.float64),
+        along=track[:, :, 0],
         across=track[:, :, 1],
         arc=np.unique(np.round(x, 12)),
-    )  # fmt: skip
+    )
 
 
 def as_columns(motion: StripMotion, member: int, columns: NDArray[np.float64]) -> NDArray[np.float64]:

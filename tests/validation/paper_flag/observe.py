@@ -100,9 +100,7 @@ class Observations:
         speeds = [t.speed for t in self.thresholds.stop if abs(t.length - length) < 1e-6]
         if not speeds:
             raise NotFoundError(f"no stop speed at {length:g} m", where="stop speeds", fix="name a length of the table")
-        return Condition(
-            kind=Kind.STOP, at=length, value=float(np.median(speeds)), low=min(speeds), high=max(speeds)
-        )  # fmt: skip
+        return Condition(kind=Kind.STOP, at=length, value=float(np.median(speeds)), low=min(speeds), high=max(speeds))
 
 
 def _condition(kind: Kind, at: float, estimate: Estimate) -> Condition:
@@ -134,11 +132,17 @@ def measure_clip(track: EdgeTrack, spec: ClipSpec, case: Case) -> Clip:
         drawn = drawn + np.nanmedian(track.height[:, clamp]) * ratio * scale
     shown = np.isin((columns - (clamp or 0)) * scale, found.columns)
     return Clip(
-        spec=spec, frames=len(track.time), shares={what: track.share(what) for what in Seen},
-        scatter=float(np.nanmedian(scatter(track))), clamp=clamp, tip=(float(tip[0]), float(tip[1]), float(tip[2])),
-        waves=found, lines=drawn[:, shown],
-        stretch=stretch(track, stream(case.seed, "stretch", spec.name)) if spec.whole else None, still=still,
-    )  # fmt: skip
+        spec=spec,
+        frames=len(track.time),
+        shares={what: track.share(what) for what in Seen},
+        scatter=float(np.nanmedian(scatter(track))),
+        clamp=clamp,
+        tip=(float(tip[0]), float(tip[1]), float(tip[2])),
+        waves=found,
+        lines=drawn[:, shown],
+        stretch=stretch(track, stream(case.seed, "stretch", spec.name)) if spec.whole else None,
+        still=still,
+    )
 
 
 def observe(case: Case, data: Path, *, keep: Path | None = None) -> Observations:
@@ -180,8 +184,10 @@ def read_thresholds(case: Case, data: Path) -> Thresholds:
     return Thresholds(
         stop=speeds_by_length(data / case.tables["stop"], column="Ustop"),
         onset=speeds_by_length(data / case.tables["onset"], column="Uonset"),
-        bistable=bistable, flutter=flutter, curves=digitised_curves(data / case.tables["curve"]),
-    )  # fmt: skip
+        bistable=bistable,
+        flutter=flutter,
+        curves=digitised_curves(data / case.tables["curve"]),
+    )
 
 
 def median_by_length(thresholds: Sequence[Threshold]) -> tuple[tuple[float, float], ...]:

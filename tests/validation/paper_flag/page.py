@@ -34,21 +34,25 @@ def page(case: Case, seen: Observations, study: Study, verdict: Verdict) -> str:
         plots.plane(case, seen, study.tables[Candidate.REACTIVE]),
     )
     values = {
-        "case": case, "verdict": verdict, "words": verdict_words(seen, study, verdict),
+        "case": case,
+        "verdict": verdict,
+        "words": verdict_words(seen, study, verdict),
         "images": {name: figure_url(figure) for name, figure in zip(_PICTURES, figures, strict=True)},
         "clips": [_clip_row(clip, case) for clip in seen.clips],
-        "stretches": [(c.spec.name, c.stretch) for c in seen.clips if c.stretch is not None], "far": _far(case, seen),
+        "stretches": [(c.spec.name, c.stretch) for c in seen.clips if c.stretch is not None],
+        "far": _far(case, seen),
         "declared": [_declared_row(cell) for cell in study.declared],
         "fit_speeds": _listed(c.speed for c in case.of(Group.FIT)),
         "held_speeds": _listed(c.speed for c in case.of(Group.HELD_OUT)),
         "fit_lengths": _listed(1e3 * h for h in case.fit_lengths),
         "held_lengths": _listed(1e3 * h for h in case.held_out_lengths),
-        "linear": [_model_row(o) for o in study.linear], "crossed": [_model_row(o) for o in study.crossed],
+        "linear": [_model_row(o) for o in study.linear],
+        "crossed": [_model_row(o) for o in study.crossed],
         "in_time": [_model_row(o) for o in study.in_time],
         "floor": {kind.value: 100 * value for kind, value in study.floor.items()},
         "candidates_tried": candidates_tried(study, verdict),
         "version": f"flagdata {code_version()}",
-    }  # fmt: skip
+    }
     return render("tests.validation.paper_flag", "page.html.j2", values)
 
 
@@ -62,21 +66,30 @@ def as_json(case: Case, seen: Observations, study: Study, verdict: Verdict) -> d
         "words": verdict_words(seen, study, verdict),
         "clips": [
             {
-                "name": clip.spec.name, "tunnel_speed": clip.spec.speed, "group": clip.spec.group.value,
-                "whole_sheet": clip.spec.whole, "frames": clip.frames,
+                "name": clip.spec.name,
+                "tunnel_speed": clip.spec.speed,
+                "group": clip.spec.group.value,
+                "whole_sheet": clip.spec.whole,
+                "frames": clip.frames,
                 "columns": {what.name.lower(): share for what, share in clip.shares.items()},
-                "height_error_px": clip.scatter, "frequency_hz": clip.waves.frequency.as_dict(),
+                "height_error_px": clip.scatter,
+                "frequency_hz": clip.waves.frequency.as_dict(),
                 "explained": clip.waves.explained,
                 "wave_speed_m_s": clip.waves.speed.as_dict() if clip.spec.whole else None,
                 "amplitude_m": clip.waves.amplitude.as_dict() if clip.spec.whole else None,
-                "two_modes": _number(clip.waves.two_modes), "travelling": clip.waves.travelling,
+                "two_modes": _number(clip.waves.two_modes),
+                "travelling": clip.waves.travelling,
                 "stretch": asdict(clip.stretch) if clip.stretch else None,
             }
             for clip in seen.clips
         ],
         "declared": [
-            {"load": str(c.load), "factor": c.factor, "errors": {k.value: _errors(v) for k, v in c.errors.items()},
-             "tip_travel": {f"{speed:g}": _number(tip) for speed, tip in c.tips.items()}}
+            {
+                "load": str(c.load),
+                "factor": c.factor,
+                "errors": {k.value: _errors(v) for k, v in c.errors.items()},
+                "tip_travel": {f"{speed:g}": _number(tip) for speed, tip in c.tips.items()},
+            }
             for c in study.declared
         ],
         "linear": [_outcome(o) for o in study.linear],
@@ -87,7 +100,7 @@ def as_json(case: Case, seen: Observations, study: Study, verdict: Verdict) -> d
         "insufficient": {kind.value: value for kind, value in verdict.insufficient.items()},
         "remaining": [model_name(o) for o in verdict.remaining],
         "remaining_by_what_was_fitted": [model_name(o) for o in verdict.remaining_fitted],
-    }  # fmt: skip
+    }
 
 
 def model_name(outcome: Outcome) -> str:
@@ -97,13 +110,17 @@ def model_name(outcome: Outcome) -> str:
 
 def _outcome(o: Outcome) -> dict[str, Any]:
     return {
-        "model": model_name(o), "fitted_to": [k.value for k in o.fitted_to], "load": str(o.load),
-        "strengths": asdict(o.load), "factor": o.factor, "factor_range": list(o.factors),
+        "model": model_name(o),
+        "fitted_to": [k.value for k in o.fitted_to],
+        "load": str(o.load),
+        "strengths": asdict(o.load),
+        "factor": o.factor,
+        "factor_range": list(o.factors),
         "fit_errors": {k.value: _errors(v) for k, v in o.fit.items()},
         "held_out_errors": {k.value: _errors(v) for k, v in o.held_out.items()},
         "gain_over_base": {k.value: v.as_dict() for k, v in o.gains.items()},
         "segmented_sheets_errors": _errors(o.others),
-    }  # fmt: skip
+    }
 
 
 def _errors(values: Sequence[float] | np.ndarray[Any, Any]) -> list[float | None]:
@@ -135,11 +152,15 @@ def _model_row(o: Outcome) -> dict[str, Any]:
         kind.value: f"{_times(gain.mean)} [{_times(gain.low)}, {_times(gain.high)}]" for kind, gain in o.gains.items()
     }
     return {
-        "name": model_name(o), "load": str(o.load) if flutters else "any", "factor": factor if flutters else "any",
+        "name": model_name(o),
+        "load": str(o.load) if flutters else "any",
+        "factor": factor if flutters else "any",
         "mean": {kind.value: _mean(values) for kind, values in o.held_out.items()},
         "each": {kind.value: [_percent(float(v)) for v in values] for kind, values in o.held_out.items()},
-        "gain": gains, "flutters": flutters, "others": _mean(o.others),
-    }  # fmt: skip
+        "gain": gains,
+        "flutters": flutters,
+        "others": _mean(o.others),
+    }
 
 
 def _times(gain: float) -> str:
@@ -152,12 +173,17 @@ def _clip_row(clip: Clip, case: Case) -> list[str]:
     whole = clip.spec.whole
     interval = f" [{f.low:.2f}, {f.high:.2f}], n = {f.count}" if math.isfinite(f.low) else ", too few cycles"
     return [
-        clip.spec.name, f"{clip.spec.speed:g}", clip.spec.group.value, "whole sheet" if whole else "trailing part",
-        f"{100 * clip.shares[next(iter(clip.shares))]:.0f} %", f"{clip.scatter:.2f}", f"{f.value:.2f}{interval}",
+        clip.spec.name,
+        f"{clip.spec.speed:g}",
+        clip.spec.group.value,
+        "whole sheet" if whole else "trailing part",
+        f"{100 * clip.shares[next(iter(clip.shares))]:.0f} %",
+        f"{clip.scatter:.2f}",
+        f"{f.value:.2f}{interval}",
         f"{100 * w.explained:.0f} %",
         f"{w.speed.value:.2f} [{w.speed.low:.2f}, {w.speed.high:.2f}]" if whole else "scale unknown",
         f"{w.amplitude.value / case.sheet.length:.3f}" if whole else "scale unknown",
-    ]  # fmt: skip
+    ]
 
 
 def _declared_row(cell: Cell) -> list[str]:
@@ -172,10 +198,11 @@ def _declared_row(cell: Cell) -> list[str]:
     travel = f"{min(tips):.3f} to {max(tips):.3f}" if tips else ""
     return [
         "base model" if not cell.load.reactive else f"reactive loading, {cell.load}",
-        "tunnel's" if cell.factor == 1 else f"{cell.factor:g} of the tunnel's", ratio(cell.errors[Kind.FREQUENCY]),
+        "tunnel's" if cell.factor == 1 else f"{cell.factor:g} of the tunnel's",
+        ratio(cell.errors[Kind.FREQUENCY]),
         ratio(cell.errors[Kind.STOP]),
         "; ".join(part for part in (travel, f"{lost} diverged" if lost else "") if part),
-    ]  # fmt: skip
+    ]
 
 
 def _far(case: Case, seen: Observations) -> dict[str, str]:
@@ -184,10 +211,13 @@ def _far(case: Case, seen: Observations) -> dict[str, str]:
     near = _whole_held_out(case, seen)
     span = far.tip[2] - far.tip[0]
     return {
-        "whole": _listed(c.spec.speed for c in seen.clips if c.spec.whole), "speed": f"{far.spec.speed:g}",
-        "span": f"{span:.0f}", "share": f"{100 * case.column_scale * span / case.sheet.length:.0f}",
-        "near_span": f"{near.tip[2] - near.tip[0]:.0f}", "near_speed": f"{near.spec.speed:g}",
-    }  # fmt: skip
+        "whole": _listed(c.spec.speed for c in seen.clips if c.spec.whole),
+        "speed": f"{far.spec.speed:g}",
+        "span": f"{span:.0f}",
+        "share": f"{100 * case.column_scale * span / case.sheet.length:.0f}",
+        "near_span": f"{near.tip[2] - near.tip[0]:.0f}",
+        "near_speed": f"{near.spec.speed:g}",
+    }
 
 
 def _listed(values: Any) -> str:

@@ -83,9 +83,7 @@ def _points(axes: Axes, conditions: Sequence[Condition], *, face: str, label: st
     for condition in conditions:
         if np.isfinite(condition.low):
             axes.plot([condition.at] * 2, [condition.low, condition.high], color=_INK, lw=1)
-    axes.plot(
-        [c.at for c in conditions], [c.value for c in conditions], "o", color=_INK, mfc=face, ms=5, label=label
-    )  # fmt: skip
+    axes.plot([c.at for c in conditions], [c.value for c in conditions], "o", color=_INK, mfc=face, ms=5, label=label)
 
 
 def along(seen: Observations, study: Study, case: Case) -> Figure:
@@ -105,9 +103,14 @@ def along(seen: Observations, study: Study, case: Case) -> Figure:
 
 
 def _profile(
-    size: Axes, phase: Axes, columns: NDArray[np.float64], profile: NDArray[np.complex128], colour: str, style: str,
+    size: Axes,
+    phase: Axes,
+    columns: NDArray[np.float64],
+    profile: NDArray[np.complex128],
+    colour: str,
+    style: str,
     label: str,
-) -> None:  # fmt: skip
+) -> None:
     size.plot(1e3 * columns, 1e3 * np.abs(profile), style, color=colour, lw=1.2, label=label)
     moving = np.abs(profile) > 0.08 * np.abs(profile).max()
     turned = np.unwrap(np.angle(profile[moving]))
@@ -125,14 +128,28 @@ def lengths(case: Case, seen: Observations, study: Study) -> Figure:
             (thresholds.stop, "v", "stops (single runs)"),
             (thresholds.onset, "^", "starts (single runs)"),
         ):
-            axes.plot([1e3 * t.length for t in rows], [t.speed for t in rows], marker, color=_QUIET, ms=4, mfc="none",
-                      label=label)  # fmt: skip
+            axes.plot(
+                [1e3 * t.length for t in rows],
+                [t.speed for t in rows],
+                marker,
+                color=_QUIET,
+                ms=4,
+                mfc="none",
+                label=label,
+            )
         for rows, marker, label in (
             (thresholds.bistable, "s", "authors' bistable threshold"),
             (thresholds.flutter, "D", "authors' flutter threshold"),
         ):
-            axes.plot([1e3 * t.length for t in rows], [t.speed for t in rows], marker, color=_INK, ms=4, mfc="none",
-                      label=label)  # fmt: skip
+            axes.plot(
+                [1e3 * t.length for t in rows],
+                [t.speed for t in rows],
+                marker,
+                color=_INK,
+                ms=4,
+                mfc="none",
+                label=label,
+            )
         axes.set(xlabel="length [mm]", ylim=(0, 36))
     stops = np.array(median_by_length(thresholds.stop))
     tunnel.plot(1e3 * stops[:, 0], stops[:, 1], "v", color=_INK, ms=6, label="stops (median)")
@@ -142,8 +159,14 @@ def lengths(case: Case, seen: Observations, study: Study) -> Figure:
         row = table.loads.index(model.load)
         one = np.array([model.factor])
         values = [table.predict(row, one, Condition(kind=Kind.STOP, at=float(h), value=1.0))[0] for h in every]
-        tunnel.plot(1e3 * every, values, "-", color=_COLOURS[candidate], lw=1.3,
-                    label=f"{candidate.value}: {model.load}, s = {model.factor:.2f}")  # fmt: skip
+        tunnel.plot(
+            1e3 * every,
+            values,
+            "-",
+            color=_COLOURS[candidate],
+            lw=1.3,
+            label=f"{candidate.value}: {model.load}, s = {model.factor:.2f}",
+        )
     _published(theory, case, thresholds.curves)
     tunnel.set(ylabel="speed of the tunnel [m/s]", title="thresholds and fitted models")
     theory.set(title="thresholds and the theory of Argentina and Mahadevan")
@@ -164,10 +187,17 @@ def _published(axes: Axes, case: Case, curves: Mapping[str, Sequence[tuple[float
         reduced = np.exp(np.interp(ratio, points[0], points[1], left=np.nan, right=np.nan))
         speed = reduced * np.sqrt(sheet.rigidity / (density * length**3))
         first = name.endswith("00")
-        axes.plot(1e3 * length, speed, "-", color="#3b7d6b", lw=1,
-                  label="their curves, logged speed" if first else None)  # fmt: skip
-        axes.plot(1e3 * length, speed / case.shear_factor, ":", color="#3b7d6b", lw=1.2,
-                  label=f"their curves, {case.shear_factor:g} of it at the sheet" if first else None)  # fmt: skip
+        axes.plot(
+            1e3 * length, speed, "-", color="#3b7d6b", lw=1, label="their curves, logged speed" if first else None
+        )
+        axes.plot(
+            1e3 * length,
+            speed / case.shear_factor,
+            ":",
+            color="#3b7d6b",
+            lw=1.2,
+            label=f"their curves, {case.shear_factor:g} of it at the sheet" if first else None,
+        )
 
 
 def plane(case: Case, seen: Observations, table: SimulatedTable) -> Figure:

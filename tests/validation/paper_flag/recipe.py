@@ -97,17 +97,27 @@ def load_case() -> Case:
     tried = {name: tuple(simulation[name.replace("_", "-")]) for name in _TRIED}
     run = {name: value for name, value in simulation.items() if not isinstance(value, list)}
     return Case(
-        name=top["name"], about=top["about"], seed=top["seed"], source=sheet["source"],
+        name=top["name"],
+        about=top["about"],
+        seed=top["seed"],
+        source=sheet["source"],
         sheet=Sheet(length=sheet["length"], mass=sheet["mass"], rigidity=sheet["rigidity"]),
-        density=top["air"]["density"], true_rate=camera["true-rate"], column_scale=camera["column-scale"],
-        row_scale=camera["row-scale"], folder=clips["folder"], suffix=clips["suffix"],
+        density=top["air"]["density"],
+        true_rate=camera["true-rate"],
+        column_scale=camera["column-scale"],
+        row_scale=camera["row-scale"],
+        folder=clips["folder"],
+        suffix=clips["suffix"],
         clips=tuple(
             ClipSpec(name=name, speed=speed, group=group, whole=name in camera["whole"])
             for group in Group
             for name, speed in clips[group.value].items()
         ),
         tables={key: thresholds[key] for key in ("stop", "onset", "authors", "curve")},
-        fit_lengths=tuple(thresholds["fit-lengths"]), held_out_lengths=tuple(thresholds["held-out-lengths"]),
-        reactive_share=top["declared"]["reactive-share"], shear_factor=top["declared"]["shear-factor"],
-        run=StripRun(**run), **tried,
-    )  # fmt: skip
+        fit_lengths=tuple(thresholds["fit-lengths"]),
+        held_out_lengths=tuple(thresholds["held-out-lengths"]),
+        reactive_share=top["declared"]["reactive-share"],
+        shear_factor=top["declared"]["shear-factor"],
+        run=StripRun(**run),
+        **tried,
+    )

@@ -62,9 +62,12 @@ def observed(motion: StripMotion, member: int) -> Flutter:
     except InputError:  # too few cycles in the time kept, or folded over for most of it
         return nothing
     return Flutter(
-        frequency=found.frequency.value, wave=found.speed.value, amplitude=found.amplitude.value / length, tip=travel,
+        frequency=found.frequency.value,
+        wave=found.speed.value,
+        amplitude=found.amplitude.value / length,
+        tip=travel,
         periodic=found.explained >= _PERIODIC,
-    )  # fmt: skip
+    )
 
 
 def flutters(loads: Sequence[Load], speeds: Sequence[float], *, case: Case, keep: Path | None) -> list[Flutter]:
@@ -83,24 +86,35 @@ def flutters(loads: Sequence[Load], speeds: Sequence[float], *, case: Case, keep
 def _batch(loads: Sequence[Load], speeds: Sequence[float], case: Case, keep: Path | None) -> list[Flutter]:
     def make() -> dict[str, NDArray[Any]]:
         motion = simulate(
-            length=case.sheet.length, mass=case.sheet.mass, rigidity=case.sheet.rigidity, density=case.density,
-            speeds=speeds, effects=effects(loads, length=case.sheet.length, density=case.density), run=case.run,
-        )  # fmt: skip
+            length=case.sheet.length,
+            mass=case.sheet.mass,
+            rigidity=case.sheet.rigidity,
+            density=case.density,
+            speeds=speeds,
+            effects=effects(loads, length=case.sheet.length, density=case.density),
+            run=case.run,
+        )
         found = [observed(motion, member) for member in range(len(loads))]
         return {name: np.array([getattr(one, name) for one in found]) for name in _FIELDS}
 
     inputs = {
-        "loads": [asdict(load) for load in loads], "speeds": list(speeds), "sheet": asdict(case.sheet),
-        "density": case.density, "run": asdict(case.run),
-    }  # fmt: skip
+        "loads": [asdict(load) for load in loads],
+        "speeds": list(speeds),
+        "sheet": asdict(case.sheet),
+        "density": case.density,
+        "run": asdict(case.run),
+    }
     arrays = cached(keep, inputs, (limit_cycle, waves_module, sys.modules[__name__]), make)
     return [
         Flutter(
-            frequency=float(arrays["frequency"][i]), wave=float(arrays["wave"][i]),
-            amplitude=float(arrays["amplitude"][i]), tip=float(arrays["tip"][i]), periodic=bool(arrays["periodic"][i]),
+            frequency=float(arrays["frequency"][i]),
+            wave=float(arrays["wave"][i]),
+            amplitude=float(arrays["amplitude"][i]),
+            tip=float(arrays["tip"][i]),
+            periodic=bool(arrays["periodic"][i]),
         )
         for i in range(len(loads))
-    ]  # fmt: skip
+    ]
 
 
 class SimulatedTable:

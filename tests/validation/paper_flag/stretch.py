@@ -62,9 +62,7 @@ def stretch(track: EdgeTrack, rng: np.random.Generator) -> Stretch:
         InputError: fewer than 100 frames show a line.
     """
     ratios = np.arange(0.4, 1.2001, 0.01)
-    every = EdgeTrack(
-        time=track.time[::2], height=track.height[::2], width=track.width[::2], seen=track.seen[::2]
-    )  # fmt: skip
+    every = EdgeTrack(time=track.time[::2], height=track.height[::2], width=track.width[::2], seen=track.seen[::2])
     arcs = arc_lengths(every, ratios)
     arcs = arcs[np.isfinite(arcs).all(axis=1)]
     if len(arcs) < 100:
@@ -81,10 +79,13 @@ def stretch(track: EdgeTrack, rng: np.random.Generator) -> Stretch:
     low, high = np.percentile(drawn, [5, 95])
     square = int(np.abs(ratios - 1).argmin())
     return Stretch(
-        ratio=float(ratios[best]), low=float(low), high=float(high),
-        length=float(np.percentile(arcs[:, best], _UPPER[1])), spread=float(spreads[best]),
+        ratio=float(ratios[best]),
+        low=float(low),
+        high=float(high),
+        length=float(np.percentile(arcs[:, best], _UPPER[1])),
+        spread=float(spreads[best]),
         spread_square=float(spreads[square]),
-    )  # fmt: skip
+    )
 
 
 def _spread(arcs: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -136,14 +136,18 @@ class _Evidence:
         unseen = {kind: errors(predictor, best.load, best.factor, self.unseen(kind)) for kind in judged_by}
         never = {kind: np.full(len(found), math.log(10.0)) for kind, found in unseen.items()}
         return Outcome(
-            candidate=candidate, shear=shear, fitted_to=tuple(fitted_to), load=predictor.loads[best.load],
-            factor=best.factor, factors=(min(one.factor for one in jack), max(one.factor for one in jack)),
+            candidate=candidate,
+            shear=shear,
+            fitted_to=tuple(fitted_to),
+            load=predictor.loads[best.load],
+            factor=best.factor,
+            factors=(min(one.factor for one in jack), max(one.factor for one in jack)),
             loads=tuple(dict.fromkeys(predictor.loads[one.load] for one in jack)),
             fit={k: errors(predictor, best.load, best.factor, self.of(Group.FIT, (k,))) for k in fitted_to},
             held_out=unseen,
             others=errors(predictor, best.load, best.factor, self.of(Group.OTHER, (Kind.FREQUENCY,))),
             gains={kind: paired(never[kind], found) for kind, found in unseen.items()},
-        )  # fmt: skip
+        )
 
 
 def study(case: Case, seen: Observations, *, keep: Path | None = None) -> Study:
@@ -178,10 +182,15 @@ def study(case: Case, seen: Observations, *, keep: Path | None = None) -> Study:
     ]
     best = min(in_time, key=lambda outcome: outcome.score)
     return Study(
-        declared=_declared(case, evidence, linear_table, simulated), linear=tuple(linear), crossed=tuple(crossed),
-        in_time=tuple(in_time), linear_tables=linear_tables, tables=tables, shapes=_shapes(case, in_time),
+        declared=_declared(case, evidence, linear_table, simulated),
+        linear=tuple(linear),
+        crossed=tuple(crossed),
+        in_time=tuple(in_time),
+        linear_tables=linear_tables,
+        tables=tables,
+        shapes=_shapes(case, in_time),
         floor=_floor(case, best, simulated),
-    )  # fmt: skip
+    )
 
 
 def _simulated_tables(
@@ -220,13 +229,14 @@ def _declared(
     rows = _over(loads, [factor * speed for factor in factors for speed in speeds], simulated)
     return tuple(
         Cell(
-            load=load, factor=factor,
+            load=load,
+            factor=factor,
             errors={kind: errors(table, index, factor, part) for kind, part in kinds.items()},
             tips={speed: rows[index][half * len(speeds) + at].tip for at, speed in enumerate(speeds)},
         )
         for index, load in enumerate(loads)
         for half, factor in enumerate(factors)
-    )  # fmt: skip
+    )
 
 
 def _shapes(case: Case, in_time: Sequence[Outcome]) -> dict[Candidate, StripMotion]:
@@ -234,10 +244,14 @@ def _shapes(case: Case, in_time: Sequence[Outcome]) -> dict[Candidate, StripMoti
     models = [outcome for outcome in in_time if outcome.shear is Shear.FREE]
     speed = next(clip.speed for clip in case.of(Group.HELD_OUT) if clip.whole)
     motion = simulate(
-        length=case.sheet.length, mass=case.sheet.mass, rigidity=case.sheet.rigidity, density=case.density,
+        length=case.sheet.length,
+        mass=case.sheet.mass,
+        rigidity=case.sheet.rigidity,
+        density=case.density,
         speeds=[model.factor * speed for model in models],
-        effects=effects([model.load for model in models], length=case.sheet.length, density=case.density), run=case.run,
-    )  # fmt: skip
+        effects=effects([model.load for model in models], length=case.sheet.length, density=case.density),
+        run=case.run,
+    )
     return {
         model.candidate: replace(motion, along=motion.along[..., [i]], across=motion.across[..., [i]])
         for i, model in enumerate(models)

@@ -16,9 +16,14 @@ RUN = StripRun(columns=12, stretching=40.0, settle=0.35, duration=0.25, rate=250
 def test_a_push_dies_in_the_base_model_and_grows_to_a_limit_cycle_with_reactive_loading() -> None:
     loads = [Load(), Load(), Load(reactive=0.25), Load(reactive=0.25)]
     motion = simulate(
-        length=LENGTH, mass=0.08, rigidity=1.315e-4, density=DENSITY, speeds=[4.5, 9.0, 2.0, 4.5],
-        effects=effects(loads, length=LENGTH, density=DENSITY), run=RUN,
-    )  # fmt: skip
+        length=LENGTH,
+        mass=0.08,
+        rigidity=1.315e-4,
+        density=DENSITY,
+        speeds=[4.5, 9.0, 2.0, 4.5],
+        effects=effects(loads, length=LENGTH, density=DENSITY),
+        run=RUN,
+    )
     travel = np.ptp(motion.across[:, -1], axis=0) / 2 / LENGTH
     # Pushed by 5 % of the length; the onset with M = ρL/4 is at 3.6 m/s by linear stability.
     assert (travel[:3] < 0.05).all()

@@ -43,9 +43,11 @@ def test_the_ratio_at_which_paper_keeps_its_length_is_that_of_the_pixels() -> No
 def test_a_straight_line_is_as_long_as_it_is() -> None:
     columns = np.arange(101.0)
     track = EdgeTrack(
-        time=np.arange(2.0), height=np.stack([columns, columns]) * 4 / 3, width=np.ones((2, 101)),
+        time=np.arange(2.0),
+        height=np.stack([columns, columns]) * 4 / 3,
+        width=np.ones((2, 101)),
         seen=np.zeros((2, 101), np.uint8),
-    )  # fmt: skip
+    )
     # 3 : 4 : 5; a running parabola leaves a straight line as it is.
     assert arc_lengths(track, np.ones(1))[:, 0] == pytest.approx([100 * 5 / 3] * 2, rel=1e-9)
 

@@ -44,8 +44,11 @@ def drawn_clip(spec: ClipSpec, case: Case) -> Clip:
 
 @pytest.fixture(scope="module")
 def case() -> Case:
-    groups = {Group.FIT: {"slow": 8.0, "fast": 12.0}, Group.HELD_OUT: {"middle": 10.0, "faster": 11.0},
-              Group.OTHER: {"other": 9.0}}  # fmt: skip
+    groups = {
+        Group.FIT: {"slow": 8.0, "fast": 12.0},
+        Group.HELD_OUT: {"middle": 10.0, "faster": 11.0},
+        Group.OTHER: {"other": 9.0},
+    }
     clips = tuple(
         ClipSpec(name=name, speed=speed, group=group, whole=name in ("slow", "middle"))
         for group, own in groups.items()
@@ -62,9 +65,12 @@ def case() -> Case:
 def seen(case: Case) -> Observations:
     stops = tuple(Threshold(length=h, speed=v) for h, v in ((0.08, 9.0), (0.10, 8.0), (0.12, 7.5), (0.14, 7.0)))
     tables = Thresholds(
-        stop=stops, onset=stops, bistable=stops, flutter=stops,
+        stop=stops,
+        onset=stops,
+        bistable=stops,
+        flutter=stops,
         curves={"curve_00": ((0.9, 40.0), (2.2, 28.0)), "experiments": ((2.7, 25.0),)},
-    )  # fmt: skip
+    )
     return Observations(clips=tuple(drawn_clip(spec, case) for spec in case.clips), thresholds=tables)
 
 
@@ -86,8 +92,11 @@ def found(case: Case, seen: Observations) -> studied.Study:
         return StripMotion(time=time, along=np.broadcast_to(arc[:, None], across.shape), across=across, arc=arc)
 
     def tried(candidate: Candidate) -> tuple[Load, ...]:
-        few = {Candidate.REACTIVE: (Load(reactive=0.1), TRUTH), Candidate.LIFT: (Load(lift=0.3),),
-               Candidate.REACTIVE_AND_LIFT: (Load(reactive=0.1, lift=0.3),)}  # fmt: skip
+        few = {
+            Candidate.REACTIVE: (Load(reactive=0.1), TRUTH),
+            Candidate.LIFT: (Load(lift=0.3),),
+            Candidate.REACTIVE_AND_LIFT: (Load(reactive=0.1, lift=0.3),),
+        }
         return few.get(candidate, (Load(),))
 
     with pytest.MonkeyPatch.context() as patch:

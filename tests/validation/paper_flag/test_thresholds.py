@@ -14,8 +14,9 @@ def test_decimal_commas_are_read_and_zero_is_no_measurement(tmp_path: Path) -> N
     path = tmp_path / "stop.csv"
     path.write_text('L,Ustop\n60,"15,71399"\n70,0\n80,"9,5"\n')
     assert speeds_by_length(path, column="Ustop") == (
-        Threshold(length=0.06, speed=15.71399), Threshold(length=0.08, speed=9.5),
-    )  # fmt: skip
+        Threshold(length=0.06, speed=15.71399),
+        Threshold(length=0.08, speed=9.5),
+    )
 
 
 def test_a_cell_that_is_no_number_is_named_by_its_line(tmp_path: Path) -> None:

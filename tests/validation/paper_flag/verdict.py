@@ -60,9 +60,7 @@ def judge(case: Case, seen: Observations, study: Study) -> Verdict:
     tolerance = {
         kind: max(_half_width(_conditions(case, seen, kind)), study.floor.get(kind, 0.0)) for kind in best.held_out
     }
-    missed = {
-        kind: best.held_out_error(kind) for kind in best.held_out if best.held_out_error(kind) > tolerance[kind]
-    }  # fmt: skip
+    missed = {kind: best.held_out_error(kind) for kind in best.held_out if best.held_out_error(kind) > tolerance[kind]}
     remaining = _remaining(study.in_time, tuple(best.held_out))
     names = {outcome.candidate for outcome in remaining}
     if not any(outcome.gains[kind].low > 0 for outcome in remaining for kind in fitted):
@@ -72,9 +70,13 @@ def judge(case: Case, seen: Observations, study: Study) -> Verdict:
     else:
         conclusion = Conclusion.EFFECT if len(names) == 1 else Conclusion.ONE_OF
     return Verdict(
-        conclusion=conclusion, best=best, remaining_fitted=_remaining(study.in_time, fitted), remaining=remaining,
-        insufficient=missed, tolerance=tolerance,
-    )  # fmt: skip
+        conclusion=conclusion,
+        best=best,
+        remaining_fitted=_remaining(study.in_time, fitted),
+        remaining=remaining,
+        insufficient=missed,
+        tolerance=tolerance,
+    )
 
 
 def _remaining(outcomes: Sequence[Outcome], kinds: Sequence[Kind]) -> tuple[Outcome, ...]:

@@ -48,9 +48,12 @@ class Estimate:
     def scaled(self, factor: float) -> Estimate:
         """In another unit."""
         return Estimate(
-            value=self.value * factor, error=self.error * factor, low=self.low * factor, high=self.high * factor,
+            value=self.value * factor,
+            error=self.error * factor,
+            low=self.low * factor,
+            high=self.high * factor,
             count=self.count,
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,9 +113,10 @@ def waves(
     use = seen.mean(axis=0) >= least_seen
     if use.sum() < 2:
         raise InputError(
-            f"{int(use.sum())} columns are seen in {least_seen:.0%} of the frames", where="waves",
+            f"{int(use.sum())} columns are seen in {least_seen:.0%} of the frames",
+            where="waves",
             fix="give a clip in which the line is in view for longer",
-        )  # fmt: skip
+        )
     columns, heights, seen = columns[use], heights[:, use], seen[:, use]
     mean = np.nanmean(heights, axis=0)
     frequency = _frequency(time, heights - mean, band, harmonics)
@@ -135,9 +139,14 @@ def waves(
         explained=float(1 - (residual**2).sum() / (varied**2).sum()),
         amplitude=_about(float(np.abs(profile).max()), amplitudes * float(np.abs(profile).max())),
         speed=_about(wave_speed(columns, profile, frequency), speeds),
-        travelling=_travelling(profile), columns=columns, profile=profile, mean=offset, lowest=lowest, highest=highest,
+        travelling=_travelling(profile),
+        columns=columns,
+        profile=profile,
+        mean=offset,
+        lowest=lowest,
+        highest=highest,
         two_modes=_two_modes(heights),
-    )  # fmt: skip
+    )
 
 
 def wave_speed(columns: NDArray[np.float64], profile: NDArray[np.complex128], frequency: float) -> float:

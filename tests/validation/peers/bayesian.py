@@ -52,11 +52,16 @@ class BayesianOptimisation:
                 )
                 acquisition = logei.qLogExpectedImprovement(model, best_f=best, sampler=sampler)
             found, _ = optim.optimize_acqf(
-                acquisition, bounds=bounds, q=self._batch, num_restarts=_RESTARTS, raw_samples=_RAW,
+                acquisition,
+                bounds=bounds,
+                q=self._batch,
+                num_restarts=_RESTARTS,
+                raw_samples=_RAW,
                 options={
-                    "maxiter": _STEPS, "seed": child_seed(self._seed, "peers", "bayesian", "starts", count) % 2**31
+                    "maxiter": _STEPS,
+                    "seed": child_seed(self._seed, "peers", "bayesian", "starts", count) % 2**31,
                 },
-            )  # fmt: skip
+            )
         return signed(found)
 
     def tell(self, points: NDArray[np.float64], values: NDArray[np.float64]) -> None:

@@ -26,9 +26,10 @@ class CmaEs:
         cma = library("cma", of="cma")
         self._dimension, self._begun = dimension, False
         self._strategy: Any = cma.CMAEvolutionStrategy(
-            np.zeros(dimension), _STEP,
+            np.zeros(dimension),
+            _STEP,
             {"bounds": [-1.0, 1.0], "seed": 1 + child_seed(seed, "peers", "cma-es") % (2**31 - 2), "verbose": -9},
-        )  # fmt: skip
+        )
 
     def ask(self) -> NDArray[np.float64]:
         if not self._begun:

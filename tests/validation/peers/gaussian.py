@@ -42,9 +42,11 @@ def fitted(points: NDArray[np.float64], values: NDArray[np.float64]) -> Any:
     dimension = x.shape[1]
     prior = priors.LogNormalPrior(loc=math.sqrt(2) + 0.5 * math.log(dimension), scale=math.sqrt(3))
     kernel = kernels.MaternKernel(
-        nu=2.5, ard_num_dims=dimension, lengthscale_prior=prior,
+        nu=2.5,
+        ard_num_dims=dimension,
+        lengthscale_prior=prior,
         lengthscale_constraint=constraints.GreaterThan(2.5e-2, initial_value=prior.mode),
-    )  # fmt: skip
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the linear algebra's jitter, and the deprecations of torch's own tracing
         model = models.SingleTaskGP(x, y, covar_module=kernel, outcome_transform=transforms.Standardize(m=1))

@@ -27,6 +27,7 @@ def library(module: str, *, of: str) -> ModuleType:
             return importlib.import_module(module)
     except ModuleNotFoundError as error:
         raise InputError(
-            f"{error.name} is not installed, which this optimiser needs", where=of,
+            f"{error.name} is not installed, which this optimiser needs",
+            where=of,
             fix='pip install "flagdata[dev]"',
-        ) from None  # fmt: skip
+        ) from None

@@ -26,7 +26,7 @@ from tests.validation.real_flags.study import (
     misfit,
     misfits,
     with_errors,
-)  # fmt: skip
+)
 
 _BASE, _AFTER, _BAND = "#444444", "#b5541c", "#bcd3e6"
 _HEAD = """# Real flags beside published measurements
@@ -52,12 +52,20 @@ def page(
     """The page in Markdown."""
     return "\n".join(
         [
-            _HEAD, "![Published bands, the base model and the model with the effect](real-flags.png)\n",
-            "## The numbers\n", *_numbers(base, after), "## The sources\n", *_sources(), "## The verdict\n",
-            *_verdict(base, after, fit, controls, unfitted), "## The paper flag\n",
-            *_paper(paper), "## What numerics change\n", *_numerics(base, after),
+            _HEAD,
+            "![Published bands, the base model and the model with the effect](real-flags.png)\n",
+            "## The numbers\n",
+            *_numbers(base, after),
+            "## The sources\n",
+            *_sources(),
+            "## The verdict\n",
+            *_verdict(base, after, fit, controls, unfitted),
+            "## The paper flag\n",
+            *_paper(paper),
+            "## What numerics change\n",
+            *_numerics(base, after),
         ]
-    )  # fmt: skip
+    )
 
 
 def _numbers(base: Predictions, after: Predictions) -> list[str]:
@@ -67,9 +75,18 @@ def _numbers(base: Predictions, after: Predictions) -> list[str]:
         for (name, band), first, second in pairs:
             change, error = second[0] - first[0], math.hypot(first[1], second[1])
             rows.append(
-                [one.name, f"{one.quantity}, {name}", one.role, _band(band), _shown(*first), judged(*first, band),
-                 _shown(*second), judged(*second, band), f"{change / error:+.1f}" if error else "0"]
-            )  # fmt: skip
+                [
+                    one.name,
+                    f"{one.quantity}, {name}",
+                    one.role,
+                    _band(band),
+                    _shown(*first),
+                    judged(*first, band),
+                    _shown(*second),
+                    judged(*second, band),
+                    f"{change / error:+.1f}" if error else "0",
+                ]
+            )
         if not pairs:
             bands = "; ".join(_band(band) for band in one.bands.values() if math.isfinite(band[1]))
             rows.append([one.name, one.quantity, one.role, bands, "", "not comparable", "", "not comparable", ""])
@@ -114,10 +131,14 @@ def _verdict(base: Predictions, after: Predictions, fit: Fit, controls: Sequence
         if one.predicted is not None
     ]
     return [
-        found, about, table(["effect", "strength", "refits", "misfit, fitted", "misfit, judged"], rows), "",
+        found,
+        about,
+        table(["effect", "strength", "refits", "misfit, fitted", "misfit, judged"], rows),
+        "",
         "Number by number, of all that a number is predicted for:\n",
-        table(["name", "used to", "misfit, base", f"misfit, with {NAMED}"], by_number), "",
-    ]  # fmt: skip
+        table(["name", "used to", "misfit, base", f"misfit, with {NAMED}"], by_number),
+        "",
+    ]
 
 
 def _held(model: Predictions) -> tuple[int, int]:

@@ -86,17 +86,25 @@ def frequencies(case: Case, shares: Sequence[float], speeds: Sequence[float], ho
     along = np.clip((x - cell / 2) / (length - cell / 2), 0, None)
     across = case.run.push * length * along**2 * (6 - 4 * along + along**2) / 3
     paper = isotropic(
-        name="paper", density=case.sheet.mass, stretching=how.stretching, shear=how.stretching,
-        bending=_GRID_RIGIDITY * case.sheet.rigidity, damping=case.run.damping,
-    )  # fmt: skip
+        name="paper",
+        density=case.sheet.mass,
+        stretching=how.stretching,
+        shear=how.stretching,
+        bending=_GRID_RIGIDITY * case.sheet.rigidity,
+        damping=case.run.damping,
+    )
     scenes = [
         Scene(
-            mesh=mesh, position=np.stack([x, across, mesh.rest[:, 1]], axis=1), material=paper,
+            mesh=mesh,
+            position=np.stack([x, across, mesh.rest[:, 1]], axis=1),
+            material=paper,
             handles=Handles(vertices=tuple(int(i) for i in np.flatnonzero(x < cell)), stiffness=math.inf),
-            wind=(float(speed), 0.0, 0.0), gravity=(0.0, 0.0, 0.0), air=QuadraticNormal(density=case.density),
+            wind=(float(speed), 0.0, 0.0),
+            gravity=(0.0, 0.0, 0.0),
+            air=QuadraticNormal(density=case.density),
         )
         for speed in speeds
-    ]  # fmt: skip
+    ]
     system, state = assemble(scenes, dtype=torch.float64)
     loading = FiniteSpanLoading(share=torch.tensor(shares, dtype=torch.float64), density=case.density)
     system, state = apply([loading], system, state)
@@ -219,9 +227,14 @@ def study(case: Case, share: float, keep: Path | None) -> Paper:
 
     def simulated(shares: Sequence[float], speeds: Sequence[float], how: Sheet, of: Case = case) -> NDArray[np.float64]:
         given = {
-            "sheet": asdict(of.sheet), "density": of.density, "run": asdict(of.run), "how": asdict(how),
-            "shares": list(shares), "speeds": list(speeds), "height": HEIGHT,
-        }  # fmt: skip
+            "sheet": asdict(of.sheet),
+            "density": of.density,
+            "run": asdict(of.run),
+            "how": asdict(how),
+            "shares": list(shares),
+            "speeds": list(speeds),
+            "height": HEIGHT,
+        }
         method = (sys.modules[__name__], waves_module)
         return cached(keep, given, method, lambda: {"hz": frequencies(of, shares, speeds, how)})["hz"]
 
@@ -237,6 +250,9 @@ def study(case: Case, share: float, keep: Path | None) -> Paper:
         hz = simulated([free.share] * len(STOPS), (STOPS * free.factor * one.speed).tolist(), Sheet(), sheet)
         stops[one.length] = one.speed, one.speed * stop(hz)
     return Paper(
-        stops=stops, base=predicted(table, 0.0, 0.5), found=fitted(table, [share]), free=free,
+        stops=stops,
+        base=predicted(table, 0.0, 0.5),
+        found=fitted(table, [share]),
+        free=free,
         numerics={name: float(np.abs(hz / reference - 1).max()) for name, hz in zip(VARIANTS, others, strict=True)},
-    )  # fmt: skip
+    )

@@ -136,6 +136,9 @@ def read(
     chord = (course[:, -1] - course[:, 0]).mean(0)
     return (
         float(force[:, 0].mean() / (AIR / 2 * one.speed**2 * LENGTH * HEIGHT)),
-        float(np.arctan2(-chord[2], np.hypot(chord[0], chord[1]))), frequency, found.length,
-        frequency * found.length, float(course[:, -1, 1].std() / LENGTH),
-    )  # fmt: skip
+        float(np.arctan2(-chord[2], np.hypot(chord[0], chord[1]))),
+        frequency,
+        found.length,
+        frequency * found.length,
+        float(course[:, -1, 1].std() / LENGTH),
+    )

@@ -177,9 +177,11 @@ def fitted(name: str, grid: Values, tables: Values) -> Fit:
     left_out = [fine[int(np.argmin(np.delete(squares, i, axis=1).mean(1)))] for i in range(squares.shape[1])]
     best = int(np.argmin(squares.mean(1)))
     return Fit(
-        name=name, strength=float(round(fine[best], 3)), interval=(float(min(left_out)), float(max(left_out))),
+        name=name,
+        strength=float(round(fine[best], 3)),
+        interval=(float(min(left_out)), float(max(left_out))),
         readings=between[best],
-    )  # fmt: skip
+    )
 
 
 class Verdict:

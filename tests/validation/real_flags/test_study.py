@@ -18,7 +18,7 @@ from tests.validation.real_flags.study import (
     misfits,
     numerical_error,
     with_errors,
-)  # fmt: skip
+)
 from tests.validation.real_flags.waves import waves
 
 ALONG = np.linspace(0, 1, 19)
@@ -45,9 +45,13 @@ def test_readings_have_the_units_that_they_state() -> None:
     found = dict(zip(READINGS, read(course, force, ALONG, flag, 50.0), strict=True))
     # ½ 1.2 25 1.5 = 22.5 N; half as far down as along; 2 Hz · 1.5 m / 5 m/s; 0.1 m / √2 over 1.5 m.
     expected = {
-        "drag": 0.1, "droop": math.atan(0.5), "frequency": 0.6, "wavelength": 1.5, "speed": 0.9,
+        "drag": 0.1,
+        "droop": math.atan(0.5),
+        "frequency": 0.6,
+        "wavelength": 1.5,
+        "speed": 0.9,
         "amplitude": 0.1 / math.sqrt(2) / 1.5,
-    }  # fmt: skip
+    }
     assert found == pytest.approx(expected, rel=0.03)
 
 

@@ -34,15 +34,22 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     picture(base, after, folder / "real-flags.png")
     numbers = [
         {
-            "name": one.name, "of": name, "band": list(band), "role": one.role.value,
-            "base": known(first[0]), "base_error": known(first[1]), "base_verdict": judged(*first, band),
-            "after": known(second[0]), "after_error": known(second[1]), "after_verdict": judged(*second, band),
+            "name": one.name,
+            "of": name,
+            "band": list(band),
+            "role": one.role.value,
+            "base": known(first[0]),
+            "base_error": known(first[1]),
+            "base_verdict": judged(*first, band),
+            "after": known(second[0]),
+            "after_error": known(second[1]),
+            "after_verdict": judged(*second, band),
         }
         for one in PUBLISHED
         for (name, band), first, second in zip(
             one.bands.items(), with_errors(one, base), with_errors(one, after), strict=False
         )
-    ]  # fmt: skip
+    ]
     fits = (fit, *controls)
     return {
         "fits": [{"effect": one.name, "strength": one.strength, "refits": list(one.interval)} for one in fits],

@@ -58,29 +58,41 @@ def page(found: HeldCloth) -> str:
         f"{', '.join(at_bounds(last)) or 'none'}."
     )
     lines = [
-        "# A cloth carried by a robot", "", split, "",
-        "| model | fitted programmes | held-out programmes |", "|---|---|---|",
-        *(
-            f"| {name} | {_mm(found.of_fitted[name])} | {_mm(found.of_held_out[name])} |"
-            for name in found.of_held_out
-        ), "",
-        f"The median distance of the held-out nodes is {1e3 * found.median:.0f} mm after calibration.", "",
+        "# A cloth carried by a robot",
+        "",
+        split,
+        "",
+        "| model | fitted programmes | held-out programmes |",
+        "|---|---|---|",
+        *(f"| {name} | {_mm(found.of_fitted[name])} | {_mm(found.of_held_out[name])} |" for name in found.of_held_out),
+        "",
+        f"The median distance of the held-out nodes is {1e3 * found.median:.0f} mm after calibration.",
+        "",
         *_lacking(found),
-        "| parameter | calibrated | with all that was added |", "|---|---|---|",
+        "| parameter | calibrated | with all that was added |",
+        "|---|---|---|",
         f"| mass over drag, of nominal | {own.density:.2f} | {last.density:.2f} |",
         f"| bending, of nominal | {own.bending:.2f} | {last.bending:.2f} |",
         f"| internal damping | {1e3 * own.damping:.1f} ms | {1e3 * last.damping:.1f} ms |",
         f"| camera behind the tool's clock | {1e3 * own.lag:.0f} ms | {1e3 * last.lag:.0f} ms |",
-        *(f"| {name} [{described(name).unit}] | – | {value:.3g} |" for name, value in last.strengths.items()), "",
-        at_bound, "",
-        "| what is left of the held-out error with all that was added | mm |", "|---|---|",
-        *(f"| {name} | {1e3 * value:.1f} |" for name, value in found.parts.items()), "",
-        f"At rest the square of nodes is {1e3 * wide:.0f} × {1e3 * high:.0f} mm. In motion it is {extents}.", "",
-        "## Repeats of one programme (A/A)", "",
-        compared, "",
-        "| repeats | p | p with stamps moved |", "|---|---|---|",
+        *(f"| {name} [{described(name).unit}] | – | {value:.3g} |" for name, value in last.strengths.items()),
+        "",
+        at_bound,
+        "",
+        "| what is left of the held-out error with all that was added | mm |",
+        "|---|---|",
+        *(f"| {name} | {1e3 * value:.1f} |" for name, value in found.parts.items()),
+        "",
+        f"At rest the square of nodes is {1e3 * wide:.0f} × {1e3 * high:.0f} mm. In motion it is {extents}.",
+        "",
+        "## Repeats of one programme (A/A)",
+        "",
+        compared,
+        "",
+        "| repeats | p | p with stamps moved |",
+        "|---|---|---|",
         *(f"| {pair.first}, {pair.second} | {pair.p:.3f} | {pair.p_moved:.3f} |" for pair in found.pairs),
-    ]  # fmt: skip
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -94,15 +106,24 @@ def _lacking(found: HeldCloth) -> list[str]:
         f"{', '.join(f'{1e6 * max(gain.floor for gain in own.gains):.0f}' for own in found.rounds)} mm² by rounds."
     )
     lines = [
-        "## What the calibrated model lacks", "", how, "", "| round | added | next best |", "|---|---|---|",
-        *(f"| {place} | {_chosen(own)} |" for place, own in enumerate(found.rounds, start=1)), "",
-        "Held-out programmes, lower half of the nodes:", "",
-        "| model | error [mm] | mean square taken off [mm²] |", "|---|---|---|",
+        "## What the calibrated model lacks",
+        "",
+        how,
+        "",
+        "| round | added | next best |",
+        "|---|---|---|",
+        *(f"| {place} | {_chosen(own)} |" for place, own in enumerate(found.rounds, start=1)),
+        "",
+        "Held-out programmes, lower half of the nodes:",
+        "",
+        "| model | error [mm] | mean square taken off [mm²] |",
+        "|---|---|---|",
         *(
             f"| {own.model} | {1e3 * own.lower:.1f} | {_squares(own.gain, own.error) if place else '–'} |"
             for place, own in enumerate(found.reductions)
-        ), "",
-    ]  # fmt: skip
+        ),
+        "",
+    ]
     if any(value for row in found.camera for value in row):
         rows = "; ".join(", ".join(f"{value:+.3f}" for value in row) for row in found.camera)
         remark = (

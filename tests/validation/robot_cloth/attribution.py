@@ -22,9 +22,17 @@ from tests.validation.robot_cloth.reading import Floats, Swing
 from tests.validation.robot_cloth.tracker import TRACKER, latencies, left, shifts, upper
 
 OF_CLOTH = (
-    "tangential-linear-drag", "tangential-quadratic-drag", "power-law-drag", "lift", "added-mass", "reactive-loading",
-    "porosity", "hem-mass", "hem-stiffness", "rest-curvature",
-)  # fmt: skip
+    "tangential-linear-drag",
+    "tangential-quadratic-drag",
+    "power-law-drag",
+    "lift",
+    "added-mass",
+    "reactive-loading",
+    "porosity",
+    "hem-mass",
+    "hem-stiffness",
+    "rest-curvature",
+)
 """Effects of the library with one strength that act in still air. `air-density` is left out: the calibrated density
 stands for the ratio of mass to drag."""
 LEAD = 2.0
@@ -64,9 +72,13 @@ class Round:
 
 
 def sought(
-    cloth: Cloth, swings: Mapping[str, Sequence[Swing]], start: Fit, *,
-    candidates: Sequence[str] = (*TRACKER, *OF_CLOTH), advance: Callable[[int], None] | None = None,
-) -> list[Round]:  # fmt: skip
+    cloth: Cloth,
+    swings: Mapping[str, Sequence[Swing]],
+    start: Fit,
+    *,
+    candidates: Sequence[str] = (*TRACKER, *OF_CLOTH),
+    advance: Callable[[int], None] | None = None,
+) -> list[Round]:
     """The rounds of choice, the last of which adds nothing.
 
     Args:
@@ -181,7 +193,10 @@ def late(cloth: Cloth, swings: Sequence[Swing], fit: Fit, *, without: Fit, seed:
         moved[..., 2] -= shifts(swing, run, without.tracker, lag)[:, None]
         shifted.append(moved)
     return Late(
-        deviation=float(np.concatenate(found).std()), rank_correlation=own, p=(1 + as_large) / (1 + _SHUFFLES),
-        control=float(lower(shifted).mean()), without=float(lower(unshifted).mean()),
+        deviation=float(np.concatenate(found).std()),
+        rank_correlation=own,
+        p=(1 + as_large) / (1 + _SHUFFLES),
+        control=float(lower(shifted).mean()),
+        without=float(lower(unshifted).mean()),
         with_=float(lower(left(swings, runs, fit.tracker, fit.parameters.lag)).mean()),
-    )  # fmt: skip
+    )

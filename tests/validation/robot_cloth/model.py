@@ -55,13 +55,15 @@ class Parameters:
         """
         density, bending, damping, lag, *effects = steps
         return Parameters(
-            density=self.density * math.exp(density), bending=self.bending * math.exp(bending),
-            damping=self.damping * math.exp(damping), lag=self.lag + lag,
+            density=self.density * math.exp(density),
+            bending=self.bending * math.exp(bending),
+            damping=self.damping * math.exp(damping),
+            lag=self.lag + lag,
             strengths={
                 name: described(name).nearest(value + step)
                 for (name, value), step in zip(self.strengths.items(), effects, strict=True)
             },
-        )  # fmt: skip
+        )
 
 
 def described(effect: str) -> Parameter:
@@ -106,9 +108,12 @@ class Cloth:
         side = swings[0].side
         places = hanging.reshape(side, side, 3)
         return cls(
-            material=material, width=float(np.linalg.norm(places[-1, 0] - places[0, 0])), side=side, hanging=hanging,
+            material=material,
+            width=float(np.linalg.norm(places[-1, 0] - places[0, 0])),
+            side=side,
+            hanging=hanging,
             height=float(np.median(np.linalg.norm(places[:, 0] - places[:, -1], axis=1))),
-        )  # fmt: skip
+        )
 
     @property
     def upper(self) -> tuple[int, int]:
@@ -143,13 +148,13 @@ def predicted(cloth: Cloth, swings: Sequence[Swing], parameters: Sequence[Parame
     start = [_hung(mesh, held, *cloth.carried(swing, cloth.upper)[0]) for swing in swings]
     scenes = [
         Scene(
-            mesh=mesh, position=own, handles=Handles(vertices=held, stiffness=math.inf),
-            material=replace(
-                cloth.material.scaled(density=p.density, bending=p.bending), damping=p.damping
-            ),
+            mesh=mesh,
+            position=own,
+            handles=Handles(vertices=held, stiffness=math.inf),
+            material=replace(cloth.material.scaled(density=p.density, bending=p.bending), damping=p.damping),
         )
         for own, p in zip(start, parameters, strict=True)
-    ]  # fmt: skip
+    ]
     system, state = assemble(scenes)
     last = max(float(swing.tool_times[-1]) for swing in swings)
     times = np.arange(math.ceil(last / PERIOD) + 1, dtype=np.float64) * PERIOD

@@ -57,9 +57,10 @@ class Swing:
         seen = self.positions[still]
         if not np.isfinite(seen).all(axis=2).any(axis=0).all():
             raise InputError(
-                "a node was never tracked before the tool moves", where=f"recording {self.name!r}",
+                "a node was never tracked before the tool moves",
+                where=f"recording {self.name!r}",
                 fix="take a recording that begins at rest",
-            )  # fmt: skip
+            )
         return np.nanmedian(seen, axis=0)
 
 
@@ -88,9 +89,10 @@ def read(folder: Path, name: str) -> Swing:
     side = round(nodes**0.5)
     if side < 2 or seen.shape[1] != _FIRST_NODE + 3 * side * side:
         raise InputError(
-            f"{seen.shape[1] - _FIRST_NODE} coordinates are not those of a square of nodes", where=f"{name}_mesh.csv",
+            f"{seen.shape[1] - _FIRST_NODE} coordinates are not those of a square of nodes",
+            where=f"{name}_mesh.csv",
             fix="give all x, all y and all z of n × n nodes after five columns",
-        )  # fmt: skip
+        )
     positions = seen[:, _FIRST_NODE:].reshape(len(seen), 3, nodes).transpose(0, 2, 1)
     positions = positions @ Rotation.from_quat(camera[3:]).as_matrix().T + camera[:3]
     tool_stamps, poses = _stamped(folder / f"{name}_tcp.csv")
@@ -100,10 +102,14 @@ def read(folder: Path, name: str) -> Swing:
         )
     rotations = Rotation.from_quat(poses[:, 7:])
     return Swing(
-        name=name, side=side, times=(stamps - tool_stamps[0]) / NANOSECONDS, positions=positions,
-        tool_times=(tool_stamps - tool_stamps[0]) / NANOSECONDS, tool=poses[:, 4:7],
+        name=name,
+        side=side,
+        times=(stamps - tool_stamps[0]) / NANOSECONDS,
+        positions=positions,
+        tool_times=(tool_stamps - tool_stamps[0]) / NANOSECONDS,
+        tool=poses[:, 4:7],
         turns=(rotations * rotations[0].inv()).as_matrix(),
-    )  # fmt: skip
+    )
 
 
 def read_all(folder: Path, programmes: Sequence[str]) -> dict[str, list[Swing]]:

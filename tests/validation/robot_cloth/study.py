@@ -138,22 +138,33 @@ def study(folder: Path, material: Material, *, fitted: Sequence[str], held_out: 
     fits = _completed(cloth, known, base, [entry.added for entry in rounds if entry.added])
     found, last = base.parameters, list(fits.values())[-1]
     models = {
-        "nominal, stamps at their word": Parameters(), "nominal, with the lag": Parameters(lag=found.lag),
-    }  # fmt: skip
+        "nominal, stamps at their word": Parameters(),
+        "nominal, with the lag": Parameters(lag=found.lag),
+    }
     plain = {name: Fit.start(known, own) for name, own in models.items()} | {"calibrated": base}
     if last is not base:
         plain["with all that was added"] = last
     after = left_errors(cloth, unseen, base)
     pairs, chance = _pairs(cloth, swings, base, seed)
     return HeldCloth(
-        fitted=tuple(fitted), held_out=tuple(held_out), size=(cloth.width, cloth.height), parameters=found,
-        bounds=at_bounds(found), rounds=tuple(rounds), completed=last.parameters,
-        camera=tuple(tuple(row) for row in last.tracker.camera.tolist()), reductions=_reductions(cloth, unseen, fits),
-        late=_late(cloth, unseen, known, fits, seed), parts=_parts(left_errors(cloth, unseen, last)), pairs=pairs,
-        p_pairs=chance, extents=_extents(unseen, after), of_fitted=_compared(cloth, known, plain, found.lag),
+        fitted=tuple(fitted),
+        held_out=tuple(held_out),
+        size=(cloth.width, cloth.height),
+        parameters=found,
+        bounds=at_bounds(found),
+        rounds=tuple(rounds),
+        completed=last.parameters,
+        camera=tuple(tuple(row) for row in last.tracker.camera.tolist()),
+        reductions=_reductions(cloth, unseen, fits),
+        late=_late(cloth, unseen, known, fits, seed),
+        parts=_parts(left_errors(cloth, unseen, last)),
+        pairs=pairs,
+        p_pairs=chance,
+        extents=_extents(unseen, after),
+        of_fitted=_compared(cloth, known, plain, found.lag),
         of_held_out=_compared(cloth, unseen, plain, found.lag),
         median=float(np.nanmedian(np.concatenate([np.linalg.norm(e, axis=2).ravel() for e in after]))),
-    )  # fmt: skip
+    )
 
 
 def _completed(cloth: Cloth, known: Sequence[Swing], base: Fit, added: Sequence[str]) -> dict[str, Fit]:
@@ -170,10 +181,14 @@ def _reductions(cloth: Cloth, unseen: Sequence[Swing], fits: Mapping[str, Fit]) 
     for name, fit in fits.items():
         squares = lower(left_errors(cloth, unseen, fit))
         gained = (squares if before is None else before) - squares
-        made.append(Reduction(
-            model=name, lower=float(np.sqrt(squares.mean())), gain=float(gained.mean()),
-            error=float(gained.std(ddof=1) / np.sqrt(len(gained))),
-        ))  # fmt: skip
+        made.append(
+            Reduction(
+                model=name,
+                lower=float(np.sqrt(squares.mean())),
+                gain=float(gained.mean()),
+                error=float(gained.std(ddof=1) / np.sqrt(len(gained))),
+            )
+        )
         before = squares
     return tuple(made)
 
@@ -245,12 +260,14 @@ def _pairs(cloth: Cloth, swings: Mapping[str, Sequence[Swing]], fit: Fit, seed: 
     scale = np.concatenate(list(known.values())).std(axis=0)
     pairs = tuple(
         Pair(
-            first=a.name, second=b.name, p=tail_probability(known[a.name], known[b.name], scale),
+            first=a.name,
+            second=b.name,
+            p=tail_probability(known[a.name], known[b.name], scale),
             p_moved=tail_probability(known[a.name], moved[b.name], scale),
         )
         for own in swings.values()
         for a, b in combinations(own, 2)
-    )  # fmt: skip
+    )
     count, rng = sum(pair.p <= LEVEL for pair in pairs), stream(seed, "held", "shuffles")
     as_many = 0
     for _ in range(SHUFFLES):

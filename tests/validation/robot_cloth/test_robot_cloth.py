@@ -36,9 +36,14 @@ def _swing(name: str, *, frequency: float = 0.7, duration: float = 4.0) -> Swing
     tool = np.stack([np.zeros(len(along)), along, np.ones(len(along))], axis=1, dtype=np.float64)
     times = np.arange(0.0, duration - 0.1, 0.1)
     return Swing(
-        name=name, side=SIDE, times=times, positions=np.tile(_square(), (len(times), 1, 1)), tool_times=tool_times,
-        tool=tool, turns=np.tile(np.eye(3), (len(tool), 1, 1)),
-    )  # fmt: skip
+        name=name,
+        side=SIDE,
+        times=times,
+        positions=np.tile(_square(), (len(times), 1, 1)),
+        tool_times=tool_times,
+        tool=tool,
+        turns=np.tile(np.eye(3), (len(tool), 1, 1)),
+    )
 
 
 def _filmed(swing: Swing, cloth: Cloth, truth: Parameters, *, seed: int, noise: float = 2e-3) -> Swing:
@@ -204,10 +209,12 @@ def _programmes(truth: Truth) -> tuple[Cloth, dict[str, list[Swing]], dict[str, 
 @pytest.mark.parametrize(
     ("truth", "named"),
     [
-        (Truth(delay=0.04), LATENCY), (Truth(camera=TURNED), CAMERA), (Truth(offsets=0.015), OFFSETS),
+        (Truth(delay=0.04), LATENCY),
+        (Truth(camera=TURNED), CAMERA),
+        (Truth(offsets=0.015), OFFSETS),
         (Truth(), ""),
     ],
-)  # fmt: skip
+)
 def test_what_acts_is_named_first_and_leaves_next_to_nothing_to_others(truth: Truth, named: str) -> None:
     cloth, tracked, _ = _programmes(truth)
     start = Fit.start([swing for own in tracked.values() for swing in own], Parameters())

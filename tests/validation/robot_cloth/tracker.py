@@ -56,7 +56,7 @@ class Tracker:
         nodes = swings[0].positions.shape[1]
         return cls(
             offsets=np.zeros((nodes, 3)), camera=np.zeros((3, 3)), shift=np.zeros(3), about=np.nanmean(places, axis=0)
-        )  # fmt: skip
+        )
 
     def seen(self, places: Floats) -> Floats:
         """(frame, node, 3) where the tracker reports nodes that are at `places` [m]."""

@@ -23,9 +23,11 @@ def pole(radius: float, *, top: float, gray: float) -> Body:
     )
     cap = np.stack([np.full(_SIDES - 2, _SIDES), _SIDES + k[1:-1], _SIDES + k[2:]], axis=1)
     return Body(
-        positions=np.concatenate([low, high])[None], faces=np.concatenate([sides, cap]), colour=(gray, gray, gray),
+        positions=np.concatenate([low, high])[None],
+        faces=np.concatenate([sides, cap]),
+        colour=(gray, gray, gray),
         gloss=0.3,
-    )  # fmt: skip
+    )
 
 
 def sun(view: View, rng: np.random.Generator) -> list[Light]:
@@ -63,9 +65,9 @@ def tree(times: NDArray[np.float64], view: View, rng: np.random.Generator, *, le
     crown[:, 2] += 0.1 * half
     height = np.clip((crown[:, 2] + half) / (2 * half), 0.1, 1.0)
     trunk_sway = 0.06 * half * smooth(times, rng, slowest=0.3, fastest=1.2)[:, None] * height**1.5
-    own = np.stack(
-        [smooth(times, rng, slowest=0.8, fastest=4.0) for _ in range(24)], axis=1
-    )[:, rng.integers(24, size=leaves)]  # fmt: skip
+    own = np.stack([smooth(times, rng, slowest=0.8, fastest=4.0) for _ in range(24)], axis=1)[
+        :, rng.integers(24, size=leaves)
+    ]
     middle = foot + crown + (trunk_sway + 0.012 * half * own)[..., None] * aside
     size = 0.03 * half * rng.uniform(0.6, 1.4, (leaves, 1, 1))
     corner = rng.normal(size=(leaves, 3, 3))

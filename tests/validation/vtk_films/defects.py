@@ -128,8 +128,11 @@ def cut_off(makings: Makings) -> Source:
     side = makings.number % 4
     x, y = round(left + share * (right - left)), round(top + share * (bottom - top))
     part = {
-        0: film.frames[:, :, :x], 1: film.frames[:, :, x:], 2: film.frames[:, :y], 3: film.frames[:, y:],
-    }[side]  # fmt: skip
+        0: film.frames[:, :, :x],
+        1: film.frames[:, :, x:],
+        2: film.frames[:, :y],
+        3: film.frames[:, y:],
+    }[side]
     return film.of(_even(part))
 
 
@@ -206,9 +209,11 @@ def overlapping(makings: Makings) -> Source:
     aside = float(makings.rng.uniform(0.4, 0.8)) * (1 if makings.number % 2 else -1)
     place = aside * scene.view.right - 0.9 * scene.view.outward + np.array([0.0, 0.0, makings.rng.uniform(-0.3, 0.3)])
     other = Body(
-        positions=cloth.positions[::-1] + place, faces=cloth.faces, uv=cloth.uv,
+        positions=cloth.positions[::-1] + place,
+        faces=cloth.faces,
+        uv=cloth.uv,
         texture=texture("stripes", makings.rng),
-    )  # fmt: skip
+    )
     stand = scene.bodies[1]
     return makings.drawn(
         replace(scene, bodies=[*scene.bodies, other, replace(stand, positions=stand.positions + place)])

@@ -23,10 +23,18 @@ from tests.validation.vtk_films.scene import Body, Camera, Scene, View
 
 SEED = 20261127
 ALL_RATES = {
-    "23.976": Fraction(24000, 1001), "24": Fraction(24), "25": Fraction(25), "29.97": Fraction(30000, 1001),
-    "30": Fraction(30), "48": Fraction(48), "50": Fraction(50), "59.94": Fraction(60000, 1001), "60": Fraction(60),
-    "120": Fraction(120), "240": Fraction(240),
-}  # fmt: skip
+    "23.976": Fraction(24000, 1001),
+    "24": Fraction(24),
+    "25": Fraction(25),
+    "29.97": Fraction(30000, 1001),
+    "30": Fraction(30),
+    "48": Fraction(48),
+    "50": Fraction(50),
+    "59.94": Fraction(60000, 1001),
+    "60": Fraction(60),
+    "120": Fraction(120),
+    "240": Fraction(240),
+}
 COMPARED = ("24", "25", "30", "60", "120")
 """Rates whose answers may differ by 0.1 m/s at most."""
 _SIZES = ((640, 480), (480, 848), (1280, 720))
@@ -101,19 +109,56 @@ def _rates() -> list[Design]:
     """One view of a run at 5 m/s at all rates, and of runs at 3 and 7 m/s at those that are compared."""
     return [
         Design(
-            name=f"rates-w{wind}-{name}", part="rates", run=f"jittered/null_w{wind}", rate=name,
-            duration=_SHORTER.get(name, _DURATION), texture="quarters", background="field", yaw=22.0,
-            share=0.58, camera=Camera(noise=1.0, crf=20), alike=f"rates-{wind}",
+            name=f"rates-w{wind}-{name}",
+            part="rates",
+            run=f"jittered/null_w{wind}",
+            rate=name,
+            duration=_SHORTER.get(name, _DURATION),
+            texture="quarters",
+            background="field",
+            yaw=22.0,
+            share=0.58,
+            camera=Camera(noise=1.0, crf=20),
+            alike=f"rates-{wind}",
         )
         for wind, names in ((5, tuple(ALL_RATES)), (3, COMPARED), (7, COMPARED))
         for name in names
-    ]  # fmt: skip
+    ]
 
 
 _COVERAGE_RATES = (
-    "30", "25", "59.94", "29.97", "24", "60", "30", "23.976", "25", "29.97", "24", "30", "50", "120", "30", "23.976",
-    "25", "29.97", "48", "30", "240", "24", "60", "29.97", "25", "23.976", "30", "59.94", "30", "24", "25",
-)  # fmt: skip
+    "30",
+    "25",
+    "59.94",
+    "29.97",
+    "24",
+    "60",
+    "30",
+    "23.976",
+    "25",
+    "29.97",
+    "24",
+    "30",
+    "50",
+    "120",
+    "30",
+    "23.976",
+    "25",
+    "29.97",
+    "48",
+    "30",
+    "240",
+    "24",
+    "60",
+    "29.97",
+    "25",
+    "23.976",
+    "30",
+    "59.94",
+    "30",
+    "24",
+    "25",
+)
 """In the order of the films: of 31, so that each run and view meets others."""
 
 
@@ -132,44 +177,71 @@ def _coverage() -> list[Design]:
         spare = {"flag_w4_dt05": 4.0, "flag_w4_dt5": 16.0, "flag_w8_dt5": 16.0}.get(short, 10.0) - length
         found.append(
             Design(
-                name=f"coverage-{short}-{view}", part="other air" if run in OTHER_AIR else "coverage", run=run,
-                rate=rate, start=float(rng.uniform(0, spare)), duration=length,
-                size=_SIZES[int(rng.choice(3, p=(0.7, 0.2, 0.1)))], texture=str(rng.choice(list(TEXTURES))),
+                name=f"coverage-{short}-{view}",
+                part="other air" if run in OTHER_AIR else "coverage",
+                run=run,
+                rate=rate,
+                start=float(rng.uniform(0, spare)),
+                duration=length,
+                size=_SIZES[int(rng.choice(3, p=(0.7, 0.2, 0.1)))],
+                texture=str(rng.choice(list(TEXTURES))),
                 background=str(rng.choice(list(BACKGROUNDS))),
                 yaw=float(rng.uniform(15, 40)) * int(rng.choice([-1, 1])),
-                elevation=float(rng.uniform(-16, 3)), side=int(rng.choice([-1, 1])),
-                distance=float(rng.uniform(5, 20)), share=float(rng.uniform(0.45, 0.68)),
+                elevation=float(rng.uniform(-16, 3)),
+                side=int(rng.choice([-1, 1])),
+                distance=float(rng.uniform(5, 20)),
+                share=float(rng.uniform(0.45, 0.68)),
                 aside=(float(rng.uniform(-0.06, 0.06)), float(rng.uniform(-0.06, 0.06))),
                 shutter=0.0 if fast else float(rng.choice(_SHUTTERS)),
                 camera=Camera(noise=float(rng.uniform(0.5, 3.0)), crf=int(rng.integers(18, 31))),
                 alike=f"coverage-{short}-{view}",
             )
-        )  # fmt: skip
+        )
     return found
 
 
 STRESSORS: Mapping[str, Mapping[str, object]] = MappingProxyType(
     {
-        "none": {}, "shake of 1 px": {"shake": 1.0}, "shake of 3 px": {"shake": 3.0}, "tree": {"tree": True},
-        "second flag": {"second": True}, "40 % size": {"share": 0.4 * 0.6},
-        "dusk": {"camera": Camera(exposure=0.1, noise=3.0, crf=23)}, "crf 38": {"camera": Camera(crf=38)},
+        "none": {},
+        "shake of 1 px": {"shake": 1.0},
+        "shake of 3 px": {"shake": 3.0},
+        "tree": {"tree": True},
+        "second flag": {"second": True},
+        "40 % size": {"share": 0.4 * 0.6},
+        "dusk": {"camera": Camera(exposure=0.1, noise=3.0, crf=23)},
+        "crf 38": {"camera": Camera(crf=38)},
         "mirrored": {"camera": Camera(mirrored=True)},
     }
-)  # fmt: skip
+)
 """What is done to a film; the first is the film without."""
 
 
 def _stressed() -> list[Design]:
     base = (
         Design(
-            name="", part="stressors", run="jittered/null_w5", rate="30", texture="cross", background="field",
-            yaw=-20.0, alike="stressed-5", start=0.9,
+            name="",
+            part="stressors",
+            run="jittered/null_w5",
+            rate="30",
+            texture="cross",
+            background="field",
+            yaw=-20.0,
+            alike="stressed-5",
+            start=0.9,
         ),
         Design(
-            name="", part="stressors", run="jittered/full-hoist-attached_w7", rate="29.97", texture="disc",
-            background="houses", yaw=30.0, side=1, alike="stressed-7", start=0.9,
+            name="",
+            part="stressors",
+            run="jittered/full-hoist-attached_w7",
+            rate="29.97",
+            texture="disc",
+            background="houses",
+            yaw=30.0,
+            side=1,
+            alike="stressed-7",
+            start=0.9,
         ),
-    )  # fmt: skip
+    )
     return [
         replace(one, name=f"stressed-w{one.run[-1]}-{name.replace(' ', '-').replace('%', 'percent')}", **change)  # type: ignore[arg-type]
         for one in base
@@ -204,10 +276,15 @@ def scene_of(design: Design, motion: Motion) -> Scene:
         [design.aside[0] * math.cos(yaw), design.aside[0] * math.sin(yaw), design.aside[1]]
     )
     view = View(
-        size=design.size, target=(float(target[0]), float(target[1]), float(target[2])), yaw=design.yaw,
-        elevation=design.elevation, side=design.side, distance=design.distance, extent=extent,
+        size=design.size,
+        target=(float(target[0]), float(target[1]), float(target[2])),
+        yaw=design.yaw,
+        elevation=design.elevation,
+        side=design.side,
+        distance=design.distance,
+        extent=extent,
         turned=shaking(times, design.shake, stream(SEED, "films", design.alike, "shake")),
-    )  # fmt: skip
+    )
     bodies = [
         view.plate(background(design.background, rng)),
         pole(0.022 + 0.016 * rng.random(), top=1.0 + 0.2 * rng.random(), gray=float(rng.uniform(0.25, 0.9))),
@@ -218,9 +295,14 @@ def scene_of(design: Design, motion: Motion) -> Scene:
     if design.second:
         bodies += _second(motion, times, view, stream(SEED, "films", design.alike, "second"))
     return Scene(
-        bodies=bodies, lights=sun(view, rng), view=view, rate=rate, frames=design.frames, subframes=subframes,
+        bodies=bodies,
+        lights=sun(view, rng),
+        view=view,
+        rate=rate,
+        frames=design.frames,
+        subframes=subframes,
         camera=design.camera,
-    )  # fmt: skip
+    )
 
 
 def _second(motion: Motion, times: np.ndarray, view: View, rng: np.random.Generator) -> list[Body]:

@@ -134,8 +134,12 @@ def _field(rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 BACKGROUNDS: dict[str, Callable[[np.random.Generator], NDArray[np.float64]]] = {
-    "sky": _sky, "overcast": _overcast, "hedge": _hedge, "houses": _houses, "field": _field,
-}  # fmt: skip
+    "sky": _sky,
+    "overcast": _overcast,
+    "hedge": _hedge,
+    "houses": _houses,
+    "field": _field,
+}
 
 
 def background(kind: str, rng: np.random.Generator) -> Picture:

@@ -21,10 +21,15 @@ DENSITY = 0.284
 """Area weight of the cloth of all runs, Camel Ponte Roma [kg/m²]."""
 LENGTH, HEIGHT = 1.5, 1.0
 UNDISTURBED = (
-    *(f"jittered/{name}_w{wind}" for name in ("null", "full-hoist-attached", "wind-turned-10deg",
-                                              "wind-varies-20pct-0.5hz") for wind in (3, 5, 7)),
-    "flag_w4_dt5", "flag_w4_dt05", "flag_w8_dt5",
-)  # fmt: skip
+    *(
+        f"jittered/{name}_w{wind}"
+        for name in ("null", "full-hoist-attached", "wind-turned-10deg", "wind-varies-20pct-0.5hz")
+        for wind in (3, 5, 7)
+    ),
+    "flag_w4_dt5",
+    "flag_w4_dt05",
+    "flag_w8_dt5",
+)
 """Runs in which nothing acts that a flag in the wind has not; the wind of some is turned, or varies about its mean."""
 OTHER_AIR = tuple(f"jittered/pressure-x1.6_w{wind}" for wind in (3, 5, 7))
 """Runs in air that is 1.6 times as dense."""
@@ -75,6 +80,8 @@ def read(folder: Path, name: str) -> Motion:
             positions = content["positions"][round(_FROM_REST[name] * RATE) :].astype(np.float64)
             wind = np.array(json.loads(str(content["scene"]))["wind"]["velocity"], dtype=np.float64)
         return Motion(
-            positions=positions, faces=content["faces"].astype(np.int64), rest=content["rest"].astype(np.float64),
+            positions=positions,
+            faces=content["faces"].astype(np.int64),
+            rest=content["rest"].astype(np.float64),
             wind=float(np.linalg.norm(wind)),
-        )  # fmt: skip
+        )

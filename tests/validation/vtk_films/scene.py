@@ -92,9 +92,7 @@ class View:
     def outward(self) -> Floats:
         """(3,) unit vector from the target to the camera."""
         yaw, up = math.radians(self.yaw), math.radians(self.elevation)
-        return np.array(
-            [math.sin(yaw) * math.cos(up), self.side * math.cos(yaw) * math.cos(up), math.sin(up)]
-        )  # fmt: skip
+        return np.array([math.sin(yaw) * math.cos(up), self.side * math.cos(yaw) * math.cos(up), math.sin(up)])
 
     @property
     def right(self) -> Floats:
@@ -112,9 +110,11 @@ class View:
     def settings(self) -> dict[str, Any]:
         target = np.array(self.target)
         return {
-            "eye": (target + self.distance * self.outward).tolist(), "target": list(self.target),
-            "view_angle": self.view_angle, "size": list(self.size),
-        }  # fmt: skip
+            "eye": (target + self.distance * self.outward).tolist(),
+            "target": list(self.target),
+            "view_angle": self.view_angle,
+            "size": list(self.size),
+        }
 
     def degrees(self) -> Floats:
         """(subframe, 3) of `turned`."""
@@ -128,10 +128,15 @@ class View:
         middle = np.array(self.target) + _PLATE * inward
         corners = [middle + half * (x * right + y * up) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
         return Body(
-            positions=np.array(corners)[None], faces=np.array([[0, 1, 2], [0, 2, 3]]), texture=picture,
-            uv=np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64), lit=False, ambient=1.0, diffuse=0.0,
+            positions=np.array(corners)[None],
+            faces=np.array([[0, 1, 2], [0, 2, 3]]),
+            texture=picture,
+            uv=np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64),
+            lit=False,
+            ambient=1.0,
+            diffuse=0.0,
             gloss=0.0,
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,14 +193,21 @@ def pictures(python: Path, scene: Scene) -> Iterator[NDArray[np.uint8]]:
             arrays |= {f"{name}_texture": body.texture, f"{name}_uv": body.uv}
         bodies.append(
             {
-                "name": name, "colour": body.colour, "lit": body.lit, "ambient": body.ambient,
-                "diffuse": body.diffuse, "gloss": body.gloss,
+                "name": name,
+                "colour": body.colour,
+                "lit": body.lit,
+                "ambient": body.ambient,
+                "diffuse": body.diffuse,
+                "gloss": body.gloss,
             }
-        )  # fmt: skip
+        )
     settings = {
-        **scene.view.settings, "bodies": bodies, "frames": scene.frames, "subframes": scene.subframes,
+        **scene.view.settings,
+        "bodies": bodies,
+        "frames": scene.frames,
+        "subframes": scene.subframes,
         "lights": [vars(light) for light in scene.lights],
-    }  # fmt: skip
+    }
     width, height = scene.view.size
     with TemporaryDirectory(prefix="flagdata-vtk-") as folder:
         job = Path(folder, "job.npz")

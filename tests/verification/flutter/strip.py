@@ -57,9 +57,13 @@ def assembled(
     scenes = []
     for index, strip in enumerate(members):
         material = isotropic(
-            name=f"strip {index}", density=strip.mass, stretching=stretching, shear=stretching,
-            bending=5 * strip.rigidity, damping=strip.damping,
-        )  # fmt: skip
+            name=f"strip {index}",
+            density=strip.mass,
+            stretching=stretching,
+            shear=stretching,
+            bending=5 * strip.rigidity,
+            damping=strip.damping,
+        )
         free = np.clip(x, 0, None)
         # Stretched by the friction, so that it does not bounce; the bend has no curvature at the free end.
         along = x + strip.friction * strip.speed * (length * free - free**2 / 2) / stretching
@@ -67,11 +71,14 @@ def assembled(
         across = deflection * length * share**2 * (6 - 4 * share + share**2) / 3
         scenes.append(
             Scene(
-                mesh=mesh, position=np.stack([along, across, mesh.rest[:, 1]], axis=1), material=material,
-                handles=Handles(vertices=clamp, stiffness=math.inf), wind=(strip.speed, 0.0, 0.0),
+                mesh=mesh,
+                position=np.stack([along, across, mesh.rest[:, 1]], axis=1),
+                material=material,
+                handles=Handles(vertices=clamp, stiffness=math.inf),
+                wind=(strip.speed, 0.0, 0.0),
                 gravity=(0.0, 0.0, 0.0),
             )
-        )  # fmt: skip
+        )
 
     def each(name: str) -> torch.Tensor:
         return torch.tensor([getattr(strip, name) for strip in members], dtype=torch.float64)

@@ -21,11 +21,28 @@ from flagdata.ingest.anemometer.instants.stamps import DAY, HOUR, snapped
 from flagdata.timebase import NANOSECONDS, from_datetime
 
 _UNITS = {
-    "nanosecond": 1, "nsec": 1, "ns": 1, "microsecond": 1_000, "microsec": 1_000, "usec": 1_000, "us": 1_000,
-    "millisecond": 1_000_000, "millisec": 1_000_000, "msec": 1_000_000, "ms": 1_000_000, "second": NANOSECONDS,
-    "sec": NANOSECONDS, "s": NANOSECONDS, "minute": 60 * NANOSECONDS, "min": 60 * NANOSECONDS, "hour": HOUR, "hr": HOUR,
-    "h": HOUR, "day": DAY, "d": DAY,
-}  # fmt: skip
+    "nanosecond": 1,
+    "nsec": 1,
+    "ns": 1,
+    "microsecond": 1_000,
+    "microsec": 1_000,
+    "usec": 1_000,
+    "us": 1_000,
+    "millisecond": 1_000_000,
+    "millisec": 1_000_000,
+    "msec": 1_000_000,
+    "ms": 1_000_000,
+    "second": NANOSECONDS,
+    "sec": NANOSECONDS,
+    "s": NANOSECONDS,
+    "minute": 60 * NANOSECONDS,
+    "min": 60 * NANOSECONDS,
+    "hour": HOUR,
+    "hr": HOUR,
+    "h": HOUR,
+    "day": DAY,
+    "d": DAY,
+}
 """Nanoseconds of a unit; with an s behind it as well."""
 _CALENDARS = ("standard", "gregorian", "proleptic_gregorian")
 _SINCE = re.compile(r"\s*(?P<unit>\S+)\s+since\s+(?P<date>\S.*?)\s*", re.IGNORECASE)

@@ -31,7 +31,7 @@ _HEADINGS: dict[str, dict[str, str]] = {
     "sensor_msgs/Temperature": {"temperature": "air_temperature (degC)"},
     "sensor_msgs/FluidPressure": {"fluid_pressure": "air_pressure (Pa)"},
     "sensor_msgs/RelativeHumidity": {"relative_humidity": "relative_humidity (1)"},
-}  # fmt: skip
+}
 """Type of messages, as ROS 1 names it → field → heading."""
 
 

@@ -21,11 +21,16 @@ from flagdata.units import UNITS, spelled
 
 _HDF = b"\x89HDF"
 _STANDARD = {
-    "wind_speed": "wind_speed", "wind_from_direction": "wind_direction", "wind_to_direction": "wind_direction",
+    "wind_speed": "wind_speed",
+    "wind_from_direction": "wind_direction",
+    "wind_to_direction": "wind_direction",
     "eastward_wind": "eastward wind",
-    "northward_wind": "northward wind", "upward_air_velocity": "upward wind", "air_temperature": "air_temperature",
-    "relative_humidity": "relative_humidity", "air_pressure": "air_pressure",
-}  # fmt: skip
+    "northward_wind": "northward wind",
+    "upward_air_velocity": "upward wind",
+    "air_temperature": "air_temperature",
+    "relative_humidity": "relative_humidity",
+    "air_pressure": "air_pressure",
+}
 
 
 def open_dataset(path: Path, *, limits: Limits) -> TableText:

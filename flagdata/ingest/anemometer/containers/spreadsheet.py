@@ -40,9 +40,10 @@ def open_sheet(path: Path, *, limits: Limits) -> TableText:
         raise LimitError(what, where=where, fix="save the sheet as CSV")
     if find_spec("python_calamine") is None:
         raise InputError(
-            "this is an Excel workbook, and the library that reads it is not installed", where=where,
+            "this is an Excel workbook, and the library that reads it is not installed",
+            where=where,
             fix="install it: pip install 'flagdata[excel]', or save the sheet as CSV",
-        )  # fmt: skip
+        )
     sheet = _read(where, limits)
     if sheet is None:
         raise InputError("no sheet with two rows", where=where, fix="check that the workbook holds the log")

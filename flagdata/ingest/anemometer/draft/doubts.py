@@ -90,8 +90,9 @@ def doubts(reading: Reading, recipe: Recipe, *, assumed: frozenset[str], left_ou
     of_values = tuple(Doubt(key=key, text=text, question=question) for key, text, question in found if text)
     of_reader = (
         Doubt(key=one.kind, text=one.what, question="Is that right?")
-        for one in reading.findings if one.kind in REPORTED and one.kind not in recipe.expect
-    )  # fmt: skip
+        for one in reading.findings
+        if one.kind in REPORTED and one.kind not in recipe.expect
+    )
     return (*of_values, *of_reader)
 
 
@@ -108,8 +109,9 @@ def reported(reading: Reading, answered: frozenset[str]) -> tuple[Finding, ...]:
     seen = _seen(reading, written, "m/s", assumed=False, left_out=0, now=0)
     return tuple(
         Finding(kind="doubtful-numbers", severity=Severity.WARNING, what=f"{speed}: {text}", fix=CHECKS[key][1])
-        for key in _OF_THE_COLUMN if key not in answered and (text := CHECKS[key][0](seen))
-    )  # fmt: skip
+        for key in _OF_THE_COLUMN
+        if key not in answered and (text := CHECKS[key][0](seen))
+    )
 
 
 def _seen(
@@ -118,9 +120,15 @@ def _seen(
     speed, direction = written["wind_speed"], written["wind_direction"]
     known = np.isfinite(speed) & np.isfinite(direction)
     return _Seen(
-        reading=reading, speed=speed[np.isfinite(speed)], direction=direction[np.isfinite(direction)],
-        both=(speed[known], direction[known]), unit=unit_name, assumed=assumed, left_out=left_out, now=now,
-    )  # fmt: skip
+        reading=reading,
+        speed=speed[np.isfinite(speed)],
+        direction=direction[np.isfinite(direction)],
+        both=(speed[known], direction[known]),
+        unit=unit_name,
+        assumed=assumed,
+        left_out=left_out,
+        now=now,
+    )
 
 
 def _unit(recipe: Recipe, name: str) -> str:

@@ -41,12 +41,16 @@ _BESIDE = {
 _AXES = {"x": "wind_x", "y": "wind_y", "z": "wind_z"}
 _OF_WIND = frozenset({"speed", "direction", "x", "y", "z"})
 _PLAIN = {
-    "wind_speed": ("wind speed",), "wind_direction": ("wind direction",), "air_temperature": ("air temperature",),
-    "relative_humidity": ("relative humidity",), "sonic_temperature": ("sonic temperature",),
+    "wind_speed": ("wind speed",),
+    "wind_direction": ("wind direction",),
+    "air_temperature": ("air temperature",),
+    "relative_humidity": ("relative humidity",),
+    "sonic_temperature": ("sonic temperature",),
     "air_pressure": ("air pressure",),
-    "wind_x": ("wind x", "eastward wind"), "wind_y": ("wind y", "northward wind"),
+    "wind_x": ("wind x", "eastward wind"),
+    "wind_y": ("wind y", "northward wind"),
     "wind_z": ("wind z", "upward wind"),
-}  # fmt: skip
+}
 """Words of a heading that state a quantity in full; others are understood, and what is understood is inferred."""
 _WRITINGS = {"iso": "ISO 8601", "elapsed-s": "a count of seconds", "elapsed-ms": "a count of milliseconds"}
 """Forms of stamps that have a name."""
@@ -150,14 +154,22 @@ def draft(
     unused = tuple(shape.shown(i) for i in left)
     rivals = tuple(shape.label(i) for i in left if meanings[i].kind in _OF_WIND)
     return Draft(
-        facts=tuple(parts.facts), open=tuple(parts.open), unused=unused, winds=winds, rivals=rivals,
+        facts=tuple(parts.facts),
+        open=tuple(parts.open),
+        unused=unused,
+        winds=winds,
+        rivals=rivals,
         of_earth=of_earth,
         recipe=recipe_text(
-            shape, time=None if time is None else time.columns, form=time.form if time is not None else None,
-            zone="UTC" if time is not None and time.utc and not time.zoned else None, channels=parts.channels,
-            label=label, missing=options.missing,
+            shape,
+            time=None if time is None else time.columns,
+            form=time.form if time is not None else None,
+            zone="UTC" if time is not None and time.utc and not time.zoned else None,
+            channels=parts.channels,
+            label=label,
+            missing=options.missing,
         ),
-    )  # fmt: skip
+    )
 
 
 def _mixed(parts: _Parts, shape: Shape, meanings: Sequence[Meaning]) -> None:
@@ -184,9 +196,14 @@ def _cutting(shape: Shape, lines: Sequence[str]) -> Fact:
 
 
 def _time(
-    parts: _Parts, shape: Shape, meanings: Sequence[Meaning], given: GivenColumns | None, options: WindOptions, *,
+    parts: _Parts,
+    shape: Shape,
+    meanings: Sequence[Meaning],
+    given: GivenColumns | None,
+    options: WindOptions,
+    *,
     counted: bool,
-) -> TimeFields | None:  # fmt: skip
+) -> TimeFields | None:
     if given is not None:
         columns = given.time or ((len(shape.names) - 1,) if counted else ())
         time = of_columns(shape, columns, options.date_order, given.form or None) if columns else None
@@ -309,9 +326,15 @@ def _of_wind(
 
 
 def _measured(
-    parts: _Parts, shape: Shape, meanings: Sequence[Meaning], channel: str, index: int, options: WindOptions, *,
+    parts: _Parts,
+    shape: Shape,
+    meanings: Sequence[Meaning],
+    channel: str,
+    index: int,
+    options: WindOptions,
+    *,
     given: bool,
-) -> None:  # fmt: skip
+) -> None:
     """A column of wind with its unit; `given` where the user named it, and it is not one of several by its heading."""
     own = meanings[index]
     parts.used.add(index)
@@ -338,10 +361,12 @@ _GIVEN: Origin = "given"
 def _direction(parts: _Parts, shape: Shape, meanings: Sequence[Meaning], speed: int) -> int | None:
     """The direction that belongs to a speed: of the same height, the only one of the table; its column, if numeric."""
     near = [
-        i for i, one in enumerate(meanings)
-        if one.kind == "direction" and not set(one.against) - {"to", "toward", "towards", "going"}
+        i
+        for i, one in enumerate(meanings)
+        if one.kind == "direction"
+        and not set(one.against) - {"to", "toward", "towards", "going"}
         and meanings[speed].height in (None, one.height)
-    ]  # fmt: skip
+    ]
     if len(near) != 1:
         return None
     index = near[0]

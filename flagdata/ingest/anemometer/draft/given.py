@@ -23,8 +23,14 @@ from flagdata.units import canonical
 _WHERE = "--columns"
 TOWARDS = "wind_direction_to"
 PARTS = {
-    "year": "%Y", "month": "%m", "day": "%d", "day_of_year": "%j", "hour": "%H", "minute": "%M", "second": "%S%f",
-}  # fmt: skip
+    "year": "%Y",
+    "month": "%m",
+    "day": "%d",
+    "day_of_year": "%j",
+    "hour": "%H",
+    "minute": "%M",
+    "second": "%S%f",
+}
 _TIMES = ("date", "time", *PARTS)
 _COUNTS = {form.removeprefix("elapsed-"): form for form in ELAPSED}
 _NAMES = tuple(name for name, channel in CHANNELS.items() if channel.dims == ("time",))

@@ -55,6 +55,7 @@ class OpenFactsError(RefusedError):
         options = f"answer by {' '.join(one.fix() for one in questions)}; or describe the file by a recipe: "
         return cls(
             f"the file leaves this open: {'; '.join(one.question for one in questions)}",
-            where=where, questions=tuple(questions),
+            where=where,
+            questions=tuple(questions),
             fix="; ".join(recipes) or f"{options}--sensor FILE.toml",
-        )  # fmt: skip
+        )

@@ -101,10 +101,15 @@ def shape_of(lines: Sequence[str]) -> Shape | None:
     names, units, preamble = _heading([line for line, _ in filled[:first]], cut[:first], width)
     header = numbers[0] - 1 - preamble if names else 0
     return Shape(
-        delimiter=delimiter, decimal=_decimal(rows, numeric, delimiter), header=header,
-        preamble=preamble if names else numbers[0] - 1, names=tuple(names or [""] * width),
-        units=tuple(units or [""] * width), rows=tuple(rows), lines=tuple(numbers),
-    )  # fmt: skip
+        delimiter=delimiter,
+        decimal=_decimal(rows, numeric, delimiter),
+        header=header,
+        preamble=preamble if names else numbers[0] - 1,
+        names=tuple(names or [""] * width),
+        units=tuple(units or [""] * width),
+        rows=tuple(rows),
+        lines=tuple(numbers),
+    )
 
 
 def _delimiter(lines: Sequence[str]) -> str | None:
@@ -142,10 +147,11 @@ def _numeric(rows: Sequence[Sequence[str]], width: int) -> frozenset[int]:
     """Columns that hold numbers in most rows."""
     full = [row for row in rows if len(row) == width]
     found = (
-        index for index in range(width)
+        index
+        for index in range(width)
         if sum(is_number(row[index]) or is_missing(row[index]) for row in full) >= _AGREE * len(full)
         and any(is_number(row[index]) for row in full)
-    )  # fmt: skip
+    )
     return frozenset(found)
 
 

@@ -15,9 +15,23 @@ from flagdata.timebase import iso
 
 _CLOCKS = ("%H:%M:%S%f", "%H:%M", "%I:%M:%S%f %p", "%I:%M %p", "%H%M%S", "%H%M", "%H")
 _DATES = (
-    "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y%m%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y",
-    "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%d %b %Y", "%d-%b-%Y", "%b %d %Y", "%Y %j",
-)  # fmt: skip
+    "%Y-%m-%d",
+    "%Y/%m/%d",
+    "%Y.%m.%d",
+    "%Y%m%d",
+    "%d.%m.%Y",
+    "%d/%m/%Y",
+    "%m/%d/%Y",
+    "%d-%m-%Y",
+    "%m-%d-%Y",
+    "%d.%m.%y",
+    "%d/%m/%y",
+    "%m/%d/%y",
+    "%d %b %Y",
+    "%d-%b-%Y",
+    "%b %d %Y",
+    "%Y %j",
+)
 _WHOLE = ("iso", "%Y%m%d%H%M%S", "%Y%m%d%H%M", "%Y%m%dT%H%M%S%z")
 _UNITS_OF_A_COUNT = re.compile(r"\d{9,19}([.,]\d+)?|\d([.,]\d+)?[eE]\+?\d{1,2}")
 _OTHER_ORIGINS = words_of(
@@ -73,9 +87,7 @@ def find_time(shape: Shape, meanings: Sequence[Meaning], order: str | None) -> T
         dated = not dates or any(i in dates for i in columns)
         if found is not None and (dated or not any(map(is_time_of_day, found.forms))):
             utc = any(meanings[i].utc for i in columns)
-            return TimeFields(
-                columns=columns, forms=found.forms, zoned=found.zoned, utc=utc, evidence=found.evidence
-            )  # fmt: skip
+            return TimeFields(columns=columns, forms=found.forms, zoned=found.zoned, utc=utc, evidence=found.evidence)
     return None
 
 
@@ -160,9 +172,12 @@ def _ordered(form: str, order: str | None) -> bool:
 
 
 def _same_but_order(one: str, other: str) -> bool:
-    return one != other and sorted(_letters(one)) == sorted(_letters(other)) and _letters(one) != _letters(other) and (
-        re.sub(r"%[dmYy]", "", one) == re.sub(r"%[dmYy]", "", other)
-    )  # fmt: skip
+    return (
+        one != other
+        and sorted(_letters(one)) == sorted(_letters(other))
+        and _letters(one) != _letters(other)
+        and (re.sub(r"%[dmYy]", "", one) == re.sub(r"%[dmYy]", "", other))
+    )
 
 
 def _distinct(forms: Sequence[str], texts: Sequence[str]) -> tuple[str, ...]:

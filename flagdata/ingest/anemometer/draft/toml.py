@@ -31,11 +31,19 @@ def recipe_text(
     """The recipe of a table."""
     delimiter = next(name for name, character in DELIMITERS.items() if character == shape.delimiter)
     lines = [
-        'name = "drafted"', 'about = "drafted from the first lines of the file"', 'source = "the file"', "",
-        "[file]", f"delimiter = {quoted(delimiter)}", f"decimal = {quoted(shape.decimal)}",
-        f"preamble = {shape.preamble}", f"header = {shape.header}", f"missing = [{', '.join(map(quoted, missing))}]",
-        "", "[time]",
-    ]  # fmt: skip
+        'name = "drafted"',
+        'about = "drafted from the first lines of the file"',
+        'source = "the file"',
+        "",
+        "[file]",
+        f"delimiter = {quoted(delimiter)}",
+        f"decimal = {quoted(shape.decimal)}",
+        f"preamble = {shape.preamble}",
+        f"header = {shape.header}",
+        f"missing = [{', '.join(map(quoted, missing))}]",
+        "",
+        "[time]",
+    ]
     columns = ["?"] if time is None else [shape.reference(i) for i in time]
     lines += [f"columns = [{', '.join(map(reference, columns))}]", f"format = {quoted(form or '?')}"]
     lines += [f"zone = {quoted(zone)}"] if zone is not None else []

@@ -16,7 +16,7 @@ from flagdata.units import UNITS, spelled
 
 Kind = Literal[
     "speed", "direction", "site", "sonic", "x", "y", "z", "time", "date", "temperature", "humidity", "pressure", "other"
-]  # fmt: skip
+]
 
 
 def words_of(text: str) -> frozenset[str]:
@@ -34,9 +34,10 @@ _DIRECTION = words_of(
     "direccion richting direzione"
 )
 _AXES: tuple[tuple[Kind, frozenset[str]], ...] = (
-    ("x", words_of("u ux x east eastward")), ("y", words_of("v uy y north northward")),
+    ("x", words_of("u ux x east eastward")),
+    ("y", words_of("v uy y north northward")),
     ("z", words_of("w uz z up vertical upward")),
-)  # fmt: skip
+)
 _TIME = words_of(
     "time timestamp datetime stamp clock hour uhrzeit zeit heure hora tijd ora tmstamp epoch unixtime utc gmt "
     "localtime zeitstempel date_time sampletime recordtime timestring millis elapsed"
@@ -99,9 +100,14 @@ def meaning(name: str, below: str = "") -> Meaning:
     kind = _kind(words, joined, unit)
     named = bool(joined & _WIND) or any(word.startswith(("wind", "wnd", "ws", "wd")) for word in words)
     return Meaning(
-        kind=kind, unit=unit, against=against, named=named, utc=bool({"utc", "gmt"} & joined),
-        height=float(height[1]) if height else None, plain=" ".join(words),
-    )  # fmt: skip
+        kind=kind,
+        unit=unit,
+        against=against,
+        named=named,
+        utc=bool({"utc", "gmt"} & joined),
+        height=float(height[1]) if height else None,
+        plain=" ".join(words),
+    )
 
 
 def fits(channel: str, unit: str) -> bool:
@@ -132,9 +138,12 @@ def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:
     if set(words) & _SITES and not set(words) & (_TEMPERATURE | _HUMIDITY | _PRESSURE | _TIME | _DATE):
         return "site"
     ordinary: tuple[tuple[frozenset[str], Kind], ...] = (
-        (_TEMPERATURE, "temperature"), (_HUMIDITY, "humidity"), (_PRESSURE, "pressure"), (_TIME, "time"),
+        (_TEMPERATURE, "temperature"),
+        (_HUMIDITY, "humidity"),
+        (_PRESSURE, "pressure"),
+        (_TIME, "time"),
         (_DATE, "date"),
-    )  # fmt: skip
+    )
     for known, kind in ordinary:
         if joined & known:
             return kind

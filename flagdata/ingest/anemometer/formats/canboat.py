@@ -55,14 +55,20 @@ _RESTS = re.compile(r"\d,(?P<pgn>\d{4,6}),(?P<src>\d{1,3}),\d{1,3},(?P<size>\d{1
 _WORDS = re.compile(r"\d\s+(?P<src>\d{1,3})\s+\d{1,3}\s+(?P<pgn>\d{4,6})\s[^:]{0,80}:(?P<fields>.*)")
 _CUT = re.compile(r"\d{4}-\d{2}-\d{2}[T Z-]|\{\"timestamp\"")
 _REFERENCES: Mapping[str, int] = {
-    "true (ground referenced to north)": 0, "true": 0, "magnetic (ground referenced to magnetic north)": 1,
-    "apparent": 2, "true (boat referenced)": 3, "true (water referenced)": 4,
-}  # fmt: skip
+    "true (ground referenced to north)": 0,
+    "true": 0,
+    "magnetic (ground referenced to magnetic north)": 1,
+    "apparent": 2,
+    "true (boat referenced)": 3,
+    "true (water referenced)": 4,
+}
 _CHANNELS = {
-    0: ("wind_speed", "wind_direction"), 1: ("wind_speed", "wind_direction_magnetic"),
-    2: ("apparent_wind_speed", "apparent_wind_direction"), 3: ("theoretical_wind_speed", "theoretical_wind_direction"),
+    0: ("wind_speed", "wind_direction"),
+    1: ("wind_speed", "wind_direction_magnetic"),
+    2: ("apparent_wind_speed", "apparent_wind_direction"),
+    3: ("theoretical_wind_speed", "theoretical_wind_direction"),
     4: ("theoretical_wind_speed", "theoretical_wind_direction"),
-}  # fmt: skip
+}
 """Reference of a wind → its channels."""
 
 
@@ -92,17 +98,20 @@ class Canboat:
         where = str(source.path)
         network = _Network(options.talker)
         instrument = Instrument(
-            name="wind on NMEA 2000 (PGN 130306)", parse=network, splits=lambda: split,
+            name="wind on NMEA 2000 (PGN 130306)",
+            parse=network,
+            splits=lambda: split,
             channels=tuple(name for pair in _CHANNELS.values() for name in pair),
             sensor=Sensor(name="NMEA 2000 wind sensor", resolution=0.01),
-        )  # fmt: skip
+        )
         reading = read_lines(source, instrument, zone_name=options.zone)
         if len(network.devices) > 1:
             listed = ", ".join(sorted(network.devices, key=int))
             raise InputError(
-                f"several devices send wind: {listed}; they are different instruments", where=where,
+                f"several devices send wind: {listed}; they are different instruments",
+                where=where,
                 fix=f"choose one by its address, e.g. --talker {min(network.devices, key=int)}",
-            )  # fmt: skip
+            )
         found = tuple(finding for finding in reading.findings if finding.kind != "non-data-lines")
         knots = [speed / UNITS["kn"].scale for speed in network.speeds]
         channels, about = over_ground.settled(

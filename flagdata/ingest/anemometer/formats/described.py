@@ -182,17 +182,26 @@ def complete(
         channels[name] = {**layout, "column": column.number, "unit": column.unit}
     keys = data.keys() - {"match", "facts", "described-by", "check"}
     closed: dict[str, Any] = {
-        **{key: value for key, value in data.items() if key in keys}, "time": time, "channels": channels,
+        **{key: value for key, value in data.items() if key in keys},
+        "time": time,
+        "channels": channels,
         "file": _file(data.get("file", {}), heading, [column.number - 1 for column in taken.values()], rows),
-        "sensor": _sensor(data["sensor"], facts), "check": _checks(data.get("check", ()), heading),
-    }  # fmt: skip
+        "sensor": _sensor(data["sensor"], facts),
+        "check": _checks(data.get("check", ()), heading),
+    }
     match = data.get("match", {})
     begins = "starts" in match and re.search(match["starts"], "\n".join(lines[: heading.at])) is not None
     return Completed(
-        recipe=recipes.of_data(closed, where=where), data=closed, channels=taken, unread=unread, rivals=rivals,
-        findings=(*about_time, *found.notes), inferred=found.inferred, averaged=match.get("averaged", True),
+        recipe=recipes.of_data(closed, where=where),
+        data=closed,
+        channels=taken,
+        unread=unread,
+        rivals=rivals,
+        findings=(*about_time, *found.notes),
+        inferred=found.inferred,
+        averaged=match.get("averaged", True),
         starts=begins,
-    )  # fmt: skip
+    )
 
 
 @cache
@@ -215,9 +224,12 @@ def _file(
     # A line of units that names columns of its own leaves the heading no right count of cells.
     named = bool(heading.cells) and not any(heading.below[len(heading.cells) :]) and heading.delimiter != " "
     return {
-        "decimal": "," if commas else ".", **file, "delimiter": heading.delimiter,
-        "preamble": heading.at if named else heading.rows, "header": heading.rows - heading.at if named else 0,
-    }  # fmt: skip
+        "decimal": "," if commas else ".",
+        **file,
+        "delimiter": heading.delimiter,
+        "preamble": heading.at if named else heading.rows,
+        "header": heading.rows - heading.at if named else 0,
+    }
 
 
 def _stamped(
@@ -241,9 +253,13 @@ def _stamped(
 
 
 def _format(
-    time: Mapping[str, Any], columns: Sequence[int], heading: Heading, rows: Sequence[Sequence[str]],
-    options: WindOptions, where: str,
-) -> tuple[str, tuple[Finding, ...]]:  # fmt: skip
+    time: Mapping[str, Any],
+    columns: Sequence[int],
+    heading: Heading,
+    rows: Sequence[Sequence[str]],
+    options: WindOptions,
+    where: str,
+) -> tuple[str, tuple[Finding, ...]]:
     """The format of stamps: the recipe's, the first of its formats that most fit, or that of the stamps themselves."""
     forms = time.get("format", [])
     if isinstance(forms, str):
@@ -281,9 +297,14 @@ def _channel(channels: Mapping[str, Mapping[str, Any]], column: Column) -> str |
 
 
 def _with_units(
-    data: Mapping[str, Any], heading: Heading, rows: Sequence[Sequence[str]], facts: Mapping[str, str],
-    stamped: Iterable[int], options: WindOptions, where: str,
-) -> tuple[list[Column], _Units]:  # fmt: skip
+    data: Mapping[str, Any],
+    heading: Heading,
+    rows: Sequence[Sequence[str]],
+    facts: Mapping[str, str],
+    stamped: Iterable[int],
+    options: WindOptions,
+    where: str,
+) -> tuple[list[Column], _Units]:
     """The columns but those of time, with the units that they are read in."""
     channels: Mapping[str, Mapping[str, Any]] = data["channels"]
     if not heading.cells:
@@ -349,9 +370,10 @@ def _whole(cells: Iterable[str], counted: str) -> str | None:
     speeds = {float(text) for text in texts if re.fullmatch(r"\d{1,3}(\.\d)?", text)} - {0.0}
     steps = {name: UNITS[counted].scale / UNITS[name].scale for name in _WINDS}
     fits = [
-        name for name, step in steps.items()
+        name
+        for name, step in steps.items()
         if all(abs(round(round(speed / step) * step, 1) - speed) < 0.01 for speed in speeds)
-    ]  # fmt: skip
+    ]
     return fits[0] if len(speeds) >= _ENOUGH and len(fits) == 1 else None
 
 
@@ -416,14 +438,16 @@ def column_findings(done: Completed) -> tuple[Finding, ...]:
         used = next(done.channels[name].name for name in ("wind_speed", "wind_x") if name in done.channels)
         found.append(
             Finding(
-                kind="several-anemometers", severity=Severity.WARNING, count=len(done.rivals),
+                kind="several-anemometers",
+                severity=Severity.WARNING,
+                count=len(done.rivals),
                 what=f"wind is read from {used!r}, the first of {len(done.rivals) + 1} columns of wind; not from "
                 f"{', '.join(column.name for column in done.rivals)}",
                 fix="to read the others, too, ingest the file with --as delimited, which asks for what the headings do "
                 "not state (such as --unit); where it does not read them, describe the file by a recipe that names "
                 "the column",
             )
-        )  # fmt: skip
+        )
     if done.unread:
         # Columns that speak of the wind come first, so that none of them is lost among a hundred others.
         names = sorted((column.name for column in done.unread), key=lambda name: "wind" not in name.lower())

@@ -34,8 +34,13 @@ def parse(raw: str) -> Sample | Defect:
 
 
 INSTRUMENT = Instrument(
-    format="ft", about="FT Technologies WV sentences", name="an FT wind sensor", parse=parse,
-    line="sentences of an FT wind sensor (WVP=)", channels=("wind_speed", "wind_direction"),
-    sensor=Sensor(name="FT wind sensor", resolution=0.1), described_by="the manual of the FT702LT",
-)  # fmt: skip
+    format="ft",
+    about="FT Technologies WV sentences",
+    name="an FT wind sensor",
+    parse=parse,
+    line="sentences of an FT wind sensor (WVP=)",
+    channels=("wind_speed", "wind_direction"),
+    sensor=Sensor(name="FT wind sensor", resolution=0.1),
+    described_by="the manual of the FT702LT",
+)
 Ft = partial(InstrumentLines, INSTRUMENT)

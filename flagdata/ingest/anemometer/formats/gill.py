@@ -85,10 +85,14 @@ def _fields(body: str) -> Sample | None:
 
 
 INSTRUMENT = Instrument(
-    format="gill", about="Gill WindSonic, WindObserver or WindMaster ASCII lines", name="a Gill anemometer",
-    line="Gill ASCII (identifier, wind, unit, status)", parse=parse, axes_from_south=True,
+    format="gill",
+    about="Gill WindSonic, WindObserver or WindMaster ASCII lines",
+    name="a Gill anemometer",
+    line="Gill ASCII (identifier, wind, unit, status)",
+    parse=parse,
+    axes_from_south=True,
     channels=("wind_speed", "wind_direction", "wind_x", "wind_y", "wind_z", "sonic_temperature"),
     sensor=Sensor(name="Gill ultrasonic anemometer", resolution=0.01),
     described_by="Gill's manuals of WindSonic, WindObserver and WindMaster",
-)  # fmt: skip
+)
 Gill = partial(InstrumentLines, INSTRUMENT)

@@ -44,9 +44,10 @@ class HostStamped:
         if len(lines) < max(1, len(head.lines) // 2) or lines[0] == first or not _RAW.search(first.partition(",")[2]):
             return None
         shares = {
-            name: sum(_in_range(recipe, line) for line in lines) / len(lines) for name in recipes.SENSORS.names()
+            name: sum(_in_range(recipe, line) for line in lines) / len(lines)
+            for name in recipes.SENSORS.names()
             if isinstance(recipe := recipes.load(name), Recipe) and recipe.file.host
-        }  # fmt: skip
+        }
         name, share = max(shares.items(), key=lambda item: item[1])
         if share <= LEAST:
             return None
@@ -66,9 +67,10 @@ class HostStamped:
         recipe = recipes.load(options.recipe)
         if not isinstance(recipe, Recipe) or not recipe.file.host:
             raise UsageError(
-                f"the recipe {recipe.name} says nothing of a host's stamp", where=str(source.path),
-                fix="add host = \"iso\" to its [file], or use --as delimited",
-            )  # fmt: skip
+                f"the recipe {recipe.name} says nothing of a host's stamp",
+                where=str(source.path),
+                fix='add host = "iso" to its [file], or use --as delimited',
+            )
         rows = HostRows(source, recipe)
         where = str(source.path)
         reading = read_table(
@@ -163,11 +165,15 @@ class HostRows:
         if self._read < LEAST * (self._read + other):
             raise InputError(
                 f"{other} of {other + self._read} lines do not have the fields of the recipe",
-                where=f"{self._source.path}, line {self._other[0]}", fix="check the recipe, or the device's settings",
-            )  # fmt: skip
+                where=f"{self._source.path}, line {self._other[0]}",
+                fix="check the recipe, or the device's settings",
+            )
         return (
             Finding(
-                kind="non-data-lines", severity=Severity.WARNING, count=other, where=f"line {self._other[0]}",
+                kind="non-data-lines",
+                severity=Severity.WARNING,
+                count=other,
+                where=f"line {self._other[0]}",
                 what=f"{other} lines without the fields of a reading (counters, menus, fragments); left out",
             ),
-        )  # fmt: skip
+        )

@@ -127,9 +127,13 @@ class TimeLine:
         spacing = float(np.median(np.diff(marks))) / NANOSECONDS
         time = self.bursts.placed(lines, winds, at, marks) if winds else None
         return Placed(
-            time=_interpolate(lines, at, marks) if time is None else time, spacing=spacing, marks=len(marks), kind=kind,
-            findings=tuple(found), bursts=time is not None,
-        )  # fmt: skip
+            time=_interpolate(lines, at, marks) if time is None else time,
+            spacing=spacing,
+            marks=len(marks),
+            kind=kind,
+            findings=tuple(found),
+            bursts=time is not None,
+        )
 
     def _single(self) -> str | None:
         """The kind of the one mark of the stream; `None` where there are more or none."""
@@ -165,9 +169,10 @@ class TimeLine:
         if self.dated is None:
             if date is None:
                 raise TimeError(
-                    "the stream carries the time of day, but no date", where=f"{where}, line {at[0]}",
+                    "the stream carries the time of day, but no date",
+                    where=f"{where}, line {at[0]}",
                     fix="give the date (UTC) of its first sentence: --date 2026-05-01",
-                )  # fmt: skip
+                )
             return date.toordinal() - epoch
         line, time, stated = self.dated
         nearest = int(np.argmin(np.abs(at - line)))
@@ -177,8 +182,9 @@ class TimeLine:
         if date is not None and date.toordinal() - epoch != start:
             raise UsageError(
                 f"the date {date} was given, but the stream begins on {dt.date.fromordinal(start + epoch)}",
-                where=where, fix="leave out --date",
-            )  # fmt: skip
+                where=where,
+                fix="leave out --date",
+            )
         return start
 
 

@@ -79,16 +79,24 @@ def _newest(values: list[float]) -> Sample | Defect:
 def _sample(axes: dict[str, float], speed: float | None, degrees: float, celsius: float) -> dict[str, float]:
     x, y, z = (axes.get(name, math.nan) for name in "xyz")
     return {
-        "wind_speed": math.hypot(x, y) if speed is None else speed, "wind_direction": math.radians(degrees),
-        "wind_x": x, "wind_y": y, "wind_z": z, "sonic_temperature": celsius + UNITS["degC"].offset,
-    }  # fmt: skip
+        "wind_speed": math.hypot(x, y) if speed is None else speed,
+        "wind_direction": math.radians(degrees),
+        "wind_x": x,
+        "wind_y": y,
+        "wind_z": z,
+        "sonic_temperature": celsius + UNITS["degC"].offset,
+    }
 
 
 INSTRUMENT = Instrument(
-    format="metek", about="METEK uSonic and USA-1 telegrams", name="a METEK sonic", parse=parse, splits=_Clock,
+    format="metek",
+    about="METEK uSonic and USA-1 telegrams",
+    name="a METEK sonic",
+    parse=parse,
+    splits=_Clock,
     line="METEK telegrams (M:x = …, M:v=… or status;x;y;z;T)",
     channels=("wind_speed", "wind_direction", "wind_x", "wind_y", "wind_z", "sonic_temperature"),
     sensor=Sensor(name="METEK sonic", resolution=0.01),
     described_by="METEK's manuals of uSonic-2 and USA-1, or a published sample",
-)  # fmt: skip
+)
 Metek = partial(InstrumentLines, INSTRUMENT)

@@ -53,9 +53,14 @@ _SIDES = {"MWV": ("R", "T"), "VWR": ("L", "R", ""), "VWT": ("L", "R", "")}
 _BEFORE = re.compile(r"(?=[^$!]*\d[^$!]*\d)(?!\\)[^$!]*(?=[$!])")
 """What stands before a sentence and holds numbers, as a stamp would."""
 _CHANNELS = (
-    "apparent_wind_speed", "apparent_wind_direction", "theoretical_wind_speed", "theoretical_wind_direction",
-    "wind_speed", "wind_direction", "wind_direction_magnetic",
-)  # fmt: skip
+    "apparent_wind_speed",
+    "apparent_wind_direction",
+    "theoretical_wind_speed",
+    "theoretical_wind_direction",
+    "wind_speed",
+    "wind_direction",
+    "wind_direction_magnetic",
+)
 
 
 @dataclass
@@ -191,10 +196,15 @@ def reading_of(stream: Stream, time: Instants, options: WindOptions, *, where: s
     source = _sources(stream, "wind")
     channels, about = over_ground.settled(channels, options, speeds=stream.speeds, source=source, where=where)
     return Reading(
-        time=time, channels=channels, flags=np.array(stream.flags, dtype=np.uint16), line=line,
-        sensor=Sensor(name=f"NMEA 0183 talker {stream.talkers[0]}"), step=NANOSECONDS, stamped=False,
+        time=time,
+        channels=channels,
+        flags=np.array(stream.flags, dtype=np.uint16),
+        line=line,
+        sensor=Sensor(name=f"NMEA 0183 talker {stream.talkers[0]}"),
+        step=NANOSECONDS,
+        stamped=False,
         findings=(*_kinds(stream, time), *_findings(stream), *found, about),
-    )  # fmt: skip
+    )
 
 
 def _take(stream: Stream, line: str, at: int, talker: str | None) -> None:

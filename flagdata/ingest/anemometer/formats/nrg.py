@@ -49,9 +49,10 @@ class Nrg(Described):
             done = replace(done, averaged=False, starts=False)
             reading = replace(reading, sensor=replace(reading.sensor, averaging=0.0))
         sensor = replace(
-            reading.sensor, name=channel.get("description") or reading.sensor.name,
+            reading.sensor,
+            name=channel.get("description") or reading.sensor.name,
             height=float(height) if re.fullmatch(r"\d+(\.\d+)?", height) and float(height) > 0 else None,
-        )  # fmt: skip
+        )
         return self.finished(replace(reading, sensor=sensor), done, options, where=str(source.path))
 
 

@@ -135,8 +135,11 @@ def _gll(fields: tuple[str, ...]) -> TimeMark | None:
 
 
 _TIMES: Mapping[str, Callable[[tuple[str, ...]], TimeMark | None]] = {
-    "ZDA": _zda, "RMC": _rmc, "GGA": _first, "GLL": _gll,
-}  # fmt: skip
+    "ZDA": _zda,
+    "RMC": _rmc,
+    "GGA": _first,
+    "GLL": _gll,
+}
 
 
 def speed_over_ground(sentence: Sentence) -> float | None:

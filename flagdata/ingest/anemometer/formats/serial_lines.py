@@ -56,8 +56,10 @@ _MONTH = re.compile(
 )
 _CTIME = re.compile(
     r"\s*[\"\[(]?(?:[A-Za-z]{3},? )?(?P<month>[A-Za-z]{3}) +(?P<day>\d{1,2}) "
-    + _CLOCK + r" (?:(?P<zone>[A-Z]{3,4}) )?(?P<year>\d{4})" + _RAW
-)  # fmt: skip
+    + _CLOCK
+    + r" (?:(?P<zone>[A-Z]{3,4}) )?(?P<year>\d{4})"
+    + _RAW
+)
 """As C's asctime and the command date write it, perhaps with a fraction: "Tue Jul 17 12:48:36.971 2018"."""
 _COMPACT = re.compile(
     r"\s*[\"\[(]?(?P<year>(?:19|20)\d{2})(?P<month>\d{2})(?P<day>\d{2})[T _-]?"
@@ -262,20 +264,22 @@ def read_lines(source: TextFile, instrument: Instrument, *, zone_name: str | Non
             f"the lines of {instrument.name} state no unit of speed",
             where=f"{where}, line {gathered.defects[Defect.UNIT][0]}",
             fix="give the one that the instrument is set to: --unit m/s (or km/h, mph, kn)",
-        )  # fmt: skip
+        )
     if count == 0 and gathered.unstamped:
         raise TimeError(
-            f"the lines of {instrument.name} carry no time", where=f"{where}, line {gathered.unstamped[0]}",
+            f"the lines of {instrument.name} carry no time",
+            where=f"{where}, line {gathered.unstamped[0]}",
             fix="log each line after the computer's stamp: 2026-05-01T12:00:00.123Z,LINE; if the readings came at a "
             "steady rate that is known: --start TIME --rate HZ, with the instant of the first",
-        )  # fmt: skip
+        )
     if count == 0:
         bad = sum(len(places) for places in gathered.defects.values())
         raise InputError(
-            f"none of {bad} lines is a reading of {instrument.name}", where=where,
+            f"none of {bad} lines is a reading of {instrument.name}",
+            where=where,
             fix="a stamp before each line is known as 2026-05-01T12:00:00 or 2026/05/01 12:00:00: write it so; or "
             "look at the lines with flagdata ingest --sniff",
-        )  # fmt: skip
+        )
     stamps = stamps_of(gathered.stamps)
     line = np.array(gathered.line, dtype=np.int64)
     keep = stamps.valid
@@ -288,9 +292,14 @@ def read_lines(source: TextFile, instrument: Instrument, *, zone_name: str | Non
         )
     flags |= _missing(channels)
     return Reading(
-        time=time, channels=channels, flags=flags, line=line[keep], sensor=instrument.sensor, step=stamps.step,
+        time=time,
+        channels=channels,
+        flags=flags,
+        line=line[keep],
+        sensor=instrument.sensor,
+        step=stamps.step,
         findings=(*found, *_findings(gathered, instrument, flags, line[keep], int((~keep).sum())), *about),
-    )  # fmt: skip
+    )
 
 
 def stamps_of(texts: Sequence[str]) -> Stamps:
@@ -310,9 +319,10 @@ def turned(reading: Reading, azimuth: float | None, *, where: str) -> Reading:
         if azimuth is None:
             return reading
         raise UsageError(
-            "an azimuth was given, but the lines hold components in the instrument's own axes", where=where,
+            "an azimuth was given, but the lines hold components in the instrument's own axes",
+            where=where,
             fix="leave out --azimuth, or have the instrument send speed and direction",
-        )  # fmt: skip
+        )
     text = "directions are relative to the instrument's north mark, which is taken to point north"
     fix: str | None = "if it does not, give the direction it points to: --azimuth DEG"
     channels = dict(reading.channels)

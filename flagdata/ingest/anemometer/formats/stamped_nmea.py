@@ -117,9 +117,12 @@ def _receiver(stamps: Mapping[int, int], marks: Mapping[int, int]) -> tuple[Find
     side = "behind" if median < 0 else "before"
     return (
         Finding(
-            kind="receiver-clock-off", severity=Severity.WARNING if abs(median) >= _OFF else Severity.NOTE,
-            count=len(off), value=median, where=f"line {off[0][0]}",
+            kind="receiver-clock-off",
+            severity=Severity.WARNING if abs(median) >= _OFF else Severity.NOTE,
+            count=len(off),
+            value=median,
+            where=f"line {off[0][0]}",
             what=f"the satellite receiver's time (RMC, ZDA) is {size} {side} the stamps of the lines, which are taken",
             fix="check the zone of the stamps and the computer's clock; for the receiver's time, take the stamps out",
         ),
-    )  # fmt: skip
+    )

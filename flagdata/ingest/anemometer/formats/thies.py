@@ -58,9 +58,14 @@ def _number(text: str | None) -> float:
 
 
 INSTRUMENT = Instrument(
-    format="thies", about="Telegrams of a Thies ultrasonic anemometer", name="a Thies anemometer", parse=parse,
-    line="telegrams of a Thies anemometer", in_unit=lambda unit: partial(parse, given=unit),
+    format="thies",
+    about="Telegrams of a Thies ultrasonic anemometer",
+    name="a Thies anemometer",
+    parse=parse,
+    line="telegrams of a Thies anemometer",
+    in_unit=lambda unit: partial(parse, given=unit),
     channels=("wind_speed", "wind_direction", "sonic_temperature"),
-    sensor=Sensor(name="Thies ultrasonic anemometer", resolution=0.1), described_by="Thies' manuals",
-)  # fmt: skip
+    sensor=Sensor(name="Thies ultrasonic anemometer", resolution=0.1),
+    described_by="Thies' manuals",
+)
 Thies = partial(InstrumentLines, INSTRUMENT)

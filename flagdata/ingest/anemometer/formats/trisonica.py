@@ -21,9 +21,13 @@ from flagdata.signals import Sensor
 from flagdata.units import UNITS
 
 _CHANNELS = {
-    "U": ("wind_x", "m/s"), "V": ("wind_y", "m/s"), "W": ("wind_z", "m/s"), "T": ("sonic_temperature", "degC"),
-    "H": ("relative_humidity", "%"), "P": ("air_pressure", "hPa"),
-}  # fmt: skip
+    "U": ("wind_x", "m/s"),
+    "V": ("wind_y", "m/s"),
+    "W": ("wind_z", "m/s"),
+    "T": ("sonic_temperature", "degC"),
+    "H": ("relative_humidity", "%"),
+    "P": ("air_pressure", "hPa"),
+}
 _LINE = re.compile(r"(?:[A-Z][A-Z0-9]{0,2}[ ,:]+(?:-?\d+(?:\.\d+)?|nan)(?:[ ,;]+|$))++")
 _PAIR = re.compile(r"([A-Z][A-Z0-9]{0,2})[ ,:]+(-?\d+(?:\.\d+)?|nan)")
 _BEGINS = re.compile(r"S[23]?[ ,:]+-?\d")
@@ -55,9 +59,13 @@ def parse(raw: str) -> Sample | Defect:
 
 
 INSTRUMENT = Instrument(
-    format="trisonica", about="TriSonica Mini tagged lines", name="a TriSonica", parse=parse,
+    format="trisonica",
+    about="TriSonica Mini tagged lines",
+    name="a TriSonica",
+    parse=parse,
     line="tags and values of a TriSonica (S, D, U, V, W, …)",
     channels=("wind_speed", "wind_direction", *(name for name, _ in _CHANNELS.values())),
-    sensor=Sensor(name="TriSonica Mini", resolution=0.01), described_by="the TriSonica Mini user manual",
-)  # fmt: skip
+    sensor=Sensor(name="TriSonica Mini", resolution=0.01),
+    described_by="the TriSonica Mini user manual",
+)
 TriSonica = partial(InstrumentLines, INSTRUMENT)

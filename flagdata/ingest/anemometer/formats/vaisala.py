@@ -17,10 +17,12 @@ from flagdata.signals import Sensor
 from flagdata.units import UNITS
 
 _FIELDS = {
-    "Sm": ("wind_speed", {"M": "m/s", "K": "km/h", "S": "mph", "N": "kn"}), "Dm": ("wind_direction", {"D": "deg"}),
-    "Ta": ("air_temperature", {"C": "degC", "F": "degF"}), "Ua": ("relative_humidity", {"P": "%"}),
+    "Sm": ("wind_speed", {"M": "m/s", "K": "km/h", "S": "mph", "N": "kn"}),
+    "Dm": ("wind_direction", {"D": "deg"}),
+    "Ta": ("air_temperature", {"C": "degC", "F": "degF"}),
+    "Ua": ("relative_humidity", {"P": "%"}),
     "Pa": ("air_pressure", {"H": "hPa", "P": "Pa", "I": "inHg"}),
-}  # fmt: skip
+}
 """Key of a field → its channel, and letters of its units."""
 _MESSAGE = re.compile(
     r"[0-9A-Za-z](?P<kind>[Rr])[0-5](?P<fields>(?:,[A-Z][a-z]=-?\d+(?:\.\d+)?[A-Za-z#])+)(?P<crc>.{3})?"
@@ -70,9 +72,14 @@ def crc16(text: str) -> str:
 
 
 INSTRUMENT = Instrument(
-    format="vaisala", about="Vaisala WXT or WMT50 ASCII messages", name="a Vaisala transmitter", parse=parse,
-    line="Vaisala messages, some of them with an average wind speed (Sm=)", splits=lambda: split,
+    format="vaisala",
+    about="Vaisala WXT or WMT50 ASCII messages",
+    name="a Vaisala transmitter",
+    parse=parse,
+    line="Vaisala messages, some of them with an average wind speed (Sm=)",
+    splits=lambda: split,
     channels=tuple(channel for channel, _ in _FIELDS.values()),
-    sensor=Sensor(name="Vaisala weather transmitter", resolution=0.1), described_by="the WXT530 user guide",
-)  # fmt: skip
+    sensor=Sensor(name="Vaisala weather transmitter", resolution=0.1),
+    described_by="the WXT530 user guide",
+)
 Vaisala = partial(InstrumentLines, INSTRUMENT)

@@ -41,11 +41,14 @@ def parse(raw: str) -> Sample | Defect:
 
 
 INSTRUMENT = Instrument(
-    format="young", about="Young 81000 lines", name="a Young 81000", parse=parse,
+    format="young",
+    about="Young 81000 lines",
+    name="a Young 81000",
+    parse=parse,
     line="five numbers of a Young 81000, the fourth a speed of sound",
     channels=("wind_speed", "wind_direction", "wind_x", "wind_y", "wind_z", "sonic_temperature"),
     # Manual, specification: ±1 % rms ±0.05 m/s up to 30 m/s; already standard deviations.
     sensor=Sensor(name="Young 81000", resolution=0.01, accuracy=0.05, accuracy_relative=0.01),
     described_by="the manual of the 81000",
-)  # fmt: skip
+)
 Young = partial(InstrumentLines, INSTRUMENT)

@@ -144,9 +144,11 @@ def set_on(time: Instants, *, returns: Sequence[Jump] = ()) -> tuple[Jump, ...]:
         by_hours = jump.whole and step // 2 <= left <= step + max(step // 2, JITTER // 2)
         if steps[row] > _NEVER_SET:
             found.append(Jump(row=row + 1, size=int(steps[row]) - step, whole=False))
-        elif by_hours and steps[row] <= _FARTHEST + 2 * step and (
-            jump.size in undone or (jump.size % HOUR == 0 and by_chance <= _CHANCE)
-        ):  # fmt: skip
+        elif (
+            by_hours
+            and steps[row] <= _FARTHEST + 2 * step
+            and (jump.size in undone or (jump.size % HOUR == 0 and by_chance <= _CHANCE))
+        ):
             found.append(jump)
     return tuple(found)
 
@@ -238,9 +240,14 @@ def continued(time: Instants, jumps: Sequence[Jump], choice: ClockChoice | None)
 
 
 def report(
-    time: Instants, jumps: Sequence[Jump], line: NDArray[np.int64], choice: ClockChoice | None, *, kept: bool = False,
+    time: Instants,
+    jumps: Sequence[Jump],
+    line: NDArray[np.int64],
+    choice: ClockChoice | None,
+    *,
+    kept: bool = False,
     sortable: bool = False,
-) -> tuple[Finding, ...]:  # fmt: skip
+) -> tuple[Finding, ...]:
     """Finding on clocks that were set anew and continued: the jump, its line, and what remains uncertain.
 
     Args:
@@ -271,11 +278,17 @@ def report(
         elif abs(jump.size) == HOUR:
             fix += "; if it is daylight saving, and the stamps state no offset, name the place by --zone Region/City"
         fix += f"; {SORT}" if sortable and jump.size < 0 else ""
-        found.append(Finding(
-            kind=f"clock-set-{'back' if jump.size < 0 else 'on'}", value=jump.size / NANOSECONDS, where=f"line {at}",
-            severity=Severity.WARNING if choice is None else Severity.NOTE, count=1 if kept else rows, what=what,
-            fix=fix if choice is None else None,
-        ))  # fmt: skip
+        found.append(
+            Finding(
+                kind=f"clock-set-{'back' if jump.size < 0 else 'on'}",
+                value=jump.size / NANOSECONDS,
+                where=f"line {at}",
+                severity=Severity.WARNING if choice is None else Severity.NOTE,
+                count=1 if kept else rows,
+                what=what,
+                fix=fix if choice is None else None,
+            )
+        )
     return tuple(found)
 
 

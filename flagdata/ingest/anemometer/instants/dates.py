@@ -141,9 +141,10 @@ def refuse_twelve(wall: NDArray[np.int64], *, line: NDArray[np.int64], where: st
     if np.all((wall[falls + 1] - wall[falls]) % (12 * HOUR) <= max(3 * usual, 1)):
         raise TimeError(
             "the hours run from 1 to 12 without AM or PM, so that the file does not say of which half of the day they "
-            "are", where=f"{where}, line {line[falls[0] + 1]}",
+            "are",
+            where=f"{where}, line {line[falls[0] + 1]}",
             fix="export the log with a clock of 24 hours, or with AM and PM",
-        )  # fmt: skip
+        )
 
 
 def completed(
@@ -210,18 +211,24 @@ def since_start(
     """
     if start is None:
         raise TimeError(
-            f"the stamps count from a start ({form}), not from a date", where=f"{where}, line {line[0]}",
+            f"the stamps count from a start ({form}), not from a date",
+            where=f"{where}, line {line[0]}",
             fix="give the instant of the first row: --start 2026-05-01T12:00:00+02:00",
-        )  # fmt: skip
+        )
     found: list[Finding] = []
     span = _OVERFLOW.get(form)
     over = np.concatenate(([False], np.diff(count) < -0.9 * span if span else np.zeros(len(count) - 1, dtype=bool)))
     if span and over.any():
         what = f"the counter of 32 bits runs over {int(over.sum())} times; the rows after it go on"
-        found.append(Finding(
-            kind="counter-overflow", severity=Severity.NOTE, count=int(over.sum()), what=what,
-            where=f"line {line[over][0]}",
-        ))  # fmt: skip
+        found.append(
+            Finding(
+                kind="counter-overflow",
+                severity=Severity.NOTE,
+                count=int(over.sum()),
+                what=what,
+                where=f"line {line[over][0]}",
+            )
+        )
         count = count + np.cumsum(over) * span
     steps = np.diff(count)
     usual = int(np.median(steps[steps > 0])) if np.any(steps > 0) else 0
@@ -230,8 +237,9 @@ def since_start(
         row, times = int(np.flatnonzero(again)[0]) + 1, f"{int(again.sum())} times" if again.sum() > 1 else "once"
         raise TimeError(
             f"the count starts again {times}, first at line {line[row]}, and the file does not say how long after",
-            where=where, fix="make a file of each stretch and give each its own --start",
-        )  # fmt: skip
+            where=where,
+            fix="make a file of each stretch and give each its own --start",
+        )
     what = f"the stamps count from a start; the first row was at {iso(start)}, as given"
     if int(count[0]) > max(int(np.diff(count[:2]).max(initial=0)), NANOSECONDS):
         what += f", its count being {count[0] / NANOSECONDS:g} s; if that was the zero of the count instead, "

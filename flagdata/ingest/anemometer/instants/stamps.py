@@ -43,26 +43,62 @@ HOUR = 3600 * NANOSECONDS
 DAY = 24 * HOUR
 _MINUTE = 60 * NANOSECONDS
 ABBREVIATED = {
-    "WEST": 1, "CET": 1, "CEST": 2, "MEZ": 1, "MESZ": 2, "EET": 2, "EEST": 3, "MSK": 3, "JST": 9, "KST": 9, "AEST": 10,
-    "AEDT": 11, "AWST": 8, "NZST": 12, "NZDT": 13, "SAST": 2, "HKT": 8, "EST": -5, "EDT": -4, "CDT": -5, "MDT": -6,
-    "PST": -8, "PDT": -7, "AKST": -9, "AKDT": -8, "HST": -10, "BRT": -3,
-}  # fmt: skip
+    "WEST": 1,
+    "CET": 1,
+    "CEST": 2,
+    "MEZ": 1,
+    "MESZ": 2,
+    "EET": 2,
+    "EEST": 3,
+    "MSK": 3,
+    "JST": 9,
+    "KST": 9,
+    "AEST": 10,
+    "AEDT": 11,
+    "AWST": 8,
+    "NZST": 12,
+    "NZDT": 13,
+    "SAST": 2,
+    "HKT": 8,
+    "EST": -5,
+    "EDT": -4,
+    "CDT": -5,
+    "MDT": -6,
+    "PST": -8,
+    "PDT": -7,
+    "AKST": -9,
+    "AKDT": -8,
+    "HST": -10,
+    "BRT": -3,
+}
 """Hours east of UTC of the abbreviations that mean one offset (tz database)."""
 ENGLISH = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
 _ENDS = ("uary", "ruary", "ch", "il", "", "e", "y", "ust", "tember", "ober", "ember", "ember")
 _MONTHS = {
     short + end[:letters]: 1 + at
-    for at, (short, end) in enumerate(zip(ENGLISH, _ENDS, strict=True)) for letters in range(len(end) + 1)
-}  # fmt: skip
+    for at, (short, end) in enumerate(zip(ENGLISH, _ENDS, strict=True))
+    for letters in range(len(end) + 1)
+}
 """The month of each name, whole or cut short."""
 _OFFSET = rf"\s*(?P<z>Z|UTC|GMT|{'|'.join(ABBREVIATED)}|[+-](?:0\d|1[0-5])(?::?[0-5]\d)?)?"
 _LETTERS = "A-Za-zÀ-ɏА-яё"
 _GROUPS: dict[str, str] = {
-    "Y": r"(?P<Y>\d{4})", "y": r"(?P<y>\d{2})", "m": r"(?P<m>\d{1,2})", "d": r"(?P<d>\d{1,2})", "j": r"(?P<j>\d{1,3})",
-    "H": r"(?P<H>\d{1,2})", "I": r"(?P<I>\d{1,2})", "M": r"(?P<M>\d{1,2})", "S": r"(?P<S>\d{1,2})",
-    "f": r"(?:[.,](?P<f>\d{1,9}))?", "p": r"(?P<p>[AaPp](?:\.?\s?[Mm]\.?)?)", "b": r"(?P<b>[A-Za-z]{3,9})\.?",
-    "a": rf"(?:(?P<a>[{_LETTERS}]{{2,13}})\.?,?)", "z": _OFFSET, "Z": r"\s*(?:[A-Z]{3,4})?",
-}  # fmt: skip
+    "Y": r"(?P<Y>\d{4})",
+    "y": r"(?P<y>\d{2})",
+    "m": r"(?P<m>\d{1,2})",
+    "d": r"(?P<d>\d{1,2})",
+    "j": r"(?P<j>\d{1,3})",
+    "H": r"(?P<H>\d{1,2})",
+    "I": r"(?P<I>\d{1,2})",
+    "M": r"(?P<M>\d{1,2})",
+    "S": r"(?P<S>\d{1,2})",
+    "f": r"(?:[.,](?P<f>\d{1,9}))?",
+    "p": r"(?P<p>[AaPp](?:\.?\s?[Mm]\.?)?)",
+    "b": r"(?P<b>[A-Za-z]{3,9})\.?",
+    "a": rf"(?:(?P<a>[{_LETTERS}]{{2,13}})\.?,?)",
+    "z": _OFFSET,
+    "Z": r"\s*(?:[A-Z]{3,4})?",
+}
 _SAME = {"B": "b", "h": "b", "A": "a", "e": "d"}
 """Directives of C's strftime that others here read as well: a month's name may be whole or cut short."""
 _TOKEN = re.compile(r"(?P<run>(?<![^ ])%H%M(?:%S)?)|%(?P<directive>.?)|[.,](?=%f)|(?P<sign>.)", re.DOTALL)
@@ -86,25 +122,39 @@ _CENTURY = YEARS[0] % 100
 PLAIN_FORMS = ("iso", "%Y-%m-%d %H:%M:%S%f")
 """Forms of which 2021-05-14 00:00:00.05 is one."""
 EPOCH = {
-    "epoch-s": NANOSECONDS, "epoch-ms": 1_000_000, "epoch-us": 1_000, "epoch-ns": 1, "labview-s": NANOSECONDS,
-    "filetime": 100, "ticks": 100,
-}  # fmt: skip
+    "epoch-s": NANOSECONDS,
+    "epoch-ms": 1_000_000,
+    "epoch-us": 1_000,
+    "epoch-ns": 1,
+    "labview-s": NANOSECONDS,
+    "filetime": 100,
+    "ticks": 100,
+}
 """Counts of seconds or their parts since an origin: the nanoseconds of one unit."""
 _SINCE_1970 = {
-    "labview-s": 2_082_844_800, "filetime": 116_444_736_000_000_000, "ticks": 621_355_968_000_000_000,
-}  # fmt: skip
+    "labview-s": 2_082_844_800,
+    "filetime": 116_444_736_000_000_000,
+    "ticks": 621_355_968_000_000_000,
+}
 """What a count of another origin than 1970 says of it, in its unit."""
 _SINCE, _UNTIL = 631_152_000, 4_102_444_800
 """1990 and 2100 in Unix time: what lies beyond is a counter or another unit."""
 SERIAL = {
-    "excel-days": 25_569, "excel-days-1904": 24_107, "datenum": 719_529, "julian-days": 2_440_587.5,
+    "excel-days": 25_569,
+    "excel-days-1904": 24_107,
+    "datenum": 719_529,
+    "julian-days": 2_440_587.5,
     "julian-days-modified": 40_587,
-}  # fmt: skip
+}
 """Number of the day 1970-01-01."""
 ELAPSED = {
-    "elapsed-s": NANOSECONDS, "elapsed-ms": 1_000_000, "elapsed-us": 1_000, "elapsed-min": _MINUTE, "elapsed-h": HOUR,
+    "elapsed-s": NANOSECONDS,
+    "elapsed-ms": 1_000_000,
+    "elapsed-us": 1_000,
+    "elapsed-min": _MINUTE,
+    "elapsed-h": HOUR,
     "elapsed-d": DAY,
-}  # fmt: skip
+}
 EXPONENT = r"^\d(?:[.,]\d{1,20})?[eE]\+?\d{1,2}$"
 """A number that is written with an exponent."""
 NAMED = (*EPOCH, *SERIAL, *ELAPSED)

@@ -74,15 +74,22 @@ def to_utc(
         if after > before:
             raise TimeError(
                 f"{_show(int(wall[rows[0]]))} does not exist in {place}: the clocks were set forward over it",
-                where=f"{where}, line {lines[rows[0]]}", fix=_FIX,
-            )  # fmt: skip
+                where=f"{where}, line {lines[rows[0]]}",
+                fix=_FIX,
+            )
         late = _second_pass(wall, rows, end - start, place, f"{where}, line {lines[rows[0]]}")
         offset[late] = after
         what = f"the hour from {_show(start)} occurs twice in {place}; by their order {len(rows) - len(late)} rows are "
         what += f"of its first pass, {len(late)} of its second"
-        found.append(Finding(
-            kind="clocks-set-back", severity=Severity.NOTE, count=len(rows), where=f"line {lines[rows[0]]}", what=what
-        ))  # fmt: skip
+        found.append(
+            Finding(
+                kind="clocks-set-back",
+                severity=Severity.NOTE,
+                count=len(rows),
+                where=f"line {lines[rows[0]]}",
+                what=what,
+            )
+        )
     return wall - offset, tuple(found)
 
 
@@ -179,8 +186,9 @@ def stated(lines: Sequence[str]) -> Statement | None:
     found = [
         Statement(line=number, text=" ".join(match[0].split()), name=name)
         for number, line in enumerate(lines[:LINES], start=1)
-        for match in _STATED.finditer(line[:_LONGEST]) if (name := _name(match["zone"].strip())) is not None
-    ]  # fmt: skip
+        for match in _STATED.finditer(line[:_LONGEST])
+        if (name := _name(match["zone"].strip())) is not None
+    ]
     winters, summers = ({offset_at(zone(one.name), at) for one in found} for at in (0, 182 * 24 * HOUR))
     return found[0] if len(winters) == 1 or len(summers) == 1 else None
 

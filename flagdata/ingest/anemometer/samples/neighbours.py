@@ -54,11 +54,14 @@ def hours_off(series: WindSeries, other: WindSeries, *, name: str) -> Finding | 
         return None
     when = f"{span(abs(best) * NANOSECONDS)} {'later' if best > 0 else 'earlier'}"
     return Finding(
-        kind="hours-off", severity=Severity.WARNING, value=float(best), count=n,
+        kind="hours-off",
+        severity=Severity.WARNING,
+        value=float(best),
+        count=n,
         what=f"its wind is that of {name} if its stamps were {when} (correlation {correlation:.2f} over {n} means of "
         f"{length} s; as stamped {scores[0][1]:.2f}): off by hours, as by a wrong zone",
         fix="check --zone of both logs: a logger may stay on winter time, or keep UTC; then ingest the wrong one again",
-    )  # fmt: skip
+    )
 
 
 def _changes(series: WindSeries, length: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:

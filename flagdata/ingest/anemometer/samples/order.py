@@ -185,8 +185,9 @@ def _runs_back(reading: Reading, where: str, *, settable: bool) -> TimeError:
     return TimeError(
         f"time runs backwards {places}by {(reached - time)[at] / NANOSECONDS:.1f} s, from {iso(int(reached[at]))} to "
         f"{iso(int(time[at]))}, and {out} rows would have to go",
-        where=f"{where}, line {reading.line[at]}", fix="; ".join(ways),
-    )  # fmt: skip
+        where=f"{where}, line {reading.line[at]}",
+        fix="; ".join(ways),
+    )
 
 
 def _continued(reading: Reading, jumps: tuple[Jump, ...], choice: ClockChoice | None) -> Reading:
@@ -240,9 +241,11 @@ def _distinct(reading: Reading, where: str) -> Reading:
     else:
         time, period, hold = _evenly(reading, runs)
         counted = any(one.kind == RATE_GIVEN for one in reading.findings)
-        if hold > _COARSE and not counted and (
-            hold > 1.5 * reading.step or reading.step >= DAY or not _even(runs, period)
-        ):  # fmt: skip
+        if (
+            hold > _COARSE
+            and not counted
+            and (hold > 1.5 * reading.step or reading.step >= DAY or not _even(runs, period))
+        ):
             raise _shared(reading, runs, hold, f"{where}, line {reading.line[shared][0]}")
         held, moved = hold > 1.5 * reading.step or hold > _COARSE, np.ones(len(time), dtype=bool)
         kind = "counted-together" if counted else "held-stamps" if held else "coarse-stamps"
@@ -308,9 +311,11 @@ def _even(runs: _Runs, period: float) -> bool:
 def _shared(reading: Reading, runs: _Runs, hold: int, where: str) -> TimeError:
     low, high = int(runs.rows.min()), int(runs.rows.max())
     number, dates = f"{low}" if low == high else f"{low} to {high}", reading.step >= DAY
-    what = "the stamps are dates without a time of day, and stand" if dates else (
-        f"the stamps are {hold / NANOSECONDS:g} s apart, and stand"
-    )  # fmt: skip
+    what = (
+        "the stamps are dates without a time of day, and stand"
+        if dates
+        else (f"the stamps are {hold / NANOSECONDS:g} s apart, and stand")
+    )
     fix = "name the column of the time of day beside that of the date; " if dates else "log a stamp with every row; "
     fix += "if the rows came at a steady rate, read the wind alone (--columns) with --start TIME --rate HZ; "
     return TimeError(

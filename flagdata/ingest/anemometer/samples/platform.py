@@ -102,10 +102,11 @@ def settle(
     shown = motion(reading, positions or {})
     if given == "fixed" and shown is not None:
         raise InputError(
-            f"the platform was given as fixed, but {shown.text}", where=where,
+            f"the platform was given as fixed, but {shown.text}",
+            where=where,
             fix="say --platform moving: its wind is then apparent wind; where the log's wind is over ground, "
             "computed from a moving platform: --platform corrected",
-        )  # fmt: skip
+        )
     has = set(reading.channels)
     if given == "fixed":
         text, names = "fixed platform, as given", {}
@@ -134,9 +135,15 @@ def settle(
 
 
 def _renamed(
-    reading: Reading, names: Mapping[str, str], kind: str, what: str, *, severity: Severity = Severity.WARNING,
-    value: float | None = None, fix: str | None = None,
-) -> Reading:  # fmt: skip
+    reading: Reading,
+    names: Mapping[str, str],
+    kind: str,
+    what: str,
+    *,
+    severity: Severity = Severity.WARNING,
+    value: float | None = None,
+    fix: str | None = None,
+) -> Reading:
     """The reading with channels under other names, and its findings."""
     found = Finding(kind=kind, severity=severity, what=what, value=value, fix=fix)
     channels = {names.get(name, name): values for name, values in reading.channels.items()}
@@ -148,9 +155,10 @@ def check_corrected(reading: Reading, given: Platform | None, *, where: str) -> 
     if given != "corrected" or "wind_speed" in reading.channels or {"wind_x", "wind_y"} <= set(reading.channels):
         return
     raise InputError(
-        "no wind over ground in the log, which was given as corrected for its platform's motion", where=where,
+        "no wind over ground in the log, which was given as corrected for its platform's motion",
+        where=where,
         fix="say --platform moving: its wind is then apparent wind",
-    )  # fmt: skip
+    )
 
 
 def _of_unknown(reading: Reading) -> Reading:

@@ -90,9 +90,13 @@ def direction(
         return angle, ()
     what = f"{int(beyond.sum())} impossible values of {name}, outside -180° to 360°; left out of averages"
     found = Finding(
-        kind=_OUT, severity=Severity.WARNING, count=int(beyond.sum()), where=f"line {line[beyond][0]}", what=what,
+        kind=_OUT,
+        severity=Severity.WARNING,
+        count=int(beyond.sum()),
+        where=f"line {line[beyond][0]}",
+        what=what,
         fix=_OUT_FIX,
-    )  # fmt: skip
+    )
     return np.where(beyond, np.nan, angle), (found,)
 
 
@@ -130,9 +134,13 @@ def negative(reading: Reading) -> Reading:
             )
         what = f"{{n}} negative values of {name}, down to {lowest:.3g} m/s; left out of averages"
         reading = reading.marked(
-            below, "negative-speed", what, flag=SampleFlag.OUT_OF_RANGE, value=lowest,
+            below,
+            "negative-speed",
+            what,
+            flag=SampleFlag.OUT_OF_RANGE,
+            value=lowest,
             fix="if calm air reads below zero, give --zero-offset",
-        )  # fmt: skip
+        )
     return reading
 
 
@@ -149,9 +157,13 @@ def dead_zone(reading: Reading) -> Reading:
     below &= (reading.flags & SampleFlag.DEAD_ZONE) == 0
     text = f"below the sensor's threshold, {threshold:g} m/s" if threshold else "exactly 0: calm, or below a threshold"
     return reading.marked(
-        below, "dead-zone", f"{{n}} of {len(speed)} speeds are {text}", flag=SampleFlag.DEAD_ZONE,
-        severity=Severity.NOTE, value=threshold,
-    )  # fmt: skip
+        below,
+        "dead-zone",
+        f"{{n}} of {len(speed)} speeds are {text}",
+        flag=SampleFlag.DEAD_ZONE,
+        severity=Severity.NOTE,
+        value=threshold,
+    )
 
 
 def idle(reading: Reading) -> Reading:
@@ -174,14 +186,19 @@ def idle(reading: Reading) -> Reading:
         longest = float(span[long].max())
         what = f"{name} reads exactly 0 in {'all ' if always else ''}{{n}} rows, for {longest:.0f} s on end: "
         what += (
-            "a calm all along, or a sensor that is not connected or blocked" if on_mast else
-            "past a platform that may move no air stands so still; the sensor is not connected or blocked; left out of "
-            "averages"
-        )  # fmt: skip
+            "a calm all along, or a sensor that is not connected or blocked"
+            if on_mast
+            else "past a platform that may move no air stands so still; the sensor is not connected or blocked; left "
+            "out of averages"
+        )
         reading = reading.marked(
-            zero, "stays-at-zero", what, flag=SampleFlag.OK if on_mast else SampleFlag.STALE, value=longest,
+            zero,
+            "stays-at-zero",
+            what,
+            flag=SampleFlag.OK if on_mast else SampleFlag.STALE,
+            value=longest,
             fix="check the sensor, its cable and the column",
-        )  # fmt: skip
+        )
     return reading
 
 
@@ -242,9 +259,12 @@ def stale(reading: Reading) -> Reading:
 
 
 def _longer(
-    same: NDArray[np.bool_], starts: NDArray[np.int64], lengths: NDArray[np.int64], span: NDArray[np.float64],
+    same: NDArray[np.bool_],
+    starts: NDArray[np.int64],
+    lengths: NDArray[np.int64],
+    span: NDArray[np.float64],
     allowed: float | None,
-) -> tuple[NDArray[np.bool_], str, str | None]:  # fmt: skip
+) -> tuple[NDArray[np.bool_], str, str | None]:
     """Which runs of repeats are too long, in words, and what to do where the air was that steady."""
     if allowed is not None:
         return span > allowed, f"for longer than the {allowed:g} s its recipe allows", None
@@ -343,12 +363,15 @@ def gaps(reading: Reading) -> Reading:
         longest = int(wide[np.argmax(steps[wide])])
         lost, seconds = float((steps[wide] - usual).sum()) / NANOSECONDS, float(steps[longest]) / NANOSECONDS
         found = Finding(
-            kind="gaps", severity=Severity.WARNING, count=len(wide), value=seconds,
+            kind="gaps",
+            severity=Severity.WARNING,
+            count=len(wide),
+            value=seconds,
             where=f"line {reading.line[rows[longest + 1]]}",
             what=f"{len(wide)} {'interval' if len(wide) == 1 else 'intervals'}{of} longer than the usual "
             f"{usual / NANOSECONDS:.4g} s, {lost:.3f} s lost in all; the longest interval, {seconds:.3f} s, ends at "
             "the line named",
-        )  # fmt: skip
+        )
         reading = reading.with_findings((found,))
     return reading
 
@@ -384,6 +407,14 @@ def future(reading: Reading, *, now: int) -> Reading:
 
 
 RULES: tuple[Callable[[Reading], Reading], ...] = (
-    faults, negative, dead_zone, idle, one_direction, stale, at_nyquist, gaps, steady,
-)  # fmt: skip
+    faults,
+    negative,
+    dead_zone,
+    idle,
+    one_direction,
+    stale,
+    at_nyquist,
+    gaps,
+    steady,
+)
 """In order: what an earlier rule flags, a later one leaves alone."""

@@ -83,10 +83,13 @@ def estimate(time: NDArray[np.int64], speed: NDArray[np.float64]) -> Zero | None
         return None  # a speed that often falls below it blows there
     leaves = np.append(idle[:-1] & ~idle[1:] & np.isfinite(speed[1:]), False)
     return Zero(
-        offset=offset, sigma=float(np.std(medians[same])), idle=idle, seconds=float(same.sum() * _WINDOW),
+        offset=offset,
+        sigma=float(np.std(medians[same])),
+        idle=idle,
+        seconds=float(same.sum() * _WINDOW),
         jump=float(np.median(speed[np.flatnonzero(leaves) + 1] - offset)) if leaves.any() else float("nan"),
         leaves=leaves,
-    )  # fmt: skip
+    )
 
 
 def check(reading: Reading, asked: ZeroOffset | None, *, where: str) -> None:

@@ -113,17 +113,18 @@ def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:
     if _LEFT_OUT & {finding.kind for finding in reading.findings}:
         _refuse_new_names(source, recipe, where)
     odd = doubts(
-        reading, recipe, assumed=frozenset(fact.what for fact in found.facts if fact.origin == "assumed"),
-        left_out=sum(one.count for one in reading.findings if one.kind in _LEFT_OUT), now=time.time_ns(),
-    )  # fmt: skip
+        reading,
+        recipe,
+        assumed=frozenset(fact.what for fact in found.facts if fact.origin == "assumed"),
+        left_out=sum(one.count for one in reading.findings if one.kind in _LEFT_OUT),
+        now=time.time_ns(),
+    )
     if odd:
         asked = [Open(key="expect", question=f"{one.text}. {one.question}", example=one.key) for one in odd]
         raise OpenFactsError.of(asked, where=where)
     unused = _unused(found)
     understood = tuple(fact.line() for fact in found.facts)
-    return replace(
-        reading.with_findings(unused), drafted=found.recipe, stated=found.stated, understood=understood
-    )  # fmt: skip
+    return replace(reading.with_findings(unused), drafted=found.recipe, stated=found.stated, understood=understood)
 
 
 def _refuse_new_names(source: TextFile, recipe: Recipe, where: str) -> None:

@@ -148,9 +148,13 @@ class _Gathered:
             cells = cells_of(block, column.index)
             cells = _in_degrees(cells, recipe.file.decimal, column.points) if column.points is not None else cells
             parsed = numbers(
-                cells, decimal=recipe.file.decimal, missing=(*recipe.file.missing, *column.absent),
-                suffix=column.suffix, zeros=column.calm, below=bool(column.calm),
-            )  # fmt: skip
+                cells,
+                decimal=recipe.file.decimal,
+                missing=(*recipe.file.missing, *column.absent),
+                suffix=column.suffix,
+                zeros=column.calm,
+                below=bool(column.calm),
+            )
             column.limit = max(column.limit, parsed.limit)
             column.values.add(parsed.value[keep])
             column.states.add(parsed.state[keep])
@@ -169,9 +173,10 @@ def _still(states: Mapping[str, NDArray[np.uint8]]) -> dict[str, NDArray[np.bool
     """
     calm = {name: state == Cell.CALM for name, state in states.items() if (state == Cell.CALM).any()}
     return {
-        one: here for name, here in calm.items()
+        one: here
+        for name, here in calm.items()
         for one in (name, *(other for other in states if other.startswith(name.replace("speed", "direction"))))
-    }  # fmt: skip
+    }
 
 
 def _of_cells(
@@ -180,9 +185,12 @@ def _of_cells(
     """The finding about the cells of a channel in the rows `here` (n,)."""
     count = int(here.sum())
     return Finding(
-        kind=kind, severity=severity, count=count, where=f"line {line[here][0]}",
+        kind=kind,
+        severity=severity,
+        count=count,
+        where=f"line {line[here][0]}",
         what=f"{count} {what.format(name=name)}",
-    )  # fmt: skip
+    )
 
 
 def _in_degrees(cells: Sequence[str] | pa.StringArray, decimal: str, points: Mapping[str, float]) -> list[str]:
@@ -310,9 +318,16 @@ def read_table(
         flags[fault] |= SampleFlag.SENSOR_FAULT
         findings.extend(found)
     reading = Reading(
-        time=time, channels=channels, flags=flags, line=line, sensor=sensor, step=gathered.clock.step,
-        rules=recipe.quality, host_time=host_time, findings=tuple(findings),
-    )  # fmt: skip
+        time=time,
+        channels=channels,
+        flags=flags,
+        line=line,
+        sensor=sensor,
+        step=gathered.clock.step,
+        rules=recipe.quality,
+        host_time=host_time,
+        findings=tuple(findings),
+    )
     return Table(reading=reading, extra={name: column.value(order) for name, column in gathered.extra.items()})
 
 
@@ -334,9 +349,10 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str)
     far = f"; {distant} of them are {years}: a clock that was not set" if distant else ""
     if count == 0 and not bad and recipe.rows is not None:
         raise InputError(
-            f"no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which names the site", where=where,
+            f"no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which names the site",
+            where=where,
             fix=f"name a site as the file writes it: {_listed(gathered.others)}",
-        )  # fmt: skip
+        )
     if count == 0:
         refused = InputError if recipe.rows is None else NothingMeasuredError  # of several sites the others are read
         raise refused(
@@ -351,14 +367,17 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str)
     unset = f"{blank} rows before the first stamp have none: the clock was not set; left out"
     return (
         Finding(
-            kind="unreadable-stamps", severity=Severity.ERROR, count=len(bad), where=f"line {bad[0]}",
+            kind="unreadable-stamps",
+            severity=Severity.ERROR,
+            count=len(bad),
+            where=f"line {bad[0]}",
             what=f"{len(bad)} rows whose stamp is {years}: a clock that was not set; left out"
             if distant == len(bad)
             else unset
             if blank == len(bad)
             else f"{len(bad)} rows whose stamp is not {form} or no date; left out{far}",
         ),
-    )  # fmt: skip
+    )
 
 
 def _channel_columns(recipe: Recipe, rows: Rows, where: str) -> dict[str, int]:
@@ -373,9 +392,12 @@ def _channel_columns(recipe: Recipe, rows: Rows, where: str) -> dict[str, int]:
 
 def _channel_column(name: str, index: int, layout: ChannelLayout) -> _Column:
     return _Column(
-        index=index, suffix=layout.suffix, points=compass.BY_UNIT.get(layout.unit),
-        calm=compass.STILL if name in _SPEEDS else (), absent=tuple(compass.CALM) if name in _DIRECTIONS else (),
-    )  # fmt: skip
+        index=index,
+        suffix=layout.suffix,
+        points=compass.BY_UNIT.get(layout.unit),
+        calm=compass.STILL if name in _SPEEDS else (),
+        absent=tuple(compass.CALM) if name in _DIRECTIONS else (),
+    )
 
 
 def _index(column: str | int, rows: Rows, where: str) -> int:
@@ -460,9 +482,10 @@ def with_horizontal(reading: Reading, azimuth: float | None, *, where: str) -> R
     if not {"wind_x", "wind_y"} <= set(channels) or "wind_speed" in channels:
         if azimuth is not None:
             raise UsageError(
-                "an azimuth was given, but the log has no wind components", where=where,
+                "an azimuth was given, but the log has no wind components",
+                where=where,
                 fix="leave out --azimuth; a turned vane is a rotation in the recipe",
-            )  # fmt: skip
+            )
         return reading
     x, y = channels["wind_x"], channels["wind_y"]
     added = {"wind_speed": np.hypot(x, y)}

@@ -118,10 +118,13 @@ class Lines:
             read_options=csv.ReadOptions(use_threads=False, block_size=len(kept) + 1, column_names=names),
             parse_options=csv.ParseOptions(delimiter=chr(self.shape.delimiter), ignore_empty_lines=False),
             convert_options=csv.ConvertOptions(
-                check_utf8=False, column_types=dict.fromkeys(names[:count], pa.string()),
-                include_columns=names[:count], strings_can_be_null=False, quoted_strings_can_be_null=False,
+                check_utf8=False,
+                column_types=dict.fromkeys(names[:count], pa.string()),
+                include_columns=names[:count],
+                strings_can_be_null=False,
+                quoted_strings_can_be_null=False,
             ),
-        )  # fmt: skip
+        )
         return Columns(cells=[table.column(i).combine_chunks() for i in range(count)])
 
     def _kept(self) -> bytes:

@@ -42,9 +42,10 @@ class RowReader:
         head = source.head(layout.preamble + layout.header + 1)
         if len(head) < layout.preamble + layout.header:
             raise InputError(
-                f"the file ends in line {len(head)}, before its header does", where=str(source.path),
+                f"the file ends in line {len(head)}, before its header does",
+                where=str(source.path),
                 fix="check the recipe's preamble and header, or copy the file from the logger again",
-            )  # fmt: skip
+            )
         self.first_line = layout.preamble + layout.header + 1
         self.shift = 0
         self.header: list[str] | None = None
@@ -137,9 +138,12 @@ class RowReader:
         line = data[at + 1 :].partition(b"\n")[0].rstrip(b"\r")
         named = len(self.header) if self.header is not None else None
         return shape_of(
-            line, delimiter=self._layout.delimiter, named=named, comment=self._layout.comment,
+            line,
+            delimiter=self._layout.delimiter,
+            named=named,
+            comment=self._layout.comment,
             ascii_only=self._source.encoding == "latin-1",
-        )  # fmt: skip
+        )
 
     def _of_lines(self, lines: Lines, first: int, width: int, encoding: str) -> tuple[NDArray[np.int64], Columns]:
         """Rows of a block whose first line has the number `first`."""
@@ -171,23 +175,29 @@ class RowReader:
         if len(malformed) > self._read and len(malformed) > 1:
             raise InputError(
                 f"{len(malformed)} of {len(malformed) + self._read} lines have another number of columns than expected",
-                where=f"{self._source.path}, line {malformed[0]}", fix="check delimiter and header of the recipe",
-            )  # fmt: skip
+                where=f"{self._source.path}, line {malformed[0]}",
+                fix="check delimiter and header of the recipe",
+            )
         if self._last_malformed and malformed:
             last = malformed.pop()
             found.append(
                 Finding(
-                    kind="cut-off", severity=Severity.WARNING, where=f"line {last}",
+                    kind="cut-off",
+                    severity=Severity.WARNING,
+                    where=f"line {last}",
                     what="the last line is incomplete, as when the logger lost power; left out",
                 )
-            )  # fmt: skip
+            )
         if malformed:
             found.append(
                 Finding(
-                    kind="malformed-lines", severity=Severity.ERROR, count=len(malformed), where=f"line {malformed[0]}",
+                    kind="malformed-lines",
+                    severity=Severity.ERROR,
+                    count=len(malformed),
+                    where=f"line {malformed[0]}",
                     what=f"{len(malformed)} lines with another number of columns than the header; left out",
                 )
-            )  # fmt: skip
+            )
         return tuple(found)
 
 

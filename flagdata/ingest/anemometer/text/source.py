@@ -103,9 +103,12 @@ class TableText(TextFile):
     def of(cls, source: TextFile, lines: Sequence[str], findings: Iterable[Finding] = ()) -> TableText:
         """A file converted to these lines, with what was found beside the file's own findings."""
         return cls(
-            path=source.path, encoding="utf-8", lines=len(lines), findings=(*source.findings, *findings),
+            path=source.path,
+            encoding="utf-8",
+            lines=len(lines),
+            findings=(*source.findings, *findings),
             text=tuple(lines),
-        )  # fmt: skip
+        )
 
     def blocks(self, size: int = 200_000) -> Iterator[tuple[int, list[str]]]:
         """See `TextFile.blocks`."""
@@ -329,15 +332,18 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
             if codec is not None:
                 raise InputError(
                     f"not valid {codec}: {error.__class__.__name__}",
-                    where=f"{where}, line {done + 1}", fix="name the encoding it is in, e.g. --encoding cp1252",
-                ) from None  # fmt: skip
+                    where=f"{where}, line {done + 1}",
+                    fix="name the encoding it is in, e.g. --encoding cp1252",
+                ) from None
             return "latin-1", (
                 Finding(
-                    kind="encoding-assumed", severity=Severity.WARNING, where=f"line {done + 1}",
+                    kind="encoding-assumed",
+                    severity=Severity.WARNING,
+                    where=f"line {done + 1}",
                     what="not valid UTF-8, read as Latin-1: letters beyond ASCII may be wrong, numbers are not",
                     fix="name the encoding, e.g. --encoding cp1252",
                 ),
-            )  # fmt: skip
+            )
     return codec or "utf-8", ()
 
 
@@ -383,8 +389,10 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
     if nul and nul * 3 < size:
         found.append(
             Finding(
-                kind="nul-bytes", severity=Severity.WARNING, count=nul,
+                kind="nul-bytes",
+                severity=Severity.WARNING,
+                count=nul,
                 what=f"{nul} NUL bytes, as a logger leaves behind when it loses power; lines holding them are left out",
             )
-        )  # fmt: skip
+        )
     return lines, tuple(found)

@@ -36,10 +36,13 @@ def made() -> Made:
         speeds = 2 + np.modf(np.arange(len(time)) * 0.618034)[0] * 7 if speed is None else speed
         channels = {"wind_speed": speeds, **own} if speed is not False else own
         return Reading(
-            time=time, channels={name: np.asarray(values, dtype=np.float64) for name, values in channels.items()},
-            flags=np.zeros(len(time), dtype=np.uint16), line=np.arange(2, len(time) + 2), step=round(step * SECOND),
+            time=time,
+            channels={name: np.asarray(values, dtype=np.float64) for name, values in channels.items()},
+            flags=np.zeros(len(time), dtype=np.uint16),
+            line=np.arange(2, len(time) + 2),
+            step=round(step * SECOND),
             **{"sensor": Sensor(name="test"), **more},  # type: ignore[arg-type]
-        )  # fmt: skip
+        )
 
     return rows
 

@@ -133,9 +133,11 @@ def test_columns_equal_rows_for_random_bytes(tmp_path: Path, monkeypatch: pytest
 def toa5(path: Path) -> None:
     """20 Hz with missing trailing zeros, NAN, a jump of RECORD, damaged rows, and rows cut off at the end."""
     lines = [
-        '"TOA5","CR3000","CR3000","1","os","CPU:a","2","t"', '"TIMESTAMP","RECORD","Ux","Uy","Uz","diag_csat"',
-        '"TS","RN","m/s","m/s","m/s",""', '"","","Smp","Smp","Smp","Smp"',
-    ]  # fmt: skip
+        '"TOA5","CR3000","CR3000","1","os","CPU:a","2","t"',
+        '"TIMESTAMP","RECORD","Ux","Uy","Uz","diag_csat"',
+        '"TS","RN","m/s","m/s","m/s",""',
+        '"","","Smp","Smp","Smp","Smp"',
+    ]
     rng = np.random.default_rng(4)
     for i in range(600):
         whole, part = divmod(i * 50, 1000)

@@ -65,11 +65,10 @@ ODD = {
     "order": table(usual, vane, stamp="2026-05-01T12:00:{h:02d}Z"),
     "future": table(usual, vane, stamp="2199-05-01T12:{m:02d}:{s:02d}Z"),
     "old": table(usual, vane, stamp="1980-05-01T12:{m:02d}:{s:02d}Z"),
-    "coarse": PLAIN + "".join(
-        f"2026-05-{1 + k // 12:02d}T{2 * (k % 12):02d}:00:00Z,{usual(k)},{vane(k)}\n" for k in range(60)
-    ),
+    "coarse": PLAIN
+    + "".join(f"2026-05-{1 + k // 12:02d}T{2 * (k % 12):02d}:00:00Z,{usual(k)},{vane(k)}\n" for k in range(60)),
     "lines": table(usual, vane).replace("12:00:30Z", "nonsense"),
-}  # fmt: skip
+}
 
 
 def test_every_check_has_a_case() -> None:
@@ -143,9 +142,13 @@ def test_components_that_turn_by_themselves_contradict_any_direction(log_file: W
 
 @pytest.mark.parametrize(
     ("zero", "others", "odd"),
-    [(0, (*range(10, 350, 10),), "calm"), (0, (*range(10, 350, 10), 360), "zero-beside-360"),
-     (0, (*range(3, 360, 10),), ""), (340, (*range(10, 350, 10),), "")],
-)  # fmt: skip
+    [
+        (0, (*range(10, 350, 10),), "calm"),
+        (0, (*range(10, 350, 10), 360), "zero-beside-360"),
+        (0, (*range(3, 360, 10),), ""),
+        (340, (*range(10, 350, 10),), ""),
+    ],
+)
 def test_a_zero_where_no_wind_is_near_north_or_360_stands_for_north_is_asked(
     zero: int, others: tuple[int, ...], odd: str, log_file: Write
 ) -> None:
@@ -188,9 +191,13 @@ def seen(speed: NDArray[np.float64], unit_name: str, days: float = 0.01) -> str:
     time = np.linspace(0, days * 86_400e9, len(speed)).astype(np.int64)
     channels = {"wind_speed": unit(unit_name).to_si(speed)}
     reading = Reading(
-        time=time, channels=channels, flags=np.zeros(len(speed), np.uint16), line=np.arange(len(speed)),
-        sensor=Sensor(name="made"), step=1,
-    )  # fmt: skip
+        time=time,
+        channels=channels,
+        flags=np.zeros(len(speed), np.uint16),
+        line=np.arange(len(speed)),
+        sensor=Sensor(name="made"),
+        step=1,
+    )
     known = recipes.load("generic-csv")
     assert isinstance(known, recipes.Recipe)
     recipe = replace(known, expect=frozenset(KEYS - {"steps", "strong", "grows"}))
@@ -205,9 +212,15 @@ WIND: NDArray[np.float64] = np.asarray(5 * np.abs(np.random.default_rng(7).weibu
 
 def test_multiples_of_a_converted_step_show_the_unit_they_are_written_in() -> None:
     cases = [
-        ("mph", 1.0, "km/h", 1), ("mph", 1.0, "m/s", 2), ("kn", 1.0, "m/s", 1), ("km/h", 1.0, "m/s", 2),
-        ("m/s", 1.0, "km/h", 1), ("m/s", 0.1, "km/h", 2), ("m/s", 0.1, "mph", 2), ("kn", 1.0, "km/h", 1),
-    ]  # fmt: skip
+        ("mph", 1.0, "km/h", 1),
+        ("mph", 1.0, "m/s", 2),
+        ("kn", 1.0, "m/s", 1),
+        ("km/h", 1.0, "m/s", 2),
+        ("m/s", 1.0, "km/h", 1),
+        ("m/s", 0.1, "km/h", 2),
+        ("m/s", 0.1, "mph", 2),
+        ("kn", 1.0, "km/h", 1),
+    ]
     for native, step, shown, digits in cases:
         counts = np.round(WIND / unit(native).scale / step)
         values = np.round(counts * step * unit(native).scale / unit(shown).scale, digits)

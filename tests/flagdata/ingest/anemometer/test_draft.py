@@ -201,11 +201,13 @@ def test_components_are_read_as_such() -> None:
 @pytest.mark.parametrize(
     ("text", "delimiter", "decimal"),
     [
-        (lines("a,b", "{v},{d}"), ",", "."), (lines("a;b", "{n},5;{d}"), ";", ","),
+        (lines("a,b", "{v},{d}"), ",", "."),
+        (lines("a;b", "{n},5;{d}"), ";", ","),
         (lines("a\tb", "{v}\t{d}"), "\t", "."),
-        (lines("a b c", "{v}  {d} {n}"), " ", "."), (lines("a|b", "{v}|{d}"), "|", "."),
+        (lines("a b c", "{v}  {d} {n}"), " ", "."),
+        (lines("a|b", "{v}|{d}"), "|", "."),
     ],
-)  # fmt: skip
+)
 def test_the_dialect_is_found(text: list[str], delimiter: str, decimal: str) -> None:
     shape = shape_of(text)
     assert shape is not None
@@ -225,11 +227,17 @@ def test_text_is_no_table() -> None:
 @pytest.mark.parametrize(
     ("heading", "kind", "unit"),
     [
-        ("Wind Speed [km/h]", "speed", "km/h"), ("ws_ms", "speed", None), ("WindDir", "direction", None),
-        ("Windgeschwindigkeit (m/s)", "speed", "m/s"), ("Air Temp (°C)", "temperature", "degC"), ("u", "x", None),
-        ("eastward_wind (m/s)", "x", "m/s"), ("rain (mm)", "other", "mm"), ("wind, kn", "speed", "kn"),
+        ("Wind Speed [km/h]", "speed", "km/h"),
+        ("ws_ms", "speed", None),
+        ("WindDir", "direction", None),
+        ("Windgeschwindigkeit (m/s)", "speed", "m/s"),
+        ("Air Temp (°C)", "temperature", "degC"),
+        ("u", "x", None),
+        ("eastward_wind (m/s)", "x", "m/s"),
+        ("rain (mm)", "other", "mm"),
+        ("wind, kn", "speed", "kn"),
     ],
-)  # fmt: skip
+)
 def test_headings_are_understood_by_their_words(heading: str, kind: str, unit: str | None) -> None:
     found = meaning(heading)
     assert (found.kind, found.unit) == (kind, unit)
@@ -249,12 +257,15 @@ def test_columns_are_given_in_one_line(log_file: Write) -> None:
 @pytest.mark.parametrize(
     ("columns", "error", "says"),
     [
-        ("time,wind_sped[kn]", UnknownNameError, "wind_speed"), ("time,wind_speed", UsageError, "no unit"),
-        ("time,wind_speed[kn],wind_speed[kn]", UsageError, "twice"), ("9=time,2=wind_speed[kn]", UnknownNameError, "9"),
-        ("time,,,,,,,wind_speed[kn]", InputError, "beyond"), ("time,wind_speed[?]", UsageError, "cannot be read"),
+        ("time,wind_sped[kn]", UnknownNameError, "wind_speed"),
+        ("time,wind_speed", UsageError, "no unit"),
+        ("time,wind_speed[kn],wind_speed[kn]", UsageError, "twice"),
+        ("9=time,2=wind_speed[kn]", UnknownNameError, "9"),
+        ("time,,,,,,,wind_speed[kn]", InputError, "beyond"),
+        ("time,wind_speed[?]", UsageError, "cannot be read"),
         ("time", UsageError, "no channel"),
     ],
-)  # fmt: skip
+)
 def test_a_line_of_columns_that_does_not_fit_is_refused(columns: str, error: type[Exception], says: str) -> None:
     with pytest.raises(error, match=says):
         draft(lines("a,b,c", ISO + ",{v},{d}"), WindOptions(columns=columns))

@@ -61,10 +61,11 @@ def test_a_sheet_with_dates_is_read_by_its_recipe(book: Book) -> None:
 
 def test_a_makers_export_in_a_sheet_is_identified_like_its_text(book: Book) -> None:
     rows = [
-        ["z6-01234", "Port1", None, "Port8"], ["# Records: 3", "ATMOS 22 Ultrasonic Anemometer", None, "Barometer"],
+        ["z6-01234", "Port1", None, "Port8"],
+        ["# Records: 3", "ATMOS 22 Ultrasonic Anemometer", None, "Barometer"],
         ["Timestamps", " m/s Wind Speed", "° Wind Direction", " kPa Reference Pressure"],
         *([START + dt.timedelta(minutes=5 * i), 1.5 + i, 90, 97.8] for i in range(4)),
-    ]  # fmt: skip
+    ]
     log = read_log(book(Processed=rows), WindOptions(zone="+03:00"))
     assert (log.format, iso(int(log.series.time[0]))) == ("zentra", "2026-05-01T20:59:58Z")
     assert log.series.channels["wind_speed"].tolist() == [1.5, 2.5, 3.5, 4.5]

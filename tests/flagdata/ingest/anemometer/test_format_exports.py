@@ -38,15 +38,22 @@ def nrg(*, zone: str = "UTC-5:00", unit: str = "m/s") -> str:
         "Sensor History",
     ]
     for channel, kind, about, height in [
-        (1, "Anemometer", "NRG S1", "40.00"), (2, "Anemometer", "NRG 40C", "20.00"),
-        (13, "Vane", "NRG 200M Vane", "38.00"), (15, "Analog", "NRG T60 Temp", "2.00"),
+        (1, "Anemometer", "NRG S1", "40.00"),
+        (2, "Anemometer", "NRG 40C", "20.00"),
+        (13, "Vane", "NRG 200M Vane", "38.00"),
+        (15, "Analog", "NRG T60 Temp", "2.00"),
         (16, "Analog", "PV module temp", "2.00"),
-    ]:  # fmt: skip
+    ]:
         head += [f"Channel:\t{channel}", f"Type:\t{kind}", f"Description:\t{about}", f"Height:\t{height}", ""]
     columns = [
-        "Timestamp", f"Ch1_Anem_40.00m_N_Avg_{unit}", f"Ch1_Anem_40.00m_N_SD_{unit}", f"Ch2_Anem_20.00m_N_Avg_{unit}",
-        "Ch13_Vane_38.00m_N_Avg_Deg", "Ch15_Analog_2.00m_N_Avg_C", "Ch16_Analog_2.00m_N_Avg_C",
-    ]  # fmt: skip
+        "Timestamp",
+        f"Ch1_Anem_40.00m_N_Avg_{unit}",
+        f"Ch1_Anem_40.00m_N_SD_{unit}",
+        f"Ch2_Anem_20.00m_N_Avg_{unit}",
+        "Ch13_Vane_38.00m_N_Avg_Deg",
+        "Ch15_Analog_2.00m_N_Avg_C",
+        "Ch16_Analog_2.00m_N_Avg_C",
+    ]
     rows = [f"2026-05-01 12:{10 * i:02d}:00\t{5 + i}.0\t0.5\t4.0\t{200 + i}.0\t15.0\t40.0" for i in range(5)]
     return "\n".join([*head, "Data", "\t".join(columns), *rows])
 
@@ -108,9 +115,10 @@ def test_windographer_units_of_columns_go_before_and_without_any_nothing_is_read
 
 def zentra(rows: list[str], *, padded: bool = True) -> str:
     head = [
-        "\ufeffz6-01234,Port1,,,Port7,", f"# Records: {len(rows)},ATMOS 22 Ultrasonic Anemometer,,,Barometer,",
+        "\ufeffz6-01234,Port1,,,Port7,",
+        f"# Records: {len(rows)},ATMOS 22 Ultrasonic Anemometer,,,Barometer,",
         "Timestamps,° Wind Direction, m/s Wind Speed, m/s Gust Speed, kPa Reference Pressure, °C Logger Temperature",
-    ]  # fmt: skip
+    ]
     return "\r\n".join([*head, *([",,,,,"] if padded else []), *rows, ""])
 
 
@@ -138,8 +146,9 @@ def resaved(stamps: list[str]) -> str:
     head = [
         "\ufeffTOA5,site,CR1000,E7000,CR1000.Std.22,CPU:mast.CR1,12345,mast,",
         "Timestamp,RECORD,Spd80mN,Spd80mS,Spd80mNStd,Dir78mS,T2m,RH2m,P2m",
-        "TS,RN,Metres/Second,Metres/Second,Metres/Second,Deg,Celcius,%,Millibar", ",,Avg,Avg,Std,WVc,Smp,Avg,Avg",
-    ]  # fmt: skip
+        "TS,RN,Metres/Second,Metres/Second,Metres/Second,Deg,Celcius,%,Millibar",
+        ",,Avg,Avg,Std,WVc,Smp,Avg,Avg",
+    ]
     rows = [f"{stamp},{i},{8 + i}.37,7.9,1.2,114.2,0.5,98,935" for i, stamp in enumerate(stamps)]
     return "\n".join([*head, *rows, ""])
 
@@ -185,8 +194,10 @@ def test_the_unit_of_weatherlinks_print_shows_in_whole_miles_and_is_to_be_confir
 ) -> None:
     log = read(weatherlink([round(speed * scale, 1) for speed in MILES], **layout), zone="UTC")
     assert (log.format, first(log), iso(int(log.series.time[2]))) == (
-        "weatherlink", "2026-05-25T10:30:00Z", "2026-05-25T12:30:00Z",
-    )  # fmt: skip
+        "weatherlink",
+        "2026-05-25T10:30:00Z",
+        "2026-05-25T12:30:00Z",
+    )
     assert log.series.channels["wind_speed"] == pytest.approx(np.array(MILES) * 0.44704, abs=0.05)
     assert log.series.channels["wind_direction"] == pytest.approx([np.radians(22.5)] * 6)
     assert log.drafted
@@ -302,7 +313,7 @@ def test_eddypro_units_are_those_of_its_third_line(read: Read) -> None:
         "file_info,,,,air_properties,,,rotated_wind,,",
         "filename,date,time,DOY,sonic_temperature,air_temperature,air_pressure,u_rot,wind_speed,wind_dir",
         ",[yyyy-mm-dd],[HH:MM],[ddd.ddd],[K],[K],[Pa],[m+1s-1],[m+1s-1],[deg_from_north]",
-    ]  # fmt: skip
+    ]
     rows = [f"f{i}.raw,2026-05-01,{12 + i}:30,121.5,290.1,289.5,101325,2.5,2.{5 + i},200" for i in range(4)]
     rows.append("not_enough_data,2026-05-01,16:30,121.7,-9999.0,-9999.0,-9999.0,-9999.0,-9999.0,-9999.0")
     log = read("\n".join([*head, *rows, ""]), zone="UTC")
@@ -313,11 +324,26 @@ def test_eddypro_units_are_those_of_its_third_line(read: Read) -> None:
 
 
 EDDYPRO = {
-    "filename": "", "date": "[yyyy-mm-dd]", "time": "[HH:MM]", "DOY": "[ddd.ddd]", "H_strg": "[W+1m-2]",
-    "sonic_temperature": "[K]", "air_temperature": "[K]", "air_pressure": "[Pa]", "RH": "[%]", "u_rot": "[m+1s-1]",
-    "v_rot": "[m+1s-1]", "w_rot": "[m+1s-1]", "wind_speed": "[m+1s-1]", "max_wind_speed": "[m+1s-1]",
-    "wind_dir": "[deg_from_north]", "yaw": "[deg]", "u_spikes": "[#]", "v_spikes": "[#]", "u_var": "[m+2s-2]",
-}  # fmt: skip
+    "filename": "",
+    "date": "[yyyy-mm-dd]",
+    "time": "[HH:MM]",
+    "DOY": "[ddd.ddd]",
+    "H_strg": "[W+1m-2]",
+    "sonic_temperature": "[K]",
+    "air_temperature": "[K]",
+    "air_pressure": "[Pa]",
+    "RH": "[%]",
+    "u_rot": "[m+1s-1]",
+    "v_rot": "[m+1s-1]",
+    "w_rot": "[m+1s-1]",
+    "wind_speed": "[m+1s-1]",
+    "max_wind_speed": "[m+1s-1]",
+    "wind_dir": "[deg_from_north]",
+    "yaw": "[deg]",
+    "u_spikes": "[#]",
+    "v_spikes": "[#]",
+    "u_var": "[m+2s-2]",
+}
 """Some columns of EddyPro's full output with their units."""
 
 
@@ -364,9 +390,27 @@ def test_statistics_of_components_are_no_wind_of_a_table_read_without_its_format
 
 
 STATISTICS = (
-    "spikes", "skewness", "kurtosis", "flag", "qc", "var", "cov", "rand_err", "strg", "stdev", "sd", "skw", "kur", "se",
-    "quality_flag", "itc", "timelag_hf", "mask", "error", "count",
-)  # fmt: skip
+    "spikes",
+    "skewness",
+    "kurtosis",
+    "flag",
+    "qc",
+    "var",
+    "cov",
+    "rand_err",
+    "strg",
+    "stdev",
+    "sd",
+    "skw",
+    "kur",
+    "se",
+    "quality_flag",
+    "itc",
+    "timelag_hf",
+    "mask",
+    "error",
+    "count",
+)
 
 
 def test_flux_networks_have_fixed_units_and_stamp_the_end(read: Read) -> None:

@@ -188,10 +188,15 @@ def test_a_north_mark_that_points_elsewhere_turns_directions(read: Read) -> None
     ("message", "crc"),
     # WXT520 and WXT530 user guides, "Polling with CRC": queries, and the answer to a query for its checksum
     [
-        ("0r1", "Goe"), ("0r2", "Gje"), ("0r3", "Kid"), ("0r5", "Kcd"), ("0r", "BVT"), ("0r0", "Kld"),
+        ("0r1", "Goe"),
+        ("0r2", "Gje"),
+        ("0r3", "Kid"),
+        ("0r5", "Kcd"),
+        ("0r", "BVT"),
+        ("0r0", "Kld"),
         ("0tX,Use chksum Goe", "IU~"),
     ],
-)  # fmt: skip
+)
 def test_the_checksum_of_vaisala_is_the_manuals(message: str, crc: str) -> None:
     assert vaisala.crc16(message) == crc
 

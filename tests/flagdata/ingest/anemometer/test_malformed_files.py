@@ -42,8 +42,13 @@ REFUSED = [
     case("one-byte", content=b"x", error=InputError, says="known format"),
     case("gzip-cut-off", content=gzip.compress(csv(ROW))[:-9], error=InputError, says="gunzip"),
     case("gzip-of-nul", content=gzip.compress(b"\x00" * 20000000), error=InputError, says="NUL"),
-    case("gzip-bomb", content=gzip.compress(csv(*[ROW] * 40_000)), error=LimitError, says="unpacks to more than",
-         options={"limits": Limits(size=1_000_000)}),
+    case(
+        "gzip-bomb",
+        content=gzip.compress(csv(*[ROW] * 40_000)),
+        error=LimitError,
+        says="unpacks to more than",
+        options={"limits": Limits(size=1_000_000)},
+    ),
     case("zip", content=zipped(csv(ROW)), error=InputError, says="zip archive"),
     case("zip-bomb", content=zipped(b"0" * 20000000), error=InputError, says="zip archive"),
     case("empty-zip", content=b"PK\x05\x06" + bytes(18), error=InputError, says="empty zip"),
@@ -73,7 +78,7 @@ REFUSED = [
     case("html", content=b"<!doctype html><html><body>404</body></html>\n", error=InputError),
     case("toml", content=b'[file]\ndelimiter = ","\n', error=InputError),
     case("numbers-without-header", content=b"1 2 3\n4 5 6\n", error=FlagdataError),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("case", REFUSED)

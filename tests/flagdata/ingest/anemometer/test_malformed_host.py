@@ -30,22 +30,56 @@ def host_line(i: int, raw: str = "3.14") -> str:
 REFUSED = [
     case("no-zone", content=hosted(*map(host_line, range(5))), error=TimeError, where="line 2", says="--zone"),
     case("header-alone", content=hosted(), error=InputError),
-    case("header-alone-recipe-named", content=hosted(), error=InputError, where="line 2",
-         options={"recipe": "serial-speed"}),
+    case(
+        "header-alone-recipe-named",
+        content=hosted(),
+        error=InputError,
+        where="line 2",
+        options={"recipe": "serial-speed"},
+    ),
     case("menus-only", content=hosted(*(host_line(i, "READY") for i in range(30))), error=InputError),
-    case("menus-only-recipe-named", content=hosted(*(host_line(i, "READY") for i in range(30))), error=InputError,
-         where="line 2", options={"recipe": "serial-speed", **UTC}),
-    case("recipe-of-another-format", content=hosted(host_line(0)), error=UsageError,
-         options={"format": "host-stamped", "recipe": "generic-csv"}),
-]  # fmt: skip
+    case(
+        "menus-only-recipe-named",
+        content=hosted(*(host_line(i, "READY") for i in range(30))),
+        error=InputError,
+        where="line 2",
+        options={"recipe": "serial-speed", **UTC},
+    ),
+    case(
+        "recipe-of-another-format",
+        content=hosted(host_line(0)),
+        error=UsageError,
+        options={"format": "host-stamped", "recipe": "generic-csv"},
+    ),
+]
 REPORTED = [
-    case("boot-message", content=hosted(host_line(0, "boot v1.2"), *map(host_line, range(1, 9))),
-         finding="non-data-lines", count=1, where="line 2", samples=8, options=UTC),
-    case("counter-instead-of-speed", content=hosted(*map(host_line, range(9)), host_line(9, "10000000306")),
-         finding="out-of-range", count=1, where="line 11", flag=SampleFlag.OUT_OF_RANGE, flagged=1, options=UTC),
-    case("no-payload", content=hosted(*map(host_line, range(9)), "2026-05-01T12:00:09.5"), finding="non-data-lines",
-         count=1, options=UTC),
-]  # fmt: skip
+    case(
+        "boot-message",
+        content=hosted(host_line(0, "boot v1.2"), *map(host_line, range(1, 9))),
+        finding="non-data-lines",
+        count=1,
+        where="line 2",
+        samples=8,
+        options=UTC,
+    ),
+    case(
+        "counter-instead-of-speed",
+        content=hosted(*map(host_line, range(9)), host_line(9, "10000000306")),
+        finding="out-of-range",
+        count=1,
+        where="line 11",
+        flag=SampleFlag.OUT_OF_RANGE,
+        flagged=1,
+        options=UTC,
+    ),
+    case(
+        "no-payload",
+        content=hosted(*map(host_line, range(9)), "2026-05-01T12:00:09.5"),
+        finding="non-data-lines",
+        count=1,
+        options=UTC,
+    ),
+]
 
 
 def test_a_log_without_header_loses_no_line(read: Callable[..., WindLog]) -> None:

@@ -20,7 +20,7 @@ REFUSED = [
     case("line", content=csv(ROW + "0" * 70000), error=LimitError, where="line 2", says="65536"),
     case("line-without-end", content=csv(ROW) + b"9" * 3000000, error=LimitError, where="line 3"),
     case("one-line-of-commas", content=b"," * 100000, error=LimitError),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize("case", REFUSED)

@@ -23,9 +23,13 @@ SINCE = "seconds since 2026-05-01 12:00:00"
 
 
 def written(
-    folder: Path, *variables: Variable, since: str = SINCE, times: Sequence[float] = (0.0, 1.0, 2.0, 3.0),
-    kind: str = "d", **attributes: object,
-) -> Path:  # fmt: skip
+    folder: Path,
+    *variables: Variable,
+    since: str = SINCE,
+    times: Sequence[float] = (0.0, 1.0, 2.0, 3.0),
+    kind: str = "d",
+    **attributes: object,
+) -> Path:
     """A file of four seconds of some variables: name, standard name, unit and values; `attributes` of its time."""
     path = folder / "wind.nc"
     with netcdf_file(path, "w") as file:
@@ -131,9 +135,15 @@ def test_a_time_since_a_date_is_the_instant_that_it_says(tmp_path: Path, since: 
 
 def test_packed_times_are_unpacked_and_missing_ones_are_no_rows(tmp_path: Path) -> None:
     path = written(
-        tmp_path, SPEED, since="seconds since 2026-05-01 11:00:00", times=[0, 2, -32768, 6], kind="h",
-        scale_factor=0.5, add_offset=3600.0, _FillValue=np.int16(-32768),
-    )  # fmt: skip
+        tmp_path,
+        SPEED,
+        since="seconds since 2026-05-01 11:00:00",
+        times=[0, 2, -32768, 6],
+        kind="h",
+        scale_factor=0.5,
+        add_offset=3600.0,
+        _FillValue=np.int16(-32768),
+    )
     log = read_log(path, WindOptions(expect=("lines",)))
     assert log.series.time.tolist() == [(NOON + s) * 10**9 for s in (0, 1, 3)]
     assert [one.count for one in log.findings if one.kind == "unreadable-stamps"] == [1]
@@ -168,9 +178,12 @@ def test_units_that_are_no_instant_are_refused_with_their_text(
 def test_a_first_year_of_the_gregorian_calendar_is_read_where_that_is_stated(tmp_path: Path) -> None:
     first = 739_736.5  # days to 2026-05-01 12:00, by Python's ordinals, which are proleptic Gregorian
     path = written(
-        tmp_path, SPEED, since="days since 0001-01-01", calendar="proleptic_gregorian",
+        tmp_path,
+        SPEED,
+        since="days since 0001-01-01",
+        calendar="proleptic_gregorian",
         times=[first + k / 86_400 for k in range(4)],
-    )  # fmt: skip
+    )
     assert np.abs(read_log(path).series.time - (NOON + np.arange(4)) * 10**9).max() <= 10_000  # of a double, 10 µs
 
 

@@ -128,8 +128,11 @@ def test_every_format_of_the_catalog_is_in_the_table_and_open() -> None:
 
 def test_a_recipe_of_the_catalogs_kind_may_be_given_for_a_file_that_no_format_claims(log_file: Write) -> None:
     text = (files("catalogs") / "sensors/formats/davis.toml").read_text(encoding="utf-8")
-    own = str(log_file(text.replace("Avg Wind Speed", "Mittlerer Wind").replace("avg wind speed", "mittlerer wind"),
-                       "own.toml"))  # fmt: skip
+    own = str(
+        log_file(
+            text.replace("Avg Wind Speed", "Mittlerer Wind").replace("avg wind speed", "mittlerer wind"), "own.toml"
+        )
+    )
     path = log_file('"Date & Time","Mittlerer Wind - km/h"\n"5/13/26 12:05 AM","18.0"\n')
     log = read_log(path, WindOptions(recipe=own, zone="UTC"))
     assert log.series.channels["wind_speed"] == pytest.approx([5.0])

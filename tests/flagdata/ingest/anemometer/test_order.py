@@ -36,21 +36,44 @@ MS, FAST = 0.001, 0.005 * np.arange(1, 3000)
 EVERY = np.arange(1, 3000) % 50 == 0
 SPREAD: dict[str, tuple[Sequence[float] | np.ndarray, float, Sequence[float] | np.ndarray, str]] = {
     "four a second, the log begins and ends within a second": (
-        [0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3], 1, 0.25 * np.arange(2, 13), "coarse-stamps"),
-    "12 a minute under stamps of minutes": (
-        np.repeat(60 * np.arange(20), 12), 60, 5 * np.arange(240), "held-stamps"),
+        [0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3],
+        1,
+        0.25 * np.arange(2, 13),
+        "coarse-stamps",
+    ),
+    "12 a minute under stamps of minutes": (np.repeat(60 * np.arange(20), 12), 60, 5 * np.arange(240), "held-stamps"),
     "a timer of 16 ms": (np.arange(3000) // 3 * 0.016, MS, np.arange(3000) * 0.016 / 3, "held-stamps"),
     "every fiftieth row of 200 Hz with the stamp before it": (
-        np.where(EVERY, FAST - 0.005, FAST), MS, FAST, "equal-stamps"),
+        np.where(EVERY, FAST - 0.005, FAST),
+        MS,
+        FAST,
+        "equal-stamps",
+    ),
     "every fiftieth row of 200 Hz with the stamp after it": (
-        np.where(EVERY, FAST + 0.005, FAST), MS, FAST, "equal-stamps"),
+        np.where(EVERY, FAST + 0.005, FAST),
+        MS,
+        FAST,
+        "equal-stamps",
+    ),
     "a first row with the stamp of the second": (
-        [0, *(0.05 * np.arange(100))], MS, 0.05 * np.arange(-1, 100), "equal-stamps"),
+        [0, *(0.05 * np.arange(100))],
+        MS,
+        0.05 * np.arange(-1, 100),
+        "equal-stamps",
+    ),
     "two records of a slow logger for one instant": (
-        600 * np.array([0, 1, 2, 2, 3, 4, 5]), 60, 600 * np.arange(6), "duplicate-stamps"),
+        600 * np.array([0, 1, 2, 2, 3, 4, 5]),
+        60,
+        600 * np.arange(6),
+        "duplicate-stamps",
+    ),
     "two first records of a slow logger": (
-        600 * np.array([0, 0, 1, 2, 3, 4, 5]), 60, 600 * np.arange(6), "duplicate-stamps"),
-}  # fmt: skip
+        600 * np.array([0, 0, 1, 2, 3, 4, 5]),
+        60,
+        600 * np.arange(6),
+        "duplicate-stamps",
+    ),
+}
 """Stamps [s], their resolution [s], the instants that the rows get [s] and the finding that says so."""
 
 
@@ -61,8 +84,9 @@ def test_rows_that_share_a_stamp_get_instants_of_their_own(name: str, made: Made
     assert seconds(found) == pytest.approx(list(expected), abs=1e-8)
     (finding,) = found.findings
     assert (finding.kind, finding.severity) == (
-        kind, Severity.ERROR if kind == "duplicate-stamps" else Severity.WARNING,
-    )  # fmt: skip
+        kind,
+        Severity.ERROR if kind == "duplicate-stamps" else Severity.WARNING,
+    )
     assert "by up to" in finding.what or kind == "duplicate-stamps"
     moved = found.time != made(stamps).time[: len(found.time)]
     assert kind == "duplicate-stamps" or bool(np.all(found.flags[moved] & SampleFlag.TIME_UNSURE))
@@ -81,11 +105,15 @@ SHARED: dict[str, tuple[np.ndarray, float]] = {
     "a receiver's clock that is read once a minute": (np.arange(6000) // 600 * 60, 1),
     "bursts of ten rows a minute": (np.repeat(np.arange(200) * 60, 10), 1),
     "a number of rows that does not follow the stamps": (
-        np.repeat(np.arange(40) * 60, np.tile([2, 9, 4, 14, 6, 20, 3, 11], 5)), 60),
+        np.repeat(np.arange(40) * 60, np.tile([2, 9, 4, 14, 6, 20, 3, 11], 5)),
+        60,
+    ),
     "rows that come when something happens": (
-        60 * np.repeat(UNEVEN, stream(12, "spread").integers(1, 6, len(UNEVEN))), 60),
+        60 * np.repeat(UNEVEN, stream(12, "spread").integers(1, 6, len(UNEVEN))),
+        60,
+    ),
     "dates that rows share": (np.repeat(np.arange(4), 10) * 86_400, 86_400),
-}  # fmt: skip
+}
 """Stamps that stand for rows whose own times the file does not state."""
 
 
@@ -148,8 +176,10 @@ def test_order_is_kept_and_nothing_lost_when_rows_come_a_little_late(made: Made)
 
 WILD: dict[str, dict[int, float]] = {
     "stamps of other years": {20: 1e6, 50: -1e6, 51: -1e6},
-    "the first row": {0: 3e6}, "the last row": {99: -3e6}, "two rows that changed places": {30: 5, 35: -5},
-}  # fmt: skip
+    "the first row": {0: 3e6},
+    "the last row": {99: -3e6},
+    "two rows that changed places": {30: 5, 35: -5},
+}
 
 
 @pytest.mark.parametrize("choice", [None, "first", "last"])

@@ -250,11 +250,11 @@ BAD: list[tuple[str, str, str, str]] = [
     ("frame-rate-of-unknown", "[sensor]", '[quality]\nframe-rate-of = ["fluter"]\n[sensor]', "unknown channel"),
     ("check-without-values", "[sensor]", '[[check]]\ncolumn = 2\nabout = "x"\n[sensor]', "without values"),
     ("check-without-column", "[sensor]", '[[check]]\nvalues = ["A"]\nabout = "x"\n[sensor]', "no column"),
-    ("check-key", "[sensor]", '[[check]]\ncolum = 2\n[sensor]', "did you mean 'column'"),
+    ("check-key", "[sensor]", "[[check]]\ncolum = 2\n[sensor]", "did you mean 'column'"),
     ("check-no-table", 'name = "mine"', 'check = [1]\nname = "mine"', "not a table"),
     ("not-toml", "[time]", "[time", "not TOML"),
     ("directive", '"iso"', '"%Y-%m-%d %W"', "unknown directive"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("old", "new", "says"), [b[1:] for b in BAD], ids=[b[0] for b in BAD])

@@ -48,13 +48,19 @@ FREE: dict[str, tuple[np.ndarray, float, Mapping[str, object]]] = {
     # repeats by chance are flagged with a probability of about 1e-3 a log: none in these
     **{f"wind shown with {d} decimals": (gusts(20_000, decimals=d), 0.1, {}) for d in (0, 1, 2)},
     "a direction that moves beside a steady speed": (
-        np.full(2000, 3.0), 1, {"wind_direction": stream(6, "direction").uniform(0, 6, 2000)}),
+        np.full(2000, 3.0),
+        1,
+        {"wind_direction": stream(6, "direction").uniform(0, 6, 2000)},
+    ),
     # 50 s at one value, as an idle sensor shows, and nothing else to compare with
     "a fast log that stands for less than a minute": (np.full(10_000, 3.0), 0.005, {}),
     "a reading that its recipe lets stand": (
-        np.array([3.0] * 30 + [4.0, 5.0] * 10), 1, {"rules": QualityRules(stale_after=60)}),
+        np.array([3.0] * 30 + [4.0, 5.0] * 10),
+        1,
+        {"rules": QualityRules(stale_after=60)},
+    ),
     "the least speed of a coarse instrument": (COARSE, 1, {}),
-}  # fmt: skip
+}
 """Speeds, their period [s] and what else is known."""
 
 
@@ -78,13 +84,21 @@ STALE: dict[str, tuple[np.ndarray, float, Mapping[str, object], range]] = {
     "ten minutes": (frozen(600), 0.1, {}, range(1001, 1600)),
     **{
         f"all but {k} rows": (
-            np.r_[gusts(20)[:k], np.full(200 - k, 4.0)], 1, {"wind_direction": np.full(200, 4.7)}, range(k + 1, 200))
+            np.r_[gusts(20)[:k], np.full(200 - k, 4.0)],
+            1,
+            {"wind_direction": np.full(200, 4.7)},
+            range(k + 1, 200),
+        )
         for k in (0, 5, 20)
     },
     "longer than its recipe allows": (
-        np.array([3.0] * 30 + [4.0, 5.0] * 10), 1, {"rules": QualityRules(stale_after=10)}, range(1, 30)),
+        np.array([3.0] * 30 + [4.0, 5.0] * 10),
+        1,
+        {"rules": QualityRules(stale_after=10)},
+        range(1, 30),
+    ),
     "another than the least speed of a coarse instrument": (HIGHER, 1, {}, range(401, 440)),
-}  # fmt: skip
+}
 """Speeds that stand still: their period [s], what else is known, and the rows that repeat the one before."""
 
 
@@ -233,10 +247,11 @@ def test_an_impossible_speed_is_flagged_reported_and_in_no_mean(read: Read, spee
     ("row", "channel"),
     [
         *((f"4,{angle},20,1013,50", "wind_direction") for angle in ("999", "361", "-181", "1e30")),
-        ("4,10,999,1013,50", "air_temperature"), ("4,10,20,0,50", "air_pressure"),
+        ("4,10,999,1013,50", "air_temperature"),
+        ("4,10,20,0,50", "air_pressure"),
         ("4,10,20,1013,400", "relative_humidity"),
     ],
-)  # fmt: skip
+)
 def test_an_impossible_direction_or_air_is_left_out_and_leaves_the_wind_usable(
     read: Read, row: str, channel: str
 ) -> None:
@@ -286,8 +301,11 @@ def test_a_recipe_narrows_what_is_possible_and_turns_a_vane_past_north(
 
 
 def test_an_impossible_angle_of_a_stream_is_left_out_and_reported(read: Read) -> None:
-    bodies = ("GPZDA,120000.00,01,05,2026,00,00", *(f"WIMWV,{at},R,5.0,M,A" for at in ("010.0", "999.0", "010.0")),
-              "GPZDA,120004.00,01,05,2026,00,00")  # fmt: skip
+    bodies = (
+        "GPZDA,120000.00,01,05,2026,00,00",
+        *(f"WIMWV,{at},R,5.0,M,A" for at in ("010.0", "999.0", "010.0")),
+        "GPZDA,120004.00,01,05,2026,00,00",
+    )
     log = read("".join(f"${body}\r\n" for body in bodies))
     angle = np.degrees(log.series.channels["apparent_wind_direction"])
     assert np.isnan(angle).tolist() == [False, True, False]
@@ -354,11 +372,13 @@ def idle(made: Made) -> Reading:
 @pytest.mark.parametrize(
     ("choice", "shift", "severity", "says"),
     [
-        ("report", 0, Severity.WARNING, "not subtracted"), ("estimate", 0.35, Severity.NOTE, "; subtracted"),
-        (-0.35, 0.35, Severity.NOTE, "; subtracted"), (-0.34, 0.34, Severity.NOTE, "; subtracted"),
+        ("report", 0, Severity.WARNING, "not subtracted"),
+        ("estimate", 0.35, Severity.NOTE, "; subtracted"),
+        (-0.35, 0.35, Severity.NOTE, "; subtracted"),
+        (-0.34, 0.34, Severity.NOTE, "; subtracted"),
         (-0.1, 0.1, Severity.WARNING, "-0.250 m/s in calm air"),
     ],
-)  # fmt: skip
+)
 def test_a_zero_offset_is_subtracted_only_where_asked_and_reported(
     choice: Any, shift: float, severity: Severity, says: str, idle: Reading
 ) -> None:

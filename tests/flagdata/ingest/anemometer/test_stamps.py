@@ -206,7 +206,7 @@ UNDECIDED: dict[str, tuple[list[str], str | None, str]] = {
     "an order that a number contradicts": (["13/6/2026 10:00"], "mdy", "leave out --date-order, it is dmy"),
     "two orders": (["13/6/2026 10:00", "6/13/2026 10:00"], None, "split it"),
     "no date": (["10:00", "10:01"], None, "recipe"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", UNDECIDED)
@@ -242,18 +242,30 @@ def test_months_are_read_by_their_english_names_whole_or_cut_short_and_by_no_oth
 
 MIXED: dict[str, tuple[str, list[str], list[str], int]] = {
     "dates alone are midnight": (
-        "iso", ["2026-05-01 23:50:00", "2026-05-02", "2026-05-02 00:10:00"],
-        ["2026-05-01T23:50:00", "2026-05-02T00:00:00", "2026-05-02T00:10:00"], 1),
+        "iso",
+        ["2026-05-01 23:50:00", "2026-05-02", "2026-05-02 00:10:00"],
+        ["2026-05-01T23:50:00", "2026-05-02T00:00:00", "2026-05-02T00:10:00"],
+        1,
+    ),
     "and in a form of their own": (
-        "%d.%m.%Y %I:%M %p", ["01.05.2026 11:50 PM", "02.05.2026", "02.05.2026 12:10 AM"],
-        ["2026-05-01T23:50:00", "2026-05-02T00:00:00", "2026-05-02T00:10:00"], 1),
+        "%d.%m.%Y %I:%M %p",
+        ["01.05.2026 11:50 PM", "02.05.2026", "02.05.2026 12:10 AM"],
+        ["2026-05-01T23:50:00", "2026-05-02T00:00:00", "2026-05-02T00:10:00"],
+        1,
+    ),
     "the end of a day with seconds": (
-        "%Y-%m-%d %H:%M", ["2026-05-01 23:00", "2026-05-01 24:00:00", "2026-05-02 01:00"],
-        ["2026-05-01T23:00:00", "2026-05-02T00:00:00", "2026-05-02T01:00:00"], 0),
+        "%Y-%m-%d %H:%M",
+        ["2026-05-01 23:00", "2026-05-01 24:00:00", "2026-05-02 01:00"],
+        ["2026-05-01T23:00:00", "2026-05-02T00:00:00", "2026-05-02T01:00:00"],
+        0,
+    ),
     "and without": (
-        "%Y-%m-%d %H:%M:%S", ["2026-05-01 23:00:00", "2026-05-01 24:00", "2026-05-02 01:00:00"],
-        ["2026-05-01T23:00:00", "2026-05-02T00:00:00", "2026-05-02T01:00:00"], 0),
-}  # fmt: skip
+        "%Y-%m-%d %H:%M:%S",
+        ["2026-05-01 23:00:00", "2026-05-01 24:00", "2026-05-02 01:00:00"],
+        ["2026-05-01T23:00:00", "2026-05-02T00:00:00", "2026-05-02T01:00:00"],
+        0,
+    ),
+}
 
 
 @pytest.mark.parametrize("name", MIXED)
@@ -355,10 +367,13 @@ def test_a_time_of_day_beside_a_date_that_does_not_read_is_not_the_time() -> Non
 
 COUNTS: dict[str, tuple[str, list[str], list[float]]] = {
     "milliseconds that run over 32 bits": (
-        "elapsed-ms", [str((2**32 - 3000 + at * 1000) % 2**32) for at in range(12)], list(range(12))),
+        "elapsed-ms",
+        [str((2**32 - 3000 + at * 1000) % 2**32) for at in range(12)],
+        list(range(12)),
+    ),
     "hours to the fourth digit": ("elapsed-h", ["0.1667", "0.3333", "0.5"], [0, 600, 1200]),
     "seconds": ("elapsed-s", ["7.25", "7.5", "1e1"], [0, 0.25, 2.75]),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", COUNTS)

@@ -59,9 +59,13 @@ def test_a_gap_of_one_kind_of_wind_is_named_with_it() -> None:
     order = np.argsort(time)
     keep = order[~((order >= n + 100) & (order < n + 130))]
     reading = Reading(
-        time=T0 + time[keep], channels={"apparent_wind_speed": relative[keep], "wind_speed": over_ground[keep]},
-        flags=np.zeros(len(keep), dtype=np.uint16), line=np.arange(len(keep)) + 1, sensor=Sensor(name="x"), step=1,
-    )  # fmt: skip
+        time=T0 + time[keep],
+        channels={"apparent_wind_speed": relative[keep], "wind_speed": over_ground[keep]},
+        flags=np.zeros(len(keep), dtype=np.uint16),
+        line=np.arange(len(keep)) + 1,
+        sensor=Sensor(name="x"),
+        step=1,
+    )
     (gap,) = rules.gaps(reading).findings
     assert gap.value == pytest.approx(31.0)
     assert " of wind_speed " in gap.what

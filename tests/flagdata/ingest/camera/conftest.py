@@ -107,6 +107,9 @@ def cfr60(tmp_path_factory: pytest.TempPathFactory, write_video: Callable[..., P
     """Two seconds of H.264 at 60 Hz in MP4, without B-frames, a key frame every 12."""
     path = tmp_path_factory.mktemp("cfr") / "cfr60.mp4"
     return write_video(
-        path, range(120), tick=Fraction(1, 60), rate=60,
+        path,
+        range(120),
+        tick=Fraction(1, 60),
+        rate=60,
         encoder={"preset": "ultrafast", "crf": "12", "g": "12", "bf": "0"},
-    )  # fmt: skip
+    )

@@ -39,9 +39,12 @@ def take(tmp_path: Path, write_video: Callable[..., Path]) -> Callable[..., Path
     def write(seconds: float, frames: int) -> Path:
         first = round(seconds * 90_000)
         return write_video(
-            tmp_path / f"{seconds:g}-{frames}.ts", range(first, first + frames * PERIOD, PERIOD), tick=TICK,
-            encoder=B_FRAMES, muxer={"mpegts_copyts": "1"},
-        )  # fmt: skip
+            tmp_path / f"{seconds:g}-{frames}.ts",
+            range(first, first + frames * PERIOD, PERIOD),
+            tick=TICK,
+            encoder=B_FRAMES,
+            muxer={"mpegts_copyts": "1"},
+        )
 
     return write
 
@@ -49,9 +52,13 @@ def take(tmp_path: Path, write_video: Callable[..., Path]) -> Callable[..., Path
 # Seconds at which the second take's clock begins; the first one's runs from 5000 s on for 0.8 s.
 @pytest.mark.parametrize("second", [4000, 4998, 0])
 def test_a_clock_that_starts_anew_ends_the_recording_and_is_no_wrap(
-    second: int, tmp_path: Path, take: Callable[..., Path], plain: CameraOptions,
-    number_of: Callable[..., int], start: int,
-) -> None:  # fmt: skip
+    second: int,
+    tmp_path: Path,
+    take: Callable[..., Path],
+    plain: CameraOptions,
+    number_of: Callable[..., int],
+    start: int,
+) -> None:
     joined = tmp_path / "joined.ts"
     joined.write_bytes(take(5000, 20).read_bytes() + take(second, 12).read_bytes())
     info, frames, found = read(joined, plain)

@@ -73,9 +73,14 @@ def film(request: pytest.FixtureRequest, tmp_path: Path, write_video: Callable[.
 )
 @pytest.mark.parametrize("wide", [False, True])
 def test_each_frame_of_an_edited_film_comes_once_at_its_time_and_the_edits_are_reported(
-    entries: list[Entry], says: str, wide: bool, film: Path, plain: CameraOptions,
-    number_of: Callable[[np.ndarray], int], start: int,
-) -> None:  # fmt: skip
+    entries: list[Entry],
+    says: str,
+    wide: bool,
+    film: Path,
+    plain: CameraOptions,
+    number_of: Callable[[np.ndarray], int],
+    start: int,
+) -> None:
     _, frames, found = read(edited(film, entries, wide=wide), replace(plain, rate="native"))
     assert [number_of(f.image) for f in frames] == list(range(FRAMES))
     assert [f.time - start for f in frames] == [k * 20 * MS for k in range(FRAMES)]
@@ -92,9 +97,13 @@ def test_each_frame_of_an_edited_film_comes_once_at_its_time_and_the_edits_are_r
     ],
 )
 def test_a_film_that_is_trimmed_or_begins_later_is_shown_as_its_edit_list_says(
-    entries: list[Entry], shown: range, film: Path, plain: CameraOptions, number_of: Callable[[np.ndarray], int],
+    entries: list[Entry],
+    shown: range,
+    film: Path,
+    plain: CameraOptions,
+    number_of: Callable[[np.ndarray], int],
     start: int,
-) -> None:  # fmt: skip
+) -> None:
     _, frames, found = read(edited(film, entries), replace(plain, rate="native"))
     numbers = [number_of(f.image) for f in frames]
     # FFmpeg may keep a frame or two about the ends of what is shown.
@@ -117,9 +126,14 @@ def test_a_phones_slow_motion_is_reported_with_its_rate_which_works(
 ) -> None:
     stated = {"com.android.capture.fps": "240.000000"}
     film = write_video(
-        tmp_path / "slow.mp4", range(60), tick=Fraction(1, 30), rate=30, container="mp4", metadata=stated,
+        tmp_path / "slow.mp4",
+        range(60),
+        tick=Fraction(1, 30),
+        rate=30,
+        container="mp4",
+        metadata=stated,
         muxer={"movflags": "use_metadata_tags"},
-    )  # fmt: skip
+    )
     options = replace(plain, rate="native")
     finding = read(film, options)[2]["capture-rate"]
     assert (finding.value, finding.fix) == (240, "give the camera's rate: --true-fps 240")
@@ -128,7 +142,12 @@ def test_a_phones_slow_motion_is_reported_with_its_rate_which_works(
     assert frames[-1].time - start == round(59e9 / 240)
     stated["com.android.capture.fps"] = "29.97"
     usual = write_video(
-        tmp_path / "usual.mp4", range(10), tick=Fraction(1, 30), rate=30, container="mp4", metadata=stated,
+        tmp_path / "usual.mp4",
+        range(10),
+        tick=Fraction(1, 30),
+        rate=30,
+        container="mp4",
+        metadata=stated,
         muxer={"movflags": "use_metadata_tags"},
-    )  # fmt: skip
+    )
     assert "capture-rate" not in read(usual, options)[2]

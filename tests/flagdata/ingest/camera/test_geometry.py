@@ -25,11 +25,16 @@ ONE = 1 << 16
     ("value", "upright", "clockwise", "mirrored"),
     [
         # CIPA DC-008: which stored row and column is the visual top and left.
-        (1, [[1, 2], [3, 4]], 0, False), (2, [[2, 1], [4, 3]], 0, True), (3, [[4, 3], [2, 1]], 180, False),
-        (4, [[3, 4], [1, 2]], 180, True), (5, [[1, 3], [2, 4]], 270, True), (6, [[3, 1], [4, 2]], 90, False),
-        (7, [[4, 2], [3, 1]], 90, True), (8, [[2, 4], [1, 3]], 270, False),
+        (1, [[1, 2], [3, 4]], 0, False),
+        (2, [[2, 1], [4, 3]], 0, True),
+        (3, [[4, 3], [2, 1]], 180, False),
+        (4, [[3, 4], [1, 2]], 180, True),
+        (5, [[1, 3], [2, 4]], 270, True),
+        (6, [[3, 1], [4, 2]], 90, False),
+        (7, [[4, 2], [3, 1]], 90, True),
+        (8, [[2, 4], [1, 3]], 270, False),
     ],
-)  # fmt: skip
+)
 def test_the_eight_exif_orientations(value: int, upright: list[list[int]], clockwise: int, mirrored: bool) -> None:
     orientation = Orientation.of_exif(value)
     assert orientation.apply(CORNERS).tolist() == upright
@@ -71,9 +76,13 @@ def test_cropping_then_turning_equals_turning_then_cropping(value: int, x: int, 
     upright = orientation.apply(stored)
     x, y = min(x, upright.shape[1] - side), min(y, upright.shape[0] - side)
     geometry = Geometry(
-        width=96, height=64, aspect=Fraction(1), orientation=orientation,
-        crop=CropBox(x=x, y=y, width=side, height=side), size=side,
-    )  # fmt: skip
+        width=96,
+        height=64,
+        aspect=Fraction(1),
+        orientation=orientation,
+        crop=CropBox(x=x, y=y, width=side, height=side),
+        size=side,
+    )
     out = geometry.render(Image.fromarray(stored), black=0, white=255)
     assert np.array_equal(out, upright[y : y + side, x : x + side])
 
@@ -83,9 +92,13 @@ def test_an_oblong_crop_is_padded_and_never_stretched() -> None:
     rows, columns = np.mgrid[:200, :400]
     disk = np.where((rows - 100) ** 2 + (columns - 200) ** 2 <= 80**2, 255, 60).astype(np.uint8)
     geometry = Geometry(
-        width=400, height=200, aspect=Fraction(1), orientation=Orientation(),
-        crop=CropBox(x=0, y=0, width=400, height=200), size=300,
-    )  # fmt: skip
+        width=400,
+        height=200,
+        aspect=Fraction(1),
+        orientation=Orientation(),
+        crop=CropBox(x=0, y=0, width=400, height=200),
+        size=300,
+    )
     assert geometry.padded
     out = geometry.render(Image.fromarray(disk), black=0, white=255)
     assert out.shape == (300, 300)
@@ -101,9 +114,13 @@ def test_shrinking_averages_over_area_and_does_not_alias() -> None:
     # One-pixel stripes at 1200 px are far beyond what 300 px can show: what is left is their mean, 127.5.
     stripes = np.tile(np.array([0, 255], dtype=np.uint8), (1200, 600))
     geometry = Geometry(
-        width=1200, height=1200, aspect=Fraction(1), orientation=Orientation(),
-        crop=CropBox(x=0, y=0, width=1200, height=1200), size=300,
-    )  # fmt: skip
+        width=1200,
+        height=1200,
+        aspect=Fraction(1),
+        orientation=Orientation(),
+        crop=CropBox(x=0, y=0, width=1200, height=1200),
+        size=300,
+    )
     out = geometry.render(Image.fromarray(stripes), black=0, white=255).astype(float)
     # The kernel's response to the alternating pattern is below 1 %; the outermost pixel sees half a kernel.
     assert np.abs(out[:, 2:-2] - 127.5).max() <= 3
@@ -114,9 +131,13 @@ def test_scaling_does_not_ring_at_an_edge() -> None:
     edge[:, 450:] = 200
     for crop in (900, 200):
         geometry = Geometry(
-            width=900, height=900, aspect=Fraction(1), orientation=Orientation(),
-            crop=CropBox(x=450 - crop // 2, y=0, width=crop, height=crop), size=300,
-        )  # fmt: skip
+            width=900,
+            height=900,
+            aspect=Fraction(1),
+            orientation=Orientation(),
+            crop=CropBox(x=450 - crop // 2, y=0, width=crop, height=crop),
+            size=300,
+        )
         out = geometry.render(Image.fromarray(edge), black=0, white=255)
         assert (out.min(), out.max()) == (50, 200)
 
@@ -127,9 +148,13 @@ def test_a_moving_picture_moves_by_the_same_share() -> None:
         edge = np.zeros((600, 600), dtype=np.uint8)
         edge[:, column:] = 200
         geometry = Geometry(
-            width=600, height=600, aspect=Fraction(1), orientation=Orientation(),
-            crop=CropBox(x=0, y=0, width=600, height=600), size=300,
-        )  # fmt: skip
+            width=600,
+            height=600,
+            aspect=Fraction(1),
+            orientation=Orientation(),
+            crop=CropBox(x=0, y=0, width=600, height=600),
+            size=300,
+        )
         out = geometry.render(Image.fromarray(edge), black=0, white=255)[150].astype(float)
         assert 300 - out.sum() / 200 == pytest.approx(column / 2, abs=0.02)
 
@@ -137,9 +162,13 @@ def test_a_moving_picture_moves_by_the_same_share() -> None:
 def test_limited_range_is_stretched_and_clipped_only_outside_it() -> None:
     levels = np.tile(np.array([16, 235, 126, 0, 255, 17], dtype=np.uint8), (6, 1))
     geometry = Geometry(
-        width=6, height=6, aspect=Fraction(1), orientation=Orientation(), crop=CropBox(x=0, y=0, width=6, height=6),
+        width=6,
+        height=6,
+        aspect=Fraction(1),
+        orientation=Orientation(),
+        crop=CropBox(x=0, y=0, width=6, height=6),
         size=6,
-    )  # fmt: skip
+    )
     # (126 - 16) · 255 / 219 = 128.08; (17 - 16) · 255 / 219 = 1.16.
     assert geometry.render(Image.fromarray(levels), black=16, white=235)[0].tolist() == [0, 255, 128, 0, 255, 1]
 
@@ -164,10 +193,18 @@ def test_what_is_not_a_crop_is_refused() -> None:
 
 def test_options_without_meaning_are_refused() -> None:
     cases = [
-        {"rate": 0.0}, {"rate": float("nan")}, {"true_fps": -1.0}, {"true_fps": float("inf")}, {"sequence_fps": 0.0},
-        {"exposure": -1e-3}, {"tolerance": float("nan")}, {"size": 0}, {"threads": 0}, {"crop": "centre"},
+        {"rate": 0.0},
+        {"rate": float("nan")},
+        {"true_fps": -1.0},
+        {"true_fps": float("inf")},
+        {"sequence_fps": 0.0},
+        {"exposure": -1e-3},
+        {"tolerance": float("nan")},
+        {"size": 0},
+        {"threads": 0},
+        {"crop": "centre"},
         {"rate": "native", "tolerance": 0.1},
-    ]  # fmt: skip
+    ]
     assert not unrefused(lambda options: CameraOptions(**options), zip(cases), UsageError)
 
 

@@ -27,9 +27,26 @@ def frame(pixel_format: str, value: int, *, width: int = 34, height: int = 18) -
 
 @pytest.mark.parametrize(
     "pixel_format",
-    ["yuv420p", "yuv422p", "yuv444p", "yuv411p", "nv12", "nv21", "yuyv422", "uyvy422", "yuv420p10le", "yuv422p10le",
-     "yuv444p12le", "yuv420p16le", "yuv420p10be", "p010le", "p016le", "y210le", "yuva420p"],
-)  # fmt: skip
+    [
+        "yuv420p",
+        "yuv422p",
+        "yuv444p",
+        "yuv411p",
+        "nv12",
+        "nv21",
+        "yuyv422",
+        "uyvy422",
+        "yuv420p10le",
+        "yuv422p10le",
+        "yuv444p12le",
+        "yuv420p16le",
+        "yuv420p10be",
+        "p010le",
+        "p016le",
+        "y210le",
+        "yuva420p",
+    ],
+)
 def test_limited_luma_means_the_same_in_every_layout(pixel_format: str) -> None:
     # 16 is black, 235 white, 126 at (126 - 16) / 219 between.
     for value, expected in ((16, 0.0), (235, 255.0), (126, 110 / 219 * 255)):

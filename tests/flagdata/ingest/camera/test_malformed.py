@@ -51,10 +51,16 @@ def bases(
     made = {}
     for name, (container, codec, encoder, muxer) in BASES.items():
         path = write_video(
-            folder / name, range(FRAMES), tick=Fraction(1, 25), container=container, codec=codec, encoder=encoder,
-            muxer=muxer, pixel_format="yuvj420p" if codec == "mjpeg" else "yuv420p",
+            folder / name,
+            range(FRAMES),
+            tick=Fraction(1, 25),
+            container=container,
+            codec=codec,
+            encoder=encoder,
+            muxer=muxer,
+            pixel_format="yuvj420p" if codec == "mjpeg" else "yuv420p",
             picture=lambda number: grainy(numbered(number)),
-        )  # fmt: skip
+        )
         made[name] = path.read_bytes()
     return made
 
@@ -107,16 +113,24 @@ def test_an_mp4_without_index_says_that_it_was_not_closed(
     assert "moov" in outcome.fix
 
 
-@pytest.mark.parametrize("movflags", ["frag_keyframe", "frag_keyframe+empty_moov+default_base_moof",
-                                      "dash+frag_keyframe+global_sidx"])  # fmt: skip
+@pytest.mark.parametrize(
+    "movflags", ["frag_keyframe", "frag_keyframe+empty_moov+default_base_moof", "dash+frag_keyframe+global_sidx"]
+)
 def test_of_a_fragmented_film_cut_in_any_box_all_whole_fragments_are_kept_and_the_cut_is_reported(
-    movflags: str, tmp_path: Path, plain: CameraOptions, write_video: Callable[..., Path],
-    number_of: Callable[..., int], start: int,
-) -> None:  # fmt: skip
+    movflags: str,
+    tmp_path: Path,
+    plain: CameraOptions,
+    write_video: Callable[..., Path],
+    number_of: Callable[..., int],
+    start: int,
+) -> None:
     whole = write_video(
-        tmp_path / "whole.mp4", range(FRAMES), tick=Fraction(1, 25), muxer={"movflags": movflags},
+        tmp_path / "whole.mp4",
+        range(FRAMES),
+        tick=Fraction(1, 25),
+        muxer={"movflags": movflags},
         encoder={"preset": "veryfast", "bf": "2", "g": "10"},
-    )  # fmt: skip
+    )
     data, path = whole.read_bytes(), tmp_path / "cut.mp4"
     found, _ = top(whole)
     first = next(box.end for box in found if box.kind == b"mdat")
@@ -153,9 +167,12 @@ def test_a_film_cut_before_its_first_frame_is_refused_with_what_is_missing(
 
 @pytest.mark.parametrize("container", ["matroska", "webm", "mov", "avi", "mpegts"])
 def test_a_film_with_sound_that_is_cut_is_reported_as_cut_where_frames_are_missing(
-    container: str, tmp_path: Path, plain: CameraOptions, numbered: Callable[..., np.ndarray],
+    container: str,
+    tmp_path: Path,
+    plain: CameraOptions,
+    numbered: Callable[..., np.ndarray],
     number_of: Callable[..., int],
-) -> None:  # fmt: skip
+) -> None:
     path = tmp_path / "sound"
     codecs = {"webm": ("libvpx", "libopus")}.get(container, ("mpeg4", "mp2"))
     with av.open(

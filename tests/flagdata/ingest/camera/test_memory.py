@@ -24,9 +24,13 @@ def test_memory_does_not_grow_with_the_length(tmp_path: Path, write_video: Calla
 
     def peak(frames: int) -> tuple[int, int]:
         path = write_video(
-            tmp_path / f"{frames}.mp4", range(frames), tick=Fraction(1, 50), rate=50, picture=lambda _: noise,
+            tmp_path / f"{frames}.mp4",
+            range(frames),
+            tick=Fraction(1, 50),
+            rate=50,
+            picture=lambda _: noise,
             encoder={"preset": "ultrafast", "crf": "30", "bf": "0"},
-        )  # fmt: skip
+        )
         result = subprocess.run(
             [sys.executable, "-c", SCRIPT, str(path)], capture_output=True, text=True, check=True, timeout=500
         )

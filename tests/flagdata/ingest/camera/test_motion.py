@@ -49,9 +49,12 @@ def scene(
 def film(tmp_path: Path, write_video: Callable[..., Path]) -> Callable[..., Path]:
     def write(name: str, picture: Callable[[int], np.ndarray], *, frames: int = 300) -> Path:
         return write_video(
-            tmp_path / name, range(frames), tick=Fraction(1, 25), picture=picture,
+            tmp_path / name,
+            range(frames),
+            tick=Fraction(1, 25),
+            picture=picture,
             encoder={"preset": "ultrafast", "crf": "18", "g": "50", "bf": "0"},
-        )  # fmt: skip
+        )
 
     return write
 
@@ -133,11 +136,13 @@ def test_an_automatic_crop_is_used_and_kept_with_its_picture(film: Callable[...,
 @pytest.mark.parametrize(
     ("crop", "edges"),
     [
-        ("150,20,100,160", {"right": 30}), ("230,90,150,100", {"left": 30, "top": 30}), ("190,50,100,100", {}),
+        ("150,20,100,160", {"right": 30}),
+        ("230,90,150,100", {"left": 30, "top": 30}),
+        ("190,50,100,100", {}),
         ("10,10,100,100", {}),
     ],
     ids=["tip", "corner", "whole flag", "elsewhere"],
-)  # fmt: skip
+)
 def test_a_crop_that_cuts_through_what_moves_is_reported_with_the_edges(
     crop: str, edges: dict[str, int], film: Callable[..., Path], plain: CameraOptions
 ) -> None:
@@ -167,9 +172,12 @@ def test_a_stream_that_cannot_seek_is_sampled_from_its_beginning(
 ) -> None:
     flag = (200, 60, 80)
     path = write_video(
-        tmp_path / "raw.h264", range(60), tick=Fraction(1, 25), container="h264",
+        tmp_path / "raw.h264",
+        range(60),
+        tick=Fraction(1, 25),
+        container="h264",
         picture=lambda n: scene(n, flag=flag),
-    )  # fmt: skip
+    )
     proposal = propose_crop(path, CameraOptions(sequence_fps=25.0))
     assert covers(proposal.box.as_tuple(), flag)
 

@@ -13,10 +13,19 @@ pytestmark = pytest.mark.reference
 
 # Frames by the containers' own tables (ffprobe -show_entries stream=nb_frames).
 TUNNEL = {
-    "fullVeloc_10.05": 1001, "fullVeloc_10.95": 1001, "fullVeloc_12.30": 1002, "fullVeloc_7.64": 1001,
-    "fullVeloc_8.09": 1006, "fullVeloc_9.30": 1001, "rectVeloc_10.80": 302, "rectVeloc_12.30": 1024,
-    "triangVeloc_10.05": 1001, "triangVeloc_12.30": 1002, "triangVeloc_7.04": 1003, "triangVeloc_8.54": 1005,
-}  # fmt: skip
+    "fullVeloc_10.05": 1001,
+    "fullVeloc_10.95": 1001,
+    "fullVeloc_12.30": 1002,
+    "fullVeloc_7.64": 1001,
+    "fullVeloc_8.09": 1006,
+    "fullVeloc_9.30": 1001,
+    "rectVeloc_10.80": 302,
+    "rectVeloc_12.30": 1024,
+    "triangVeloc_10.05": 1001,
+    "triangVeloc_12.30": 1002,
+    "triangVeloc_7.04": 1003,
+    "triangVeloc_8.54": 1005,
+}
 
 
 def tunnel(reference_data: Path, name: str) -> Path:

@@ -27,13 +27,31 @@ def save(folder: Path, names: dict[int, str], numbered: Callable[..., np.ndarray
     return folder
 
 
-@pytest.mark.parametrize(("suffix", "mode"), [("png", "L"), ("png", "RGB"), ("png", "RGBA"), ("png", "P"), ("png", "1"),
-                                              ("jpg", "L"), ("jpg", "RGB"), ("jpg", "CMYK"), ("tif", "I;16"),
-                                              ("bmp", "RGB"), ("png", "LA")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("suffix", "mode"),
+    [
+        ("png", "L"),
+        ("png", "RGB"),
+        ("png", "RGBA"),
+        ("png", "P"),
+        ("png", "1"),
+        ("jpg", "L"),
+        ("jpg", "RGB"),
+        ("jpg", "CMYK"),
+        ("tif", "I;16"),
+        ("bmp", "RGB"),
+        ("png", "LA"),
+    ],
+)
 def test_images_are_taken_by_number_at_the_given_rate(
-    suffix: str, mode: str, tmp_path: Path, options: CameraOptions, numbered: Callable[..., np.ndarray],
-    number_of: Callable[..., int], start: int,
-) -> None:  # fmt: skip
+    suffix: str,
+    mode: str,
+    tmp_path: Path,
+    options: CameraOptions,
+    numbered: Callable[..., np.ndarray],
+    number_of: Callable[..., int],
+    start: int,
+) -> None:
     folder = tmp_path / "images"
     folder.mkdir()
     for number in range(12):

@@ -66,11 +66,16 @@ def test_an_unusable_time_is_passed_over_and_mentioned() -> None:
 @pytest.mark.parametrize(
     "metadata",
     [
-        {}, {"creation_time": "1904-01-01T00:00:00.000000Z"}, {"creation_time": "1970-01-01T00:00:00.000000Z"},
-        {"creation_time": "1970-01-09T11:00:00.000000Z"}, {"creation_time": "yesterday"}, {"creation_time": ""},
-        {"com.apple.quicktime.creationdate": "2026-05-01T12:00:00"}, {"date": "2026-05-01"},
+        {},
+        {"creation_time": "1904-01-01T00:00:00.000000Z"},
+        {"creation_time": "1970-01-01T00:00:00.000000Z"},
+        {"creation_time": "1970-01-09T11:00:00.000000Z"},
+        {"creation_time": "yesterday"},
+        {"creation_time": ""},
+        {"com.apple.quicktime.creationdate": "2026-05-01T12:00:00"},
+        {"date": "2026-05-01"},
     ],
-)  # fmt: skip
+)
 def test_without_a_usable_time_the_way_out_is_named(metadata: dict[str, str]) -> None:
     with pytest.raises(TimeError) as raised:
         find(metadata)
@@ -93,12 +98,22 @@ def test_the_avchd_message_is_read_as_binary_coded_decimals() -> None:
 
 def test_an_unknown_start_is_flagged_and_goes_before_the_files_own() -> None:
     options = camera_options(
-        start="unknown", zone_name=None, true_fps=None, sequence_fps=None, rate="25", crop="whole", exposure=None,
+        start="unknown",
+        zone_name=None,
+        true_fps=None,
+        sequence_fps=None,
+        rate="25",
+        crop="whole",
+        exposure=None,
         archive="jpeg",
-    )  # fmt: skip
+    )
     found = find_start(
-        options.camera.start, {"creation_time": "2024-05-01T12:00:00Z"}, recorded=None, place=None, duration=10.0,
+        options.camera.start,
+        {"creation_time": "2024-05-01T12:00:00Z"},
+        recorded=None,
+        place=None,
+        duration=10.0,
         where="film.mp4",
-    )  # fmt: skip
+    )
     assert (iso(found.instant), found.source, found.sigma) == ("2000-01-01T00:00:00Z", "unknown", None)
     assert quality_flags(found.findings) == ["start-unknown"]

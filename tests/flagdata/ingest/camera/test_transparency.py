@@ -37,9 +37,14 @@ FRAMES = 8
     ],
 )
 def test_a_film_with_transparency_is_read_below_it_and_says_so(
-    name: str, codec: str, pixels: str, tmp_path: Path, plain: CameraOptions, numbered: Callable[..., np.ndarray],
+    name: str,
+    codec: str,
+    pixels: str,
+    tmp_path: Path,
+    plain: CameraOptions,
+    numbered: Callable[..., np.ndarray],
     number_of: Callable[..., int],
-) -> None:  # fmt: skip
+) -> None:
     path, clear = tmp_path / name, "a" in pixels
     with av.open(str(path), "w") as out:
         stream = out.add_stream(codec, rate=25)

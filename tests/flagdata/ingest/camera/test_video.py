@@ -44,20 +44,32 @@ SIXTY_TO_25 = [0, 2, 5, 7, 10, 12, 14, 17, 19, 22]
         ("mov", "png", "rgb24", {}),
         ("gif", "gif", "pal8", {}),
     ],
-)  # fmt: skip
+)
 def test_the_nearest_frame_by_stamp_comes_out_of_every_container(
-    container: str, codec: str, pixel_format: str, encoder: dict[str, str],
-    tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions, number_of: Callable[..., int], start: int,
-) -> None:  # fmt: skip
+    container: str,
+    codec: str,
+    pixel_format: str,
+    encoder: dict[str, str],
+    tmp_path: Path,
+    write_video: Callable[..., Path],
+    plain: CameraOptions,
+    number_of: Callable[..., int],
+    start: int,
+) -> None:
     if codec not in av.codecs_available:
         pytest.skip(f"this build of FFmpeg has no encoder {codec}")
     if container == "gif":
         pixel_format = "gray"
     path = write_video(
-        tmp_path / "camera.bin", range(24), tick=Fraction(1, 50 if container == "gif" else 60),
-        rate=50 if container == "gif" else 60, container=container, codec=codec, pixel_format=pixel_format,
+        tmp_path / "camera.bin",
+        range(24),
+        tick=Fraction(1, 50 if container == "gif" else 60),
+        rate=50 if container == "gif" else 60,
+        container=container,
+        codec=codec,
+        pixel_format=pixel_format,
         encoder=encoder,
-    )  # fmt: skip
+    )
     info, frames, found = read(path, plain)
     # GIF counts in hundredths of a second, so it gets 50 Hz: every second frame.
     expected = list(range(0, 24, 2)) if container == "gif" else SIXTY_TO_25
@@ -132,9 +144,11 @@ def test_33_bit_stamps_that_wrap_run_on(
     # A transport stream counts to 2^33 at 90 kHz; the wrap falls into the middle of these 20 frames.
     first = 2**33 - 10 * 3600
     path = write_video(
-        tmp_path / "wrap.ts", range(first, first + 20 * 3600, 3600), tick=Fraction(1, 90_000),
+        tmp_path / "wrap.ts",
+        range(first, first + 20 * 3600, 3600),
+        tick=Fraction(1, 90_000),
         muxer={"mpegts_copyts": "1"},
-    )  # fmt: skip
+    )
     with av.open(str(path)) as raw:
         assert raw.streams.video[0].start_time is not None
     info, frames, found = read(path, plain)
@@ -202,15 +216,22 @@ def test_a_stream_is_read_once(cfr60: Path, plain: CameraOptions) -> None:
 
 @pytest.mark.parametrize("counter_clockwise", [90, 180, 270])
 def test_rotated_files_come_out_upright(
-    counter_clockwise: int, tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions,
-    numbered: Callable[..., np.ndarray], number_of: Callable[..., int],
-) -> None:  # fmt: skip
+    counter_clockwise: int,
+    tmp_path: Path,
+    write_video: Callable[..., Path],
+    plain: CameraOptions,
+    numbered: Callable[..., np.ndarray],
+    number_of: Callable[..., int],
+) -> None:
     # The stored pictures are turned clockwise; the file says: turn them back.
     turns = counter_clockwise // 90
     path = write_video(
-        tmp_path / "turned.mp4", range(4), tick=Fraction(1, 25), rotation=counter_clockwise,
+        tmp_path / "turned.mp4",
+        range(4),
+        tick=Fraction(1, 25),
+        rotation=counter_clockwise,
         picture=lambda n: np.ascontiguousarray(np.rot90(numbered(n), -turns)),
-    )  # fmt: skip
+    )
     info, frames, _ = read(path, plain)
     assert [number_of(f.image) for f in frames] == [0, 1, 2, 3]
     assert info.rotation == 360 - counter_clockwise
@@ -220,14 +241,20 @@ def test_rotated_files_come_out_upright(
 
 
 def test_pixels_that_are_not_square_are_made_so(
-    tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions, numbered: Callable[..., np.ndarray],
+    tmp_path: Path,
+    write_video: Callable[..., Path],
+    plain: CameraOptions,
+    numbered: Callable[..., np.ndarray],
     number_of: Callable[..., int],
-) -> None:  # fmt: skip
+) -> None:
     # Stored at half width; each pixel is twice as wide as high.
     path = write_video(
-        tmp_path / "anamorphic.mp4", range(3), tick=Fraction(1, 25), aspect=Fraction(2, 1),
+        tmp_path / "anamorphic.mp4",
+        range(3),
+        tick=Fraction(1, 25),
+        aspect=Fraction(2, 1),
         picture=lambda n: np.ascontiguousarray(numbered(n)[:, ::2]),
-    )  # fmt: skip
+    )
     info, frames, found = read(path, plain)
     assert (info.width, info.height) == (96, 96)
     assert [number_of(f.image) for f in frames] == [0, 1, 2]
@@ -235,9 +262,12 @@ def test_pixels_that_are_not_square_are_made_so(
 
 
 def test_odd_sizes_and_a_crop_keep_the_pixels_they_name(
-    tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions, numbered: Callable[..., np.ndarray],
+    tmp_path: Path,
+    write_video: Callable[..., Path],
+    plain: CameraOptions,
+    numbered: Callable[..., np.ndarray],
     number_of: Callable[..., int],
-) -> None:  # fmt: skip
+) -> None:
     def offset(number: int) -> np.ndarray:
         wide = np.full((131, 163), 100, dtype=np.uint8)
         wide[17:113, 41:137] = numbered(number)

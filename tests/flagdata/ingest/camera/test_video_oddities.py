@@ -23,9 +23,12 @@ def test_a_cut_off_file_keeps_its_frames_and_is_marked(
     tmp_path: Path, plain: CameraOptions, number_of: Callable[..., int], write_video: Callable[..., Path]
 ) -> None:
     whole = write_video(
-        tmp_path / "whole.mp4", range(100), tick=Fraction(1, 25), muxer={"movflags": "faststart"},
+        tmp_path / "whole.mp4",
+        range(100),
+        tick=Fraction(1, 25),
+        muxer={"movflags": "faststart"},
         encoder={"preset": "ultrafast", "crf": "12", "bf": "0"},
-    )  # fmt: skip
+    )
     data = whole.read_bytes()
     cut = tmp_path / "cut.mp4"
     cut.write_bytes(data[: len(data) * 3 // 4])
@@ -64,9 +67,13 @@ def test_a_video_whose_size_changes_keeps_the_first_size(
         tmp_path / "a.ts", range(10), tick=Fraction(1, 25), encoder={"bf": "0"}, muxer={"mpegts_copyts": "1"}
     )
     large = write_video(
-        tmp_path / "b.ts", range(10, 20), tick=Fraction(1, 25), encoder={"bf": "0"},
-        picture=lambda n: np.full((128, 128), 90, dtype=np.uint8), muxer={"mpegts_copyts": "1"},
-    )  # fmt: skip
+        tmp_path / "b.ts",
+        range(10, 20),
+        tick=Fraction(1, 25),
+        encoder={"bf": "0"},
+        picture=lambda n: np.full((128, 128), 90, dtype=np.uint8),
+        muxer={"mpegts_copyts": "1"},
+    )
     both = tmp_path / "both.ts"
     both.write_bytes(small.read_bytes() + large.read_bytes())
     _, frames, found = read(both, plain)
@@ -77,9 +84,11 @@ def test_a_video_whose_size_changes_keeps_the_first_size(
 
 def test_interlaced_video_is_flagged(tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions) -> None:
     path = write_video(
-        tmp_path / "interlaced.mp4", range(10), tick=Fraction(1, 25),
+        tmp_path / "interlaced.mp4",
+        range(10),
+        tick=Fraction(1, 25),
         encoder={"preset": "veryfast", "x264-params": "interlaced=1:tff=1"},
-    )  # fmt: skip
+    )
     _, _, found = read(path, plain)
     assert found["interlaced"].severity is Severity.WARNING
 
@@ -126,9 +135,11 @@ def test_a_transport_stream_joined_in_the_middle_keeps_time_from_its_first_packe
     tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions, number_of: Callable[..., int], start: int
 ) -> None:
     whole = write_video(
-        tmp_path / "whole.ts", range(60), tick=Fraction(1, 25),
+        tmp_path / "whole.ts",
+        range(60),
+        tick=Fraction(1, 25),
         encoder={"preset": "ultrafast", "crf": "12", "bf": "0", "g": "20"},
-    )  # fmt: skip
+    )
     data = whole.read_bytes()
     with av.open(str(whole)) as raw:
         first = [p.pos for p in raw.demux(video=0) if p.size][5]
@@ -147,9 +158,12 @@ def test_hidden_reference_frames_are_not_missed(
 ) -> None:
     # VP8 with alternate reference frames: packets that are decoded and never shown.
     path = write_video(
-        tmp_path / "hidden.webm", range(60), tick=Fraction(1, 25), codec="libvpx",
+        tmp_path / "hidden.webm",
+        range(60),
+        tick=Fraction(1, 25),
+        codec="libvpx",
         encoder={"auto-alt-ref": "1", "lag-in-frames": "16", "deadline": "good", "cpu-used": "5", "b": "2M"},
-    )  # fmt: skip
+    )
     _, frames, found = read(path, plain)
     assert [number_of(f.image) for f in frames] == list(range(60))
     assert "frames-missing" not in found
@@ -169,9 +183,11 @@ def test_what_an_edit_list_cuts_away_is_not_shown(
     tmp_path: Path, write_video: Callable[..., Path], plain: CameraOptions, number_of: Callable[..., int], start: int
 ) -> None:
     path = write_video(
-        tmp_path / "edited.mp4", range(30), tick=Fraction(1, 25),
+        tmp_path / "edited.mp4",
+        range(30),
+        tick=Fraction(1, 25),
         encoder={"preset": "ultrafast", "crf": "12", "bf": "0", "g": "10"},
-    )  # fmt: skip
+    )
     data = bytearray(path.read_bytes())
     with av.open(str(path)) as raw:
         ticks = int(1 / (25 * raw.streams.video[0].time_base))

@@ -31,8 +31,11 @@ def test_each_row_is_a_film_with_its_cloths_properties(folder: Path) -> None:
     first, second, third = read_cloths(written(folder, HEADING, *ROWS))
     assert (first.film, first.fabric, first.density) == (folder / "a.mp4", "Faux Fur", 0.39)
     assert first.parameters == {
-        "fabric": "Faux Fur", "density": 0.39, "bending_stiffness": 2.1e-5, "wind_level": "W1",
-    }  # fmt: skip
+        "fabric": "Faux Fur",
+        "density": 0.39,
+        "bending_stiffness": 2.1e-5,
+        "wind_level": "W1",
+    }
     assert second.wind_level == "W2"
     assert second.wind is None
     assert third.parameters == {"fabric": "silk", "density": 0.05}
@@ -72,11 +75,13 @@ def test_missing_and_doubled_columns_are_refused(folder: Path) -> None:
     cases = ["film,fabric", "film,fabric,area_weight,area_weight"]
     assert (
         unrefused(
-            lambda heading: read_cloths(written(folder, heading, "a.mp4,silk")), zip(cases), InputError,
+            lambda heading: read_cloths(written(folder, heading, "a.mp4,silk")),
+            zip(cases),
+            InputError,
             r"area_weight|twice",
         )
         == []
-    )  # fmt: skip
+    )
 
 
 def test_a_table_without_rows_and_one_that_is_not_there_are_errors(folder: Path) -> None:

@@ -123,11 +123,16 @@ def test_simulated_time_is_refused_and_read_from_a_start_that_is_given(tmp_path:
 @pytest.mark.parametrize(
     "stamp",
     [
-        lambda ns: ns, lambda ns: ns // 1000, lambda ns: ns // 10**6, lambda ns: ns / 1e9, lambda ns: str(ns),
-        lambda ns: f"2026-05-01T12:00:{ns // 10**9 % 60:02d}Z", lambda ns: {"sec": ns // 10**9},
+        lambda ns: ns,
+        lambda ns: ns // 1000,
+        lambda ns: ns // 10**6,
+        lambda ns: ns / 1e9,
+        lambda ns: str(ns),
+        lambda ns: f"2026-05-01T12:00:{ns // 10**9 % 60:02d}Z",
+        lambda ns: {"sec": ns // 10**9},
         lambda ns: {"secs": ns // 10**9, "nsecs": ns % 10**9},
     ],
-)  # fmt: skip
+)
 def test_an_instant_is_read_in_the_unit_that_it_has(
     write_json: Callable[..., Path], stamp: Callable[[int], Any]
 ) -> None:

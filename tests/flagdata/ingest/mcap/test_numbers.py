@@ -28,10 +28,12 @@ def wind(count: int = 60) -> list[dict[str, Any]]:
     return [
         {
             "timestamp": {"sec": NOON // 10**9 + k, "nsec": 250_000_000},
-            "air": {"speed": SPEED[k], "from": [90 + k % 7, 0.5]}, "state": "ok", "count": k,
+            "air": {"speed": SPEED[k], "from": [90 + k % 7, 0.5]},
+            "state": "ok",
+            "count": k,
         }
         for k in range(count)
-    ]  # fmt: skip
+    ]
 
 
 def test_columns_are_given_by_the_path_of_a_field(write_json: Callable[..., Path]) -> None:
@@ -65,9 +67,11 @@ def test_flagdatas_own_samples_in_another_programs_file_need_no_units(tmp_path: 
 
     time = NOON + 10**9 * np.arange(30)
     series = WindSeries(
-        time=time, channels={"wind_speed": np.array(SPEED[:30]), "wind_direction": np.arange(30) % 7 / 10},
-        flags=np.zeros(30, np.uint16), sensor=Sensor(name="cup"),
-    )  # fmt: skip
+        time=time,
+        channels={"wind_speed": np.array(SPEED[:30]), "wind_direction": np.arange(30) % 7 / 10},
+        flags=np.zeros(30, np.uint16),
+        sensor=Sensor(name="cup"),
+    )
     ours, filtered = tmp_path / "ours.mcap", tmp_path / "filtered.mcap"
     with RecordWriter(ours, metadata={}) as record:
         record.wind(series)

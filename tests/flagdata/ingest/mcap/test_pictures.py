@@ -113,10 +113,16 @@ def test_pictures_that_cannot_be_decoded_are_counted_and_left_out(write_json: Ca
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"data": 10**12}, {"data": "A"}, {"data": None}, {"step": -4}, {"step": "4"}, {"width": 1e300},
-        {"height": None}, {"data": ["a"]},
+        {"data": 10**12},
+        {"data": "A"},
+        {"data": None},
+        {"step": -4},
+        {"step": "4"},
+        {"width": 1e300},
+        {"height": None},
+        {"data": ["a"]},
     ],
-)  # fmt: skip
+)
 def test_plain_pixels_whose_numbers_or_bytes_make_no_sense_are_left_out(
     write_json: Callable[..., Path], wrong: dict[str, Any]
 ) -> None:

@@ -37,16 +37,24 @@ def test_numbers_within_lists_of_messages_are_read_by_their_path() -> None:
 
 def test_every_field_has_the_value_that_was_encoded() -> None:
     assert [(topic.name, topic.count) for topic in topics(FILE)] == [
-        ("/compressed", 12), ("/image", 12), ("/mast", 12), ("/pressure", 12)
-    ]  # fmt: skip
+        ("/compressed", 12),
+        ("/image", 12),
+        ("/mast", 12),
+        ("/pressure", 12),
+    ]
     third = list(messages(FILE, "/mast"))[3].values
     assert third == {
         "header": {"stamp": {"sec": NOON // 10**9, "nanosec": 300_000_000}, "frame_id": "odd"},
-        "sound": True, "kind": 1, "volts": [1.5, 2.5, 3.5], "empty": [], "last": 2**40 + 3,
+        "sound": True,
+        "kind": 1,
+        "volts": [1.5, 2.5, 3.5],
+        "empty": [],
+        "last": 2**40 + 3,
         "readings": [
-            {"unit": "m/s", "speed": 6.0, "from_degrees": 93.0}, {"unit": "m/s", "speed": 6.25, "from_degrees": 93.0},
+            {"unit": "m/s", "speed": 6.0, "from_degrees": 93.0},
+            {"unit": "m/s", "speed": 6.25, "from_degrees": 93.0},
         ],
-    }  # fmt: skip
+    }
 
 
 def test_a_big_endian_message_is_read_by_its_header() -> None:

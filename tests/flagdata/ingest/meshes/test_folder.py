@@ -102,10 +102,12 @@ def test_too_many_frames_are_refused_before_they_are_read(
     ("frames", "word", "frame"),
     [
         ([MILLIMETRES, MILLIMETRES], r"1000 times .*: mm and m mixed\?", 0),
-        ([SQUARE.format(w=100)], r"cm and m mixed\?", 0), ([SQUARE.format(w=0.001)], r"mm and m mixed\?", 0),
-        ([LARGE], "3 times as long", 0), ([UNIT, UNIT, MILLIMETRES], r"mm and m mixed\?", 2),
+        ([SQUARE.format(w=100)], r"cm and m mixed\?", 0),
+        ([SQUARE.format(w=0.001)], r"mm and m mixed\?", 0),
+        ([LARGE], "3 times as long", 0),
+        ([UNIT, UNIT, MILLIMETRES], r"mm and m mixed\?", 2),
     ],
-)  # fmt: skip
+)
 def test_lengths_of_two_units_are_suspected(
     make_folder: Callable[..., Path], frames: list[str], word: str, frame: int
 ) -> None:

@@ -18,9 +18,11 @@ SPLIT = [[0, 1, 6], [0, 6, 2], [0, 2, 3], *JOINED[2:]]
 
 def sheet(faces: list[list[int]], positions: NDArray[np.float64]) -> MeshSequence:
     return MeshSequence(
-        time=np.array([0]), positions=positions[None].astype(np.float32), faces=np.array(faces, dtype=np.int32),
+        time=np.array([0]),
+        positions=positions[None].astype(np.float32),
+        faces=np.array(faces, dtype=np.int32),
         rest=REST.astype(np.float32),
-    )  # fmt: skip
+    )
 
 
 def flat(turn: float = 0.0) -> NDArray[np.float64]:

@@ -53,13 +53,18 @@ def test_a_malformed_line_is_refused_by_its_number(tmp_path: Path) -> None:
         (TRIANGLE + "f 1/1 2/2 4/3\n", "what is not there", 7),
         (TRIANGLE + "f 1/1 2/2 3/4\n", "what is not there", 7),
         (TRIANGLE + "f 0/1 2/2 3/3\n", "what is not there", 7),
-        (TRIANGLE + "f -4/1 2/2 3/3\n", "what is not there", 7), (TRIANGLE + "f 1/1 2/2\n", "fewer than three", 7),
+        (TRIANGLE + "f -4/1 2/2 3/3\n", "what is not there", 7),
+        (TRIANGLE + "f 1/1 2/2\n", "fewer than three", 7),
         (TRIANGLE + "f 1/1 2/x 3/3\n", "not a corner", 7),
         (TRIANGLE + "f 1/1 2/2 3/3\nf 1/2 2/2 3/3\n", "two material coordinates", 8),
-        ("v 0 0 nan\n", "not 3 finite", 1), ("v 0 0 inf\n", "not 3 finite", 1), ("v 0 0\n", "not 3 finite", 1),
-        ("v 0 0 0x\n", "not 3 finite", 1), ("vt 0\n", "not 2 finite", 1), ("nv 1 2 3\n", "before any vertex", 1),
+        ("v 0 0 nan\n", "not 3 finite", 1),
+        ("v 0 0 inf\n", "not 3 finite", 1),
+        ("v 0 0\n", "not 3 finite", 1),
+        ("v 0 0 0x\n", "not 3 finite", 1),
+        ("vt 0\n", "not 2 finite", 1),
+        ("nv 1 2 3\n", "before any vertex", 1),
         ("solid cube\n", "unknown keyword 'solid'", 1),
-    ]  # fmt: skip
+    ]
     for text, word, line in cases:
         refused = unrefused(lambda text: read(tmp_path, text), [(text, word)], InputError, where=f"line {line}$")
         assert refused == []

@@ -26,18 +26,23 @@ def sheet() -> MeshSequence:
     faces = [f for c in corner for f in ((c, c + N + 1, c + N + 2), (c, c + N + 2, c + 1))]
     positions = [np.stack([u, v, 0.05 * np.sin(6 * u + k)], axis=1) for k in range(FRAMES)]
     return MeshSequence(
-        time=np.arange(FRAMES, dtype=np.int64), positions=np.array(positions, dtype=np.float32),
-        faces=np.array(faces, dtype=np.int32), rest=np.stack([u, v], axis=1).astype(np.float32),
-    )  # fmt: skip
+        time=np.arange(FRAMES, dtype=np.int64),
+        positions=np.array(positions, dtype=np.float32),
+        faces=np.array(faces, dtype=np.int32),
+        rest=np.stack([u, v], axis=1).astype(np.float32),
+    )
 
 
 def soup(whole: MeshSequence, **changes: object) -> MeshSequence:
     """The same surface with vertices of its own for each triangle."""
     corners = whole.faces.ravel()
     parts = {
-        "time": whole.time, "positions": whole.positions[:, corners], "rest": whole.rest[corners],
-        "faces": np.arange(len(corners), dtype=np.int32).reshape(-1, 3), "attributes": {},
-    }  # fmt: skip
+        "time": whole.time,
+        "positions": whole.positions[:, corners],
+        "rest": whole.rest[corners],
+        "faces": np.arange(len(corners), dtype=np.int32).reshape(-1, 3),
+        "attributes": {},
+    }
     return MeshSequence(**(parts | changes))  # type: ignore[arg-type]
 
 
@@ -113,11 +118,13 @@ def test_pieces_of_a_remeshed_cloth_are_those_of_its_worst_frame() -> None:
     whole, loose = sheet(), soup(sheet())
     parts = [whole.frame(0), loose.frame(1), whole.frame(2)]
     ragged = RaggedMeshSequence(
-        time=whole.time, positions=np.concatenate([p.positions for p in parts]),
-        faces=np.concatenate([p.faces for p in parts]), rest=np.concatenate([p.rest for p in parts]),
+        time=whole.time,
+        positions=np.concatenate([p.positions for p in parts]),
+        faces=np.concatenate([p.faces for p in parts]),
+        rest=np.concatenate([p.rest for p in parts]),
         vertex_offset=np.cumsum([0, *(len(p.rest) for p in parts)]),
         face_offset=np.cumsum([0, *(len(p.faces) for p in parts)]),
-    )  # fmt: skip
+    )
     assert welded(ragged) == (ragged, ())
     (finding,) = in_pieces(ragged)
     assert (finding.count, finding.where) == (2 * N * N, "frame 1")
