@@ -34,16 +34,20 @@ class DrawnRecipe:
         duration: of the film [s].
         rate: frames a second [Hz].
         wind: the gusts; an intensity near zero makes the steady wind in which clocks cannot be found.
+        clock: what must be added to the camera's clock to reach the anemometer's [s]; drawn if `None`.
     """
 
     seed: int
     duration: float = 600.0
     rate: int = 25
     wind: VonKarman = field(default_factory=lambda: VonKarman(mean=5.0, intensity=0.2, length=60.0))
+    clock: float | None = None
 
     @property
     def offset(self) -> float:
         """What must be added to the camera's clock to reach the anemometer's [s]."""
+        if self.clock is not None:
+            return self.clock
         return float(stream(self.seed, "clock").uniform(-_LARGEST_OFFSET, _LARGEST_OFFSET))
 
     def blown(self) -> NDArray[np.float64]:

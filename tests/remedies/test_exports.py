@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from flagdata import selection
+from flagdata.align import methods
 from flagdata.ingest.camera import CameraOptions
 from flagdata.ingest.store import CameraIngest, Labels, ingest_camera
 from flagdata.lake import Lake
@@ -29,11 +30,19 @@ CASES = [
 ]
 
 
+@pytest.fixture
+def short_films_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lets films of a second be compared with logs, which stand for films of two minutes."""
+    monkeypatch.setattr(methods, "_check_lengths", lambda *_: None)
+
+
+@pytest.mark.usefixtures("short_films_compared")
 @pytest.mark.parametrize("case", CASES, ids=str)
 def test_what_a_remedy_says_heals(case: Case, user: User) -> None:
     heal(user, case)
 
 
+@pytest.mark.usefixtures("short_films_compared")
 def test_a_film_that_cannot_be_aligned_is_looked_at_or_its_offset_given(user: User) -> None:
     fix = user.meets("align/methods.py", "look at it with --plot FILE.png", "align", "first", "mast")
     user.follows("align", "first", "mast", "--plot", "FILE.png", code=3, shows="plot: FILE.png")

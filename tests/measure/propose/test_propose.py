@@ -22,6 +22,7 @@ from measure.verdict.record import Estimate
 from sim.effects.field import FieldEffect, Seen
 from sim.effects.files import load
 from sim.scene import assemble, flag
+from tests.measure.propose.conftest import PUSH
 
 
 def silent(what: str, done: int, total: int) -> None:
@@ -63,7 +64,7 @@ def test_the_effect_of_the_file_is_the_planted_field(found: Outcome, specimen: S
     )
     field = effect.acceleration(seen).expand(state.position.shape)[..., 0].numpy()
     share = system.cloth.mesh.rest[:, 1] / system.cloth.mesh.rest[:, 1].max()
-    planted = 5 / (1 + np.exp(-(0.5 - share) * 0.5 / 0.06))
+    planted = PUSH / (1 + np.exp(-(0.5 - share) * 0.5 / 0.06))
     # The wave of the terms and the edge of the push differ by 0.05 of its root mean square; errors of the fit add.
     error = np.sqrt(np.mean((field[:, 1] - planted) ** 2))
     assert error < 0.3 * np.sqrt(np.mean(planted**2))
