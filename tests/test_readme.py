@@ -72,8 +72,8 @@ def test_the_demonstration_ends_in_pages_that_need_no_other_folder(folder: Path)
     assert (folder / "recording.html").read_text(encoding="utf-8").count("data:image/webp;base64,") == 6
 
 
+def test_the_demonstration_recovers_the_offset_it_hid(folder: Path) -> None:
     """Beside its step and in the last table, inferred or given, with an interval of 90 % that contains the truth."""
-    """Beside its step and in the last table, inferred or given: the interval of 90 % is to hold for this one seed."""
     index = (folder / "index.html").read_text(encoding="utf-8")
     row, again = re.findall(r"<tr><td>the log&#39;s clock minus the camera&#39;s</td>.*</tr>", index)
     assert row == again
