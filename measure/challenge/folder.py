@@ -256,9 +256,12 @@ def _array(path: Path) -> Floats:
         ValueError: its header states no numbers, or another count of them than the file holds.
     """
     with path.open("rb") as stream:
-        first = np.lib.format.read_magic(stream) == (1, 0)
-        header = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
-        shape, _, kind = header(stream)
+        try:
+            first = np.lib.format.read_magic(stream) == (1, 0)
+            header = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
+            shape, _, kind = header(stream)
+        except Exception as error:  # NumPy reads headers as Python, whose tokenizer raises errors of its own
+            raise ValueError(f"{path.name} has no header of NumPy: {error}") from error
         size = path.stat().st_size - stream.tell()
     if kind.kind not in "fiu" or min(shape, default=0) < 0 or math.prod(shape) * kind.itemsize != size:
         raise ValueError(f"{path.name} states {shape} of {kind}, and holds {size} bytes")
