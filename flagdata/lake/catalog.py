@@ -428,16 +428,15 @@ class Catalog:
         """Compare what the Delta library reads for a version with what was noted of it: the newest checkpoint up to it,
         and the entries after that. Those that no summary covers were compared when the history was read."""
         newest = max((number for number in self._entries.checkpoints() if number <= version), default=-1)
-        for place in (self._log / _HINT, self._log / f"{newest:020d}{CHECKPOINT}"):
+        checkpoint = self._log / f"{newest:020d}{CHECKPOINT}"
+        for place in (self._log / _HINT, checkpoint):
             if isinstance(place, Path) and place.exists() and not place.is_file():  # of a pipe it would wait for ever
                 what = f"{place.name} of the catalog's log is no regular file"
                 raise CorruptError(what, where=str(place), fix=_DELETE)
         noted = self._summaries.checkpoints.get(newest)
-        if noted is not None:
-            path = self._log / f"{newest:020d}{CHECKPOINT}"
-            if file_hash(path) != noted:
-                what = "a checkpoint of the catalog's log has changed since it was written"
-                raise CorruptError(what, where=str(path), fix=_DELETE)
+        if noted is not None and file_hash(checkpoint) != noted:
+            what = "a checkpoint of the catalog's log has changed since it was written"
+            raise CorruptError(what, where=str(checkpoint), fix=_DELETE)
         if newest + 1 < self._summaries.covered:
             history = self.history()
             *_, last = self._entries.entries(range(newest + 1, version + 1), head=history[0]["version"]) or [None]
