@@ -35,9 +35,9 @@ def _zeros(path: Path, *, rows: int) -> Path:
 
 
 def _one_long_text(path: Path) -> Path:
-    """A dictionary of one text of a megabyte, which two thousand rows name."""
+    """A dictionary of one text of a megabyte, which two hundred rows name."""
     text = pa.array(["y" * 1_000_000])
-    pq.write_table(pa.table({"a": text.take(pa.array(np.zeros(2000, dtype=np.int64)))}), path)
+    pq.write_table(pa.table({"a": text.take(pa.array(np.zeros(200, dtype=np.int64)))}), path)
     return path
 
 
