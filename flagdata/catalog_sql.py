@@ -88,7 +88,7 @@ class Question:
 
 
 class Answers:
-    """Answers to questions, by the number of each; see `flagdata.selection` for what is asked."""
+    """Answers to questions, by the number of each; see `flagdata.lake.selection` for what is asked."""
 
     def __init__(self) -> None:
         sys.meta_path.insert(0, _WithoutPandas())
@@ -119,7 +119,7 @@ class Answers:
             also a UsageError, where the SQL could not be run on these rows: they may be to blame.
 
         Raises:
-            UsageError, LimitError: as `flagdata.selection.Selection`.
+            UsageError, LimitError: as `flagdata.lake.selection.Selection`.
             MemoryError: DuckDB was refused memory.
         """
         verb, number, *rest = message

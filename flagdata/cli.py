@@ -12,8 +12,7 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from flagdata.commands.help import print_help
-from flagdata.console import Aside, document, echo_lines, fail, foreseen, say
+from flagdata.console import Aside, document, echo_lines, fail, foreseen, print_help, say
 from flagdata.errors import UnknownNameError, UsageError
 
 # group → what it is about, and its verbs: where the click command is, one line of help shown without importing it

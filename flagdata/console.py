@@ -279,3 +279,11 @@ def _report(what: str, error: FlagdataError, *, mark: str = "flagdata") -> None:
     if error.where:
         say(f"  where: {error.where}")
     say(f"  fix:   {error.fix}")
+
+
+def print_help(shown: click.Context, *, as_json: bool) -> None:
+    """The help of a command on stdout."""
+    if as_json:
+        document("help", {"command": shown.command_path, "help": shown.get_help()})
+    else:
+        echo_lines(shown.get_help())

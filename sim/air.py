@@ -24,8 +24,8 @@ from torch import Tensor
 
 from flagdata.errors import InputError
 from flagdata.registry import Registry
+from sim import on_mesh
 from sim.cloth import Cloth
-from sim.kernel import on_mesh
 
 # Dynamic viscosity of air at 288.15 K, U.S. Standard Atmosphere 1976, table 4.
 _VISCOSITY = 1.789e-5

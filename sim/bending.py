@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from sim import on_mesh
 from sim.cloth import Cloth, gather_sum
-from sim.kernel import on_mesh
 from sim.tables import bending_stiffness
 
 # Lengths below this share of the edge are held there, so that a collapsed triangle pushes back with a finite force.

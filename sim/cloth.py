@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from flagdata.errors import InputError, UsageError
-from sim.kernel import on_mesh
+from sim import on_mesh
 from sim.material import Material
 from sim.mesh import Mesh
 from sim.tables import GRIDS, Evaluation, StrainGrid, bending_segments, direction_rows, sample_stretching

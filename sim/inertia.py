@@ -16,8 +16,8 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from sim import on_mesh
 from sim.cloth import Cloth
-from sim.kernel import on_mesh
 
 
 def rest_areas(cloth: Cloth) -> Tensor:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from flagdata.align.constant import ConstantWind, declared_recording
@@ -16,7 +18,6 @@ from flagdata.align.recording import RecordingResult, copy_frames, recorded
 from flagdata.dataset.clips import clip_rows
 from flagdata.errors import UsageError
 from flagdata.findings import Finding, Severity, quality_flags
-from flagdata.ingest.cloths import ClothFilm
 from flagdata.lake import Artifact, Lake
 from flagdata.provenance import canonical
 from flagdata.record import Record, RecordWriter
@@ -27,6 +28,37 @@ from flagdata.timebase import NANOSECONDS, iso
 
 REPORT_SCHEMA = "flagdata.cloth-report/1"
 Progress = Callable[[int], object]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClothFilm:
+    """A film of a cloth and what was measured of it.
+
+    Attributes:
+        film: the file.
+        fabric: its name; films of one fabric are never on two sides of a split.
+        density: area weight [kg/m²].
+        bending_stiffness: flexural rigidity for each metre of width [N·m]; None if unknown.
+        wind_level: a fan's setting, as the table has it; "" if none is stated.
+        wind: mean speed and its standard uncertainty [m/s]; None if unknown.
+    """
+
+    film: Path
+    fabric: str
+    density: float
+    bending_stiffness: float | None = None
+    wind_level: str = ""
+    wind: tuple[float, float] | None = None
+
+    @property
+    def parameters(self) -> dict[str, float | str]:
+        """What the catalog keeps, by the names that simulated recordings have."""
+        found: dict[str, float | str] = {"fabric": self.fabric, "density": self.density}
+        if self.bending_stiffness is not None:
+            found["bending_stiffness"] = self.bending_stiffness
+        if self.wind_level:
+            found["wind_level"] = self.wind_level
+        return found
 
 
 def cloth_recording(

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from flagdata.align.clock import ClockModel, Segment
+from flagdata.clock import ClockModel, Segment
 from flagdata.errors import InputError, UsageError
 from flagdata.signals import Instants
 from flagdata.timebase import NANOSECONDS

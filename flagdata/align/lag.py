@@ -34,9 +34,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flagdata.align.bins import STEPS, LagBins
-from flagdata.align.clock import NINETY
 from flagdata.align.motion import MotionSeries
 from flagdata.align.whitened import FEWEST_BINS, Whitened, fit, longest_compared
+from flagdata.clock import NINETY
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.signals import Series, WindAverage

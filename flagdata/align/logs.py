@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.align.clock import ClockModel, Segment
 from flagdata.align.declared import QUARTZ, stamp_sigma
 from flagdata.align.drift import FEWEST_PARTS, PART, ClockLine, line_through
 from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
@@ -29,6 +28,7 @@ from flagdata.align.motion import MotionSeries
 from flagdata.align.whitened import long_run_variance
 from flagdata.align.windbins import SHORTEST, lead, wind_bins
 from flagdata.averaging import average
+from flagdata.clock import ClockModel, Segment
 from flagdata.errors import InputError, RefusedError
 from flagdata.schema import UNUSABLE
 from flagdata.signals import Instants, Series, WindAverage, WindSeries

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.align.clock import NINETY, ClockModel, Segment
 from flagdata.align.declared import by_stamps, given, stamp_sigma
 from flagdata.align.drift import ClockLine, clock_line
 from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
 from flagdata.align.motion import MotionSeries
 from flagdata.align.recording import Alignment, Pair
 from flagdata.align.windbins import wind_bins
+from flagdata.clock import NINETY, ClockModel, Segment
 from flagdata.errors import CorruptError, RefusedError, UsageError
 from flagdata.findings import Finding, Severity
 from flagdata.record.metadata import CAMERA

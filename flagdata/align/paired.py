@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.align.clock import NINETY, ClockModel, Segment
 from flagdata.align.declared import PRIOR_DRIFT, stamp_sigma
+from flagdata.clock import NINETY, ClockModel, Segment
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.signals import Instants, Series, WindSeries

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flagdata.align.bins import normal_scores
-from flagdata.align.clock import NINETY
 from flagdata.align.drift import ClockLine
 from flagdata.align.lag import LagEstimate
 from flagdata.align.methods import Evidence
+from flagdata.clock import NINETY
 from flagdata.errors import InputError
 from flagdata.outputs import check_file, write_file
 from flagdata.signals import Series

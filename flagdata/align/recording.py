@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.align.apart import by_offset
-from flagdata.align.clock import ClockModel
 from flagdata.align.motion import MotionSeries, motion_energy
 from flagdata.align.present import find_made, provenance
+from flagdata.clock import ClockModel
 from flagdata.dataset.clips import clip_rows
 from flagdata.errors import InputError, UsageError
 from flagdata.findings import Finding, quality_flags

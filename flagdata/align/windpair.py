@@ -12,9 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from flagdata.align.clock import NINETY
 from flagdata.align.logs import LogClock
 from flagdata.align.present import find_made, provenance
+from flagdata.clock import NINETY
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.healing import Healing, Present

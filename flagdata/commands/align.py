@@ -344,7 +344,7 @@ def _report(made: RecordingResult | None, outcome: Outcome | None, *, as_json: b
 
 def _sentence(outcome: Outcome) -> str:
     """`offset +12.31 s [12.02, 12.60] 90 %, confidence 0.99, n = 596 bins of 1 s`."""
-    from flagdata.align.clock import NINETY
+    from flagdata.clock import NINETY
 
     (segment,) = outcome.alignment.clock.segments
     half = NINETY * segment.sigma_offset

@@ -112,7 +112,7 @@ def _report(
 
 def sentence(found: LogClock) -> str:
     """Offset and drift of the sensor's clock, and its gain, each with its 90 % interval or σ."""
-    from flagdata.align.clock import NINETY
+    from flagdata.clock import NINETY
 
     (segment,), gain = found.model.segments, found.gain
     half = NINETY * segment.sigma_offset

@@ -78,6 +78,7 @@ def show(artifact: str, whole: bool, at: str | None, as_json: bool, lake_path: s
     ARTIFACT is an id or its beginning, a name, the file it came from, or NAME@TAG. Of a verdict or a measurement its
     sentence comes first, of a network its card.
     """
+    from flagdata.cells import said
     from flagdata.ingest.before import unconfirmed
     from flagdata.lake import Lake
     from flagdata.lake.labels import PREFIX
@@ -178,19 +179,6 @@ def _line(row: Mapping[str, Any], *, lost: bool, superseded: bool) -> list[objec
         "lost" if lost else "" if row["kind"] == Kind.CLIP else size_text(row["object_bytes"]),
         ",".join([*row["quality"], *(["superseded"] if superseded else [])]),
     ]
-
-
-def said(column: str, value: object) -> str:
-    """A value for people: instants as times, numbers with their unit, mappings and lists as JSON."""
-    from flagdata.schema import CATALOG
-    from flagdata.timebase import iso
-
-    unit = CATALOG[column].unit
-    if unit == "ns" and isinstance(value, int):
-        return iso(value)
-    if isinstance(value, dict | list):
-        return json.dumps(value, ensure_ascii=False)
-    return f"{value} {unit}" if unit not in ("", "1") else str(value)
 
 
 def relative(row: Mapping[str, Any]) -> dict[str, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from flagdata.console import document, echo_lines, json_option
+from flagdata.console import json_option, print_help
 from flagdata.errors import UnknownNameError
 
 
@@ -29,11 +29,3 @@ def help_(context: click.Context, verbs: tuple[str, ...], as_json: bool) -> None
             raise UnknownNameError.of("command", verb, known, where=shown.command_path)
         shown = click.Context(found, info_name=verb, parent=shown)
     print_help(shown, as_json=as_json)
-
-
-def print_help(shown: click.Context, *, as_json: bool) -> None:
-    """The help of a command on stdout."""
-    if as_json:
-        document("help", {"command": shown.command_path, "help": shown.get_help()})
-    else:
-        echo_lines(shown.get_help())

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from datetime import date, datetime, time
-from decimal import Decimal
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from flagdata.cells import plain
 from flagdata.console import LocalPath, at_option, csv_rows, document, json_option, lake_option, say, table
 from flagdata.errors import UsageError
 from flagdata.printable import SHORT
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from flagdata.lake.rowfiles import Scan
-    from flagdata.selection import Request, Selection
+    from flagdata.lake.selection import Request, Selection
 
 PEOPLE_LIMIT = 20
-_TIME_LIMIT = 60.0  # s; that of `flagdata.selection`, which is not imported for --help
+_TIME_LIMIT = 60.0  # s; that of `flagdata.lake.selection`, which is not imported for --help
 
 # What people see without --columns, by the one kind that was selected.
 VIEWS: dict[str | None, tuple[str, ...]] = {
@@ -113,8 +113,8 @@ def query(
         return
     sql_process()  # starts while the lake is read
     from flagdata.lake import Lake
+    from flagdata.lake.selection import Request, Selection
     from flagdata.outputs import check_file
-    from flagdata.selection import Request, Selection
 
     if arrow is not None:
         check_file(arrow)
@@ -192,29 +192,6 @@ def as_document(selection: Selection, *, at: str | None, version: int) -> dict[s
     }
 
 
-def plain(value: Any) -> Any:
-    """A cell as what JSON and CSV can hold; times as ISO 8601.
-
-    Raises:
-        UsageError: a type with no such form (bytes, intervals).
-    """
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    if isinstance(value, datetime):
-        return value.isoformat().replace("+00:00", "Z")
-    if isinstance(value, date | time):
-        return value.isoformat()
-    if isinstance(value, Decimal):
-        return int(value) if value == value.to_integral_value() else float(value)
-    if isinstance(value, list):
-        return [plain(item) for item in value]
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    raise UsageError(
-        f"a value of type {type(value).__name__} has no form in text", fix="cast it in the SQL, or write it by --arrow"
-    )
-
-
 def _print_csv(selection: Selection) -> None:
     batches = selection.batches()
     csv_rows([batches.schema.names])
@@ -231,7 +208,7 @@ def _csv_cell(value: Any) -> Any:
 def _print_table(catalog: pa.Table | Scan, request: Request) -> None:
     from dataclasses import replace
 
-    from flagdata.selection import Request, Selection
+    from flagdata.lake.selection import Request, Selection
 
     if request.sql is None and request.columns is None:
         kinds = Selection(catalog, replace(request, columns=("kind",), limit=None)).table()["kind"].unique().to_pylist()
@@ -273,7 +250,7 @@ def _cell(value: Any, *, short: bool) -> str | None:
 
 
 def _describe(*, as_json: bool) -> None:
-    from flagdata.selection import COLUMNS
+    from flagdata.lake.selection import COLUMNS
 
     if as_json:
         columns = [

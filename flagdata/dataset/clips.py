@@ -11,8 +11,8 @@ from datetime import UTC, datetime
 import numpy as np
 
 from flagdata import provenance
-from flagdata.align.clock import ClockModel
 from flagdata.arguments import checked
+from flagdata.clock import ClockModel
 from flagdata.dataset.truth import TruthSeries, WindTruth, over_ground
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact

@@ -20,10 +20,10 @@ from flagdata.errors import NotFoundError, RefusedError, UsageError
 from flagdata.lake import Lake
 from flagdata.lake.matching import Where
 from flagdata.lake.rowfiles import Scan
+from flagdata.lake.selection import Request, Selection
 from flagdata.lake.tabled import labels_of
 from flagdata.record import Record
 from flagdata.schema import TRUTH_WINDOW, Kind
-from flagdata.selection import Request, Selection
 
 _ORIGIN = ("artifact", "recording", "session", "seed", "day")
 _LINEAGE = ("artifact", "kind", "parents", "created", "source_hash", "object", "session")

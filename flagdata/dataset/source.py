@@ -53,7 +53,7 @@ class Source:
         at: str | None = None,
     ) -> Rows:
         """Rows of the catalog; arguments and errors as of `flagdata.query`."""
-        from flagdata.selection import select
+        from flagdata.lake.selection import select
 
         return Rows(select(self.lake, where, at=at, columns=columns, order=order, sql=sql, limit=limit))
 

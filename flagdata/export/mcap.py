@@ -27,16 +27,12 @@ from flagdata.record import Coding, messages
 from flagdata.record.checksums import ChecksummedWriter
 from flagdata.record.container import Messages, check_parts, read_exact, read_messages, read_summary
 from flagdata.record.key_frames import is_key
+from flagdata.record.metadata import ROWS, SAMPLE
 from flagdata.record.source import open_bytes
 from flagdata.record.writer import PROFILE
 from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, Kind
 from flagdata.timebase import NANOSECONDS
 
-SAMPLE = "sample"
-"""Metadata record of a subset: the artifact it is, the object it was cut from, the frames before the clip's own that
-H.264 needs, and its label as JSON."""
-ROWS = "artifacts.parquet"
-"""File of an export with the catalog's rows of what it holds, by which `flagdata ingest` restores them."""
 CHUNK_BYTES = 1 << 20  # uncompressed, as in committed records: readers reach a frame directly
 
 

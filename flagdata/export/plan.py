@@ -14,13 +14,13 @@ from flagdata.export.choice import check_kinds, current, on_side
 from flagdata.export.source import Source
 from flagdata.lake import Lake
 from flagdata.lake.labels import columns
+from flagdata.lake.selection import Request, Selection
 from flagdata.lake.tabled import labels_of, with_labels
 from flagdata.manifest import write_manifest
 from flagdata.outputs import fresh_folder
 from flagdata.provenance import code_version, digest, recipe_hash
 from flagdata.registry import Registry
 from flagdata.schema import FORMAT_VERSION, Kind
-from flagdata.selection import Request, Selection
 
 FORMATS = Registry(
     "export format",
@@ -60,7 +60,7 @@ class Export:
 
     Attributes:
         format: a name of `FORMATS`.
-        where: filter as in `flagdata.selection`; `None` is every row.
+        where: filter as in `flagdata.lake.selection`; `None` is every row.
         at: ref; `None` is the head of main.
         split: side of the leakage-safe split: only its clips, and the recordings they are of; `None` is everything.
         salt: of the split, see `flagdata.dataset.splits.HashedSplit`.

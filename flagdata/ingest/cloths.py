@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from flagdata.addresses import local_path
+from flagdata.align.cloth import ClothFilm
 from flagdata.errors import FlagdataError, InputError
 from flagdata.files import check_input, is_folder
 from flagdata.ingest.headings import check_columns, small_table
@@ -30,37 +30,6 @@ _NUMBERS = frozenset({"area_weight", "bending_stiffness", "wind_speed", "wind_si
 SIZE_LIMIT = 1 << 24
 """Largest table that is read [B]."""
 _WEIGHTS = (0.005, 5.0)  # kg/m²; silk organza has 0.02, heavy canvas 1
-
-
-@dataclass(frozen=True, kw_only=True)
-class ClothFilm:
-    """A film of a cloth and what was measured of it.
-
-    Attributes:
-        film: the file.
-        fabric: its name; films of one fabric are never on two sides of a split.
-        density: area weight [kg/m²].
-        bending_stiffness: flexural rigidity for each metre of width [N·m]; None if unknown.
-        wind_level: a fan's setting, as the table has it; "" if none is stated.
-        wind: mean speed and its standard uncertainty [m/s]; None if unknown.
-    """
-
-    film: Path
-    fabric: str
-    density: float
-    bending_stiffness: float | None = None
-    wind_level: str = ""
-    wind: tuple[float, float] | None = None
-
-    @property
-    def parameters(self) -> dict[str, float | str]:
-        """What the catalog keeps, by the names that simulated recordings have."""
-        found: dict[str, float | str] = {"fabric": self.fabric, "density": self.density}
-        if self.bending_stiffness is not None:
-            found["bending_stiffness"] = self.bending_stiffness
-        if self.wind_level:
-            found["wind_level"] = self.wind_level
-        return found
 
 
 def read_cloths(path: Path) -> tuple[ClothFilm, ...]:

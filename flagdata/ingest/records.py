@@ -18,12 +18,11 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from flagdata.align.clock import ClockModel
 from flagdata.align.recording import truth_window
+from flagdata.clock import ClockModel
 from flagdata.dataset.clips import clip_rows
 from flagdata.documents import column_json, from_json
 from flagdata.errors import CorruptError, InputError
-from flagdata.export.mcap import ROWS, SAMPLE
 from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.ingest.report import REPORT_SCHEMA
 from flagdata.ingest.source import Source
@@ -32,7 +31,7 @@ from flagdata.lake import Artifact, Lake
 from flagdata.parquet import read_parquet
 from flagdata.printable import SHORT
 from flagdata.record import Record
-from flagdata.record.metadata import CLOCK, PROVENANCE
+from flagdata.record.metadata import CLOCK, PROVENANCE, ROWS, SAMPLE
 from flagdata.schema import CATALOG, TOPIC_IMAGE, TOPIC_WIND, Kind
 from flagdata.timebase import NANOSECONDS, iso
 

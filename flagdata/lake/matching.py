@@ -17,7 +17,7 @@ Values: TypeAlias = Mapping[str, Any]
 """Column → the value wanted, `None` where the column must be empty, or several values (list, tuple, set), one of which
 a row must have."""
 Where: TypeAlias = str | Values
-"""A filter over the catalog: the user's SQL expression as in `flagdata.selection`, or the values that columns have."""
+"""A filter over the catalog: the user's SQL expression as in `flagdata.lake.selection`, or values that columns have."""
 
 
 def matching(rows: pa.Table, values: Values) -> pa.Table:

@@ -84,7 +84,7 @@ class Store:
 
         Args:
             where: the values that columns must have, {"kind": Kind.CLIP, "recording": identity}, see
-                `flagdata.lake.matching`; or an SQL expression as in `flagdata.selection` ("kind = 'clip' and wind
+                `flagdata.lake.matching`; or an SQL expression as in `flagdata.lake.selection` ("kind = 'clip' and wind
                 between 3 and 6"; the column "end" needs its quotes, `end_time` does not).
             at: tag, branch, version number or commit id; the head of main if `None`.
             columns: which to return, in this order; all if `None`.
@@ -244,6 +244,6 @@ class Store:
 
 
 def _filter(table: pa.Table | Scan, where: str) -> pa.Table:
-    from flagdata.selection import Request, Selection  # it knows what a view is, so it imports this package
+    from flagdata.lake.selection import Request, Selection  # it knows what a view is, so it imports this package
 
     return Selection(table, Request(where=where, order=_ORDER)).table()

@@ -14,6 +14,11 @@ CLOCK = "clock"
 PROVENANCE = "provenance"
 UNITS = "units"
 SALVAGE = "salvage"
+SAMPLE = "sample"
+"""Metadata record of a subset: the artifact it is, the object it was cut from, the frames before the clip's own that
+H.264 needs, and its label as JSON."""
+ROWS = "artifacts.parquet"
+"""File beside exported records with the catalog's rows of what they hold, by which `flagdata ingest` restores them."""
 
 
 def sensor_metadata(sensor: Sensor) -> dict[str, str]:

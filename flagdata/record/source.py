@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Protocol
 
 from flagdata.errors import NotFoundError
+from flagdata.lake.object_ranges import ObjectRanges
 from flagdata.storage import Place
-from flagdata.storage.ranges import ObjectRanges
 
 
 class Bytes(Protocol):

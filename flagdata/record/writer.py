@@ -15,8 +15,8 @@ import simplejpeg
 from mcap.well_known import MessageEncoding, SchemaEncoding
 from numpy.typing import NDArray
 
-from flagdata.align.clock import ClockModel
 from flagdata.averaging import average
+from flagdata.clock import ClockModel
 from flagdata.errors import ConflictError, InputError, LimitError, TimeError, UsageError
 from flagdata.record import messages, wind_messages
 from flagdata.record.checksums import CHECKSUMS, ChecksummedFile

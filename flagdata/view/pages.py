@@ -14,8 +14,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from markupsafe import Markup
 
-from flagdata.commands.artifacts import said
-from flagdata.commands.query import plain
+from flagdata.cells import plain, said
 from flagdata.documents import column_json
 from flagdata.errors import FlagdataError, NotFoundError, UnknownNameError, UsageError
 from flagdata.lake import Artifact, Lake
@@ -23,13 +22,13 @@ from flagdata.lake.ancestry import ancestry
 from flagdata.lake.labels import PREFIX
 from flagdata.lake.refs import MAIN, View
 from flagdata.lake.results import versions
+from flagdata.lake.selection import COLUMNS, Request, Selection
 from flagdata.lake.tabled import labels_of
 from flagdata.pages.graph import COLOURS
 from flagdata.pages.lineage import picture
 from flagdata.pages.render import render, text_of
 from flagdata.printable import SHORT, printable, size_text
 from flagdata.schema import Kind
-from flagdata.selection import COLUMNS, Request, Selection
 from flagdata.timebase import iso
 from flagdata.view.films import DRAWN
 from flagdata.view.media import Media

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.align.clock import ClockModel
 from flagdata.align.declared import given
 from flagdata.align.lag import LagSearch
 from flagdata.align.logs import clock_between
+from flagdata.clock import ClockModel
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.lake import Lake
 from flagdata.record import Record

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.align.clock import ClockModel
+from flagdata.clock import ClockModel
 from flagdata.errors import InputError
 from flagdata.findings import Finding, Severity
 from flagdata.provenance import file_hash

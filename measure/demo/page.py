@@ -13,7 +13,7 @@ import numpy as np
 import torch
 
 import flagdata
-from flagdata.align.clock import ClockModel
+from flagdata.clock import ClockModel
 from flagdata.dataset.sample import Sample
 from flagdata.lake import Lake
 from flagdata.pages.pictures import data_url, figure_url, moving

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from flagdata.errors import UsageError
 from sim.cloth import Cloth
-from sim.kernel.build import of_effect
+from sim.compiler import of_effect
 from sim.kernel.given import Compilable, Given, header
 from sim.system import System
 

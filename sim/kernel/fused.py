@@ -14,9 +14,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from sim.compiler import library
 from sim.contact import Contact, layers
 from sim.kernel.acting import Acting, Entry, acting
-from sim.kernel.build import library
 from sim.limits import chebyshev_weights
 from sim.system import Drive, System
 from sim.tables import Evaluation

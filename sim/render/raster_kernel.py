@@ -8,7 +8,7 @@ import functools
 import torch
 from torch import Tensor
 
-from sim.kernel.build import compiled
+from sim.compiler import compiled
 from sim.render.geometry import Geometry
 from sim.render.light import Light
 from sim.render.shadow import SIZE, basis

@@ -20,7 +20,7 @@ from flagdata.lake.healing import Healing, unsound
 from flagdata.lake.meshes import write_meshes
 from flagdata.provenance import canonical
 from flagdata.schema import Kind
-from sim.kernel.build import library
+from sim.compiler import library
 from sim.run.batch import Outcome, Stepper, run
 from sim.run.members import Crew
 from sim.run.recipe import Recipe

@@ -57,7 +57,7 @@ _FRESH = (
     _LAP
     + """wall, cpu = time.perf_counter(), time.process_time()
 from flagdata.lake import Artifact, Lake
-from flagdata.selection import select
+from flagdata.lake.selection import select
 found = {"import": lap()}
 lake = Lake.open(sys.argv[1])
 groups = select(lake, sql=sys.argv[2]).num_rows

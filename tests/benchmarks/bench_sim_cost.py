@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 import torch
 
+from sim.compiler import compiler
 from sim.integrate.stability import stable_step
 from sim.integrate.symplectic import Backend, advance
-from sim.kernel.build import compiler
 from sim.material import named
 from sim.scene import assemble, flag
 from sim.state import State

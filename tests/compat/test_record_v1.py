@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.align.clock import ClockModel
+from flagdata.clock import ClockModel
 from flagdata.record import Coding, Record, salvage
 from flagdata.signals import Sensor
 

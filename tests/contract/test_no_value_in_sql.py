@@ -6,7 +6,7 @@ import ast
 import re
 from collections.abc import Iterator
 
-from flagdata.selection import COLUMNS
+from flagdata.lake.selection import COLUMNS
 from tests.contract.imports import ROOT, modules
 
 TAKES_SQL = {"rows", "pairs", "sides", "sql", "execute", "query", "select", "Request", "ExplicitSplit", "_clips"}

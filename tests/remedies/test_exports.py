@@ -9,11 +9,10 @@ from typing import Any
 
 import pytest
 
-from flagdata import selection
 from flagdata.align import methods
 from flagdata.ingest.camera import CameraOptions
 from flagdata.ingest.store import CameraIngest, Labels, ingest_camera
-from flagdata.lake import Lake
+from flagdata.lake import Lake, selection
 from tests.remedies.cases import Case, heal
 from tests.remedies.user import User
 
@@ -77,7 +76,7 @@ def test_sql_that_gives_more_than_can_be_held_is_limited_or_written(
     """A smaller limit stands for millions of values."""
     monkeypatch.setattr(selection, "CELL_LIMIT", 5000)
     large = "select range as a from range(60000)"
-    user.meets("flagdata/selection.py", "aggregate in SQL, or giv", "query", "--json", "--sql", large)
+    user.meets("flagdata/lake/selection.py", "aggregate in SQL, or giv", "query", "--json", "--sql", large)
     user.succeeds("query", "--json", "--sql", f"select count(*) as n from ({large})", shows="60000")
     user.succeeds("query", "--json", "--sql", f"{large} limit 100")
     user.follows("query", "--csv", "--sql", large)

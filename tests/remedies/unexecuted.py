@@ -5,7 +5,7 @@ from __future__ import annotations
 BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     "a bucket, with an upload that was cut off or an object that was changed": (
         ("flagdata/lake/health.py", "; flagdata gc aborts it"),
-        ("flagdata/storage/cache.py", "run flagdata verify: it"),
+        ("flagdata/lake/object_cache.py", "run flagdata verify: it"),
     ),
     "a change of bytes between two reads": (("flagdata/lake/transfer.py", "run flagdata verify"),),
     "a data set whose films were not rendered, which `flagdata build` makes in hours": (

@@ -11,11 +11,11 @@ import pytest
 import torch
 
 from flagdata.errors import UsageError
+from sim import compiler as build
 from sim.air import QuadraticNormal, Stokes
 from sim.handles import Handles
 from sim.integrate.implicit import BackwardEuler
 from sim.integrate.symplectic import Backend, Symplectic, advance
-from sim.kernel import build
 from sim.kernel.fused import Kernel
 from sim.material import named
 from sim.state import State
@@ -153,7 +153,7 @@ def test_without_a_compiler_torch_does_the_work_after_one_warning(make_system, d
 
 
 def test_processes_that_build_at_once_all_get_a_kernel(tmp_path) -> None:
-    code = "from sim.kernel.build import library; assert library() is not None"
+    code = "from sim.compiler import library; assert library() is not None"
     cache, quick = tmp_path / "cache", tmp_path / "quick"  # the same compiler, which does not optimise
     quick.write_text(f'#!/bin/sh\nexec "{build.compiler()}" "$@" -O0\n')
     quick.chmod(0o755)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.errors import UsageError
-from sim.kernel import build
+from sim import compiler as build
 
 
 @pytest.fixture

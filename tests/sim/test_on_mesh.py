@@ -6,12 +6,11 @@ import pytest
 import torch
 from torch import Tensor
 
-from sim import bending, inertia
+from sim import bending, inertia, on_mesh
 from sim.air import NO_AIR, QuadraticNormal, Stokes, face_wind
 from sim.cloth import Cloth
 from sim.effects.permeability import Permeability
 from sim.effects.power_law_drag import PowerLawDrag
-from sim.kernel import on_mesh
 from sim.material import named
 
 BATCHES = (1, 3, 8, 20)

@@ -41,8 +41,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from flagdata.align.clock import NINETY
 from flagdata.align.paired import pair_clocks
+from flagdata.clock import NINETY
 from flagdata.pages.pictures import png
 from flagdata.rng import stream
 from flagdata.stated import Stated

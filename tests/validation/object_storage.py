@@ -35,10 +35,10 @@ from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, object_names, verify
+from flagdata.lake.object_ranges import ObjectRanges
 from flagdata.provenance import code_version
 from flagdata.schema import Kind
 from flagdata.storage.path import RemotePath
-from flagdata.storage.ranges import ObjectRanges
 from tests.s3 import BUCKET, SECRETS, moto, serving
 
 KILLS = 208

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from flagdata.align.clock import ClockModel
 from flagdata.align.lag import LagSearch
 from flagdata.align.logs import LogClock, gain_of, log_clock
 from flagdata.cli import root
+from flagdata.clock import ClockModel
 from flagdata.errors import RefusedError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter

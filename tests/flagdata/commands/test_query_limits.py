@@ -10,13 +10,13 @@ import time
 import pyarrow as pa
 import pytest
 
-from flagdata import selection
 from flagdata.catalog_sql import PART
 from flagdata.commands.query import as_document
 from flagdata.commands.query import query as command
 from flagdata.errors import LimitError, UsageError
+from flagdata.lake import selection
+from flagdata.lake.selection import Request, Selection
 from flagdata.schema import catalog_schema
-from flagdata.selection import Request, Selection
 from tests.refusals import unrefused
 
 EMPTY = catalog_schema().empty_table()
@@ -71,7 +71,7 @@ def test_sql_takes_no_more_memory_than_it_may(sql: str) -> None:
 import resource, sys
 from flagdata.errors import LimitError, UsageError
 from flagdata.schema import catalog_schema
-from flagdata.selection import Request, Selection
+from flagdata.lake.selection import Request, Selection
 try:
     for batch in Selection(catalog_schema().empty_table(), Request(sql={sql!r}, time_limit=30)).batches():
         if batch.nbytes > 300 << 20:

@@ -1,4 +1,4 @@
-"""`flagdata.selection` over a hand-written catalog: every expected value is worked out from the rows below."""
+"""`flagdata.lake.selection` over a hand-written catalog: every expected value is worked out from the rows below."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flagdata import selection
 from flagdata.commands.query import VIEWS
 from flagdata.errors import UnknownNameError, UsageError
+from flagdata.lake import selection
 from flagdata.lake.refs import Slice, View
+from flagdata.lake.selection import COLUMNS, Request, Selection, select
 from flagdata.schema import CATALOG, Kind, catalog_schema
-from flagdata.selection import COLUMNS, Request, Selection, select
 from tests.refusals import unrefused
 
 NOON = 1_777_636_800_000_000_000  # 2026-05-01T12:00:00Z: date -u -d @1777636800

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from flagdata.align.clock import ClockModel
+from flagdata.clock import ClockModel
 from flagdata.dataset.clips import clip_rows
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flagdata.align.clock import ClockModel
+from flagdata.clock import ClockModel
 from flagdata.dataset.clips import clip_rows, runs
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact

@@ -18,8 +18,8 @@ from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, Usag
 from flagdata.export import Export, export
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.labels import given
+from flagdata.lake.selection import select
 from flagdata.schema import CATALOG
-from flagdata.selection import select
 from tests.flagdata.export.conftest import known as known
 
 Put = Callable[..., Artifact]

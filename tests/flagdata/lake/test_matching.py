@@ -8,8 +8,8 @@ import pytest
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.matching import matching
+from flagdata.lake.selection import Request, Selection
 from flagdata.schema import Kind, catalog_schema
-from flagdata.selection import Request, Selection
 
 NAMES = ("plain", "o'brien", "100%", "a_b", "x' or '1' = '1")
 ROWS = [

@@ -22,15 +22,14 @@ import flagdata
 from flagdata.caches import beside
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError, RefusedError, UsageError
 from flagdata.findings import Severity
-from flagdata.lake import Artifact, Lake, remote_leases
+from flagdata.lake import Artifact, Lake, object_cache, remote_leases
 from flagdata.lake.collect import collect
 from flagdata.lake.health import doctor, object_names, verify, verify_catalog
 from flagdata.lake.leases import collecting, last_written, leases, open_lease
+from flagdata.lake.selection import select
 from flagdata.lake.transaction import Transaction
 from flagdata.schema import Kind
-from flagdata.selection import select
 from flagdata.storage import RemotePath, StoreError
-from flagdata.storage import cache as object_cache
 from flagdata.storage.connection import plain
 from tests.failing.store import failing, planned
 from tests.program import invoke

@@ -12,8 +12,8 @@ import pytest
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.ancestry import ancestry
 from flagdata.lake.results import Placed, keep, placed, versions
+from flagdata.lake.selection import Request, Selection
 from flagdata.schema import Kind
-from flagdata.selection import Request, Selection
 from tests.program import Run, invoke
 
 Put = Callable[..., Artifact]

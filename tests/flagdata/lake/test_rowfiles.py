@@ -13,8 +13,8 @@ from deltalake import DeltaTable
 from flagdata.errors import CorruptError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.rowfiles import ROW_ORDER, RowFiles, Scan, in_order
+from flagdata.lake.selection import select
 from flagdata.schema import Kind, catalog_schema
-from flagdata.selection import select
 from tests.flagdata.lake.conftest import overwrite
 from tests.program import invoke
 

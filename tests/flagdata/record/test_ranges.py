@@ -12,10 +12,12 @@ import pytest
 
 from flagdata.errors import CorruptError, NotFoundError
 from flagdata.lake import Artifact, Lake, remote_objects
+from flagdata.lake import object_cache as cache
+from flagdata.lake import object_ranges as ranges
 from flagdata.record import Chunking, Coding, Record
 from flagdata.record.checksums import ChecksummedWriter
 from flagdata.schema import Kind
-from flagdata.storage import RemotePath, cache, ranges
+from flagdata.storage import RemotePath
 from tests.flagdata.record.conftest import PERIOD, START
 
 Write = Callable[..., Path]

@@ -16,7 +16,7 @@ from mcap.reader import make_reader
 from mcap.records import ChunkIndex
 from mcap_protobuf.decoder import DecoderFactory
 
-from flagdata.align.clock import ClockModel, Segment
+from flagdata.clock import ClockModel, Segment
 from flagdata.errors import ConflictError, InputError, LimitError, TimeError, UsageError
 from flagdata.record import Chunking, Coding, Record, RecordWriter, writer
 from flagdata.signals import WindSeries

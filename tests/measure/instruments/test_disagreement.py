@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flagdata.align.clock import NINETY
+from flagdata.clock import NINETY
 from flagdata.errors import InputError
 from flagdata.rng import stream
 from flagdata.stated import parse

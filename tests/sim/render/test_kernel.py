@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from sim.kernel import build
+from sim import compiler as build
 from sim.render import raster_kernel
 from sim.render.coverage import Triangles, fragments
 from sim.render.develop import develop

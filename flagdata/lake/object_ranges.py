@@ -1,4 +1,4 @@
-"""Ranges of an object in a bucket, read in blocks that are kept on this machine: see `flagdata.storage.cache`.
+"""Ranges of an object in a bucket, read in blocks that are kept on this machine: see `flagdata.lake.object_cache`.
 
 What lies within 1 MiB of each other is fetched by one request, and what is read from one end to the other in pieces of
 8 MiB. Nothing here knows whether the bytes are right: who reads them compares them with checksums of their own.
@@ -11,7 +11,7 @@ import zlib
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
-from flagdata.storage import cache
+from flagdata.lake import object_cache
 from flagdata.storage.path import RemotePath
 
 BLOCK = 256 << 10
@@ -86,7 +86,7 @@ class ObjectRanges:
         held: dict[int, bytes] = {}
         missing: list[int] = []
         for number in wanted:
-            kept = cache.block_of(self._name, f"{self._version}-{number}")
+            kept = object_cache.block_of(self._name, f"{self._version}-{number}")
             if kept is None:
                 missing.append(number)
             else:
@@ -106,5 +106,5 @@ class ObjectRanges:
         for (first, _), data in zip(runs, self._place.read_ranges(offsets, lengths), strict=True):
             new |= {first + at // BLOCK: data[at : at + BLOCK] for at in range(0, len(data), BLOCK)}
         self._fetched = max(new)
-        cache.keep_blocks(self._name, {f"{self._version}-{number}": data for number, data in new.items()})
+        object_cache.keep_blocks(self._name, {f"{self._version}-{number}": data for number, data in new.items()})
         return held | new

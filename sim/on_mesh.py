@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
-from sim.kernel.build import library
+from sim.compiler import library
 
 _NAMES = {torch.float32: "f32", torch.float64: "f64"}
 
